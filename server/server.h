@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "common/address.h"
+#include "server/calls/server_context.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
 #include "server/connections/acceptor.h"
@@ -153,6 +154,7 @@ class Server {
   ComputePool pool_;
   IdleTimer idle_timer_;
   IntakeGuard intake_guard_;
+  const ServerContext context_;
   std::unique_ptr<Methods> methods_;
   ConnectionTable connections_;
   std::unique_ptr<Service> service_;

@@ -1,4 +1,4 @@
-// Lets calls in, or refuses them.
+// Admits or refuses calls.
 #pragma once
 
 #include <optional>
@@ -11,28 +11,28 @@
 
 namespace partiemc::server {
 
-/// What a transport knows of who calls.
+/// The origin of a call, as its transport reports it.
 struct CallOrigin {
   std::string peer;                          ///< As CallChannel::peer.
   std::optional<std::string> authorization;  ///< "Bearer TOKEN".
 };
 
-/// A call that was let in, and its place, which it keeps until its end is told.
+/// An admitted call, and its place in the caller's quota until the call ends.
 struct AdmittedCall {
   Caller caller;
   CallerAccount::Place place;
 };
 
-/// What a caller must be allowed to do: Caller::CheckMayProduce and its kin; none: nothing.
+/// A check of the caller's permissions, such as Caller::CheckMayProduce. Null: none.
 using Permission = absl::Status (Caller::*)() const;
 
-/// Each call begins with this, before anything of a request is read.
+/// Each call begins with this, before anything of a request is read. Thread-safe.
 /// Errors: UNAUTHENTICATED, PERMISSION_DENIED (NOT_PERMITTED), RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
                                    Permission permission = nullptr);
 
-/// As Admit, for a health check, which needs no token. It is counted apart from other calls, so
-/// that these keep no probe out. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
+/// As Admit, for a health check, which needs no token. Its quota is separate, so other calls keep
+/// no probe out. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
                                         const CallOrigin& origin);
 

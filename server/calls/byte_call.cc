@@ -4,22 +4,29 @@
 
 namespace partiemc::server {
 
-ByteCall::ByteCall(CallChannel& channel, const MethodMeters* meters,
-                   absl::StatusOr<AdmittedCall> admission)
-    : channel_(channel), meters_(meters), admission_(admission.status()) {
-  if (admission.ok()) call_ = *std::move(admission);
+ByteCall::ByteCall(ArrivedCall call, const ServerContext& context)
+    : channel_(call.channel),
+      meters_(call.meters),
+      context_(context),
+      admission_(call.admission.status()) {
+  if (call.admission.ok()) call_ = *std::move(call.admission);
   if (meters_ != nullptr) meters_->Started();
 }
 
 void ByteCall::OnReadDone(bool ok) {
-  RequestCame();
-  if (ok && meters_ != nullptr) meters_->Received();
-  ReadDone(ok);
+  opening_ = {};
+  if (ok) {
+    if (meters_ != nullptr) meters_->Received();
+    return OnRequest();
+  }
+  // A read fails at a half-close and at a disconnect; the channel's OnCancel may come later.
+  if (channel_.IsCancelled()) OnCancel();
+  OnRequestsEnded();
 }
 
 void ByteCall::OnWriteDone(bool ok) {
   if (ok && meters_ != nullptr) meters_->Sent();
-  WriteDone(ok);
+  OnResponseWritten(ok);
 }
 
 void ByteCall::End(const absl::Status& status) {
@@ -27,7 +34,7 @@ void ByteCall::End(const absl::Status& status) {
     LogEvent(spdlog::level::err, "a call was ended twice", {{"peer", channel_.peer()}});
     return;
   }
-  call_.place = {};  // Who hears of the end may come again at once.
+  call_.place = {};  // First: a client that sees the end may call again at once.
   if (meters_ != nullptr) {
     meters_->Handled(status.code(), std::chrono::steady_clock::now() - came_);
   }

@@ -1,4 +1,4 @@
-// How the messages of one call travel. The calls (ByteCall) know what they mean.
+// Carries the messages of one call. The calls (ByteCall) interpret them.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -9,27 +9,26 @@
 
 namespace partiemc::server {
 
-/// A call's way to its client and back: gRPC (server/rpc/grpc_call.h), or another transport.
-/// Messages are bytes in a grpc::ByteBuffer, whatever carries them: slices that can be shared.
-/// Nothing here blocks, and everything may be called from any thread, with these rules, which
-/// ByteCall's state machines keep: at most one read and one write go on at once, and Finish comes
-/// once, after the last write.
+/// The connection of a call to its client: gRPC (server/rpc/grpc_call.h) or another transport. Each
+/// message is a grpc::ByteBuffer, whose slices can be shared. No function blocks; any thread may
+/// call. The state machines of the calls keep these rules: at most one read and one write are in
+/// progress, and Finish is called once, after the last write.
 class CallChannel {
  public:
   virtual ~CallChannel() = default;
 
-  /// Reads the next message into `message`, which stays until ByteCall::OnReadDone.
+  /// Reads the next message into `message`, which lives until ByteCall::OnReadDone.
   virtual void StartRead(grpc::ByteBuffer* message) = 0;
-  /// Writes `message`, which stays until ByteCall::OnWriteDone.
+  /// Writes `message`, which lives until ByteCall::OnWriteDone.
   virtual void StartWrite(const grpc::ByteBuffer* message) = 0;
-  /// Has the read and the write that are going on fail soon.
+  /// Makes the pending read and write fail soon.
   virtual void Cancel() = 0;
-  /// Tells the client how the call ended.
+  /// Sends the status of the call to the client.
   virtual void Finish(const absl::Status& status) = 0;
 
-  /// A read that failed did so because nobody is there any more, and not for a half-close.
+  /// After a failed read: true if the client has disconnected, false if it has half-closed.
   virtual bool IsCancelled() const = 0;
-  /// Where the client is, as gRPC writes it: "ipv4:192.0.2.7:51234".
+  /// Address of the client in gRPC's format: "ipv4:192.0.2.7:51234".
   virtual std::string peer() const = 0;
 };
 

@@ -7,7 +7,7 @@
 namespace partiemc::server {
 namespace {
 
-// As other languages' libraries spell the codes, by their number.
+// The codes by number, spelled as in other languages' libraries.
 constexpr std::array<const char*, MethodMeters::kCodes> kCodeNames = {
     "OK",       "Canceled",       "Unknown",          "InvalidArgument",   "DeadlineExceeded",
     "NotFound", "AlreadyExists",  "PermissionDenied", "ResourceExhausted", "FailedPrecondition",

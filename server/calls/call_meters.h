@@ -1,5 +1,4 @@
-// The calls of our service, counted under the conventional names grpc_server_*, whatever carries
-// them.
+// Counts the calls of our service, over any channel, under the conventional names grpc_server_*.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -17,7 +16,7 @@
 
 namespace partiemc::server {
 
-/// Of the calls of one method; atomic counters, some ten nanoseconds each. Safe from any thread.
+/// Counts the calls of one method. Atomic counters, about ten nanoseconds each. Thread-safe.
 class MethodMeters {
  public:
   static constexpr std::size_t kCodes = 17;
@@ -39,10 +38,10 @@ class MethodMeters {
 
 class CallMeters {
  public:
-  /// All series are there from the start, at zero. `metrics` lives longer.
+  /// All series exist from the start, at zero. `metrics` outlives this.
   explicit CallMeters(Metrics& metrics);
 
-  /// `method`: its name in the .proto, one of our service.
+  /// Requires: `method` is the name of a method of our service in the .proto.
   const MethodMeters& Of(std::string_view method) const { return meters_.find(method)->second; }
 
  private:

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxPartsTokenBytes = 128;
 
 class PartMessage final : public PartBytes {
  public:
-  // Shares the memory.
+  // Shares the bytes.
   explicit PartMessage(const grpc::ByteBuffer& request) : bytes(request) {}
   const grpc::ByteBuffer bytes;
 };
@@ -40,11 +40,6 @@ absl::Status MalformedFrame(const std::string& field, std::size_t bytes) {
 std::chrono::milliseconds TimeoutOf(const v1::OpenStream& open) {
   const std::uint32_t asked = open.part_timeout_ms();
   return std::chrono::milliseconds(asked == 0 ? kDefaultTimeoutMs : asked);
-}
-
-// Often enough that a frame waits for its parts for hardly longer than the timeout.
-std::chrono::milliseconds LookEveryOf(std::chrono::milliseconds timeout) {
-  return std::clamp(timeout / 20, std::chrono::milliseconds(5), std::chrono::milliseconds(500));
 }
 
 }  // namespace
@@ -88,35 +83,51 @@ absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits) 
   return absl::OkStatus();
 }
 
+std::chrono::milliseconds FrameArrival::LookEvery() const {
+  using std::chrono::milliseconds;
+  if (assembler_ == nullptr) return milliseconds(0);
+  // Short compared to the timeout, so that a frame hardly waits longer.
+  return std::clamp(assembler_->timeout() / 20, milliseconds(5), milliseconds(500));
+}
+
 PartZero::PartZero(const v1::OpenStream& open, const ServerLimits& limits,
                    std::uint64_t next_sequence)
-    : timeout_(TimeoutOf(open)),
-      assembler_(std::make_shared<FrameAssembler>(
+    : FrameArrival(std::make_shared<FrameAssembler>(
           FrameAssembler::Terms{.parts = open.parts(),
                                 .window = limits.frames_in_flight,
                                 .max_frame_bytes = limits.MaxMessageBytes(),
-                                .timeout = timeout_,
+                                .timeout = TimeoutOf(open),
                                 .has_checkpoints = open.checkpoint_interval() > 0,
                                 .next_sequence = next_sequence})),
       slots_(limits.frames_in_flight) {}
 
-void PartZero::Came(std::size_t slot, grpc::ByteBuffer& request) {
+void PartZero::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   slots_[slot] = {.sequence = wire::SequenceOf(request), .came = FrameAssembler::Clock::now()};
-  if (slots_[slot].sequence) assembler_->LeaderSent(*slots_[slot].sequence);
+  if (slots_[slot].sequence) assembler()->LeaderSent(*slots_[slot].sequence);
 }
 
 bool PartZero::MayAnswer(std::size_t slot) const {
   const Slot& frame = slots_[slot];
   return !frame.sequence ||
-         assembler_->IsReady(*frame.sequence, frame.came, FrameAssembler::Clock::now());
+         assembler()->IsReady(*frame.sequence, frame.came, FrameAssembler::Clock::now());
 }
 
-std::chrono::milliseconds PartZero::LookEvery() const { return LookEveryOf(timeout_); }
+std::uint64_t PartZero::ComputedBytes(std::uint64_t bytes) const {
+  return bytes + assembler()->BytesOfNext();
+}
 
-absl::Status PartZero::Join(std::size_t slot, std::span<const std::string> attributes,
+absl::Status PartZero::Complete(std::size_t slot, const wire::Outputs& outputs,
+                                v1::ReconstructRequest& request, grpc::ByteBuffer& bytes) {
+  if (slots_[slot].sequence == assembler()->next_wanted()) {
+    if (auto status = Join(outputs.attributes, request); !status.ok()) return status;
+  }
+  if (outputs.echo_particles) bytes = wire::ToBytes(request);
+  return absl::OkStatus();
+}
+
+absl::Status PartZero::Join(std::span<const std::string> attributes,
                             v1::ReconstructRequest& request) {
-  if (slots_[slot].sequence != assembler_->next_wanted()) return absl::OkStatus();
-  const auto taken = assembler_->Take();
+  const auto taken = assembler()->Take();
   if (!taken.ok()) return taken.status();
   try {
     std::vector<v1::ParticleFrame> parts(taken->size());
@@ -133,48 +144,51 @@ absl::Status PartZero::Join(std::size_t slot, std::span<const std::string> attri
   }
 }
 
-OtherPart::OtherPart(JoinedPart joined, std::size_t window)
-    : joined_(std::move(joined)), slots_(window) {}
+void PartZero::OnAnswered(std::uint64_t next_sequence, bool with_checkpoint) {
+  assembler()->Answered(next_sequence, with_checkpoint);
+}
 
-void OtherPart::Came(std::size_t slot, grpc::ByteBuffer& request) {
+OtherPart::OtherPart(JoinedPart joined, std::size_t window)
+    : FrameArrival(joined.assembler), joined_(std::move(joined)), slots_(window) {}
+
+void OtherPart::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   const auto sequence = wire::SequenceOf(request);
   slots_[slot] = {.sequence = sequence.value_or(0), .refusal = absl::OkStatus()};
   if (!sequence) {
     slots_[slot].refusal = MalformedFrame("frame", request.Length());
     return;
   }
-  auto status = joined_.assembler->Offer(joined_.seat, *sequence, request.Length(),
-                                         std::make_shared<PartMessage>(request),
-                                         FrameAssembler::Clock::now());
-  // What this call sends after it has left the assembly is told with its end.
+  auto status =
+      assembler()->Offer(joined_.seat, *sequence, request.Length(),
+                         std::make_shared<PartMessage>(request), FrameAssembler::Clock::now());
+  // A call that has left the assembler ends with the reason as its status.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 
 bool OtherPart::MayAnswer(std::size_t slot) const {
   return !slots_[slot].refusal.ok() ||
-         joined_.assembler->IsOver(slots_[slot].sequence, FrameAssembler::Clock::now());
+         assembler()->IsOver(slots_[slot].sequence, FrameAssembler::Clock::now());
 }
 
-std::chrono::milliseconds OtherPart::LookEvery() const {
-  return LookEveryOf(joined_.assembler->timeout());
-}
-
-void OtherPart::Refuse(std::size_t slot, absl::Status why) {
+// A part may wait for others for a long time; a whole frame is computed in its turn.
+bool OtherPart::DropFrame(std::size_t slot, const absl::Status& why) {
   Slot& part = slots_[slot];
-  if (!part.refusal.ok()) return;
-  joined_.assembler->Withdraw(joined_.seat, part.sequence);
-  part.refusal = std::move(why);
+  if (!part.refusal.ok()) return true;
+  assembler()->Withdraw(joined_.seat, part.sequence);
+  part.refusal = why;
+  return true;
 }
 
-v1::ReconstructResponse OtherPart::Answer(std::size_t slot, absl::Status& refusal) {
+std::optional<v1::ReconstructResponse> OtherPart::RespondToPart(std::size_t slot) {
   const Slot part = std::exchange(slots_[slot], {});
-  refusal = part.refusal.ok() ? joined_.assembler->OutcomeOf(part.sequence) : part.refusal;
+  const absl::Status status =
+      part.refusal.ok() ? assembler()->OutcomeOf(part.sequence) : part.refusal;
   v1::ReconstructResponse response;
-  if (refusal.ok()) {
+  if (status.ok()) {
     response.mutable_part()->set_sequence(part.sequence);
-    response.mutable_part()->set_resume_sequence(joined_.assembler->resume_sequence());
+    response.mutable_part()->set_resume_sequence(assembler()->resume_sequence());
   } else {
-    wire::EncodeFrameError(refusal, part.sequence, joined_.assembler->next_wanted(),
+    wire::EncodeFrameError(status, part.sequence, assembler()->next_wanted(),
                            *response.mutable_error());
   }
   return response;

@@ -1,5 +1,4 @@
-// The messages of streams whose frames come in parts: what they mean to the call of part 0, which
-// has the session, and to those of the others.
+// The frames of a stream on their way to its session: whole, or in parts.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -11,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -19,64 +19,100 @@
 #include "server/stream/frame_assembler.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
-#include "server/stream/stream_state_machine.h"
+#include "wire/codec.h"
 
 namespace partiemc::server {
 
-/// Parses a request that holds a frame into `request`, whose buffers are used again. What is not
-/// known of it is passed over, and kept nowhere. Errors: MALFORMED, OUT_OF_MEMORY of `field`; the
-/// frame then has its `sequence` if that can be read, else 0.
+/// Parses a request with a frame into `request`, whose buffers are reused; drops unknown fields.
+/// Errors: MALFORMED, OUT_OF_MEMORY of `field`; the frame then has its `sequence` if that can be
+/// read, else 0.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field = "frame");
 
-/// Whether what `open` says of parts can be. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
+/// Checks the fields of `open` about parts. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
 absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits);
 
-/// Of the call of part 0. Not thread-safe as a whole, like StreamMessages.
-class PartZero {
+/// The steps that ReconstructCall adds for frames in parts. This class is for whole frames, each in
+/// one message, which need none. One slot for each frame in flight. Thread rules: as StreamHandler;
+/// OnFrame is called at the end of a read.
+class FrameArrival {
  public:
-  /// Frames come as `open` says, the first with this number. Requires: CheckParts, and parts > 0.
-  PartZero(const v1::OpenStream& open, const ServerLimits& limits, std::uint64_t next_sequence);
+  explicit FrameArrival(std::shared_ptr<FrameAssembler> assembler = nullptr)
+      : assembler_(std::move(assembler)) {}
+  virtual ~FrameArrival() = default;
 
+  /// Shared by the calls of all parts; null without parts.
   const std::shared_ptr<FrameAssembler>& assembler() const { return assembler_; }
-
-  /// A frame was read into `slot`.
-  void Came(std::size_t slot, grpc::ByteBuffer& request);
   /// As StreamHandler.
-  bool MayAnswer(std::size_t slot) const;
   std::chrono::milliseconds LookEvery() const;
 
-  /// The frame in `slot`, parsed into `request` already, with its other parts where it is the next
-  /// one. Errors: PARTS_MISSING, MALFORMED, OUT_OF_MEMORY, those of JoinParts.
-  absl::Status Join(std::size_t slot, std::span<const std::string> attributes,
-                    v1::ReconstructRequest& request);
+  /// A frame was read into `slot`.
+  virtual void OnFrame(std::size_t /*slot*/, grpc::ByteBuffer& /*request*/) {}
+  // As StreamHandler:
+  virtual bool MayAnswer(std::size_t /*slot*/) const { return true; }
+  virtual std::uint64_t ComputedBytes(std::uint64_t bytes) const { return bytes; }
+  virtual bool DropFrame(std::size_t /*slot*/, const absl::Status& /*why*/) { return false; }
+
+  /// Completes the frame in `slot`, which was parsed into `request`, from `bytes`. With echo,
+  /// `bytes` becomes the message of the complete frame.
+  virtual absl::Status Complete(std::size_t /*slot*/, const wire::Outputs& /*outputs*/,
+                                v1::ReconstructRequest& /*request*/, grpc::ByteBuffer& /*bytes*/) {
+    return absl::OkStatus();
+  }
+  /// The response to the part in `slot`, if this call sends parts of another call's stream.
+  virtual std::optional<v1::ReconstructResponse> RespondToPart(std::size_t /*slot*/) {
+    return std::nullopt;
+  }
+  /// The frames below `next_sequence` were answered, the last one with or without a checkpoint.
+  virtual void OnAnswered(std::uint64_t /*next_sequence*/, bool /*with_checkpoint*/) {}
+  /// The call has ended.
+  virtual void End(const absl::Status& /*status*/) {}
+
+  /// The part that this call sends of another call's stream; null if there is none.
+  virtual const JoinedPart* joined() const { return nullptr; }
+
+ private:
+  const std::shared_ptr<FrameAssembler> assembler_;
+};
+
+/// The call of part 0, which has the session.
+class PartZero final : public FrameArrival {
+ public:
+  /// Requires: CheckParts, and parts > 0. The first frame has this number.
+  PartZero(const v1::OpenStream& open, const ServerLimits& limits, std::uint64_t next_sequence);
+
+  void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;
+  bool MayAnswer(std::size_t slot) const override;
+  std::uint64_t ComputedBytes(std::uint64_t bytes) const override;
+  /// Errors: PARTS_MISSING, MALFORMED, OUT_OF_MEMORY, and the errors of JoinParts.
+  absl::Status Complete(std::size_t slot, const wire::Outputs& outputs,
+                        v1::ReconstructRequest& request, grpc::ByteBuffer& bytes) override;
+  void OnAnswered(std::uint64_t next_sequence, bool with_checkpoint) override;
+  void End(const absl::Status& status) override { assembler()->End(status); }
 
  private:
   struct Slot {
-    std::optional<std::uint64_t> sequence;  // Nothing where it could not be read.
+    std::optional<std::uint64_t> sequence;  // Absent if it could not be read.
     FrameAssembler::Clock::time_point came;
   };
 
-  const std::chrono::milliseconds timeout_;
-  const std::shared_ptr<FrameAssembler> assembler_;
+  absl::Status Join(std::span<const std::string> attributes, v1::ReconstructRequest& request);
+
   std::vector<Slot> slots_;
 };
 
-/// Of the call of another part.
-class OtherPart {
+/// The call of another part.
+class OtherPart final : public FrameArrival {
  public:
   OtherPart(JoinedPart joined, std::size_t window);
 
-  const JoinedPart& joined() const { return joined_; }
-
-  /// As PartZero.
-  void Came(std::size_t slot, grpc::ByteBuffer& request);
-  bool MayAnswer(std::size_t slot) const;
-  std::chrono::milliseconds LookEvery() const;
-  /// The server has no room for the part in `slot`: refuses it.
-  void Refuse(std::size_t slot, absl::Status why);
-  /// The answer to the part in `slot`; leaves its refusal, if it was one, in `refusal`.
-  v1::ReconstructResponse Answer(std::size_t slot, absl::Status& refusal);
+  void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;
+  bool MayAnswer(std::size_t slot) const override;
+  std::uint64_t ComputedBytes(std::uint64_t /*bytes*/) const override { return 0; }
+  bool DropFrame(std::size_t slot, const absl::Status& why) override;
+  std::optional<v1::ReconstructResponse> RespondToPart(std::size_t slot) override;
+  void End(const absl::Status& /*status*/) override { assembler()->Leave(joined_.seat); }
+  const JoinedPart* joined() const override { return &joined_; }
 
  private:
   struct Slot {

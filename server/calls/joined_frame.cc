@@ -50,7 +50,7 @@ absl::Status CheckSame(std::size_t part, std::string_view field, std::size_t byt
                                : "must be absent, as in the parts before");
 }
 
-// Null where there is none.
+// Null if there is none.
 v1::NamedScalar* FindScalar(v1::ParticleFrame& part, std::string_view name) {
   for (v1::NamedScalar& scalar : *part.mutable_scalars()) {
     if (scalar.name() == name) return &scalar;
@@ -65,7 +65,7 @@ std::uint32_t ComponentsOf(const v1::ParticleFrame& part, std::string_view name)
   return 0;
 }
 
-// `part` is number `k` and has particles, as `first` has, the first one of that kind.
+// Compares part number `k` with `first`, the first part that has particles.
 absl::Status CheckAgree(std::size_t k, const v1::ParticleFrame& part,
                         std::span<const std::string> attributes, const v1::ParticleFrame& first) {
   if (part.position_format() != first.position_format()) {
@@ -98,13 +98,13 @@ absl::Status CheckTime(std::size_t k, double time, double frame_time) {
                   absl::StrCat("must be 0 or that of part 0, ", frame_time));
 }
 
-// Number k of all parts: part 0 is the frame itself.
+// Part number `k`; part 0 is the frame itself.
 const v1::ParticleFrame& PartOf(std::size_t k, const v1::ParticleFrame& frame,
                                 std::span<const v1::ParticleFrame> parts) {
   return k == 0 ? frame : parts[k - 1];
 }
 
-// Leaves the number of the first part with particles in `first`; parts.size() + 1 if none has any.
+// Sets `first` to the number of the first part with particles, or to parts.size() + 1 without one.
 absl::Status CheckParts(std::span<const v1::ParticleFrame> parts,
                         std::span<const std::string> attributes, const v1::ParticleFrame& frame,
                         std::size_t& first) {
@@ -123,7 +123,7 @@ absl::Status CheckParts(std::span<const v1::ParticleFrame> parts,
   return absl::OkStatus();
 }
 
-// Appends the bytes of each of `more`, which are given up.
+// Appends the bytes of each of `more` and frees them.
 void Append(std::string& bytes, std::vector<std::string*>& more) {
   std::size_t size = bytes.size();
   for (const std::string* part : more) size += part->size();
@@ -148,7 +148,7 @@ std::string* ScalarBytes(v1::ParticleFrame& part, std::string_view name) {
   return scalar == nullptr ? nullptr : scalar->mutable_values();
 }
 
-// Puts rows of `bytes` into the order that `order` tells.
+// Moves row order[k] of `bytes` to row k.
 void Permute(std::span<const std::uint32_t> order, std::string& bytes) {
   if (bytes.empty()) return;
   const std::size_t row = bytes.size() / order.size();
@@ -161,7 +161,7 @@ void Permute(std::span<const std::uint32_t> order, std::string& bytes) {
   bytes.swap(sorted);
 }
 
-// The order of ascending ids, stable: a radix sort by those of their bytes that differ.
+// The order of ascending ids, by a stable radix sort over the bytes in which they differ.
 std::vector<std::uint32_t> OrderOf(std::span<const std::uint64_t> ids) {
   std::vector<std::uint32_t> order(ids.size()), sorted(ids.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -189,7 +189,7 @@ void SortById(v1::ParticleFrame& frame) {
   Permute(order, *frame.mutable_ids());
 }
 
-// Of the scalars those that are named, each once.
+// Keeps the named scalars, each once.
 void KeepNamed(std::span<const std::string> names, v1::ParticleFrame& frame) {
   google::protobuf::RepeatedPtrField<v1::NamedScalar> kept;
   for (const std::string& name : names) {
@@ -205,7 +205,7 @@ absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::
   std::size_t first = 0;
   if (auto status = CheckParts(parts, attributes, frame, first); !status.ok()) return status;
   if (first > parts.size()) {
-    // Nobody has particles; then a format need not be told.
+    // Without particles the format may be absent.
     if (frame.position_format() == v1::POSITION_FORMAT_UNSPECIFIED) {
       frame.set_position_format(v1::POSITION_FORMAT_FLOAT32_2);
     }
@@ -214,7 +214,7 @@ absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::
   for (v1::ParticleFrame& part : parts) {
     if (part.positions().empty()) part.Clear();
   }
-  if (first > 0) {  // Part 0 takes its place.
+  if (first > 0) {  // Its particles become part 0's.
     const std::uint64_t sequence = frame.sequence();
     const double time = frame.time();
     frame.Swap(&parts[first - 1]);

@@ -1,4 +1,4 @@
-// One frame out of the parts that several processes have sent.
+// Joins the parts of a frame, sent by several processes.
 #pragma once
 
 #include <span>
@@ -10,21 +10,18 @@
 
 namespace partiemc::server {
 
-/// The reason for which parts make no frame (proto/PROTOCOL.md).
+/// The reason if parts do not fit together (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonPartMismatch = "PART_MISMATCH";
 
-/// Adds the particles of `parts` behind those of `frame`, which is part 0: by their ids, ascending,
-/// where they have ids, else part by part and as they stand in each. So the frame depends on the
-/// particles alone, and with ids not even on who sends which. Of scalars only those are kept that
-/// `attributes` names. Gives up the parts' arrays. Takes at most as much memory as the arrays, and
-/// 8 bytes a particle, beside them.
+/// Appends the particles of `parts` to `frame`, which is part 0. With ids, the particles are sorted
+/// by id, so the result does not depend on their distribution over parts; otherwise they stay in
+/// the order of the parts. Keeps the scalars in `attributes` only. Consumes the parts'
+/// arrays. `frame` keeps its sequence and its time. Formats of parts without particles are ignored.
+/// Additional memory: at most the size of the arrays, and 8 bytes a particle.
 ///
-/// Parts without particles say nothing: their formats do not count. `frame` keeps its sequence and
-/// its time.
-/// Errors, INVALID_ARGUMENT with a Violation of a field of parts[k], after which `frame` is of no
-/// use: those of wire::DecodeFrame (BYTE_COUNT, UNSUPPORTED); PART_MISMATCH where parts differ in
-/// their position format, time (0: not told), which optional arrays they have, or the components
-/// of a scalar.
+/// Errors, INVALID_ARGUMENT with a Violation of a field of parts[k], after which `frame` is
+/// invalid: BYTE_COUNT, UNSUPPORTED (wire::DecodeFrame); PART_MISMATCH if parts differ in position
+/// format, time (0: not set), optional arrays, or the components of a scalar.
 absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::string> attributes,
                        v1::ParticleFrame& frame);
 

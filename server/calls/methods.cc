@@ -14,8 +14,15 @@
 #include "server/calls/stream_messages.h"
 #include "server/calls/unary_call.h"
 #include "server/calls/watch_call.h"
+#include "server/compute/compute_pool.h"
+#include "server/compute/memory_budget.h"
+#include "server/relay/relay.h"
 #include "server/relay/stream_summary.h"
+#include "server/stream/limits.h"
 #include "server/stream/session.h"
+#include "server/stream/stream_registry.h"
+#include "server/watch/result_history.h"
+#include "server/watch/watch_registry.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::server {
@@ -23,7 +30,7 @@ namespace {
 
 constexpr std::int32_t kMaxPageSize = 1000;
 
-// Begins the tokens of pages with streams of other replicas.
+// Prefix of the page tokens for streams of other replicas.
 constexpr std::string_view kRemotePage = "elsewhere:";
 
 absl::StatusOr<grpc::ByteBuffer> AnswerOrThrow(grpc::ByteBuffer& bytes, const ServerLimits& limits,
@@ -82,38 +89,25 @@ std::string_view Methods::Name(Method method) {
   return "GetServerInfo";
 }
 
-Methods::Methods(const ServerLimits& limits, const Authentication& authentication,
-                 OpeningCalls& opening, StreamRegistry& registry, UnaryRegistry& calls,
-                 MemoryBudget& budget, ComputePool& pool, WatchRegistry& watchers,
-                 WatchDispatcher& dispatcher, const HistoryRoom& history,
-                 const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics, Relay* relay)
-    : limits_(limits),
-      authentication_(authentication),
-      opening_(opening),
-      registry_(registry),
-      calls_(calls),
-      budget_(budget),
-      pool_(pool),
-      watchers_(watchers),
-      dispatcher_(dispatcher),
-      history_(history),
-      relay_(relay),
-      checkpoint_keys_(checkpoint_keys),
-      meters_(metrics) {}
+Methods::Methods(const ServerContext& context, Metrics& metrics)
+    : context_(context), meters_(metrics) {}
+
+ArrivedCall Methods::Arrive(Method method, CallChannel& channel, const CallOrigin& origin,
+                            Permission permission) const {
+  return {channel, &meters_.Of(Name(method)), Admit(context_.authentication, origin, permission)};
+}
 
 std::unique_ptr<ByteCall> Methods::Begin(Method method, CallChannel& channel,
                                          const CallOrigin& origin) const {
   switch (method) {
     case Method::kReconstruct:
       return std::make_unique<ReconstructCall>(
-          channel, Meters(method), Admit(authentication_, origin, &Caller::CheckMayProduce),
-          limits_, opening_, registry_, budget_, pool_, dispatcher_, checkpoint_keys_);
+          Arrive(method, channel, origin, &Caller::CheckMayProduce), context_);
     case Method::kReconstructFrame:
       return ReconstructFrame(channel, origin);
     case Method::kWatchStream:
-      return std::make_unique<WatchCall>(channel, Meters(method),
-                                         Admit(authentication_, origin, &Caller::CheckMayWatch),
-                                         limits_, opening_, registry_, watchers_, relay_);
+      return std::make_unique<WatchCall>(Arrive(method, channel, origin, &Caller::CheckMayWatch),
+                                         context_);
     case Method::kListStreams:
       return Information<v1::ListStreamsRequest>(method, channel, origin, &Caller::CheckMayList,
                                                  [this](const auto& request, const Caller& caller) {
@@ -130,16 +124,16 @@ std::unique_ptr<ByteCall> Methods::Begin(Method method, CallChannel& channel,
 
 std::unique_ptr<ByteCall> Methods::ReconstructFrame(CallChannel& channel,
                                                     const CallOrigin& origin) const {
-  auto admission = Admit(authentication_, origin, &Caller::CheckMayProduce);
-  // Who is let in alone counts as somebody that a drain turns away.
-  if (admission.ok()) {
-    if (auto status = registry_.CheckServing(); !status.ok()) admission = std::move(status);
+  ArrivedCall call = Arrive(Method::kReconstructFrame, channel, origin, &Caller::CheckMayProduce);
+  // After admission: only admitted callers count as refused by a drain.
+  if (call.admission.ok()) {
+    auto status = context_.streams.CheckServing();
+    if (!status.ok()) call.admission = std::move(status);
   }
   return std::make_unique<UnaryCall>(
-      channel, Meters(Method::kReconstructFrame), std::move(admission), UnaryKind::kFrame, opening_,
-      calls_, budget_, &pool_,
+      std::move(call), context_, UnaryKind::kFrame,
       [this](grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled) {
-        return AnswerFrameCall(request, limits_, *worker, cancelled);
+        return AnswerFrameCall(request, context_.limits, *worker, cancelled);
       });
 }
 
@@ -147,11 +141,10 @@ template <typename Request, typename Answer>
 std::unique_ptr<ByteCall> Methods::Information(Method method, CallChannel& channel,
                                                const CallOrigin& origin, Permission permission,
                                                Answer answer) const {
-  auto admission = Admit(authentication_, origin, permission);
-  const Caller caller = admission.ok() ? admission->caller : Caller();
+  ArrivedCall call = Arrive(method, channel, origin, permission);
+  const Caller caller = call.admission.ok() ? call.admission->caller : Caller();
   return std::make_unique<UnaryCall>(
-      channel, Meters(method), std::move(admission), UnaryKind::kInformation, opening_, calls_,
-      budget_, nullptr,
+      std::move(call), context_, UnaryKind::kInformation,
       [answer, caller](grpc::ByteBuffer& bytes, Worker*,
                        auto&) -> absl::StatusOr<grpc::ByteBuffer> {
         Request request;
@@ -169,14 +162,13 @@ absl::StatusOr<v1::ListStreamsResponse> Methods::ListStreams(const v1::ListStrea
     return BadPage(kReasonOutOfRange, "page_size", absl::StrCat(request.page_size()),
                    "must be at least 0");
   }
-  // A token is the number of the last stream that was listed or, of those of other replicas, its
-  // id.
+  // A token holds the last listed stream: its number, or its id if another replica has it.
   const std::string& token = request.page_token();
   const bool is_local = !token.starts_with(kRemotePage);
   std::uint64_t after = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), after);
   const bool is_number = error == std::errc() && end == token.data() + token.size();
-  if (!token.empty() && (is_local ? !is_number : relay_ == nullptr)) {
+  if (!token.empty() && (is_local ? !is_number : context_.relay == nullptr)) {
     return BadPage(kReasonPageToken, "page_token", absl::StrCat(token.size(), " characters"),
                    "must be the next_page_token of an answer");
   }
@@ -187,27 +179,28 @@ absl::StatusOr<v1::ListStreamsResponse> Methods::ListStreams(const v1::ListStrea
     AddRemoteStreams(token.substr(kRemotePage.size()), page_size, caller, response);
     return response;
   }
-  const auto streams = registry_.List(after, page_size + 1, caller);
+  const auto streams = context_.streams.List(after, page_size + 1, caller);
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < std::min(streams.size(), page_size); ++i) {
-    if (relay_ != nullptr && relay_->WasResumedElsewhere(streams[i].lineage, streams[i].opened)) {
-      continue;  // It is listed there.
+    if (context_.relay != nullptr &&
+        context_.relay->WasResumedElsewhere(streams[i].lineage, streams[i].opened)) {
+      continue;  // The other replica lists it.
     }
     EncodeSummary(streams[i], now, *response.add_streams());
   }
   if (streams.size() > page_size) {
     response.set_next_page_token(absl::StrCat(streams[page_size - 1].number));
-  } else if (relay_ != nullptr) {
+  } else if (context_.relay != nullptr) {
     AddRemoteStreams("", page_size, caller, response);
   }
   return response;
 }
 
-// Until there are `page_size` in the answer.
+// Fills the page up to `page_size`.
 void Methods::AddRemoteStreams(const std::string& after, std::size_t page_size,
                                const Caller& caller, v1::ListStreamsResponse& response) const {
   const std::size_t room = page_size - static_cast<std::size_t>(response.streams_size());
-  auto streams = relay_->List(after, room + 1, caller);
+  auto streams = context_.relay->List(after, room + 1, caller);
   for (std::size_t i = 0; i < std::min(streams.size(), room); ++i) {
     *response.add_streams() = std::move(*streams[i].mutable_summary());
   }
@@ -220,10 +213,10 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   v1::GetServerInfoResponse response;
   response.set_version(PARTIEMC_VERSION);
   response.set_method_version(kMethodVersion);
-  EncodeLimits(limits_, *response.mutable_limits());
-  response.set_frames_in_flight(limits_.frames_in_flight);
-  response.set_compute_threads(pool_.threads());
-  // Those that this build of the core accepts.
+  EncodeLimits(context_.limits, *response.mutable_limits());
+  response.set_frames_in_flight(context_.limits.frames_in_flight);
+  response.set_compute_threads(context_.pool.threads());
+  // A build of the core may lack some placements and fills.
   for (const Placement placement : AllPlacements()) {
     ReconstructionParameters parameters;
     parameters.placement = placement;
@@ -235,28 +228,28 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
     if (Reconstructor::Create(parameters).ok()) response.add_fills(wire::ToWire(fill));
   }
   response.add_capabilities("attributes");
-  if (limits_.max_parts > 0) response.add_capabilities("parts");
+  if (context_.limits.max_parts > 0) response.add_capabilities("parts");
   response.add_capabilities("resume");
   response.add_capabilities("slices");
   response.add_capabilities("sections");
-  if (relay_ != nullptr) response.add_capabilities("relay");
+  if (context_.relay != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");
-  if (limits_.history_bytes > 0) response.add_capabilities("history");
+  if (context_.limits.history_bytes > 0) response.add_capabilities("history");
   for (const Doubt doubt : kAllDoubts) {
     v1::DoubtText& text = *response.add_doubts();
     text.set_doubt(wire::ToWire(doubt));
     text.set_name(std::string(partiemc::Name(doubt)));
     text.set_explanation(std::string(Explanation(doubt)));
   }
-  response.set_open_streams(static_cast<std::uint32_t>(registry_.OpenCount()));
-  response.set_draining(registry_.draining());
+  response.set_open_streams(static_cast<std::uint32_t>(context_.streams.OpenCount()));
+  response.set_draining(context_.streams.draining());
   v1::ServerLoad& load = *response.mutable_load();
-  load.set_watchers(static_cast<std::uint32_t>(watchers_.count()));
-  load.set_frames_waiting(pool_.QueueLength());
-  load.set_memory_held(budget_.held());
-  load.set_memory_budget(budget_.bytes());
-  load.set_watched_bytes(watchers_.held_bytes());
-  load.set_history_bytes(history_.held());
+  load.set_watchers(static_cast<std::uint32_t>(context_.watchers.count()));
+  load.set_frames_waiting(context_.pool.QueueLength());
+  load.set_memory_held(context_.budget.held());
+  load.set_memory_budget(context_.budget.bytes());
+  load.set_watched_bytes(context_.watchers.held_bytes());
+  load.set_history_bytes(context_.history.held());
   return response;
 }
 

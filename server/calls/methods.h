@@ -1,4 +1,4 @@
-// What each method of partiemc.v1.ReconstructionService does, whatever carries its messages.
+// The methods of partiemc.v1.ReconstructionService, over any channel.
 #pragma once
 
 #include <array>
@@ -11,23 +11,12 @@
 #include "server/calls/byte_call.h"
 #include "server/calls/call_channel.h"
 #include "server/calls/call_meters.h"
-#include "server/compute/compute_pool.h"
-#include "server/compute/memory_budget.h"
-#include "server/relay/relay.h"
-#include "server/security/authentication.h"
-#include "server/security/checkpoint_keys.h"
-#include "server/stream/limits.h"
-#include "server/stream/opening_calls.h"
-#include "server/stream/stream_registry.h"
-#include "server/stream/unary_registry.h"
+#include "server/calls/server_context.h"
 #include "server/telemetry/metrics.h"
-#include "server/watch/result_history.h"
-#include "server/watch/watch_dispatcher.h"
-#include "server/watch/watch_registry.h"
 
 namespace partiemc::server {
 
-/// Safe from any thread.
+/// Thread-safe.
 class Methods {
  public:
   enum class Method { kReconstruct, kReconstructFrame, kWatchStream, kListStreams, kGetServerInfo };
@@ -38,21 +27,19 @@ class Methods {
   /// As in the .proto.
   static std::string_view Name(Method method);
 
-  /// The arguments live longer, and so do the methods than their calls. Without a `relay` there are
-  /// only the streams of this server.
-  Methods(const ServerLimits& limits, const Authentication& authentication, OpeningCalls& opening,
-          StreamRegistry& registry, UnaryRegistry& calls, MemoryBudget& budget, ComputePool& pool,
-          WatchRegistry& watchers, WatchDispatcher& dispatcher, const HistoryRoom& history,
-          const CurrentCheckpointKeys& checkpoint_keys, Metrics& metrics, Relay* relay);
+  /// `metrics` and `context` outlive this; this outlives its calls.
+  Methods(const ServerContext& context, Metrics& metrics);
 
-  /// A call of `method` begins: admits its caller, before anything of a request is read, and has
-  /// `channel` read, or end the call if it is refused.
+  /// Begins a call of `method`: admits its caller, then reads from `channel`, or ends the call if
+  /// it is refused. `channel` outlives the call.
   std::unique_ptr<ByteCall> Begin(Method method, CallChannel& channel,
                                   const CallOrigin& origin) const;
 
  private:
+  ArrivedCall Arrive(Method method, CallChannel& channel, const CallOrigin& origin,
+                     Permission permission) const;
   std::unique_ptr<ByteCall> ReconstructFrame(CallChannel& channel, const CallOrigin& origin) const;
-  // A call for information: `answer` makes its response, on the transport's own thread.
+  // A call for information: `answer` makes its response on a thread of the channel.
   template <typename Request, typename Answer>
   std::unique_ptr<ByteCall> Information(Method method, CallChannel& channel,
                                         const CallOrigin& origin, Permission permission,
@@ -63,20 +50,7 @@ class Methods {
                         v1::ListStreamsResponse& response) const;
   v1::GetServerInfoResponse GetServerInfo() const;
 
-  const MethodMeters* Meters(Method method) const { return &meters_.Of(Name(method)); }
-
-  const ServerLimits& limits_;
-  const Authentication& authentication_;
-  OpeningCalls& opening_;
-  StreamRegistry& registry_;
-  UnaryRegistry& calls_;
-  MemoryBudget& budget_;
-  ComputePool& pool_;
-  WatchRegistry& watchers_;
-  WatchDispatcher& dispatcher_;
-  const HistoryRoom& history_;
-  Relay* const relay_;
-  const CurrentCheckpointKeys& checkpoint_keys_;
+  const ServerContext& context_;
   const CallMeters meters_;
 };
 

@@ -1,12 +1,15 @@
 #include "server/calls/reconstruct_call.h"
 
-#include <chrono>
-#include <optional>
-#include <string>
 #include <utility>
 
 #include "partiemc/status.h"
+#include "server/compute/memory_budget.h"
+#include "server/relay/watched_result.h"
+#include "server/stream/limits.h"
+#include "server/stream/stream_registry.h"
+#include "server/stream/stream_token.h"
 #include "server/telemetry/logging.h"
+#include "wire/message_bytes.h"
 
 namespace partiemc::server {
 namespace {
@@ -41,67 +44,271 @@ void LogPartEnd(const JoinedPart& part, const absl::Status& status) {
 
 }  // namespace
 
-ReconstructCall::ReconstructCall(CallChannel& channel, const MethodMeters* meters,
-                                 absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
-                                 OpeningCalls& opening, StreamRegistry& registry,
-                                 MemoryBudget& budget, ComputePool& pool,
-                                 WatchDispatcher& dispatcher,
-                                 const CurrentCheckpointKeys& checkpoint_keys)
-    : ByteCall(channel, meters, std::move(admission)),
-      registry_(registry),
-      messages_(limits, registry, dispatcher, checkpoint_keys, {channel.peer(), caller().name()}),
-      machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this), messages_,
-                                                    pool, budget, limits.frames_in_flight,
-                                                    caller().account())) {
-  absl::Status status = this->admission();
-  if (status.ok()) status = registry_.Enter(machine_, caller());
-  if (status.ok()) MayGiveWay(opening, machine_);
+ReconstructCall::ReconstructCall(ArrivedCall call, const ServerContext& context)
+    : ByteCall(std::move(call), context),
+      broadcaster_(std::make_shared<ResultBroadcaster>(
+          context.dispatcher,
+          ResultBroadcaster::Limits{.mailbox_bytes = context.limits.max_watcher_bytes,
+                                    .kept_bytes = context.limits.KeptResultBytes()})),
+      requests_(context.limits.frames_in_flight),
+      answers_(context.limits.frames_in_flight),
+      machine_(std::make_shared<StreamStateMachine>(
+          static_cast<StreamTransport&>(*this), static_cast<StreamHandler&>(*this), context.pool,
+          context.budget, context.limits.frames_in_flight, caller().account())) {
+  absl::Status status = admission();
+  if (status.ok()) status = context.streams.Enter(machine_, caller());
+  if (status.ok()) AllowEviction(machine_);
   machine_->Start(std::move(status));
 }
 
-void ReconstructCall::ReadDone(bool ok) {
-  if (ok) {
-    machine_->ReadDone(messages_.Kind(read_slot_), messages_.request(read_slot_).Length());
-  } else {
-    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (channel().IsCancelled()) machine_->Cancelled();
-    machine_->ReadEnded();
-  }
+void ReconstructCall::OnRequest() {
+  const RequestKind kind = OnRequestRead(read_slot_);
+  machine_->ReadDone(kind, requests_[read_slot_].Length());
 }
 
-void ReconstructCall::WriteDone(bool ok) {
-  messages_.Written(written_, written_slot_);
+void ReconstructCall::OnResponseWritten(bool ok) {
+  Response(written_, written_slot_).Clear();
   machine_->WriteDone(ok);
 }
 
-void ReconstructCall::OnCancel() { machine_->Cancelled(); }
-
-void ReconstructCall::OnDone() { registry_.Leave(*machine_); }
+void ReconstructCall::OnDone() { context().streams.Leave(*machine_); }
 
 void ReconstructCall::StartRead(std::size_t slot) {
   read_slot_ = slot;
-  channel().StartRead(&messages_.request(slot));
+  channel().StartRead(&requests_[slot]);
 }
 
 void ReconstructCall::StartWrite(Outgoing what, std::size_t slot) {
   written_ = what;
   written_slot_ = slot;
-  channel().StartWrite(&messages_.response(what, slot));
+  if (what == Outgoing::kDraining) draining_ = DrainNotice(context().streams.TakeElsewhere());
+  channel().StartWrite(&Response(what, slot));
 }
 
-void ReconstructCall::Cut() { channel().Cancel(); }
-
 void ReconstructCall::Finish(const absl::Status& status) {
-  // Closed first: a client that sees the end may open the same name again at once.
-  const auto stream = registry_.Close(*machine_);
-  messages_.End(status);
-  if (messages_.other_part()) {
-    LogPartEnd(messages_.other_part()->joined(), status);
+  // First: a client that sees the end may open the same name again at once.
+  const auto stream = context().streams.Close(*machine_);
+  frames_->End(status);
+  if (const JoinedPart* const part = frames_->joined()) {
+    LogPartEnd(*part, status);
   } else {
     LogEnd(stream, channel().peer(), status);
   }
   if (stream) stream->description.broadcaster->End(WatchEnd::OfStream(status));
   End(status);
+}
+
+RequestKind ReconstructCall::OnRequestRead(std::size_t slot) {
+  using v1::ReconstructRequest;
+  switch (wire::HeldField(requests_[slot], ReconstructRequest::kFrameFieldNumber).value_or(-1)) {
+    case ReconstructRequest::kOpenFieldNumber:
+      return RequestKind::kOpen;
+    case ReconstructRequest::kFrameFieldNumber:
+      frames_->OnFrame(slot, requests_[slot]);
+      return RequestKind::kFrame;
+    case 0:
+      return RequestKind::kEmpty;
+    default:
+      return RequestKind::kMalformed;
+  }
+}
+
+grpc::ByteBuffer& ReconstructCall::Response(Outgoing what, std::size_t slot) {
+  switch (what) {
+    case Outgoing::kOpened:
+      return opened_;
+    case Outgoing::kDraining:
+      return draining_;
+    case Outgoing::kAnswer:
+      break;
+  }
+  return answers_[slot];
+}
+
+absl::Status ReconstructCall::Open(std::size_t slot, const StreamStateMachine& /*stream*/) {
+  v1::ReconstructRequest request;
+  const std::uint64_t max_bytes = context().limits.MaxOpenBytes();
+  if (auto status = ParseOpen(requests_[slot], max_bytes, request); !status.ok()) return status;
+  const v1::OpenStream& open = request.open();
+  if (auto status = CheckParts(open, context().limits); !status.ok()) return status;
+  return open.part() > 0 ? JoinStream(open) : OpenStream(open);
+}
+
+absl::Status ReconstructCall::OpenStream(const v1::OpenStream& open) {
+  const auto parameters = wire::DecodeParameters(open.parameters());
+  if (!parameters.ok()) return parameters.status();
+  const auto outputs = wire::DecodeOutputs(open.outputs(), open.has_outputs());
+  if (!outputs.ok()) return outputs.status();
+  if (parameters->slice && outputs->echo_particles) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(wire::kReasonUnsupported), "outputs.echo_particles", "true",
+                           "must be false with a slice, whose particles are not in its plane"});
+  }
+  auto session = Session::Open(*parameters, context().limits.frame);
+  if (!session.ok()) return session.status();
+  const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();
+  StreamTerms terms = TermsOf(open, *outputs, token);
+  if (open.has_resume()) {
+    auto status = Resume(open.resume(), context(), *session, terms);
+    if (!status.ok()) return status;
+  }
+  // Before other parts can join.
+  if (open.parts() > 0) {
+    frames_ = std::make_unique<PartZero>(open, context().limits, session->next_sequence());
+  }
+  auto stream = context().streams.Open(*machine_,
+                                       {.name = terms.name,
+                                        .labels = {open.labels().begin(), open.labels().end()},
+                                        .parameters = session->parameters(),
+                                        .broadcaster = broadcaster_,
+                                        .next_sequence = session->next_sequence(),
+                                        .assembler = frames_->assembler(),
+                                        .parts_token = open.parts_token()},
+                                       token);
+  if (!stream.ok()) return stream.status();
+  session_ = *std::move(session);
+  outputs_ = *outputs;
+  terms_ = std::move(terms);
+  terms_.name = stream->description.name;
+
+  v1::StreamOpened opened;
+  opened.set_stream_id(stream->id);
+  opened.set_stream_token(token);
+  wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
+  opened.set_next_sequence(session_->next_sequence());
+  PrepareOpened(std::move(opened));
+  LogEvent(spdlog::level::info, "stream opened",
+           {{"id", stream->id},
+            {"name", terms_.name},
+            {"peer", channel().peer()},
+            {"client", caller().name()},
+            {"placement", std::string(Name(session_->parameters().placement))},
+            {"fill", std::string(Name(session_->parameters().fill))},
+            {"parts", std::uint64_t{open.parts()}}});
+  return absl::OkStatus();
+}
+
+absl::Status ReconstructCall::JoinStream(const v1::OpenStream& open) {
+  auto joined = context().streams.JoinPart(*machine_, {.stream_name = open.stream_name(),
+                                                       .part = open.part(),
+                                                       .parts = open.parts(),
+                                                       .token = open.parts_token()});
+  if (!joined.ok()) return joined.status();
+  frames_ = std::make_unique<OtherPart>(*std::move(joined), context().limits.frames_in_flight);
+  const JoinedPart& part = *frames_->joined();
+  v1::StreamOpened opened;
+  opened.set_stream_id(part.stream_id);
+  wire::EncodeParameters(part.parameters, *opened.mutable_parameters());
+  opened.set_next_sequence(part.assembler->next_wanted());
+  PrepareOpened(std::move(opened));
+  LogEvent(spdlog::level::info, "part joined",
+           {{"stream", part.stream_id},
+            {"name", open.stream_name()},
+            {"part", std::uint64_t{part.seat.part}},
+            {"peer", channel().peer()},
+            {"client", caller().name()}});
+  return absl::OkStatus();
+}
+
+void ReconstructCall::PrepareOpened(v1::StreamOpened opened) {
+  opened.set_frames_in_flight(context().limits.frames_in_flight);
+  EncodeLimits(context().limits, *opened.mutable_limits());
+  v1::ReconstructResponse response;
+  *response.mutable_opened() = std::move(opened);
+  opened_ = wire::ToBytes(response);
+}
+
+std::uint64_t ReconstructCall::ComputedBytes(std::size_t /*slot*/, std::uint64_t bytes) const {
+  return frames_->ComputedBytes(bytes);
+}
+
+bool ReconstructCall::DropFrame(std::size_t slot, const absl::Status& why) {
+  const bool dropped = frames_->DropFrame(slot, why);
+  if (dropped) requests_[slot].Clear();
+  return dropped;
+}
+
+Answered ReconstructCall::Answer(std::size_t slot, Worker& worker,
+                                 const std::atomic<bool>& cancelled) {
+  Answered answered;
+  if (const auto response = frames_->RespondToPart(slot)) {
+    answers_[slot] = wire::ToBytes(*response);
+    answered.is_result = response->has_part();
+  } else {
+    answered = AnswerWhole(slot, worker, cancelled);
+  }
+  requests_[slot].Clear();
+  answered.bytes = answers_[slot].Length();
+  return answered;
+}
+
+Answered ReconstructCall::AnswerWhole(std::size_t slot, Worker& worker,
+                                      const std::atomic<bool>& cancelled) {
+  std::unique_ptr<FrameMessages> messages = FrameMessages::Take(worker);
+  const std::uint64_t request_bytes = requests_[slot].Length();
+  const std::uint64_t sequence = session_->next_sequence();
+  const absl::Status parsed = ParseWhole(slot, messages->request);
+  const absl::Status status = Compute(parsed, *messages, worker, cancelled);
+  const v1::ParticleFrame& request = messages->request.frame();
+  std::string checkpoint = CheckpointAfter(sequence, *session_, terms_, context());
+  frames_->OnAnswered(session_->next_sequence(), !checkpoint.empty());
+  bool has_watchers = false;
+  if (status.ok()) {
+    messages->result.set_checkpoint(std::move(checkpoint));
+    answers_[slot] = wire::ToBytes(messages->result);
+    has_watchers = Publish(slot, request);
+  } else {
+    v1::ReconstructResponse error;
+    wire::EncodeFrameError(status, request.sequence(), session_->next_sequence(),
+                           *error.mutable_error());
+    error.set_checkpoint(std::move(checkpoint));
+    answers_[slot] = wire::ToBytes(error);
+    messages->request.Clear();  // Its size was not checked.
+  }
+  messages->Shrink(request_bytes);
+  worker.message_buffers = std::move(messages);
+  return {.is_result = status.ok(),
+          .last_sequence = session_->next_sequence() - 1,
+          .afterwards = Afterwards(has_watchers)};
+}
+
+// Keeps the bytes of the request only if they are echoed.
+absl::Status ReconstructCall::ParseWhole(std::size_t slot, v1::ReconstructRequest& request) {
+  auto status = ParseFrame(requests_[slot], request);
+  if (status.ok()) status = frames_->Complete(slot, outputs_, request, requests_[slot]);
+  if (!outputs_.echo_particles) requests_[slot].Clear();
+  return status;
+}
+
+// Frames are numbered from 1. A malformed frame without a number is neither a gap nor a duplicate.
+absl::Status ReconstructCall::Compute(const absl::Status& parsed, FrameMessages& messages,
+                                      Worker& worker, const std::atomic<bool>& cancelled) {
+  const v1::ParticleFrame& frame = messages.request.frame();
+  if (!parsed.ok() && frame.sequence() == 0) return session_->Refuse(parsed, worker);
+  v1::ReconstructedFrame& result = *messages.result.mutable_frame();
+  auto status = AnswerFrame(
+      parsed.ok() ? DecodeFrameWithin(frame, context().limits, outputs_, messages.attributes)
+                  : parsed,
+      frame.sequence(), outputs_, *session_, worker, cancelled, result);
+  if (status.ok()) result.set_sequence(frame.sequence());
+  return status;
+}
+
+// Returns whether there are watchers. They share the bytes of the response, and of the request if
+// it is echoed.
+bool ReconstructCall::Publish(std::size_t slot, const v1::ParticleFrame& request) {
+  wire::WatchedBytes bytes(answers_[slot]);
+  if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
+  return broadcaster_->Publish(std::make_shared<WatchedResult>(std::move(bytes)),
+                               request.sequence());
+}
+
+std::function<void()> ReconstructCall::Afterwards(bool has_watchers) const {
+  if (frames_->assembler() == nullptr && !has_watchers) return {};
+  return [assembler = frames_->assembler(), broadcaster = has_watchers ? broadcaster_ : nullptr] {
+    if (assembler != nullptr) assembler->TellMembers();
+    if (broadcaster != nullptr) broadcaster->Announce();
+  };
 }
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// Requests from bytes, within bounds.
+// Parses requests within limits.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -12,15 +12,15 @@
 
 namespace partiemc::server {
 
-/// Far above what a request for information takes, or one of a watcher; so small that nobody fills
-/// memory with them.
+/// Limit for requests for information and requests of watchers: far above their size, and too small
+/// to exhaust the memory.
 inline constexpr std::size_t kMaxSmallRequestBytes = 4096;
 
 /// "partiemc.v1.ReconstructionService".
 const std::string& ServiceName();
 
-/// Parses a request, and gives its bytes up. Errors: INVALID_ARGUMENT (MALFORMED) for more than
-/// `max_bytes` or wire::kMaxFields fields, or for what is no such message.
+/// Parses a request and clears its bytes. Errors: INVALID_ARGUMENT (MALFORMED) for more than
+/// `max_bytes`, more than wire::kMaxFields fields, or another message.
 absl::Status ParseRequest(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
                           google::protobuf::Message& request);
 

@@ -6,13 +6,15 @@
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/security/checkpoint_keys.h"
+#include "server/stream/limits.h"
 #include "server/stream/stream_token.h"
 
 namespace partiemc::server {
 namespace {
 
 std::uint32_t NumberOf(const wire::Outputs& outputs) {
-  // Names each part, so that a new one does not compile until it is bound, too.
+  // Lists every member: a new one does not compile before it is bound as well.
   const auto& [rings, mesh, normals, relative_float32, echo_particles, attributes] = outputs;
   std::uint32_t number = 0;
   for (const bool part : {rings, mesh, normals, relative_float32, echo_particles}) {
@@ -35,19 +37,19 @@ StreamTerms TermsOf(const v1::OpenStream& open, const wire::Outputs& outputs,
           .checkpoint_interval = open.checkpoint_interval()};
 }
 
-absl::Status Resume(const v1::ResumeStream& resume, const ServerLimits& limits,
-                    const CurrentCheckpointKeys& keys, Session& session, StreamTerms& terms) {
+absl::Status Resume(const v1::ResumeStream& resume, const ServerContext& context, Session& session,
+                    StreamTerms& terms) {
   if (auto status = CheckStreamToken(resume.stream_token()); !status.ok()) return status;
   const std::uint64_t bytes = resume.checkpoint().size();
-  if (bytes > limits.MaxCheckpointBytes()) {
+  const std::uint64_t max_bytes = context.limits.MaxCheckpointBytes();
+  if (bytes > max_bytes) {
     return ViolationError(
         absl::StatusCode::kResourceExhausted,
         {std::string(kReasonCheckpointBytes), "open.resume.checkpoint",
-         absl::StrCat(bytes, " bytes"),
-         absl::StrCat("must be at most ", limits.MaxCheckpointBytes(), " bytes")});
+         absl::StrCat(bytes, " bytes"), absl::StrCat("must be at most ", max_bytes, " bytes")});
   }
-  auto checkpoint =
-      ParseCheckpoint(resume.checkpoint(), session.parameters(), terms, keys.Get().get());
+  auto checkpoint = ParseCheckpoint(resume.checkpoint(), session.parameters(), terms,
+                                    context.checkpoint_keys.Get().get());
   if (!checkpoint.ok()) return checkpoint.status();
   terms.name = checkpoint->name;
   session.GoOnFrom(*std::move(checkpoint));
@@ -55,13 +57,13 @@ absl::Status Resume(const v1::ResumeStream& resume, const ServerLimits& limits,
 }
 
 std::string CheckpointAfter(std::uint64_t sequence, const Session& session,
-                            const StreamTerms& terms, const ServerLimits& limits,
-                            const CurrentCheckpointKeys& keys) {
+                            const StreamTerms& terms, const ServerContext& context) {
   const bool used_number = session.next_sequence() > sequence;
   if (terms.checkpoint_interval == 0 || !used_number || sequence % terms.checkpoint_interval != 0) {
     return {};
   }
-  return session.MakeCheckpoint(terms, keys.Get().get(), limits.MaxCheckpointBytes());
+  return session.MakeCheckpoint(terms, context.checkpoint_keys.Get().get(),
+                                context.limits.MaxCheckpointBytes());
 }
 
 }  // namespace partiemc::server

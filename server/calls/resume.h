@@ -1,5 +1,4 @@
-// How a stream is resumed, and what it gives its producer for that: checkpoints between messages,
-// sessions and the server's keys and limits.
+// Writes the checkpoints of a stream, and resumes streams from them.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +7,8 @@
 
 #include "absl/status/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
-#include "server/security/checkpoint_keys.h"
+#include "server/calls/server_context.h"
 #include "server/stream/checkpoint.h"
-#include "server/stream/limits.h"
 #include "server/stream/session.h"
 #include "wire/codec.h"
 
@@ -19,22 +17,20 @@ namespace partiemc::server {
 /// The reason of RESOURCE_EXHAUSTED for a checkpoint that is too large (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonCheckpointBytes = "CHECKPOINT_BYTES";
 
-/// What of `open` a stream with this token keeps. Its name may still be empty.
+/// The terms that a stream with this token keeps from `open`. The name may still be empty.
 StreamTerms TermsOf(const v1::OpenStream& open, const wire::Outputs& outputs,
                     std::string_view token);
 
-/// Has `session`, just opened, go on where `resume` says; a name that `terms` leave open becomes
-/// that of the checkpoint, if there is one.
-/// Errors, each with a Violation: INVALID_ARGUMENT (STREAM_TOKEN), RESOURCE_EXHAUSTED
-/// (CHECKPOINT_BYTES, before anything of it is looked at), those of ParseCheckpoint.
-absl::Status Resume(const v1::ResumeStream& resume, const ServerLimits& limits,
-                    const CurrentCheckpointKeys& keys, Session& session, StreamTerms& terms);
+/// Continues the new `session` from the checkpoint in `resume`, and sets the name in `terms` to the
+/// checkpoint's. Errors, each with a Violation: INVALID_ARGUMENT (STREAM_TOKEN), RESOURCE_EXHAUSTED
+/// (CHECKPOINT_BYTES, before the checkpoint is read), and the errors of ParseCheckpoint.
+absl::Status Resume(const v1::ResumeStream& resume, const ServerContext& context, Session& session,
+                    StreamTerms& terms);
 
-/// The checkpoint that belongs to the answer of the frame for which `session` expected number
-/// `sequence`; empty where the stream's interval has none, where the frame used up no number, and
-/// where it might be larger than a server takes.
+/// The checkpoint for the response to a frame, before which `session` expected number `sequence`.
+/// Empty if the stream's interval has none here, if the frame used no number, or if the checkpoint
+/// could exceed the limit.
 std::string CheckpointAfter(std::uint64_t sequence, const Session& session,
-                            const StreamTerms& terms, const ServerLimits& limits,
-                            const CurrentCheckpointKeys& keys);
+                            const StreamTerms& terms, const ServerContext& context);
 
 }  // namespace partiemc::server

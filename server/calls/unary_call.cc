@@ -2,47 +2,35 @@
 
 #include <utility>
 
+#include "server/stream/unary_registry.h"
 #include "server/telemetry/logging.h"
 
 namespace partiemc::server {
 
-UnaryCall::UnaryCall(CallChannel& channel, const MethodMeters* meters,
-                     absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
-                     UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method)
-    : ByteCall(channel, meters, std::move(admission)),
-      calls_(calls),
+UnaryCall::UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method)
+    : ByteCall(std::move(call), context),
       method_(std::move(method)),
-      machine_(std::make_shared<UnaryStateMachine>(static_cast<UnaryTransport&>(*this), budget,
-                                                   pool, caller().account(), kind)) {
-  absl::Status status = this->admission();
-  if (status.ok()) status = calls_.Enter(machine_, kind);
-  if (status.ok()) MayGiveWay(opening, machine_);
+      machine_(std::make_shared<UnaryStateMachine>(
+          static_cast<UnaryTransport&>(*this), context.budget,
+          kind == UnaryKind::kFrame ? &context.pool : nullptr, caller().account(), kind)) {
+  absl::Status status = admission();
+  if (status.ok()) status = context.unary_calls.Enter(machine_, kind);
+  if (status.ok()) AllowEviction(machine_);
   machine_->Start(std::move(status));
 }
 
-void UnaryCall::ReadDone(bool ok) {
-  if (ok) {
-    if (auto status = calls_.TakePlace(*machine_, *caller().account()); !status.ok()) {
-      return machine_->GiveWay(status);
-    }
-    machine_->ReadDone(request_.Length());
-  } else {
-    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (channel().IsCancelled()) machine_->Cancelled();
-    machine_->ReadEnded();
-  }
+void UnaryCall::OnRequest() {
+  auto status = context().unary_calls.TakePlace(*machine_, *caller().account());
+  if (!status.ok()) return machine_->GiveWay(status);
+  machine_->ReadDone(request_.Length());
 }
 
-void UnaryCall::WriteDone(bool ok) {
+void UnaryCall::OnResponseWritten(bool ok) {
   answer_.Clear();
   machine_->WriteDone(ok);
 }
 
-void UnaryCall::OnCancel() { machine_->Cancelled(); }
-
-void UnaryCall::OnDone() { calls_.Leave(*machine_); }
-
-void UnaryCall::StartRead() { channel().StartRead(&request_); }
+void UnaryCall::OnDone() { context().unary_calls.Leave(*machine_); }
 
 absl::StatusOr<std::uint64_t> UnaryCall::Answer(Worker* worker) {
   auto answer = method_(request_, worker, machine_->cancelled());
@@ -52,13 +40,10 @@ absl::StatusOr<std::uint64_t> UnaryCall::Answer(Worker* worker) {
   return answer_.Length();
 }
 
-void UnaryCall::StartWrite() { channel().StartWrite(&answer_); }
-
-void UnaryCall::Cut() { channel().Cancel(); }
-
 void UnaryCall::Finish(const absl::Status& status) {
-  answer_.Clear();                  // One that was not sent.
-  calls_.GiveBackPlace(*machine_);  // Who hears of the end may come again at once.
+  answer_.Clear();  // It may not have been written.
+  // Before End: a client that sees the end may call again at once.
+  context().unary_calls.GiveBackPlace(*machine_);
   if (!status.ok() && !absl::IsCancelled(status))
     LogRefusal("call refused", channel().peer(), status);
   End(status);

@@ -1,4 +1,4 @@
-// A call of one request and one answer: translates between its channel and a UnaryStateMachine.
+// A call of one request and one response, over any channel.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -11,36 +11,35 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/calls/byte_call.h"
-#include "server/stream/unary_registry.h"
+#include "server/calls/server_context.h"
 #include "server/stream/unary_state_machine.h"
 
 namespace partiemc::server {
 
 class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
-  /// Turns a request into an answer, as UnaryTransport::Answer, unless `cancelled`. The request may
-  /// be cleared.
+  /// Turns a request into a response, unless `cancelled`. May clear the request. `worker` is null
+  /// except for UnaryKind::kFrame.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
-  /// The references outlive the call; without a pool the method is run by the channel's own thread.
-  UnaryCall(CallChannel& channel, const MethodMeters* meters,
-            absl::StatusOr<AdmittedCall> admission, UnaryKind kind, OpeningCalls& opening,
-            UnaryRegistry& calls, MemoryBudget& budget, ComputePool* pool, Method method);
+  /// Frames are computed by a worker of the pool, other kinds on a thread of the channel.
+  UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method);
 
-  void OnCancel() override;
+  void OnCancel() override { machine_->Cancelled(); }
   void OnDone() override;
 
  private:
-  void ReadDone(bool ok) override;
-  void WriteDone(bool ok) override;
-  void StartRead() override;
+  void OnRequest() override;
+  void OnRequestsEnded() override { machine_->ReadEnded(); }
+  void OnResponseWritten(bool ok) override;
+
+  void StartRead() override { channel().StartRead(&request_); }
   absl::StatusOr<std::uint64_t> Answer(Worker* worker) override;
-  void StartWrite() override;
-  void Cut() override;
+  void StartWrite() override { channel().StartWrite(&answer_); }
+  void Cut() override { channel().Cancel(); }
   void Finish(const absl::Status& status) override;
 
-  UnaryRegistry& calls_;
   const Method method_;
   grpc::ByteBuffer request_, answer_;
   std::shared_ptr<UnaryStateMachine> machine_;

@@ -30,30 +30,18 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
 
 }  // namespace
 
-WatchCall::WatchCall(CallChannel& channel, const MethodMeters* meters,
-                     absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
-                     OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers,
-                     Relay* relay)
-    : ByteCall(channel, meters, std::move(admission)),
-      opening_calls_(opening),
-      streams_(streams),
-      watchers_(watchers),
-      relay_(relay),
+WatchCall::WatchCall(ArrivedCall call, const ServerContext& context)
+    : ByteCall(std::move(call), context),
       machine_(std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this),
-                                                   limits.max_watcher_bytes)) {
-  absl::Status status = this->admission();
-  if (status.ok()) status = streams_.CheckServing();
-  if (status.ok()) status = watchers_.Enter(machine_);
-  if (status.ok()) MayGiveWay(opening, machine_);
+                                                   context.limits.max_watcher_bytes)) {
+  absl::Status status = admission();
+  if (status.ok()) status = context.streams.CheckServing();
+  if (status.ok()) status = context.watchers.Enter(machine_);
+  if (status.ok()) AllowEviction(machine_);
   machine_->Start(std::move(status));
 }
 
-void WatchCall::ReadDone(bool ok) {
-  if (!ok) {
-    // A read ends for a half-close and for a client that is gone; OnCancel may come later.
-    if (channel().IsCancelled()) machine_->Cancelled();
-    return machine_->ReadEnded();
-  }
+void WatchCall::OnRequest() {
   WatchRequest request;
   parsed_.Clear();
   if (request_.Length() <= kMaxSmallRequestBytes && wire::MergeBytes(request_, parsed_)) {
@@ -67,17 +55,15 @@ void WatchCall::ReadDone(bool ok) {
   machine_->ReadDone(request);
 }
 
-void WatchCall::WriteDone(bool ok) {
+void WatchCall::OnResponseWritten(bool ok) {
   response_.Clear();
   machine_->WriteDone(ok);
 }
 
-void WatchCall::OnCancel() { machine_->Cancelled(); }
-
-void WatchCall::OnDone() { watchers_.Leave(*machine_); }
+void WatchCall::OnDone() { context().watchers.Leave(*machine_); }
 
 void WatchCall::StartRead() {
-  if (!stream_name_.empty()) MayGiveUp(opening_calls_, machine_);
+  if (!stream_name_.empty()) AllowWatcherEviction(machine_);
   channel().StartRead(&request_);
 }
 
@@ -95,27 +81,30 @@ absl::StatusOr<WatchTerms> WatchCall::ReadTerms() const {
   return terms;
 }
 
-// The last line of each way is the call of Opened: after that the call may be gone.
+// Each path ends with `Opened`, after which the call may be deleted.
 void WatchCall::StartOpen() {
   auto terms = ReadTerms();
   if (!terms.ok()) return machine_->Opened(terms.status());
   terms_ = *std::move(terms);
   const std::string name = parsed_.open().stream_name();
-  const auto stream = streams_.Find(name, caller());
-  const bool is_elsewhere = relay_ != nullptr && (stream.ok() ? relay_->WasResumedElsewhere(
-                                                                    stream->lineage, stream->opened)
-                                                              : absl::IsNotFound(stream.status()));
+  const auto stream = context().streams.Find(name, caller());
+  const bool is_elsewhere =
+      context().relay != nullptr &&
+      (stream.ok() ? context().relay->WasResumedElsewhere(stream->lineage, stream->opened)
+                   : absl::IsNotFound(stream.status()));
   if (!is_elsewhere) {
     const absl::Status status = stream.ok() ? OpenHere(*stream) : stream.status();
     return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
   }
-  relay_->Find(name, terms_.from_sequence, [this, name](const absl::StatusOr<Relay::Found>& found) {
-    absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
-    if (absl::IsNotFound(status)) {  // It may have come here meanwhile.
-      if (const auto here = streams_.Find(name, caller()); here.ok()) status = OpenHere(*here);
-    }
-    machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
-  });
+  context().relay->Find(
+      name, terms_.from_sequence, [this, name](const absl::StatusOr<Relay::Found>& found) {
+        absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
+        if (absl::IsNotFound(status)) {  // The stream may have moved here.
+          if (const auto here = context().streams.Find(name, caller()); here.ok())
+            status = OpenHere(*here);
+        }
+        machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
+      });
 }
 
 absl::Status WatchCall::OpenHere(const StreamSummary& stream) {
@@ -142,7 +131,7 @@ absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
 }
 
 absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::string& stream_name) {
-  if (auto status = watchers_.Open(*machine_, caller()); !status.ok()) return status;
+  if (auto status = context().watchers.Open(*machine_, caller()); !status.ok()) return status;
   stream_name_ = stream_name;
   opened_.mutable_opened()->set_stream_id(stream_id);
   LogEvent(spdlog::level::info, "watch opened",
@@ -182,10 +171,9 @@ void WatchCall::Write(grpc::ByteBuffer response) {
   channel().StartWrite(&response_);
 }
 
-void WatchCall::Cut() { channel().Cancel(); }
-
 void WatchCall::Finish(const absl::Status& status) {
-  watchers_.Close(*machine_);  // Who hears of the end may come again at once.
+  // First: a client that sees the end may watch again at once.
+  context().watchers.Close(*machine_);
   LogEnd(status);
   End(status);
 }

@@ -1,5 +1,4 @@
-// A watcher: translates between its channel and a WatchStateMachine.
-// Frames pass as bytes that all watchers of a stream share.
+// A watcher, over any channel. All watchers of a stream share the bytes of its frames.
 #pragma once
 
 #include <chrono>
@@ -11,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "server/calls/byte_call.h"
+#include "server/calls/server_context.h"
 #include "server/relay/relay.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
@@ -21,24 +21,23 @@ namespace partiemc::server {
 
 class WatchCall final : public ByteCall, private WatchTransport {
  public:
-  /// What is passed outlives the call. Without a `relay` it finds streams of this server only.
-  WatchCall(CallChannel& channel, const MethodMeters* meters,
-            absl::StatusOr<AdmittedCall> admission, const ServerLimits& limits,
-            OpeningCalls& opening, StreamRegistry& streams, WatchRegistry& watchers, Relay* relay);
+  WatchCall(ArrivedCall call, const ServerContext& context);
 
-  void OnCancel() override;
+  void OnCancel() override { machine_->Cancelled(); }
   void OnDone() override;
 
  private:
-  void ReadDone(bool ok) override;
-  void WriteDone(bool ok) override;
+  void OnRequest() override;
+  void OnRequestsEnded() override { machine_->ReadEnded(); }
+  void OnResponseWritten(bool ok) override;
+
   void StartRead() override;
   void StartOpen() override;
   void WriteOpened(const HeldFrames& held) override;
   void WriteFrame(const Published& published, std::uint64_t dropped,
                   std::uint64_t oldest_sequence) override;
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
-  void Cut() override;
+  void Cut() override { channel().Cancel(); }
   void Finish(const absl::Status& status) override;
 
   absl::StatusOr<WatchTerms> ReadTerms() const;
@@ -48,10 +47,6 @@ class WatchCall final : public ByteCall, private WatchTransport {
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;
 
-  OpeningCalls& opening_calls_;
-  StreamRegistry& streams_;
-  WatchRegistry& watchers_;
-  Relay* const relay_;
   grpc::ByteBuffer request_, response_;
   v1::WatchStreamRequest parsed_;
   v1::WatchStreamResponse opened_;  // Once open.

@@ -11,15 +11,15 @@
 
 namespace partiemc::server {
 
-/// gRPC's generated services read and parse the request of a unary call before its method is asked,
-/// and hold calls whose request does not come where nobody can end them. On the wire a unary call
-/// is a stream of one message each way, so every method may be served as a stream.
+/// gRPC's generated services read and parse the request of a unary call before they call its
+/// method, and the server cannot end a call that waits for its request. A unary call looks like a
+/// stream of one message each way on the wire, so every method can be served as a stream.
 class ByteService : public grpc::Service {
  protected:
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
   using Method = std::function<Reactor*(grpc::CallbackServerContext*)>;
 
-  /// To be called before the service is registered. `path`: "/package.Service/Method".
+  /// Called before the service is registered. `path`: "/package.Service/Method".
   void Serve(std::string path, Method method);
 
  private:

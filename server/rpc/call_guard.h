@@ -10,9 +10,9 @@
 
 namespace partiemc::server {
 
-/// For services that are not ours (reflection): counts each call for its connection, and ends calls
-/// that Authentication refuses with UNAUTHENTICATED. Health checks need no token. The arguments
-/// outlive the server.
+/// Guards services that are not ours (reflection): counts each call for its connection, and ends
+/// calls that Authentication refuses with UNAUTHENTICATED. Health checks need no token. The
+/// arguments outlive the server. Thread-safe.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
     const Authentication& authentication, const ConnectionTable& connections);
 

@@ -1,4 +1,4 @@
-// What is wrong, for programs that know Google's error model.
+// Encodes errors in Google's error model.
 #pragma once
 
 #include <string>

@@ -19,8 +19,8 @@ void GrpcCall::StartRead(grpc::ByteBuffer* message) {
 }
 
 void GrpcCall::OnReadDone(bool ok) {
-  // A read that fails may leave a part of a message on the way, or one that is too large. It stays
-  // open in the tally, which allows those bytes.
+  // A failed read may leave part of a message, or a message above the limit. It stays open in the
+  // tally, which allows those bytes.
   if (ok) tally_.OnReadDone(message_->Length());
   call_->OnReadDone(ok);
 }

@@ -18,13 +18,13 @@
 
 namespace partiemc::server {
 
-/// Deletes itself, and its call, when gRPC is done with it.
+/// Deletes itself and its call in OnDone, gRPC's last call.
 class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                        private CallChannel {
  public:
   using Make = std::function<std::unique_ptr<ByteCall>(CallChannel&, const CallOrigin&)>;
 
-  /// Counts for its connection in `connections`, which lives longer.
+  /// Counts for its connection in `connections`, which outlives it.
   GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections, CallKind kind,
            const Make& make);
 
@@ -45,12 +45,12 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
 
   grpc::CallbackServerContext& context_;
   CallTally tally_;
-  grpc::ByteBuffer* message_ = nullptr;  // Of the read that goes on.
+  grpc::ByteBuffer* message_ = nullptr;  // The read in progress.
   // gRPC calls nothing before the constructor has returned.
   std::unique_ptr<ByteCall> call_;
 };
 
-/// Where a call of gRPC comes from. Of several headers `authorization` none counts: who is meant
+/// The origin of a call of gRPC. Several headers `authorization` count as none, because the choice
 /// would depend on their order.
 CallOrigin OriginOf(const grpc::ServerContextBase& context);
 

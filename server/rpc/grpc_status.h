@@ -1,4 +1,4 @@
-// absl::Status as gRPC sends it.
+// Converts absl::Status to gRPC's status.
 #pragma once
 
 #include <grpcpp/server_context.h>

@@ -1,4 +1,4 @@
-// Asks a running server whether it serves: what a container's health check calls.
+// Checks whether a running server serves, for the health checks of containers.
 #pragma once
 
 #include <chrono>
@@ -9,15 +9,17 @@
 
 namespace partiemc::server {
 
-/// A check tells the server nothing that is secret, and believes it nothing but that it serves: it
-/// does not verify who the server is, so that it works by whatever name the server is asked.
+/// Does not verify the server's certificate, so that any name of the server works. A check sends no
+/// secret, and uses nothing of the response except the state.
 struct HealthCheckSecurity {
   bool tls = false;
-  /// Shown to a server that asks clients for a certificate; PEM files, or empty.
+  /// PEM files for a server that requires client certificates, or empty.
   std::string certificate_file, key_file;
 };
 
-/// OK if the server at `address` serves; otherwise a line that says what, where and why.
+/// OK if the server at `address` serves. Errors: UNAVAILABLE; INVALID_ARGUMENT if a file of
+/// `security` cannot be read. Each message is one line: problem, place, remedy. Blocks for at most
+/// `timeout`.
 absl::Status CheckHealth(const Address& address, std::chrono::milliseconds timeout,
                          const HealthCheckSecurity& security = {});
 

@@ -21,7 +21,7 @@ absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
   health::HealthCheckRequest request;
   if (auto status = ParseRequest(bytes, kMaxSmallRequestBytes, request); !status.ok())
     return status;
-  // Of the server as a whole, or of the one service that it is there for.
+  // An empty name stands for the whole server.
   if (!request.service().empty() && request.service() != ServiceName()) {
     return absl::NotFoundError("unknown service");
   }
@@ -33,16 +33,14 @@ absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
 
 }  // namespace
 
-HealthService::HealthService(const Authentication& authentication, OpeningCalls& opening,
-                             UnaryRegistry& calls, MemoryBudget& budget,
-                             const ConnectionTable& connections) {
-  Serve("/grpc.health.v1.Health/Check", [&, this](grpc::CallbackServerContext* context) {
+HealthService::HealthService(const ServerContext& context, const ConnectionTable& connections) {
+  Serve("/grpc.health.v1.Health/Check", [&, this](grpc::CallbackServerContext* server_context) {
     return new GrpcCall(
-        *context, connections, CallKind::kHealthCheck,
+        *server_context, connections, CallKind::kHealthCheck,
         [&, this](CallChannel& channel, const CallOrigin& origin) {
           return std::make_unique<UnaryCall>(
-              channel, /*meters=*/nullptr, AdmitProbe(authentication, origin), UnaryKind::kProbe,
-              opening, calls, budget, /*pool=*/nullptr,
+              ArrivedCall{channel, /*meters=*/nullptr, AdmitProbe(context.authentication, origin)},
+              context, UnaryKind::kProbe,
               [this](grpc::ByteBuffer& bytes, Worker*, auto&) { return Check(bytes, serving_); });
         });
   });

@@ -11,13 +11,13 @@
 namespace partiemc::server {
 namespace {
 
-// Peers that were listed and never asked for are forgotten beyond this number.
+// The list of peers is cleared, and read again, when it exceeds this number.
 constexpr std::size_t kMostListed = 20'000;
 
 using Text = std::unique_ptr<char, decltype(&gpr_free)>;
 
-// The value behind `"name":"` from `from` on, which moves behind it; empty where there is none.
-// channelz writes numbers as strings, and nothing that a client chooses.
+// The value after the next `"name":"` at or after `from`, which moves behind it; empty if there is
+// none. channelz writes numbers as strings, and no text of clients.
 std::string_view NextValue(std::string_view text, std::string_view name, std::size_t& from) {
   const std::string key = "\"" + std::string(name) + "\":\"";
   const auto at = text.find(key, from);

@@ -9,10 +9,10 @@
 
 namespace partiemc::server {
 
-/// By channelz, which gRPC keeps for every connection. For one thread.
+/// Uses channelz, which gRPC keeps for every connection. For one thread.
 class ChannelzStreams final : public StreamCounter {
  public:
-  /// Of the server that was built last in this process.
+  /// Reads the server that was built last in this process.
   ChannelzStreams();
 
   bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) override;
@@ -21,8 +21,8 @@ class ChannelzStreams final : public StreamCounter {
   std::int64_t Find(const std::string& peer);
 
   std::int64_t server_ = 0;
-  std::int64_t next_socket_ = 0;                // The first that was not listed yet.
-  std::map<std::string, std::int64_t> listed_;  // By peers; some may be gone.
+  std::int64_t next_socket_ = 0;                // The first one that is not listed.
+  std::map<std::string, std::int64_t> listed_;  // By peer; some may be closed.
 };
 
 }  // namespace partiemc::server

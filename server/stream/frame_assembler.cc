@@ -29,7 +29,7 @@ absl::Status PartTakenOver() {
                          "must be sent by one call of the stream"});
 }
 
-// "3, 7, 8 and 5 more". `parts` are those from part 1 on.
+// "3, 7, 8 and 5 more". `parts` starts with part 1.
 template <typename Parts>
 std::string NamesOfMissing(const Parts& parts, bool has_leader) {
   constexpr std::uint32_t kNamed = 8;
@@ -51,19 +51,19 @@ std::string NamesOfMissing(const Parts& parts, bool has_leader) {
 
 FrameAssembler::FrameAssembler(const Terms& terms)
     : terms_(terms),
-      members_(terms.parts - 1),
+      members_(other_parts()),
       next_(terms.next_sequence),
       wanted_(terms.next_sequence),
       resume_(terms.next_sequence) {}
 
 void FrameAssembler::SetLeader(std::weak_ptr<AssemblyMember> leader) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   leader_ = std::move(leader);
 }
 
 void FrameAssembler::LeaderSent(std::uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
-  if (sequence < next_ || sequence - next_ >= terms_.window) return;  // A number that is refused.
+  const MutexLock lock(mutex_);
+  if (sequence < next_ || sequence - next_ >= terms_.window) return;  // Will be refused.
   last_of_leader_ = std::max(last_of_leader_, sequence);
   while (!checkpoints_.empty() && sequence >= terms_.window &&
          checkpoints_.front() <= sequence - terms_.window) {
@@ -74,16 +74,16 @@ void FrameAssembler::LeaderSent(std::uint64_t sequence) {
 
 bool FrameAssembler::IsReady(std::uint64_t sequence, Clock::time_point since,
                              Clock::time_point now) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (sequence != next_ || now - since >= terms_.timeout) return true;
   const auto found = frames_.find(sequence);
-  if (found == frames_.end()) return members_.empty();
+  if (found == frames_.end()) return other_parts() == 0;
   const Gathered& frame = found->second;
-  return frame.is_over || frame.count == members_.size() || now - frame.since >= terms_.timeout;
+  return frame.is_over || frame.count == other_parts() || now - frame.since >= terms_.timeout;
 }
 
 std::uint64_t FrameAssembler::BytesOfNext() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = frames_.find(next_);
   return found == frames_.end() ? 0 : found->second.all_bytes;
 }
@@ -91,12 +91,12 @@ std::uint64_t FrameAssembler::BytesOfNext() const {
 absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> FrameAssembler::Take() {
   Gathered frame;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     wanted_ = next_ + 1;
     if (auto node = frames_.extract(next_)) frame = std::move(node.mapped());
   }
-  frame.parts.resize(members_.size());
-  if (frame.count == members_.size()) return std::move(frame.parts);
+  frame.parts.resize(other_parts());
+  if (frame.count == other_parts()) return std::move(frame.parts);
   return Missing(frame, !frame.is_over);
 }
 
@@ -109,8 +109,8 @@ absl::Status FrameAssembler::Missing(const Gathered& frame, bool has_leader) con
 }
 
 void FrameAssembler::Answered(std::uint64_t next_sequence, bool with_checkpoint) {
-  std::map<std::uint64_t, Gathered> over;  // Freed without the lock.
-  const std::lock_guard lock(mutex_);
+  std::map<std::uint64_t, Gathered> over;  // Freed after the lock is released.
+  const MutexLock lock(mutex_);
   next_ = next_sequence;
   wanted_ = std::max(wanted_, next_);
   while (!frames_.empty() && frames_.begin()->first < next_) {
@@ -135,7 +135,7 @@ std::vector<std::weak_ptr<AssemblyMember>> FrameAssembler::Calls() const {
 void FrameAssembler::TellMembers() {
   std::vector<std::weak_ptr<AssemblyMember>> calls;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     calls = Calls();
   }
   for (const auto& weak : calls) {
@@ -147,7 +147,7 @@ void FrameAssembler::End(const absl::Status& status) {
   std::vector<std::weak_ptr<AssemblyMember>> calls;
   std::map<std::uint64_t, Gathered> frames;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (std::exchange(ended_, true)) return;
     calls = Calls();
     frames.swap(frames_);
@@ -162,7 +162,7 @@ absl::StatusOr<FrameAssembler::Seat> FrameAssembler::Join(std::uint32_t part,
   Seat seat{.part = part};
   std::weak_ptr<AssemblyMember> former;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (ended_) return LeaderGone();
     DropAll(part);
     Member& place = members_[part - 1];
@@ -174,13 +174,13 @@ absl::StatusOr<FrameAssembler::Seat> FrameAssembler::Join(std::uint32_t part,
 }
 
 void FrameAssembler::Leave(const Seat& seat) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (seat.holder == 0 || members_[seat.part - 1].holder != seat.holder) return;
   members_[seat.part - 1] = {};
   DropAll(seat.part);
 }
 
-// The bytes stay with their call, so that little is freed under the lock.
+// Frees little under the lock, because the call still holds the bytes.
 void FrameAssembler::Drop(Gathered& frame, std::uint32_t part) {
   if (frame.parts[part - 1] == nullptr) return;
   frame.parts[part - 1] = nullptr;
@@ -193,7 +193,7 @@ void FrameAssembler::DropAll(std::uint32_t part) {
 }
 
 void FrameAssembler::Withdraw(const Seat& seat, std::uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (members_[seat.part - 1].holder != seat.holder) return;
   if (const auto found = frames_.find(sequence); found != frames_.end()) {
     Drop(found->second, seat.part);
@@ -234,39 +234,39 @@ absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std
                                    std::shared_ptr<const PartBytes> part, Clock::time_point now) {
   std::shared_ptr<AssemblyMember> leader;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (ended_ || members_[seat.part - 1].holder != seat.holder) {
       return absl::CancelledError("the call sends no part any more");
     }
     if (auto status = CheckOffer(seat.part, sequence, bytes); !status.ok()) return status;
     Gathered& frame = frames_.try_emplace(sequence, Gathered{.since = now}).first->second;
-    frame.parts.resize(members_.size());
-    frame.bytes.resize(members_.size());
+    frame.parts.resize(other_parts());
+    frame.bytes.resize(other_parts());
     frame.parts[seat.part - 1] = std::move(part);
     frame.bytes[seat.part - 1] = bytes;
     frame.all_bytes += bytes;
-    if (++frame.count == members_.size()) leader = leader_.lock();
+    if (++frame.count == other_parts()) leader = leader_.lock();
   }
   if (leader != nullptr) leader->LookAgain();
   return absl::OkStatus();
 }
 
 bool FrameAssembler::IsOver(std::uint64_t sequence, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (ended_ || sequence < next_) return true;
   const auto found = frames_.find(sequence);
-  if (found == frames_.end()) return false;  // It is being computed.
+  if (found == frames_.end()) return false;  // The frame is being computed.
   Gathered& frame = found->second;
   const bool has_leader = sequence <= last_of_leader_;
   if (!frame.is_over && !has_leader && now - frame.since >= terms_.timeout) {
-    for (std::uint32_t part = 1; part <= members_.size(); ++part) Drop(frame, part);
+    for (std::uint32_t part = 1; part <= other_parts(); ++part) Drop(frame, part);
     frame.is_over = true;
   }
   return frame.is_over;
 }
 
 absl::Status FrameAssembler::OutcomeOf(std::uint64_t sequence) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (sequence < next_) return absl::OkStatus();
   if (const auto found = frames_.find(sequence); found != frames_.end() && found->second.is_over) {
     return Missing(found->second, false);
@@ -276,12 +276,12 @@ absl::Status FrameAssembler::OutcomeOf(std::uint64_t sequence) const {
 }
 
 std::uint64_t FrameAssembler::next_wanted() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return wanted_;
 }
 
 std::uint64_t FrameAssembler::resume_sequence() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return resume_;
 }
 

@@ -10,8 +10,12 @@
 #include "fuzz/require.h"
 #include "fuzz/single_thread.h"
 #include "partiemc/status.h"
-#include "server/calls/stream_messages.h"
+#include "server/calls/reconstruct_call.h"
+#include "server/stream/opening_calls.h"
+#include "server/stream/unary_registry.h"
+#include "server/watch/result_history.h"
 #include "server/watch/watch_dispatcher.h"
+#include "server/watch/watch_registry.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::fuzz {
@@ -40,13 +44,15 @@ const server::ServerLimits& Limits() {
   return limits;
 }
 
-// Replaces a call: only the target itself reads and writes.
-class NoTransport final : public server::StreamTransport {
+// Reads and writes nothing: the target replaces the channel and the state machine.
+class NoChannel final : public server::CallChannel {
  public:
-  void StartRead(std::size_t) override {}
-  void StartWrite(Outgoing, std::size_t) override {}
-  void Cut() override {}
+  void StartRead(grpc::ByteBuffer*) override {}
+  void StartWrite(const grpc::ByteBuffer*) override {}
+  void Cancel() override {}
   void Finish(const absl::Status&) override {}
+  bool IsCancelled() const override { return false; }
+  std::string peer() const override { return "fuzz"; }
 };
 
 // Shared by all streams of the process. The pool gets no jobs.
@@ -59,31 +65,28 @@ struct Shared {
 
 class Stream {
  public:
-  explicit Stream(Shared& shared)
-      : shared_(shared),
-        messages_(Limits(), registry_, shared.dispatcher, keys_, /*origin=*/{}),
-        machine_(std::make_shared<server::StreamStateMachine>(
-            transport_, messages_, shared.pool, shared.budget, Limits().frames_in_flight)) {
-    RequireOk(registry_.Enter(machine_), "a first call is let in");
+  explicit Stream(Shared& shared) : shared_(shared) {}
+  ~Stream() {
+    call_.OnCancel();
+    call_.OnDone();
   }
-  ~Stream() { registry_.Leave(*machine_); }
 
   void Take(std::string_view bytes) {
     const std::size_t slot = taken_++ % Limits().frames_in_flight;
     const grpc::Slice slice(bytes.data(), bytes.size());
-    messages_.request(slot) = grpc::ByteBuffer(&slice, 1);
-    const RequestKind kind = messages_.Kind(slot);
+    call_.Request(slot) = grpc::ByteBuffer(&slice, 1);
+    const RequestKind kind = call_.OnRequestRead(slot);
     if (!is_open_ && kind == RequestKind::kOpen) {
       Open(slot);
     } else if (is_open_ && kind == RequestKind::kFrame) {
       Answer(slot);
     }
-    messages_.request(slot).Clear();
+    call_.Request(slot).Clear();
   }
 
  private:
   void Open(std::size_t slot) {
-    const absl::Status opened = messages_.Open(slot, *machine_);
+    const absl::Status opened = call_.Open(slot, call_.machine());
     is_open_ = opened.ok();
     if (!is_open_) {
       RequireViolation(opened);
@@ -93,7 +96,8 @@ class Stream {
   }
 
   void Answer(std::size_t slot) {
-    const server::Answered answered = messages_.Answer(slot, shared_.worker, machine_->cancelled());
+    const server::Answered answered =
+        call_.Answer(slot, shared_.worker, call_.machine().cancelled());
     if (answered.afterwards) answered.afterwards();
     const v1::ReconstructResponse response = Response(Outgoing::kAnswer, slot);
     Require(answered.is_result ? response.has_frame() : response.has_error(), "an answer is told");
@@ -106,19 +110,34 @@ class Stream {
 
   // Checks the response as the client receives it.
   v1::ReconstructResponse Response(Outgoing what, std::size_t slot) {
-    grpc::ByteBuffer bytes = messages_.response(what, slot);
-    messages_.Written(what, slot);
+    grpc::ByteBuffer bytes;
+    bytes.Swap(&call_.Response(what, slot));
     v1::ReconstructResponse response;
     Require(wire::MergeBytes(bytes, response), "an answer reads back");
     return response;
   }
 
   Shared& shared_;
-  NoTransport transport_;
   server::StreamRegistry registry_{Limits().max_streams};
   server::CurrentCheckpointKeys keys_;
-  server::StreamMessages messages_;
-  std::shared_ptr<server::StreamStateMachine> machine_;
+  server::Authentication authentication_;
+  server::OpeningCalls opening_{1};
+  server::UnaryRegistry unary_calls_{1};
+  server::WatchRegistry watchers_{1};
+  server::HistoryRoom history_{0, 0};
+  const server::ServerContext context_{.limits = Limits(),
+                                       .authentication = authentication_,
+                                       .checkpoint_keys = keys_,
+                                       .history = history_,
+                                       .opening = opening_,
+                                       .streams = registry_,
+                                       .unary_calls = unary_calls_,
+                                       .watchers = watchers_,
+                                       .dispatcher = shared_.dispatcher,
+                                       .budget = shared_.budget,
+                                       .pool = shared_.pool};
+  NoChannel channel_;
+  server::ReconstructCall call_{{channel_, nullptr, server::AdmittedCall{}}, context_};
   bool is_open_ = false;
   std::size_t taken_ = 0;
 };

@@ -190,6 +190,7 @@ TEST_F(Parts, TheEndOfPartZeroEndsTheOthers) {
   Ranks ranks(*server_, "tank", 2);
   ranks.SendAll(1);
   ranks.ExpectAnswered(1, expected_[0]);
+  EXPECT_TRUE(Eventually([&] { return Info().load().memory_held() == 0; }));
   ranks.Send(1, 2);  // Part 0 never sends this frame.
   EXPECT_TRUE(Eventually([&] { return Info().load().memory_held() > 0; }));
   ranks[0].HalfClose();

@@ -1,0 +1,35 @@
+// The parts of the server that calls share.
+#pragma once
+
+namespace partiemc::server {
+
+class Authentication;
+class ComputePool;
+class CurrentCheckpointKeys;
+class HistoryRoom;
+class MemoryBudget;
+class OpeningCalls;
+class Relay;
+class StreamRegistry;
+class UnaryRegistry;
+class WatchDispatcher;
+class WatchRegistry;
+struct ServerLimits;
+
+/// The context and its parts outlive the calls. All parts are thread-safe.
+struct ServerContext {
+  const ServerLimits& limits;
+  const Authentication& authentication;
+  const CurrentCheckpointKeys& checkpoint_keys;
+  const HistoryRoom& history;
+  OpeningCalls& opening;
+  StreamRegistry& streams;
+  UnaryRegistry& unary_calls;
+  WatchRegistry& watchers;
+  WatchDispatcher& dispatcher;
+  MemoryBudget& budget;
+  ComputePool& pool;
+  Relay* relay = nullptr;  ///< Null: only the streams of this server.
+};
+
+}  // namespace partiemc::server
