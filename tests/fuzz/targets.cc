@@ -9,6 +9,7 @@ std::span<const Target> AllTargets() {
       {"expressions", AttackExpressions},
       {"frame_message", AttackFrameMessage},
       {"frames", AttackFrames},
+      {"gateway_bytes", AttackGatewayBytes},
       {"lammps_dump", AttackLammpsDump},
       {"npy", AttackNpy},
       {"npz", AttackNpz},

@@ -36,6 +36,7 @@ Attack AttackTextTable;
 Attack AttackTokens;         // The token file of a server.
 Attack AttackVtk;            // Legacy VTK, VTP and VTU; only if VTK is built in.
 Attack AttackWatchRequests;  // A watcher's messages while results arrive.
+Attack AttackGatewayBytes;   // Connections to a running gateway.
 Attack AttackWebRequests;    // Headers of the gateway, whole or one by one.
 Attack AttackXyz;
 

@@ -44,8 +44,8 @@ class PartOfRank final : public PartBytes {};
 class Rank final : private StreamTransport, private StreamHandler {
  public:
   Rank(World& world, std::shared_ptr<FrameAssembler> assembler, PartsThere& there,
-       std::uint32_t part, std::uint64_t first, std::uint64_t bytes)
-      : bytes(bytes),
+       std::uint32_t part, std::uint64_t first, std::uint64_t message_bytes)
+      : bytes(message_bytes),
         world_(world),
         assembler_(std::move(assembler)),
         there_(there),

@@ -139,6 +139,14 @@ TEST_F(PartRefused, PART_DUPLICATE) {
   Ranks ranks(*server_, "tank", 2);
   ranks.Send(1, 1);
   ranks.Send(1, 1);
+  // Part 0 comes after both.
+  const std::uint64_t both = 2 * PartRequest(1, 2, 1, 1, 0, true).ByteSizeLong();
+  EXPECT_TRUE(Eventually([&] {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::GetServerInfoResponse info;
+    return stub_->GetServerInfo(&context, {}, &info).ok() && info.load().memory_held() >= both;
+  }));
   ranks.Send(0, 1);
   ranks.ExpectTaken(1, 1);
   ExpectError(ranks[1].Receive(), "PART_DUPLICATE",
