@@ -22,7 +22,7 @@ class Choices {
   T Take() {
     T value{};
     const std::size_t size = std::min(sizeof(T), rest_.size());
-    std::memcpy(&value, rest_.data(), size);
+    if (size > 0) std::memcpy(&value, rest_.data(), size);
     rest_ = rest_.subspan(size);
     return value;
   }
