@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/library/manual_clock.h"
+#include "support/manual_clock.h"
 
 namespace partiemc::client {
 namespace {
@@ -17,6 +17,8 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using support::FixedRandom;
+using support::ManualClock;
 using Outcome = RetryLoop::Outcome;
 
 // Attempts with planned results; the last result repeats. Waiting moves the clock.
