@@ -11,7 +11,8 @@ class MachineClock final : public Clock {
   std::chrono::system_clock::time_point TimeOfDay() const override {
     return std::chrono::system_clock::now();
   }
-  bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const override {
+  bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const override
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     return changed.WaitUntil(mutex, until);
   }
 };

@@ -22,7 +22,8 @@ class ManualClock final : public Clock {
   std::chrono::system_clock::time_point TimeOfDay() const override {
     return std::chrono::system_clock::time_point(Now().time_since_epoch());
   }
-  bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const override {
+  bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const override
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     {
       const std::lock_guard lock(mutex_);
       waiting_.insert(until);
