@@ -15,10 +15,10 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using support::FixedRandom;
 using support::ManualClock;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using Outcome = RetryLoop::Outcome;
 
 // Attempts with planned results; the last result repeats. Waiting moves the clock.
