@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/library/credentials.h"
 #include "common/address.h"
+#include "common/clock.h"
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
@@ -87,11 +88,11 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
 
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout) {
-  if (channel->WaitForConnected(std::chrono::system_clock::now() + timeout)) {
+  if (channel->WaitForConnected(SystemClock().TimeOfDay() + timeout)) {
     return absl::OkStatus();
   }
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kReasonTimeout);
+  context.set_deadline(SystemClock().TimeOfDay() + kReasonTimeout);
   v1::GetServerInfoResponse response;
   const auto stub = v1::ReconstructionService::NewStub(channel);
   const grpc::Status status = stub->GetServerInfo(&context, {}, &response);

@@ -10,6 +10,7 @@
 #include "client/library/frame_request.h"
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "common/stage_clock.h"
 #include "partiemc/arena.h"
@@ -56,16 +57,17 @@ class Worker final : public LocalStream {
  private:
   template <typename Particles>  // Frame or wire::FrameRows.
   absl::StatusOr<std::uint64_t> Submit(const Particles& frame, double time);
-  using OptionalTime = std::optional<CondVar::TimePoint>;
+  using OptionalTime = std::optional<Clock::TimePoint>;
 
-  static OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) {
-    return wait ? OptionalTime(CondVar::TimePoint::clock::now() + *wait) : std::nullopt;
+  OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) const {
+    return wait ? OptionalTime(clock_.Now() + *wait) : std::nullopt;
   }
   // Waits for a change, and returns false once `give_up` has passed.
   bool WaitUntil(OptionalTime give_up) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Run();
   void Process(const OwnedFrame& frame, Event& event);
 
+  const Clock& clock_ = SystemClock();
   const Reconstructor reconstructor_;
   const std::vector<std::string> attributes_;
   const std::optional<std::chrono::milliseconds> send_timeout_;
@@ -93,8 +95,8 @@ bool Worker::WaitUntil(OptionalTime give_up) {
     changed_.Wait(mutex_);
     return true;
   }
-  if (CondVar::TimePoint::clock::now() >= *give_up) return false;
-  changed_.WaitUntil(mutex_, *give_up);
+  if (clock_.Now() >= *give_up) return false;
+  clock_.WaitUntil(changed_, mutex_, *give_up);
   return true;
 }
 

@@ -21,14 +21,15 @@ class RejoiningWatch::Calls final : public Attempts {
   absl::Status Start(const std::string& address) override {
     const auto channel = MakeChannel(address, watch_.options_.credentials);
     if (!channel.ok()) return channel.status();
-    watch_.SetCall(std::make_shared<WatchCall>(*channel, address));
+    watch_.SetCall(std::make_shared<WatchCall>(*channel, address, watch_.clock_));
     watch_.call_->Start(watch_.stream_name_, watch_.options_, watch_.From());
     return absl::OkStatus();
   }
 
   absl::StatusOr<bool> Check(bool& retryable) override {
     WatchCall& call = *watch_.call_;
-    const auto opened = news_ ? *std::exchange(news_, {}) : call.WaitUntilOpened(Clock::now());
+    const auto opened =
+        news_ ? *std::exchange(news_, {}) : call.WaitUntilOpened(watch_.clock_.Now());
     if (!opened.ok()) {
       const std::string reason = call.reason();
       // Can change: the producer may still be reconnecting, and the lost call may still hold its
@@ -51,7 +52,8 @@ class RejoiningWatch::Calls final : public Attempts {
       news_ = watch_.call_->WaitUntilOpened(until);
     } else {
       const MutexLock lock(watch_.mutex_);
-      while (!watch_.cancelled_ && watch_.cancel_came_.WaitUntil(watch_.mutex_, until)) {
+      while (!watch_.cancelled_ &&
+             watch_.clock_.WaitUntil(watch_.cancel_came_, watch_.mutex_, until)) {
       }
     }
   }
@@ -73,10 +75,12 @@ absl::StatusOr<std::unique_ptr<Watcher>> Watcher::Open(std::string_view address,
 }
 
 RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_view stream_name,
-                               const WatcherOptions& options)
+                               const WatcherOptions& options, const TimeAndChance& surroundings)
     : stream_name_(stream_name),
       options_(options),
-      retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout) {}
+      clock_(*surroundings.clock),
+      retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout,
+             surroundings) {}
 
 // Tries all addresses. A server's refusal says more than an address without a server, so it is the
 // error that is returned.
@@ -98,9 +102,9 @@ absl::Status RejoiningWatch::ConnectAt(std::chrono::milliseconds connect_timeout
   if (!channel.ok()) return channel.status();
   if (auto status = client::Connect(*channel, address(), connect_timeout); !status.ok())
     return status;
-  SetCall(std::make_shared<WatchCall>(*channel, address()));
+  SetCall(std::make_shared<WatchCall>(*channel, address(), clock_));
   call_->Start(stream_name_, options_, From());
-  const auto opened = call_->WaitUntilOpened(Clock::now() + options_.deadline);
+  const auto opened = call_->WaitUntilOpened(clock_.Now() + options_.deadline);
   if (!opened.ok()) return opened.status();
   if (!*opened) return NotAccepted(address(), "watcher", options_.deadline);
   stream_ = call_->stream();
@@ -119,8 +123,8 @@ absl::StatusOr<Received> RejoiningWatch::Receive(WatchedFrame& frame,
 
 absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
     WatchedFrame& frame, std::optional<std::chrono::milliseconds> wait) {
-  std::optional<Clock::time_point> until;
-  if (wait) until = Clock::now() + *wait;
+  std::optional<TimePoint> until;
+  if (wait) until = clock_.Now() + *wait;
   for (;;) {
     if (!joined_) {
       const auto rejoined = Rejoin(until);
@@ -128,7 +132,7 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
     }
     std::optional<std::chrono::milliseconds> left;
     if (until) {
-      left = std::max(std::chrono::ceil<std::chrono::milliseconds>(*until - Clock::now()),
+      left = std::max(std::chrono::ceil<std::chrono::milliseconds>(*until - clock_.Now()),
                       std::chrono::milliseconds(0));
     }
     auto received = call_->Receive(frame, left);
@@ -189,7 +193,7 @@ bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   return true;
 }
 
-absl::StatusOr<Received> RejoiningWatch::Rejoin(std::optional<Clock::time_point> until) {
+absl::StatusOr<Received> RejoiningWatch::Rejoin(std::optional<TimePoint> until) {
   Calls calls(*this);
   const auto outcome = retry_.Run(calls, until);
   if (!outcome.ok()) return outcome.status();

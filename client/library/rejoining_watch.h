@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "client/library/retry_loop.h"
 #include "client/library/watch_call.h"
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "partiemc/client/watcher.h"
 
@@ -22,11 +23,11 @@ namespace partiemc::client {
 /// Used by one thread, except Cancel.
 class RejoiningWatch final : public Watcher {
  public:
-  using Clock = WatchCall::Clock;
+  using TimePoint = Clock::TimePoint;
 
   /// Requires: at least one address.
   RejoiningWatch(std::vector<std::string> addresses, std::string_view stream_name,
-                 const WatcherOptions& options);
+                 const WatcherOptions& options, const TimeAndChance& surroundings = {});
 
   /// Same as Watcher::Open. Must be called first.
   absl::Status Connect();
@@ -51,13 +52,14 @@ class RejoiningWatch final : public Watcher {
   bool Lose(const absl::StatusOr<Received>& received);
   // kEvent if the watch continues, kNothingYet if it has not rejoined at `until`. Errors end the
   // watch.
-  absl::StatusOr<Received> Rejoin(std::optional<Clock::time_point> until);
+  absl::StatusOr<Received> Rejoin(std::optional<TimePoint> until);
   void Account(WatchedFrame& frame);
   void SetCall(std::shared_ptr<WatchCall> call) ABSL_LOCKS_EXCLUDED(mutex_);
   const std::string& address() const { return retry_.address(); }
 
   const std::string stream_name_;
   const WatcherOptions options_;
+  const Clock& clock_;
 
   WatchedStream stream_;
   std::string lineage_;

@@ -29,7 +29,7 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
                  .max_tiles_per_frame = opened.limits().max_tiles_per_frame()}};
 }
 
-constexpr auto kNever = StreamCall::Clock::time_point::max();
+constexpr auto kNever = Clock::TimePoint::max();
 
 // Purpose for classifying the end of an open call. Only a resuming part 0 may wait for its former
 // call.
@@ -75,11 +75,14 @@ absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address,
   return ResumingStream::Open(address, options);
 }
 
-ResumingStream::ResumingStream(std::vector<std::string> addresses, const StreamOptions& options)
-    : options_(options), connector_(monitor_, std::move(addresses), options) {}
+ResumingStream::ResumingStream(std::vector<std::string> addresses, const StreamOptions& options,
+                               const TimeAndChance& surroundings)
+    : options_(options),
+      monitor_(surroundings),
+      connector_(monitor_, std::move(addresses), options) {}
 
-absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string_view address,
-                                                                     const StreamOptions& options) {
+absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(
+    std::string_view address, const StreamOptions& options, const TimeAndChance& surroundings) {
   std::vector<std::string> addresses{std::string(address)};
   addresses.insert(addresses.end(), options.fallback_addresses.begin(),
                    options.fallback_addresses.end());
@@ -87,7 +90,8 @@ absl::StatusOr<std::unique_ptr<ResumingStream>> ResumingStream::Open(std::string
     const auto channel = MakeChannel(one, options.credentials);
     if (!channel.ok()) return channel.status();
   }
-  std::unique_ptr<ResumingStream> stream(new ResumingStream(std::move(addresses), options));
+  std::unique_ptr<ResumingStream> stream(
+      new ResumingStream(std::move(addresses), options, surroundings));
   absl::Status status;
   {
     const MutexLock lock(stream->monitor_.mutex);
@@ -137,7 +141,7 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendArrays(const ParticleArrays& p
 absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& frame,
                                                        std::size_t particles) {
   if (auto fits = CheckParticleCount(particles, info_.limits); !fits.ok()) return fits;
-  const auto start = Clock::now();
+  const auto start = monitor_.Now();
   const MutexLock lock(monitor_.mutex);
   AssertShared();
   if (auto ready = WaitToSend(start, 0); !ready.ok()) return ready;
@@ -149,7 +153,7 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   }
   if (!request.ok()) return request.status();
   if (auto ready = WaitToSend(start, request->Length()); !ready.ok()) return ready;
-  if (all_answered()) due_since_ = Clock::now();
+  if (all_answered()) due_since_ = monitor_.Now();
   resend_.Add(*request);
   if (call_ != nullptr) call_->Queue(*std::move(request));
   return sequence;
@@ -178,7 +182,7 @@ std::optional<absl::Status> ResumingStream::FatalEnd() const {
   return std::move(loss.status);
 }
 
-absl::Status ResumingStream::WaitToSend(Clock::time_point start, std::uint64_t bytes) {
+absl::Status ResumingStream::WaitToSend(TimePoint start, std::uint64_t bytes) {
   const auto give_up = options_.send_timeout ? start + *options_.send_timeout : kNever;
   for (;;) {
     if (!failure_.ok()) return failure_;
@@ -188,10 +192,10 @@ absl::Status ResumingStream::WaitToSend(Clock::time_point start, std::uint64_t b
     const auto due = (call_ != nullptr ? std::max(start, adopted_at_)
                                        : start + options_.reconnect.give_up_after) +
                      options_.deadline;
-    const auto now = Clock::now();
+    const auto now = monitor_.Now();
     if (now >= due) return Fail(TooSlowToSend());
     if (now >= give_up) return SendTimeout(*options_.send_timeout);
-    monitor_.changed.WaitUntil(monitor_.mutex, std::min(due, give_up));
+    monitor_.WaitUntil(std::min(due, give_up));
   }
   if (resend_.bytes() + bytes <= options_.max_held_bytes) return absl::OkStatus();
   return ViolationError(
@@ -225,7 +229,7 @@ absl::Status ResumingStream::FinishSending() {
   if (finished_) return absl::OkStatus();
   if (auto end = FatalEnd()) return *std::move(end);
   finished_ = true;
-  if (all_answered()) due_since_ = Clock::now();
+  if (all_answered()) due_since_ = monitor_.Now();
   if (call_ != nullptr) call_->HalfClose();
   monitor_.changed.NotifyAll();
   return absl::OkStatus();
@@ -233,7 +237,7 @@ absl::Status ResumingStream::FinishSending() {
 
 absl::StatusOr<Received> ResumingStream::Receive(Event& event,
                                                  std::optional<std::chrono::milliseconds> wait) {
-  const auto until = wait ? OptionalTime(Clock::now() + *wait) : std::nullopt;
+  const auto until = wait ? OptionalTime(monitor_.Now() + *wait) : std::nullopt;
   const MutexLock lock(monitor_.mutex);
   auto received = Advance(event, until);
   if (!received.ok()) return Fail(received.status());
@@ -275,7 +279,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Event& event, OptionalTime unti
       continue;
     }
     const auto due = AnswerDue();
-    const auto now = Clock::now();
+    const auto now = monitor_.Now();
     if (due && now >= *due) {
       if (call_->reads_over()) {
         return absl::DataLossError(absl::StrCat("an answer of the server at ", call_->address(),
@@ -287,8 +291,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Event& event, OptionalTime unti
     }
     if (until && now >= *until) return Received::kNothingYet;
     if (due || until) {
-      monitor_.changed.WaitUntil(monitor_.mutex,
-                                 std::min(due.value_or(kNever), until.value_or(kNever)));
+      monitor_.WaitUntil(std::min(due.value_or(kNever), until.value_or(kNever)));
     } else {
       monitor_.changed.Wait(monitor_.mutex);
     }
@@ -434,7 +437,7 @@ void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
   call.SetWindow(window);
   // Until the call is the stream's, the sender only adds to the buffer, so frames stay in order.
   for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(resend_.at(k));
-  due_since_ = adopted_at_ = Clock::now();
+  due_since_ = adopted_at_ = monitor_.Now();
   call_ = std::move(opened.call);
   if (all_answered()) connector_.Recovered();
   if (!failure_.ok()) call_->Cancel();

@@ -33,8 +33,9 @@ namespace partiemc::client {
 class ResumingStream final : public Stream {
  public:
   /// As Stream::Open.
-  static absl::StatusOr<std::unique_ptr<ResumingStream>> Open(std::string_view address,
-                                                              const StreamOptions& options);
+  static absl::StatusOr<std::unique_ptr<ResumingStream>> Open(
+      std::string_view address, const StreamOptions& options,
+      const TimeAndChance& surroundings = {});
 
   const StreamInfo& info() const override { return info_; }
   absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
@@ -48,10 +49,11 @@ class ResumingStream final : public Stream {
   void Cancel() override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
 
  private:
-  using Clock = StreamCall::Clock;
-  using OptionalTime = std::optional<Clock::time_point>;
+  using TimePoint = Clock::TimePoint;
+  using OptionalTime = std::optional<TimePoint>;
 
-  ResumingStream(std::vector<std::string> addresses, const StreamOptions& options);
+  ResumingStream(std::vector<std::string> addresses, const StreamOptions& options,
+                 const TimeAndChance& surroundings);
 
   // Methods that require the mutex may release it while they wait. Receiver's thread:
   absl::Status OpenFirst() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
@@ -74,7 +76,7 @@ class ResumingStream final : public Stream {
   absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles)
       ABSL_LOCKS_EXCLUDED(monitor_.mutex);
   absl::Status Fail(absl::Status failure) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  absl::Status WaitToSend(Clock::time_point start, std::uint64_t bytes)
+  absl::Status WaitToSend(TimePoint start, std::uint64_t bytes)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   bool MaySend(std::uint64_t bytes) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   absl::Status TooSlowToSend() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
@@ -112,8 +114,8 @@ class ResumingStream final : public Stream {
   // All parts below this frame are over, as reported by call_.
   std::uint64_t over_below_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
   // Starts of deadlines.
-  Clock::time_point due_since_ ABSL_GUARDED_BY(monitor_.mutex);
-  Clock::time_point adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
+  TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);
+  TimePoint adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
   bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // FinishSending was called.
   absl::Status failure_ ABSL_GUARDED_BY(monitor_.mutex);   // Status that ended the stream.
 };

@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/library/backoff.h"
-#include "client/library/clock.h"
+#include "common/clock.h"
 #include "partiemc/client/stream.h"
 
 namespace partiemc::client {

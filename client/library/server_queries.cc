@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/library/channel.h"
+#include "common/clock.h"
 #include "partiemc/client/server_info.h"
 #include "partiemc/client/stream_list.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
@@ -22,7 +23,7 @@ class Query {
                                        const Credentials& credentials) {
     Query query;
     query.address_ = address;
-    query.until_ = std::chrono::system_clock::now() + deadline;
+    query.until_ = SystemClock().TimeOfDay() + deadline;
     const auto channel = ConnectedChannel(query.address_, credentials, deadline);
     if (!channel.ok()) return channel.status();
     query.stub_ = v1::ReconstructionService::NewStub(*channel);

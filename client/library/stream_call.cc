@@ -86,7 +86,7 @@ StreamCall::Response StreamCall::Take() {
 void StreamCall::Recycle(Response response) {
   spare_.push_back(std::move(response));
   if (reading_ != nullptr || window_ == 0) return;
-  progress_at_ = Clock::now();  // No read was pending, so the silence was not the server's.
+  progress_at_ = monitor_.Now();  // No read was pending, so the silence was not the server's.
   ReadNext();
 }
 
@@ -149,7 +149,7 @@ void StreamCall::OnWriteDone(bool ok) {
 
 void StreamCall::OnReadDone(bool ok) {
   const MutexLock lock(monitor_.mutex);
-  progress_at_ = Clock::now();
+  progress_at_ = monitor_.Now();
   if (ok) {
     if (IsAnswer(*reading_)) ++answered_;
     ready_.push_back(std::move(reading_));

@@ -20,15 +20,25 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
 
 namespace partiemc::client {
 
-/// Mutex shared by a stream and its calls, and the condition that signals changes.
+/// Shared by a stream and its calls: a mutex, the condition that signals changes, and the clock.
 struct Monitor {
+  using TimePoint = Clock::TimePoint;
+
+  explicit Monitor(const TimeAndChance& given) : surroundings(given) {}
+  TimePoint Now() const { return surroundings.clock->Now(); }
+  bool WaitUntil(TimePoint until) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
+    return surroundings.clock->WaitUntil(changed, mutex, until);
+  }
+
   Mutex mutex;
   CondVar changed;
+  const TimeAndChance surroundings;
 };
 
 /// A call that takes longer to end after its last message is treated as broken.
@@ -38,7 +48,7 @@ inline constexpr std::chrono::seconds kEndTimeout(1);
 class StreamCall final
     : private grpc::ClientBidiReactor<grpc::ByteBuffer, v1::ReconstructResponse> {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
   using Response = std::unique_ptr<v1::ReconstructResponse>;
 
   /// `monitor` must outlive the call.
@@ -73,7 +83,7 @@ class StreamCall final
   /// Responses that can be taken.
   std::size_t ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return ready_.size(); }
   /// Time of the last message from the server, or of the last resumed read.
-  Clock::time_point progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
+  TimePoint progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
     return progress_at_;
   }
   /// No response will follow; the status may still be pending.
@@ -112,7 +122,7 @@ class StreamCall final
   // Numbers of frames.
   std::uint64_t written_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
   std::uint64_t answered_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
-  Clock::time_point progress_at_ ABSL_GUARDED_BY(monitor_.mutex) = Clock::now();
+  TimePoint progress_at_ ABSL_GUARDED_BY(monitor_.mutex) = monitor_.Now();
   bool writing_ ABSL_GUARDED_BY(monitor_.mutex) = false;
   bool half_close_wanted_ ABSL_GUARDED_BY(monitor_.mutex) = false;
   bool half_closed_ ABSL_GUARDED_BY(monitor_.mutex) = false;

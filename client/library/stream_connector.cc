@@ -92,7 +92,7 @@ class StreamConnector::Calls final : public Attempts {
   }
 
   void Wait(TimePoint until) override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
-    connector_.monitor_.changed.WaitUntil(connector_.monitor_.mutex, until);
+    connector_.monitor_.WaitUntil(until);
   }
 
   // Requires: a call is open.
@@ -109,25 +109,26 @@ StreamConnector::StreamConnector(Monitor& monitor, std::vector<std::string> addr
                                  const StreamOptions& options)
     : monitor_(monitor),
       options_(options),
-      retry_(std::move(addresses), "stream", options.reconnect, options.connect_timeout) {}
+      retry_(std::move(addresses), "stream", options.reconnect, options.connect_timeout,
+             monitor.surroundings) {}
 
 absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew() {
   // Part 0 may come later than the others.
   const auto give_up_at =
-      Clock::now() + (options_.parts.part > 0 ? options_.deadline : options_.connect_timeout);
+      monitor_.Now() + (options_.parts.part > 0 ? options_.deadline : options_.connect_timeout);
   for (;; retry_.UseNextAddress()) {
     bool retryable = true;
     auto opened = OpenNewAt(give_up_at, retryable);
-    if (opened.ok() || !retryable || Clock::now() >= give_up_at) return opened;
-    const auto next = Clock::now() + kRest;
-    while (monitor_.changed.WaitUntil(monitor_.mutex, next)) {
+    if (opened.ok() || !retryable || monitor_.Now() >= give_up_at) return opened;
+    const auto next = monitor_.Now() + kRest;
+    while (monitor_.WaitUntil(next)) {
     }
   }
 }
 
-absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Clock::time_point give_up_at,
+absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(TimePoint give_up_at,
                                                                    bool& retryable) {
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up_at - Clock::now());
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up_at - monitor_.Now());
   absl::StatusOr<std::shared_ptr<grpc::Channel>> channel;
   absl::Status reached;
   {
@@ -142,9 +143,8 @@ absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(Clock::time_p
   if (!reached.ok()) return reached;
   Start(*std::move(channel));
   AssertAttemptLocked();
-  const auto due = Clock::now() + options_.deadline;
-  while (attempt_->ready() == 0 && !attempt_->done() &&
-         monitor_.changed.WaitUntil(monitor_.mutex, due)) {
+  const auto due = monitor_.Now() + options_.deadline;
+  while (attempt_->ready() == 0 && !attempt_->done() && monitor_.WaitUntil(due)) {
   }
   Calls calls(*this);
   calls.AssertLocked();
@@ -174,7 +174,7 @@ void StreamConnector::Lost(const Loss& loss, v1::ResumeStream resume) {
 }
 
 absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgain(
-    std::optional<Clock::time_point> until) {
+    std::optional<TimePoint> until) {
   Calls calls(*this);
   calls.AssertLocked();
   const auto outcome = retry_.Run(calls, until);

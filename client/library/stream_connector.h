@@ -21,7 +21,7 @@ namespace partiemc::client {
 /// release it while they wait.
 class StreamConnector {
  public:
-  using Clock = StreamCall::Clock;
+  using TimePoint = Clock::TimePoint;
 
   struct Opened {
     std::unique_ptr<StreamCall> call;
@@ -44,7 +44,7 @@ class StreamConnector {
   void Lost(const Loss& loss, v1::ResumeStream resume);
   /// Continues to reconnect: waits, connects, opens. Returns nothing if no call is open at `until`.
   /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after.
-  absl::StatusOr<std::optional<Opened>> OpenAgain(std::optional<Clock::time_point> until)
+  absl::StatusOr<std::optional<Opened>> OpenAgain(std::optional<TimePoint> until)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   /// Ends the loss: a new result was delivered.
   void Recovered() { retry_.Recovered(); }
@@ -65,7 +65,7 @@ class StreamConnector {
  private:
   class Calls;
 
-  absl::StatusOr<Opened> OpenNewAt(Clock::time_point give_up_at, bool& retryable)
+  absl::StatusOr<Opened> OpenNewAt(TimePoint give_up_at, bool& retryable)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   void Start(std::shared_ptr<grpc::Channel> channel) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   // States to the analysis that the attempt uses the same monitor. Checks nothing.

@@ -83,9 +83,9 @@ void WatchCall::Run(v1::WatchStreamRequest open) {
   changed_.NotifyAll();
 }
 
-absl::StatusOr<bool> WatchCall::WaitUntilOpened(Clock::time_point until) {
+absl::StatusOr<bool> WatchCall::WaitUntilOpened(TimePoint until) {
   const MutexLock lock(mutex_);
-  while (!HasNews() && changed_.WaitUntil(mutex_, until)) {
+  while (!HasNews() && clock_.WaitUntil(changed_, mutex_, until)) {
   }
   if (cancelled_) return absl::CancelledError("the watch was cancelled");
   if (ready_.empty() && !status_) return false;
@@ -133,12 +133,12 @@ absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
 
 WatchCall::Message WatchCall::TakeNext(std::optional<std::chrono::milliseconds> wait,
                                        absl::StatusOr<Received>& received) {
-  const auto until = Clock::now() + wait.value_or(std::chrono::milliseconds(0));
+  const auto until = clock_.Now() + wait.value_or(std::chrono::milliseconds(0));
   const MutexLock lock(mutex_);
   while (!HasNews()) {
     if (!wait) {
       changed_.Wait(mutex_);
-    } else if (!changed_.WaitUntil(mutex_, until) && !HasNews()) {
+    } else if (!clock_.WaitUntil(changed_, mutex_, until) && !HasNews()) {
       received = Received::kNothingYet;
       return nullptr;
     }

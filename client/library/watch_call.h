@@ -16,6 +16,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "partiemc/client/watcher.h"
 #include "partiemc/v1/reconstruction.grpc.pb.h"
@@ -26,10 +27,13 @@ namespace partiemc::client {
 /// Used by one thread, except Cancel.
 class WatchCall {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
 
-  WatchCall(const std::shared_ptr<grpc::Channel>& channel, std::string address)
-      : address_(std::move(address)), stub_(v1::ReconstructionService::NewStub(channel)) {}
+  /// Requires: `clock` outlives this.
+  WatchCall(const std::shared_ptr<grpc::Channel>& channel, std::string address, const Clock& clock)
+      : address_(std::move(address)),
+        clock_(clock),
+        stub_(v1::ReconstructionService::NewStub(channel)) {}
   /// Cancels.
   ~WatchCall();
 
@@ -38,7 +42,7 @@ class WatchCall {
              std::optional<std::uint64_t> from_sequence);
   /// Waits at most until `until`; true if the server has accepted the watcher. Errors: the server's
   /// refusal.
-  absl::StatusOr<bool> WaitUntilOpened(Clock::time_point until) ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::StatusOr<bool> WaitUntilOpened(TimePoint until) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Same as Watcher::Receive. Requires: open.
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
                                    std::optional<std::chrono::milliseconds> wait)
@@ -74,6 +78,7 @@ class WatchCall {
   absl::Status Broken(const char* what) const;
 
   const std::string address_;
+  const Clock& clock_;
   const std::unique_ptr<v1::ReconstructionService::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::WatchStreamRequest, v1::WatchStreamResponse>> rpc_;

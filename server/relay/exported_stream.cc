@@ -15,10 +15,11 @@ constexpr std::size_t kMaxFetchedBytes = std::size_t{4} << 20;
 }  // namespace
 
 ExportedStream::ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
-                               std::size_t max_bytes, RelayPort& port)
+                               std::size_t max_bytes, RelayPort& port, const Clock& clock)
     : id_(std::move(id)),
       broadcaster_(std::move(broadcaster)),
       port_(port),
+      clock_(clock),
       machine_(
           std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), max_bytes)) {}
 
@@ -99,7 +100,7 @@ bool ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
     told.set_value(violation->value);
     told.set_rule(violation->rule);
   }
-  ended_at_ = Clock::now();
+  ended_at_ = clock_.Now();
   return port_.Send(SubjectOfResults(id_), end_);
 }
 

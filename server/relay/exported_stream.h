@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "common/clock.h"
 #include "server/relay/relay_port.h"
 #include "server/watch/result_broadcaster.h"
 #include "server/watch/watch_state_machine.h"
@@ -22,11 +23,11 @@ namespace partiemc::server {
 class ExportedStream final : public std::enable_shared_from_this<ExportedStream>,
                              private WatchTransport {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
 
-  /// Requires: `port` lives until live() is false; held by shared_ptr.
+  /// Requires: `port` and `clock` live until live() is false; held by shared_ptr.
   ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
-                 std::size_t max_bytes, RelayPort& port);
+                 std::size_t max_bytes, RelayPort& port, const Clock& clock);
 
   /// Starts to publish new results.
   void Begin();
@@ -38,10 +39,10 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   bool live() const { return live_; }
 
   /// Sets the time until which another replica has requested results.
-  void WantedUntil(Clock::time_point until) { wanted_until_ = until; }
-  Clock::time_point wanted_until() const { return wanted_until_; }
+  void WantedUntil(TimePoint until) { wanted_until_ = until; }
+  TimePoint wanted_until() const { return wanted_until_; }
   /// The time at which its end was published. The end is repeated for each later fetch.
-  std::optional<Clock::time_point> ended_at() const { return ended_at_; }
+  std::optional<TimePoint> ended_at() const { return ended_at_; }
   /// Responds to `fetch` of `replica`.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
@@ -71,13 +72,14 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   const std::string id_;
   const std::shared_ptr<ResultBroadcaster> broadcaster_;
   RelayPort& port_;
+  const Clock& clock_;
   const std::shared_ptr<WatchStateMachine> machine_;
   std::shared_ptr<ExportedStream> self_;  // Keeps this alive while live_: the machine calls it.
   std::atomic<bool> live_ = false, opened_ = false;
-  Clock::time_point wanted_until_;
+  TimePoint wanted_until_;
   std::uint64_t last_published_ = 0;  // Result number.
   std::function<bool()> unsent_;
-  std::optional<Clock::time_point> ended_at_;
+  std::optional<TimePoint> ended_at_;
   relay::v1::RelayMessage end_;  // Set with ended_at_.
 };
 

@@ -28,7 +28,7 @@ constexpr char kNoAnswer[] =
 
 ImportedStream::ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
                                WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port,
-                               Clock::time_point now)
+                               TimePoint now)
     : stream_(std::move(stream)),
       from_sequence_(from_sequence),
       limits_(limits),
@@ -45,13 +45,12 @@ ImportedStream::ImportedStream(RemoteStream stream, std::optional<std::uint64_t>
   Fetch(now);
 }
 
-bool ImportedStream::IsIdle(Clock::time_point now) const {
+bool ImportedStream::IsIdle(TimePoint now) const {
   return await_.empty() && broadcaster_->watcher_count() == 0 &&
          (ended_ || now - watched_ > kLinger);
 }
 
-bool ImportedStream::Covers(std::optional<std::uint64_t> from_sequence,
-                            Clock::time_point now) const {
+bool ImportedStream::Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const {
   if (ended_) return false;
   if (!from_sequence || limits_.history == nullptr) return true;
   // A second import could not hold the requested history either.
@@ -67,7 +66,7 @@ void ImportedStream::Await(Ready ready) {
 }
 
 // Each fetch has its own number, which its responses repeat.
-void ImportedStream::Fetch(Clock::time_point now) {
+void ImportedStream::Fetch(TimePoint now) {
   fetching_ = true;
   heard_ = wanted_ = now;
   fetch_.set_stream_id(stream_.id());
@@ -77,7 +76,7 @@ void ImportedStream::Fetch(Clock::time_point now) {
   port_.Send(SubjectOfAsking(stream_.replica), message);
 }
 
-void ImportedStream::FetchFrom(std::uint64_t number, Clock::time_point now) {
+void ImportedStream::FetchFrom(std::uint64_t number, TimePoint now) {
   fetch_.set_number(number);
   Fetch(now);
 }
@@ -86,7 +85,7 @@ void ImportedStream::SetOldest(std::uint64_t sequence) {
   if (limits_.history != nullptr) broadcaster_->SetOldestElsewhere(sequence);
 }
 
-void ImportedStream::OnMessage(relay::v1::Result& result, Clock::time_point now) {
+void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
   if (ended_ || result.number() == 0) return;
   if (result.fetch() == fetch_.fetch()) heard_ = now;
   SetOldest(result.oldest_sequence());
@@ -107,7 +106,7 @@ void ImportedStream::OnMessage(relay::v1::Result& result, Clock::time_point now)
   if (!fetching_) FetchFrom(next_number_, now);
 }
 
-void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, Clock::time_point now) {
+void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, TimePoint now) {
   if (ended_) return;
   if (end.gone()) {
     return Lost({std::string(kReasonProducerLost), "the producer has gone", {}}, now);
@@ -131,7 +130,7 @@ void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, Clock::time_point
 }
 
 // Missing results up to `number` cannot be fetched any more.
-void ImportedStream::FetchEnded(std::uint64_t last_number, Clock::time_point now) {
+void ImportedStream::FetchEnded(std::uint64_t last_number, TimePoint now) {
   fetching_ = false;
   DeliverUpTo(last_number);
   DeliverWaiting(now);
@@ -159,14 +158,14 @@ void ImportedStream::Deliver(Published published) {
   broadcaster_->PublishNumbered(std::move(published));
 }
 
-void ImportedStream::DeliverWaiting(Clock::time_point now) {
+void ImportedStream::DeliverWaiting(TimePoint now) {
   while (!waiting_.empty() && waiting_.begin()->first <= next_number_) {
     DeliverUpTo(waiting_.begin()->first);
   }
   if (!waiting_.empty() && !fetching_) FetchFrom(next_number_, now);
 }
 
-void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, Clock::time_point now) {
+void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, TimePoint now) {
   if (ended_) return;
   if (fetching_ || next_number_ <= end.last_number()) {
     const bool asked = fetching_;
@@ -189,7 +188,7 @@ void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, Clock::time_poin
   End(told);
 }
 
-void ImportedStream::FetchAgain(Clock::time_point now) {
+void ImportedStream::FetchAgain(TimePoint now) {
   if (ended_) return;
   if (!fetching_) return FetchFrom(next_number_, now);
   Fetch(now);
@@ -203,7 +202,7 @@ void ImportedStream::End(const WatchEnd& end) {
 }
 
 // Ends the import without waiting for pending fetches. The end may already be known.
-void ImportedStream::Lost(const WatchEnd& otherwise, Clock::time_point now) {
+void ImportedStream::Lost(const WatchEnd& otherwise, TimePoint now) {
   if (ended_) return;
   if (end_) FetchEnded(end_->last_number(), now);
   End(otherwise);
@@ -219,7 +218,7 @@ void ImportedStream::AnswerWaiting(const absl::Status& status) {
   for (const Ready& ready : std::exchange(await_, {})) ready(status);
 }
 
-void ImportedStream::Tick(Clock::time_point now, bool connected) {
+void ImportedStream::Tick(TimePoint now, bool connected) {
   if (!await_.empty() || broadcaster_->watcher_count() > 0) watched_ = now;
   if (ended_) return;
   if (fetching_ && now - heard_ > kFetchPatience && (connected || !ready_)) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "common/clock.h"
 #include "server/relay/relay_port.h"
 #include "server/relay/stream_directory.h"
 #include "server/watch/result_broadcaster.h"
@@ -22,7 +23,7 @@ namespace partiemc::server {
 /// results are fetched; results that have left the history count as dropped.
 class ImportedStream {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
   /// Called once, when the stream can be joined or with the error.
   using Ready = std::function<void(const absl::Status& status)>;
 
@@ -35,41 +36,40 @@ class ImportedStream {
 
   /// Fetches the history from `from_sequence`, or the newest result.
   ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
-                 WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port,
-                 Clock::time_point now);
+                 WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port, TimePoint now);
 
   const RemoteStream& stream() const { return stream_; }
   const std::shared_ptr<ResultBroadcaster>& broadcaster() const { return broadcaster_; }
   bool ended() const { return ended_; }
   /// Whether it has had no watcher for long enough to be deleted.
-  bool IsIdle(Clock::time_point now) const;
+  bool IsIdle(TimePoint now) const;
 
   /// Whether a watcher from `from_sequence` gets the same results here as at the owner.
-  bool Covers(std::optional<std::uint64_t> from_sequence, Clock::time_point now) const;
+  bool Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const;
   void Await(Ready ready);
 
-  void OnMessage(relay::v1::Result& result, Clock::time_point now);
-  void OnMessage(const relay::v1::FetchEnd& end, Clock::time_point now);
-  void OnMessage(const relay::v1::StreamEnd& end, Clock::time_point now);
+  void OnMessage(relay::v1::Result& result, TimePoint now);
+  void OnMessage(const relay::v1::FetchEnd& end, TimePoint now);
+  void OnMessage(const relay::v1::StreamEnd& end, TimePoint now);
   /// Fetches results and the end that may have been lost.
-  void FetchAgain(Clock::time_point now);
+  void FetchAgain(TimePoint now);
   /// The replica does not respond any more. Ends with the end that it reported, or with
   /// `otherwise`.
-  void Lost(const WatchEnd& otherwise, Clock::time_point now);
+  void Lost(const WatchEnd& otherwise, TimePoint now);
   /// Ends the stream.
   void End(const WatchEnd& end);
   /// Fails all pending joins.
   void Refuse(const absl::Status& status) { AnswerWaiting(status); }
   /// Called periodically.
-  void Tick(Clock::time_point now, bool connected);
+  void Tick(TimePoint now, bool connected);
 
  private:
-  void Fetch(Clock::time_point now);
-  void FetchFrom(std::uint64_t number, Clock::time_point now);
-  void FetchEnded(std::uint64_t last_number, Clock::time_point now);
+  void Fetch(TimePoint now);
+  void FetchFrom(std::uint64_t number, TimePoint now);
+  void FetchEnded(std::uint64_t last_number, TimePoint now);
   void Deliver(Published published);
   void DeliverUpTo(std::uint64_t number);
-  void DeliverWaiting(Clock::time_point now);
+  void DeliverWaiting(TimePoint now);
   void Fail(const absl::Status& status);
   void AnswerWaiting(const absl::Status& status);
   void SetOldest(std::uint64_t sequence);
@@ -88,7 +88,7 @@ class ImportedStream {
   relay::v1::Fetch fetch_;  // The latest fetch.
   bool fetching_ = false;
   std::optional<relay::v1::StreamEnd> end_;  // Delivered after all results.
-  Clock::time_point began_, heard_, wanted_, watched_;
+  TimePoint began_, heard_, wanted_, watched_;
 };
 
 }  // namespace partiemc::server

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -53,32 +52,18 @@ constexpr char kOnlyHere[] =
     "must be the name of an open stream of this server: NATS cannot be reached, so that those of "
     "other replicas cannot be watched here; try again";
 
-std::string NewReplicaName() {
-  std::random_device random;
-  return absl::StrCat(absl::Hex(random(), absl::kZeroPad8), absl::Hex(random(), absl::kZeroPad8));
-}
-
-// Wall-clock time, comparable between replicas.
-std::int64_t UnixMs(std::chrono::steady_clock::time_point time) {
-  const auto ago = std::chrono::steady_clock::now() - time;
-  return std::chrono::floor<milliseconds>(
-             (std::chrono::system_clock::now() -
-              std::chrono::duration_cast<std::chrono::system_clock::duration>(ago))
-                 .time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
 Relay::Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
-             const Limits& limits, std::string address)
-    : replica_(NewReplicaName()),
+             const Limits& limits, std::string address, const TimeAndChance& surroundings)
+    : clock_(*surroundings.clock),
+      replica_(absl::StrCat(absl::Hex(surroundings.random->Next(), absl::kZeroPad16))),
       address_(std::move(address)),
       limits_(limits),
       registry_(registry),
       dispatcher_(dispatcher),
       bus_(std::move(bus)),
-      queue_(std::make_shared<RelayQueue>(kQueueBytes)),
+      queue_(std::make_shared<RelayQueue>(kQueueBytes, clock_)),
       joiner_(std::max(kMaxMessageBytes, limits.watcher_bytes + kPieceBytes)),
       thread_([this] { Run(); }) {
   pthread_setname_np(thread_.native_handle(), "relay");
@@ -101,6 +86,13 @@ bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
   return sent;
 }
 
+// Time of day, comparable between replicas.
+std::int64_t Relay::UnixMs(TimePoint time) const {
+  const auto ago =
+      std::chrono::duration_cast<std::chrono::system_clock::duration>(clock_.Now() - time);
+  return std::chrono::floor<milliseconds>((clock_.TimeOfDay() - ago).time_since_epoch()).count();
+}
+
 void Relay::Run() {
   using Queue = RelayQueue;
   subscriptions_.push_back(queue_->Listen(*bus_, kReplicasSubject, Queue::kNews));
@@ -111,7 +103,7 @@ void Relay::Run() {
     for (const auto& action : work.actions) action();
     for (const std::string& piece : work.messages[Queue::kNews]) Take(piece);
     for (const std::string& piece : work.messages[Queue::kAsked]) OnAskedPiece(piece);
-    const auto now = Clock::now();
+    const auto now = clock_.Now();
     if (work.actions.empty() || now - answered_ >= kAnswerEvery) AnswerNextFetch(now);
     if (std::exchange(was_asked_, false)) Announce(now, false, false);
     if (changed_ || now - ticked_ >= kTickEvery || draining_since_) Tick(now);
@@ -120,7 +112,7 @@ void Relay::Run() {
   imports_.clear();
 }
 
-void Relay::Tick(Clock::time_point now) {
+void Relay::Tick(TimePoint now) {
   ticked_ = now;
   CheckConnection(now);
   if (registry_.changes() != local_changes_) {
@@ -136,7 +128,7 @@ void Relay::Tick(Clock::time_point now) {
   if (draining_since_) GoOnDraining(now);
 }
 
-void Relay::CheckConnection(Clock::time_point now) {
+void Relay::CheckConnection(TimePoint now) {
   const bool is_connected = bus_->connected();
   if (is_connected && !connected_) {
     connected_since_ = now;
@@ -168,7 +160,7 @@ void Relay::CheckConnection(Clock::time_point now) {
   }
 }
 
-void Relay::Announce(Clock::time_point now, bool asks, bool leaving) {
+void Relay::Announce(TimePoint now, bool asks, bool leaving) {
   announced_ = now;
   if (has_drained_ || (!connected_ && !bus_->connected())) return;
   relay::v1::RelayMessage message;
@@ -231,7 +223,7 @@ void Relay::EndTakenOver() {
   }
 }
 
-bool Relay::WasResumedElsewhere(std::string_view lineage, Clock::time_point opened) const {
+bool Relay::WasResumedElsewhere(std::string_view lineage, TimePoint opened) const {
   const auto elsewhere = directory_.FindLineage(lineage);
   return elsewhere && elsewhere->stream.opened_unix_ms() > UnixMs(opened);
 }
@@ -249,7 +241,7 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
   });
 }
 
-void Relay::LookAtExports(Clock::time_point now) {
+void Relay::LookAtExports(TimePoint now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
     // While the bus is disconnected, no replica can request results.
@@ -268,7 +260,7 @@ void Relay::LookAtExports(Clock::time_point now) {
   exported_count_ = exports_.size();
 }
 
-void Relay::LookAtImports(Clock::time_point now) {
+void Relay::LookAtImports(TimePoint now) {
   for (Import& import : imports_) {
     const RemoteStream& remote = import.stream->stream();
     import.stream->Tick(now, connected_);
@@ -292,7 +284,7 @@ void Relay::Lost(const std::string& replica) {
   for (Import& import : imports_) {
     if (import.stream->stream().replica != replica) continue;
     import.stream->Lost({std::string(kReasonProducerLost), "the server of the stream was lost", {}},
-                        Clock::now());
+                        clock_.Now());
   }
 }
 
@@ -300,7 +292,7 @@ void Relay::Take(const std::string& piece) {
   const auto whole = joiner_.Add(piece);
   relay::v1::RelayMessage message;
   if (!whole || !message.ParseFromString(*whole) || message.replica() == replica_) return;
-  const auto now = Clock::now();
+  const auto now = clock_.Now();
   const auto tell = [&](const std::string& id, auto action) {
     for (Import& import : imports_) {
       const RemoteStream& remote = import.stream->stream();
@@ -332,7 +324,7 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
     directory_.Left(replica);
     return Lost(replica);
   }
-  const auto now = Clock::now();
+  const auto now = clock_.Now();
   if (directory_.Announced(replica, announcement, now)) changed_ = true;
   // One announcement answers all pending requests. While this server drains, the next announcement
   // reports that it leaves, after the ends of its streams.
@@ -350,12 +342,12 @@ void Relay::OnAskedPiece(const std::string& piece) {
     return;
   }
   const auto exported = exports_.find(message.fetch().stream_id());
-  if (exported != exports_.end()) exported->second->WantedUntil(Clock::now() + kExportLease);
+  if (exported != exports_.end()) exported->second->WantedUntil(clock_.Now() + kExportLease);
   fetches_.Add(message.replica(), message.fetch());
   dropped_fetches_ = fetches_.dropped();
 }
 
-void Relay::AnswerNextFetch(Clock::time_point now) {
+void Relay::AnswerNextFetch(TimePoint now) {
   answered_ = now;
   if (const auto next = fetches_.TakeNext()) Answer(next->replica, next->fetch);
 }
@@ -366,12 +358,13 @@ void Relay::Answer(const std::string& replica, const relay::v1::Fetch& fetch) {
   auto exported = exports_.find(fetch.stream_id());
   const bool is_over = exported == exports_.end() || !exported->second->live();
   if (local != local_.end() && is_over && !draining_since_) {
-    exported = exports_
-                   .insert_or_assign(fetch.stream_id(),
-                                     std::make_shared<ExportedStream>(
-                                         fetch.stream_id(), local->second.broadcaster,
-                                         limits_.watcher_bytes, static_cast<RelayPort&>(*this)))
-                   .first;
+    exported =
+        exports_
+            .insert_or_assign(fetch.stream_id(),
+                              std::make_shared<ExportedStream>(
+                                  fetch.stream_id(), local->second.broadcaster,
+                                  limits_.watcher_bytes, static_cast<RelayPort&>(*this), clock_))
+            .first;
     exported->second->Begin();
   }
   if (exported == exports_.end()) {
@@ -383,7 +376,7 @@ void Relay::Answer(const std::string& replica, const relay::v1::Fetch& fetch) {
     Send(SubjectOfAnswers(replica), message);
     return;
   }
-  exported->second->WantedUntil(Clock::now() + kExportLease);
+  exported->second->WantedUntil(clock_.Now() + kExportLease);
   exported->second->Retry();
   exported->second->Answer(fetch, replica);
 }
@@ -395,7 +388,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
       [this, search = Search{
                  .name = name, .from_sequence = from_sequence, .done = std::move(done)}]() mutable {
         if (draining_since_) return search.done(DrainingError());
-        const auto now = Clock::now();
+        const auto now = clock_.Now();
         // A replica that has just connected does not know the others yet.
         const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
         search.began = now;
@@ -411,7 +404,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
       });
 }
 
-bool Relay::TryFind(const Search& search, Clock::time_point now) {
+bool Relay::TryFind(const Search& search, TimePoint now) {
   const auto remote = directory_.FindName(search.name);
   // A stream that was resumed here is local.
   const auto is_here = [&](const auto& item) {
@@ -423,7 +416,7 @@ bool Relay::TryFind(const Search& search, Clock::time_point now) {
   return true;
 }
 
-void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_point now) {
+void Relay::Watch(const RemoteStream& remote, const Search& search, TimePoint now) {
   const auto begun = std::ranges::find_if(imports_, [&](const Import& import) {
     return import.stream->stream().id() == remote.id() &&
            import.stream->Covers(search.from_sequence, now);
@@ -450,7 +443,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, Clock::time_
   });
 }
 
-void Relay::LookAtSearches(Clock::time_point now) {
+void Relay::LookAtSearches(TimePoint now) {
   // The stream may have been announced just now.
   if (!searches_.empty() && connected_ && now - asked_ > kAskEvery) {
     asked_ = now;
@@ -478,12 +471,12 @@ void Relay::WillDrain() {
 void Relay::Drain() {
   std::call_once(drain_once_, [this] {
     refuses_ = true;
-    Post([this] { draining_since_ = Clock::now(); });
+    Post([this] { draining_since_ = clock_.Now(); });
     drained_.get_future().wait_for(kLongestDrain);
   });
 }
 
-void Relay::GoOnDraining(Clock::time_point now) {
+void Relay::GoOnDraining(TimePoint now) {
   if (has_drained_) return;
   for (const Search& search : std::exchange(searches_, {})) search.done(DrainingError());
   for (Import& import : imports_) import.stream->Refuse(DrainingError());

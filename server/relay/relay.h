@@ -19,6 +19,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "common/clock.h"
 #include "server/relay/exported_stream.h"
 #include "server/relay/fetch_queue.h"
 #include "server/relay/imported_stream.h"
@@ -37,7 +38,7 @@ namespace partiemc::server {
 /// nor a drain for long.
 class Relay final : private RelayPort {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
 
   struct Limits {
     ResultBroadcaster::Limits broadcaster;  ///< For streams of other replicas.
@@ -49,7 +50,7 @@ class Relay final : private RelayPort {
   /// Requires: all references outlive this. `address` is announced to the other replicas as the
   /// address of this server for clients; empty: none.
   Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
-        const Limits& limits, std::string address = {});
+        const Limits& limits, std::string address = {}, const TimeAndChance& surroundings = {});
   ~Relay() override;
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
@@ -66,7 +67,7 @@ class Relay final : private RelayPort {
   /// (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
   void Find(const std::string& name, std::optional<std::uint64_t> from_sequence, FindDone done);
   /// Whether another replica has opened the stream with this lineage later than `opened`.
-  bool WasResumedElsewhere(std::string_view lineage, Clock::time_point opened) const;
+  bool WasResumedElsewhere(std::string_view lineage, TimePoint opened) const;
   /// At most `count` streams of other replicas with ids above `after`, in the order of ids, that
   /// `caller` may use. Without streams that were resumed here.
   std::vector<relay::v1::LiveStream> List(const std::string& after, std::size_t count,
@@ -103,37 +104,40 @@ class Relay final : private RelayPort {
   struct Import {
     std::unique_ptr<ImportedStream> stream;
     std::unique_ptr<MessageBus::Subscription> results;
-    std::optional<Clock::time_point> missing_since;  // Since when its replica does not announce it.
+    std::optional<TimePoint> missing_since;  // Since when its replica does not announce it.
   };
   struct Search {
     std::string name;
     std::optional<std::uint64_t> from_sequence;
     FindDone done;
-    Clock::time_point began = {}, settled = {}, until = {};
+    TimePoint began = {}, settled = {}, until = {};
   };
 
   void Post(std::function<void()> action) override;
   bool Send(const std::string& subject, relay::v1::RelayMessage& message) override;
 
+  std::int64_t UnixMs(TimePoint time) const;
+
   void Run();
-  void Tick(Clock::time_point now);
-  void CheckConnection(Clock::time_point now);
-  void Announce(Clock::time_point now, bool asks, bool leaving);
+  void Tick(TimePoint now);
+  void CheckConnection(TimePoint now);
+  void Announce(TimePoint now, bool asks, bool leaving);
   void LookAtLocalStreams();
-  void LookAtExports(Clock::time_point now);
-  void LookAtImports(Clock::time_point now);
+  void LookAtExports(TimePoint now);
+  void LookAtImports(TimePoint now);
   void EndTakenOver();
   void Lost(const std::string& replica);
   void Take(const std::string& piece);
   void Take(const std::string& replica, const relay::v1::Announcement& announcement);
   void OnAskedPiece(const std::string& piece);
-  void AnswerNextFetch(Clock::time_point now);
+  void AnswerNextFetch(TimePoint now);
   void Answer(const std::string& replica, const relay::v1::Fetch& fetch);
-  bool TryFind(const Search& search, Clock::time_point now);
-  void Watch(const RemoteStream& remote, const Search& search, Clock::time_point now);
-  void LookAtSearches(Clock::time_point now);
-  void GoOnDraining(Clock::time_point now);
+  bool TryFind(const Search& search, TimePoint now);
+  void Watch(const RemoteStream& remote, const Search& search, TimePoint now);
+  void LookAtSearches(TimePoint now);
+  void GoOnDraining(TimePoint now);
 
+  const Clock& clock_;
   const std::string replica_;  // Unique for this process.
   const std::string address_;
   const Limits limits_;
@@ -160,9 +164,9 @@ class Relay final : private RelayPort {
   bool changed_ = false;      // The set of streams has changed, here or at another replica.
   bool was_asked_ = false;    // Another replica has requested an announcement.
   bool will_drain_ = false;
-  const Clock::time_point began_ = Clock::now();
-  Clock::time_point announced_, asked_, ticked_, answered_, disconnected_ = began_;
-  std::optional<Clock::time_point> connected_since_, draining_since_;
+  const TimePoint began_ = clock_.Now();
+  TimePoint announced_, asked_, ticked_, answered_, disconnected_ = began_;
+  std::optional<TimePoint> connected_since_, draining_since_;
   std::promise<void> drained_;
   bool has_drained_ = false;
   std::once_flag drain_once_;

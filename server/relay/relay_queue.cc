@@ -29,11 +29,11 @@ std::unique_ptr<MessageBus::Subscription> RelayQueue::Listen(MessageBus& bus,
 }
 
 bool RelayQueue::Take(std::chrono::milliseconds patience, Work& work) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto deadline = clock_.Now() + patience;
   const MutexLock lock(mutex_);
   while (!stopped_ && work_.actions.empty() &&
          std::ranges::all_of(work_.messages, &std::deque<std::string>::empty) &&
-         came_.WaitUntil(mutex_, deadline)) {
+         clock_.WaitUntil(came_, mutex_, deadline)) {
   }
   if (stopped_ && work_.actions.empty()) return false;
   std::swap(work.actions, work_.actions);

@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "server/relay/message_bus.h"
 
@@ -35,8 +36,9 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
     std::array<std::deque<std::string>, kLanes> messages;
   };
 
-  /// Drops messages of a lane while it holds its `max_bytes`.
-  explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes) : max_bytes_(max_bytes) {}
+  /// Drops messages of a lane while it holds its `max_bytes`. Requires: `clock` lives during Take.
+  explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes, const Clock& clock = SystemClock())
+      : max_bytes_(max_bytes), clock_(clock) {}
 
   void Post(std::function<void()> action) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Queues the messages of `subject`. Returns null if memory is exhausted.
@@ -53,6 +55,7 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
 
  private:
   const std::array<std::size_t, kLanes> max_bytes_;
+  const Clock& clock_;
   mutable Mutex mutex_;
   CondVar came_;
   Work work_ ABSL_GUARDED_BY(mutex_);

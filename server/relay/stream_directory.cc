@@ -22,8 +22,7 @@ std::string AddressOf(const relay::v1::Announcement& announcement) {
 }  // namespace
 
 bool StreamDirectory::Announced(const std::string& replica,
-                                const relay::v1::Announcement& announcement,
-                                Clock::time_point now) {
+                                const relay::v1::Announcement& announcement, TimePoint now) {
   std::map<std::string, relay::v1::LiveStream> streams;
   for (const auto& stream : announcement.streams()) {
     streams.insert_or_assign(stream.summary().stream_id(), stream);
@@ -44,7 +43,7 @@ void StreamDirectory::Left(const std::string& replica) {
   replicas_.erase(replica);
 }
 
-std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
+std::vector<std::string> StreamDirectory::Expire(TimePoint before) {
   std::vector<std::string> gone;
   const MutexLock lock(mutex_);
   for (auto it = replicas_.begin(); it != replicas_.end();) {
@@ -58,7 +57,7 @@ std::vector<std::string> StreamDirectory::Expire(Clock::time_point before) {
   return gone;
 }
 
-void StreamDirectory::Refresh(Clock::time_point now) {
+void StreamDirectory::Refresh(TimePoint now) {
   const MutexLock lock(mutex_);
   for (auto& [name, replica] : replicas_) replica.heard = now;
 }
@@ -72,7 +71,7 @@ std::vector<std::string> StreamDirectory::Addresses(std::size_t count) const {
   return {addresses.begin(), addresses.end()};
 }
 
-bool StreamDirectory::HaveAllAnnouncedSince(Clock::time_point since) const {
+bool StreamDirectory::HaveAllAnnouncedSince(TimePoint since) const {
   const MutexLock lock(mutex_);
   return std::ranges::all_of(replicas_,
                              [since](const auto& item) { return item.second.announced >= since; });

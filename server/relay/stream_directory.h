@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/functional/function_ref.h"
+#include "common/clock.h"
 #include "common/mutex.h"
 #include "partiemc/relay/v1/relay.pb.h"
 
@@ -28,22 +29,22 @@ struct RemoteStream {
 /// still holds it. The directory then lists the one that was opened later by the clocks of both.
 class StreamDirectory {
  public:
-  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::TimePoint;
 
   /// Replaces the streams of a replica. Returns whether they have changed.
   bool Announced(const std::string& replica, const relay::v1::Announcement& announcement,
-                 Clock::time_point now) ABSL_LOCKS_EXCLUDED(mutex_);
+                 TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
   void Left(const std::string& replica) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes and returns the replicas without an announcement since `before`.
-  std::vector<std::string> Expire(Clock::time_point before) ABSL_LOCKS_EXCLUDED(mutex_);
+  std::vector<std::string> Expire(TimePoint before) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Treats all replicas as announced at `now`, after a disconnection of the bus.
-  void Refresh(Clock::time_point now) ABSL_LOCKS_EXCLUDED(mutex_);
+  void Refresh(TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// At most `count` distinct addresses. Draining replicas are left out.
   std::vector<std::string> Addresses(std::size_t count) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Whether every known replica has announced its streams since `since`.
-  bool HaveAllAnnouncedSince(Clock::time_point since) const ABSL_LOCKS_EXCLUDED(mutex_);
+  bool HaveAllAnnouncedSince(TimePoint since) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The stream of that name that was opened last.
   std::optional<RemoteStream> FindName(std::string_view name) const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -63,7 +64,7 @@ class StreamDirectory {
  private:
   struct Replica {
     std::map<std::string, relay::v1::LiveStream> streams;  // Key: id.
-    Clock::time_point heard, announced;
+    TimePoint heard, announced;
     std::string address;  // Empty: none.
   };
 

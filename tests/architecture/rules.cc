@@ -261,6 +261,18 @@ Violations GrpcStaysInItsRooms(const SourceTree& tree) {
   return violations;
 }
 
+Violations TimeAndChanceArePassedIn(const SourceTree& tree) {
+  static const std::regex kReads(R"(\b(\w*[cC]lock::now|random_device|sleep_for|sleep_until)\b)");
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (!path.starts_with("server/relay/") && !path.starts_with("client/library/")) continue;
+    for (const std::string& found : Matches(WithoutComments(text, Literals::kBlank), kReads)) {
+      violations.push_back(path + ": uses " + found);
+    }
+  }
+  return violations;
+}
+
 Violations StagesKeepTheirOrder(const SourceTree& tree) {
   static const std::string kReconstructor = "core/src/reconstructor.cc";
   static const std::string kLastStage = StageFile(static_cast<Stage>(kStageCount - 1), ".cc");

@@ -38,6 +38,10 @@ Violations StagesKeepTheirOrder(const SourceTree& tree);
 /// that they can run under ThreadSanitizer.
 Violations SessionsAreFreeOfGrpc(const SourceTree& tree);
 
+/// In server/relay and client/library, only a Clock and a RandomSource (proto/common/clock.h) read
+/// time and chance, and nothing sleeps.
+Violations TimeAndChanceArePassedIn(const SourceTree& tree);
+
 /// Server and client never include each other, nor link to each other.
 Violations ServerAndClientAreStrangers(const SourceTree& tree);
 

@@ -152,6 +152,22 @@ TEST(Architecture, GrpcInAnotherRoomIsSeen) {
   }
 }
 
+TEST(Architecture, TimeAndChanceArePassedIn) {
+  EXPECT_THAT(TimeAndChanceArePassedIn(Project()), IsEmpty());
+}
+
+TEST(Architecture, TimeReadAroundTheClockIsSeen) {
+  for (const std::string file :
+       {"server/relay/relay.cc", "client/library/adapters/async_stream.cc"}) {
+    for (const std::string use : {"std::chrono::steady_clock::now()", "std::random_device{}()",
+                                  "std::this_thread::sleep_for(pause)"}) {
+      EXPECT_THAT(TimeAndChanceArePassedIn(Planted(file, "\nauto x = " + use + ";\n")),
+                  Contains(HasSubstr(file + ": uses")))
+          << use;
+    }
+  }
+}
+
 TEST(Architecture, StagesKeepTheirOrder) {
   EXPECT_THAT(StagesKeepTheirOrder(Project()), IsEmpty());
 }

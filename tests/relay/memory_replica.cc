@@ -16,7 +16,7 @@ std::string FrameBytes(std::uint64_t sequence, std::size_t bytes) {
 }
 
 MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes,
-                             const std::string& address)
+                             const std::string& address, const TimeAndChance& surroundings)
     : history_(history_bytes, 8 * history_bytes),
       registry_(16, history_bytes > 0 ? &history_ : nullptr) {
   auto end = hub.Connect();
@@ -26,7 +26,7 @@ MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes,
       Relay::Limits{.broadcaster = {.mailbox_bytes = kWatcherBytes, .kept_bytes = kWatcherBytes},
                     .watcher_bytes = kWatcherBytes,
                     .history = history_bytes > 0 ? &history_ : nullptr},
-      address);
+      address, surroundings);
 }
 
 MemoryReplica::~MemoryReplica() { relay_.reset(); }

@@ -22,9 +22,9 @@ class MemoryReplica {
  public:
   static constexpr std::size_t kWatcherBytes = std::size_t{1} << 20;
 
-  /// `history_bytes`: history per stream; 0: none. `advertised`: address for clients; empty: none.
+  /// `history_bytes`: history per stream; 0: none. `address`: for clients; empty: none.
   explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20,
-                         const std::string& address = {});
+                         const std::string& address = {}, const TimeAndChance& surroundings = {});
   ~MemoryReplica();
 
   // Producer's side. `token` identifies a resumed stream.

@@ -23,7 +23,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 constexpr milliseconds kSoon(10'000);
 
@@ -193,19 +192,6 @@ TEST_F(RelayTest, WhileTheBusIsAwayNothingComesAndNothingIsMissingAfterwards) {
   }
 }
 
-TEST_F(RelayTest, AnUnknownNameIsRefusedWithWhatToDo) {
-  auto found = shows_.Find("nothing");
-  EXPECT_EQ(found.status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(found.status().message(),
-            "open.stream_name: \"nothing\"; must be the name of an open stream; ListStreams tells "
-            "them");
-  shows_.bus().SetConnected(false);
-  ASSERT_TRUE(Eventually([this] { return !shows_.relay().connected(); }));
-  found = shows_.Find("nothing");
-  EXPECT_EQ(ReasonOf(found.status()), kReasonNoSuchStream);
-  EXPECT_THAT(std::string(found.status().message()), HasSubstr("NATS cannot be reached"));
-}
-
 TEST_F(RelayTest, WhoAsksAReplicaThatHasJustComeIsToldAllTheSame) {
   Publish(1, 1);
   for (int k = 0; k < 5; ++k) {
@@ -311,16 +297,6 @@ TEST_F(RelayTest, AFrameThatIsTooLargeToBeWatchedEndsItWithTheSameError) {
   EXPECT_EQ(watcher->end_reason(), kReasonWatchedBytes);
 }
 
-TEST_F(RelayTest, AReplicaThatVanishesIsGoneAfterSomeSeconds) {
-  Publish(1, 1);
-  const auto watcher = shows_.Watch("dam");
-  ASSERT_NE(watcher, nullptr);
-  has_.bus().SetConnected(false);
-  EXPECT_TRUE(watcher->status().ok());
-  EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
-  EXPECT_EQ(shows_.relay().replicas(), 0u);
-}
-
 TEST_F(RelayTest, OneThatLeavesIsGoneAtOnce) {
   MemoryHub hub;
   MemoryReplica shows(hub);
@@ -335,16 +311,6 @@ TEST_F(RelayTest, OneThatLeavesIsGoneAtOnce) {
   EXPECT_TRUE(watcher->status().ok());
   EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
   EXPECT_EQ(shows.relay().replicas(), 0u);
-}
-
-TEST_F(RelayTest, ThatItLeavesIsTheLastThatIsHeardOfAReplica) {
-  MemoryReplica leaves(hub_);
-  ASSERT_TRUE(Eventually([&] { return shows_.relay().replicas() == 2; }));
-  leaves.relay().Drain();
-  leaves.Open("late", NewStreamToken());
-  std::this_thread::sleep_for(milliseconds(1200));  // Longer than the interval of announcements.
-  EXPECT_EQ(shows_.relay().replicas(), 1u);
-  EXPECT_EQ(shows_.relay().remote_streams(), 1u);
 }
 
 TEST_F(RelayTest, AddressesAreThoseOfReplicasThatDoNotDrain) {
@@ -369,25 +335,6 @@ TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
   shows_.relay().Drain();
   EXPECT_TRUE(Eventually([&] { return refused.load(); }));
   EXPECT_EQ(ReasonOf(shows_.Find("dam").status()), kReasonDraining);
-}
-
-TEST_F(RelayTest, NothingIsPublishedOfAStreamThatNobodyWatchesElsewhere) {
-  std::atomic<int> results = 0;
-  hub_.SetLoses([&](const std::string& subject, std::string_view) {
-    if (subject.starts_with("partiemc.results.")) ++results;
-    return false;
-  });
-  Publish(1, 20);
-  auto watcher = shows_.Watch("dam");
-  ASSERT_NE(watcher, nullptr);
-  EXPECT_TRUE(Eventually([this] { return has_.relay().exported_streams() == 1; }));
-  watcher.reset();
-  EXPECT_TRUE(Eventually([this] { return has_.relay().exported_streams() == 0; }));
-  EXPECT_TRUE(Eventually([this] { return shows_.relay().imported_streams() == 0; }));
-  const int before = results;
-  Publish(21, 40);
-  std::this_thread::sleep_for(milliseconds(50));
-  EXPECT_EQ(results, before);
 }
 
 TEST_F(RelayTest, ManyWatchersShareWhatIsPublishedOnce) {

@@ -8,13 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "client/library/manual_clock.h"
+#include "support/manual_clock.h"
 
 namespace partiemc::client {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using support::FixedRandom;
+using support::ManualClock;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Outcome = RetryLoop::Outcome;

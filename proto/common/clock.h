@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cstdint>
 
-namespace partiemc::client {
+#include "common/mutex.h"
+
+namespace partiemc {
 
 /// Thread-safe.
 class Clock {
@@ -13,17 +15,23 @@ class Clock {
 
   virtual ~Clock() = default;
   virtual TimePoint Now() const = 0;
+  /// Time of day, comparable between machines.
+  virtual std::chrono::system_clock::time_point TimeOfDay() const = 0;
+  /// As CondVar::WaitUntil of `changed`, with the time of this clock.
+  virtual bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) = 0;
 };
 
 /// Thread-safe.
 class RandomSource {
  public:
   virtual ~RandomSource() = default;
+  /// 64 random bits.
   virtual std::uint64_t Next() = 0;
 };
 
 /// The clock and the random source of the machine.
-Clock& SystemClock();
+const Clock& SystemClock();
 RandomSource& SystemRandom();
 
 struct TimeAndChance {
@@ -31,4 +39,4 @@ struct TimeAndChance {
   RandomSource* random = &SystemRandom();
 };
 
-}  // namespace partiemc::client
+}  // namespace partiemc

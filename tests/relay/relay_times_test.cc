@@ -1,0 +1,127 @@
+// Timeouts and intervals of the relay, on a clock of the test.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "partiemc/status.h"
+#include "relay/memory_replica.h"
+#include "server/base/call_errors.h"
+#include "server/stream/stream_token.h"
+#include "support/manual_clock.h"
+
+namespace partiemc::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+class RelayTimes : public testing::Test {
+ protected:
+  RelayTimes() {
+    has_.Open("dam", NewStreamToken());
+    EXPECT_TRUE(Within(seconds(1), [this] { return shows_.relay().remote_streams() == 1; }));
+  }
+
+  // Each relay does what is due after every step.
+  void Pass(milliseconds time) { clock_.Advance(time, kStep, relays_); }
+  bool Within(milliseconds time, const std::function<bool()>& is_true) {
+    for (; time.count() > 0 && !is_true(); time -= kStep) Pass(kStep);
+    return is_true();
+  }
+  void Publish(std::uint64_t first, std::uint64_t last) {
+    for (std::uint64_t k = first; k <= last; ++k) has_.Publish("dam", k);
+  }
+  absl::Status FindNothing() {
+    const auto found = std::make_shared<std::atomic<bool>>(false);
+    const auto status = std::make_shared<absl::Status>();
+    shows_.relay().Find("nothing", std::nullopt, [found, status](const auto& one) {
+      *status = one.status();
+      *found = true;
+    });
+    EXPECT_TRUE(Within(seconds(2), [&] { return found->load(); }));
+    return *found ? *status : absl::UnknownError("no answer");
+  }
+
+  static constexpr milliseconds kStep{50};
+
+  support::ManualClock clock_;
+  MemoryHub hub_;
+  std::size_t relays_ = 2;
+  MemoryReplica has_{hub_, 8 << 20, {}, {.clock = &clock_}};
+  MemoryReplica shows_{hub_, 8 << 20, {}, {.clock = &clock_}};
+};
+
+TEST_F(RelayTimes, RefusesAnUnknownNameAndSaysWhatToDo) {
+  absl::Status status = FindNothing();
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(status.message(),
+            "open.stream_name: \"nothing\"; must be the name of an open stream; ListStreams tells "
+            "them");
+  shows_.bus().SetConnected(false);
+  ASSERT_TRUE(Within(seconds(1), [this] { return !shows_.relay().connected(); }));
+  status = FindNothing();
+  const auto violation = FindViolation(status);
+  ASSERT_TRUE(violation) << status;
+  EXPECT_EQ(violation->reason, kReasonNoSuchStream);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("NATS cannot be reached"));
+}
+
+TEST_F(RelayTimes, AReplicaIsGoneAfterThreeSecondsOfSilence) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  Pass(seconds(10));
+  EXPECT_EQ(shows_.relay().replicas(), 1u);
+  has_.bus().SetConnected(false);
+  Pass(milliseconds(1900));
+  EXPECT_EQ(shows_.relay().replicas(), 1u);
+  Pass(milliseconds(1300));
+  EXPECT_EQ(shows_.relay().replicas(), 0u);
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
+  has_.bus().SetConnected(true);
+  EXPECT_TRUE(Within(seconds(4), [this] { return has_.relay().exported_streams() == 0; }));
+}
+
+TEST_F(RelayTimes, ADrainedReplicaAnnouncesNothing) {
+  MemoryReplica leaves(hub_, 0, {}, {.clock = &clock_});
+  relays_ = 3;
+  ASSERT_TRUE(Within(seconds(2), [&] { return shows_.relay().replicas() == 2; }));
+  leaves.relay().Drain();
+  leaves.Open("late", NewStreamToken());
+  Pass(milliseconds(1200));  // Longer than the interval of announcements.
+  EXPECT_EQ(shows_.relay().replicas(), 1u);
+  EXPECT_EQ(shows_.relay().remote_streams(), 1u);
+}
+
+TEST_F(RelayTimes, PublishesNothingWithoutWatchersElsewhere) {
+  std::atomic<int> results = 0;
+  hub_.SetLoses([&](const std::string& subject, std::string_view) {
+    if (subject.starts_with("partiemc.results.")) ++results;
+    return false;
+  });
+  Publish(1, 20);
+  auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  EXPECT_TRUE(Within(seconds(1), [this] { return has_.relay().exported_streams() == 1; }));
+  watcher.reset();
+  Pass(seconds(4));
+  EXPECT_EQ(shows_.relay().imported_streams(), 1u) << "watchers may reconnect";
+  EXPECT_EQ(has_.relay().exported_streams(), 1u);
+  EXPECT_TRUE(Within(seconds(2), [this] { return shows_.relay().imported_streams() == 0; }));
+  EXPECT_TRUE(Within(seconds(4), [this] { return has_.relay().exported_streams() == 0; }));
+  const int before = results;
+  Publish(21, 40);
+  Pass(seconds(1));
+  EXPECT_EQ(results, before);
+}
+
+}  // namespace
+}  // namespace partiemc::server
