@@ -63,8 +63,8 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
-// Adds, for each slice, its outline (except for the first slice, which is the stream's outline) and
-// its isolines.
+// Makes the first slice the stream's slice, and adds a section for the outline of each other slice.
+// Adds sections for the isolines of every slice; without slices, for the isolines of the stream.
 absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   const auto add_isolines = [&](const std::optional<SlicePlane>& slice) {
     for (const double isovalue : flags.isolines) {

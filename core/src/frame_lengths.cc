@@ -15,8 +15,8 @@
 namespace partiemc {
 namespace {
 
-// Limits of a spacing that is estimated in a later frame, in cells of the existing lattice: a
-// kernel must span a sensible number of cells.
+// A spacing that is estimated in a later frame is clamped to these limits, in cells of the existing
+// lattice, so that a kernel spans a sensible number of cells.
 constexpr double kMinSpacingInCells = 0.25;
 constexpr double kMaxSpacingInCells = 4;
 

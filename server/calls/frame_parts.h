@@ -24,8 +24,8 @@
 namespace partiemc::server {
 
 /// Parses a request with a frame into `request`, whose buffers are reused; drops unknown fields.
-/// Errors: MALFORMED, OUT_OF_MEMORY of `field`; the frame then has its `sequence` if that can be
-/// read, else 0.
+/// Errors: MALFORMED (names `field`), OUT_OF_MEMORY (always names "frame"). The frame in `request`
+/// then has its `sequence`, or 0 if that cannot be read.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field = "frame");
 

@@ -70,7 +70,7 @@ struct CrossedEdge {
   bool begins_inside = false;  ///< Its right node is inside; otherwise its left one is.
 };
 
-/// Visits the crossed edges of rings. Reuses its memory.
+/// Visits the horizontal lattice edges that rings cross, row by row. Reuses its memory.
 class Scanlines {
  public:
   /// Sets the rings: ring k has segments [offsets[k], offsets[k + 1]). Segments outside all rings

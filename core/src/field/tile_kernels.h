@@ -17,8 +17,8 @@
 
 namespace partiemc {
 
-/// Margin of the sums of a tile, for kernels that reach beyond its sides. Wider kernels are cut off
-/// at the sides.
+/// Margin of the sums of a tile, in nodes. Kernels of at most this radius are summed whole, beyond
+/// the sides of the tile too. Wider kernels are cut at the sides, and each tile sums its own piece.
 inline constexpr int kSumMargin = 8;
 inline constexpr int kSumColumns = kTileSize + 2 * kSumMargin;
 inline constexpr int SumIndex(int i, int j) {

@@ -41,7 +41,8 @@ class NearRing {
 
  private:
   static constexpr std::size_t kCount = 6;
-  // The diagonal of a square lattice is at 1.41; the rest is for noise.
+  // Maximum ratio of the distances of the farthest and the second nearest. In a square lattice it
+  // is 1.41, because the farthest is a diagonal neighbour; the rest is for noise.
   static constexpr double kMaxRatio = 1.6;
 
   // Two offsets whose angle has a smaller sine do not close the side between them. Otherwise noise

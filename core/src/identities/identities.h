@@ -18,7 +18,8 @@
 
 namespace partiemc {
 
-/// Warm buffers of ContinueRings. The rings of the frame are numbered in the order of their runs.
+/// Warm buffers of ContinueRings. The kept rings of the frame are numbered from 0, in the order of
+/// their first runs (NodeRun): by row, then column.
 struct IdentityScratch {
   Scanlines rows;
   std::vector<std::uint32_t> number;             // By ring of the topology.

@@ -53,10 +53,10 @@ struct RingScratch {
 /// parameters.
 /// - `parameters.clean`: drops components without particles, and holes below 2 h^2 with everything
 /// in them (core/METHOD.md, "Cleaning").
-/// - `min_component_area`, `min_component_particles`: then drops outer rings that enclose less area
-/// (h^2) or fewer particles, with everything in them.
-/// Dropped nodes change sides in `crossings`. Areas are measured on the level set, before vertices
-/// are placed.
+/// - `min_component_area`, `min_component_particles`, with or without `clean`: then drops outer
+/// rings that enclose less area (h^2) or fewer particles, with everything in them.
+/// In `crossings`, the nodes of a dropped component become outside, those of a dropped hole inside.
+/// Areas are measured on the level set, before vertices are placed.
 void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
                 const ReconstructionParameters& parameters, Crossings& crossings,
                 RingScratch& scratch, RingTopology& rings);

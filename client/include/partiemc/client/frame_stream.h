@@ -96,10 +96,11 @@ class FrameStream {
 
   /// Sends one frame and returns its number. `frame` is copied or serialised before the call
   /// returns. `time` replaces Frame::time. Waits while the window is full.
-  /// Errors: a status with a Violation (FindViolation) refuses this frame only, uses no number, and
-  /// the stream continues. Any other status ended the stream. FAILED_PRECONDITION after
-  /// FinishSending. DEADLINE_EXCEEDED if the wait exceeds the stream's deadline; with a Violation
-  /// (reason SEND_TIMEOUT) if it exceeds `send_timeout`.
+  /// Errors: a status with a Violation (FindViolation) refuses only this frame; the frame gets no
+  /// number, and the stream continues. After FinishSending, Send returns FAILED_PRECONDITION, and
+  /// the stream continues too. Any other status ended the stream.
+  /// If the wait exceeds `send_timeout`, Send returns DEADLINE_EXCEEDED with a Violation (reason
+  /// SEND_TIMEOUT). If it exceeds the stream's deadline, DEADLINE_EXCEEDED ends the stream.
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
 
   /// Same as Send for arrays with arbitrary strides. Errors: also INVALID_ARGUMENT with a Violation
