@@ -35,7 +35,8 @@ std::uint64_t BigEndian(std::string_view bytes) {
   return value;
 }
 
-// True if an operation of TLS continues when the socket is ready. Anything else ends the connection.
+// True if an operation of TLS continues when the socket is ready. Anything else ends the
+// connection.
 bool IsWaiting(SSL* tls, int code) {
   const int error = SSL_get_error(tls, code);
   ERR_clear_error();
