@@ -18,8 +18,9 @@ constexpr std::int64_t kConnectTimeoutMs = 1000;
 constexpr std::int64_t kReconnectWaitMs = 100, kReconnectJitterMs = 50;
 // Write timeout of the connection to NATS.
 constexpr std::int64_t kWriteDeadlineMs = 2000;
-// Ping interval; two missing replies end the connection.
-constexpr std::int64_t kPingIntervalMs = 2000;
+// Ping interval; the third ping without a reply ends the connection. A silent NATS server is thus
+// noticed before the other replicas count as lost (kReplicaPatience).
+constexpr std::int64_t kPingIntervalMs = 500;
 constexpr int kMaxPingsOut = 2;
 constexpr std::int64_t kFlushMs = 1000;
 // Limits of the pending messages of a subscription. Further messages are lost.

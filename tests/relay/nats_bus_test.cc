@@ -85,6 +85,21 @@ TEST(NatsBus, ComesBackWithItsSubscriptionsAndSendsNothingOld) {
   EXPECT_EQ(heard.messages[1], "second");
 }
 
+TEST(NatsBus, AFrozenServerCountsAsGoneUntilItContinues) {
+  NatsProcess nats;
+  const auto one = Connect(nats.url()), other = Connect(nats.url());
+  Heard heard;
+  const auto a = other->Subscribe("a", heard.Handler());
+  other->Flush();
+  nats.Freeze();
+  EXPECT_TRUE(Eventually([&] { return !one->connected() && !other->connected(); }));
+  nats.Continue();
+  ASSERT_TRUE(Eventually([&] { return one->connected() && other->connected(); }));
+  other->Flush();
+  ASSERT_TRUE(one->Publish("a", "again"));
+  EXPECT_TRUE(Eventually([&] { return heard.count() == 1; }));
+}
+
 TEST(NatsBus, ConnectsToAServerThatComesLater) {
   NatsProcess nats;
   nats.Stop();

@@ -56,6 +56,9 @@ void NatsProcess::Stop() {
   process_ = 0;
 }
 
+void NatsProcess::Freeze() { kill(process_, SIGSTOP); }
+void NatsProcess::Continue() { kill(process_, SIGCONT); }
+
 void NatsProcess::Start() {
   std::vector<std::string> arguments = {"/usr/sbin/nats-server", "-a", "127.0.0.1", "-p",
                                         std::to_string(port_),   "-l", "/dev/null"};

@@ -21,6 +21,9 @@ class NatsProcess {
   void Stop();
   /// Starts it again at the same port.
   void Start();
+  /// Keeps its connections and says nothing until Continue.
+  void Freeze();
+  void Continue();
 
  private:
   int port_ = 0;
