@@ -16,7 +16,8 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// The two coordinates of `plane`, particle by particle, of vectors of `components`.
+// Sets `xy` to the two coordinates in `plane` of each vector. A vector has `components` values; two
+// are copied unchanged.
 template <typename From, typename To>
 void Project(std::span<const From> vectors, std::size_t components, Plane plane,
              std::vector<To>& xy) {

@@ -92,7 +92,8 @@ class ReadPermits {
 
   // For the thread that watches the memory of the process (IntakeGuard):
 
-  /// Whether reads wait, or the reads in progress may bring more than the budget and slots permit.
+  /// True if reads wait, if permits have lapsed, or if the held and planned bytes plus one largest
+  /// message for each read in progress exceed the budget plus one largest message for each slot.
   bool NeedsLook() const;
   /// Whether permits may lapse, or have lapsed.
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }

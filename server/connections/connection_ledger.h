@@ -49,9 +49,10 @@ std::string_view FloodName(Flood flood);
 /// replies, at least zero. The open calls allow some bytes in flight. A connection is a flood if
 /// its debt exceeds this allowance by more than `unaccounted_bytes`.
 ///
-/// A client with an open call could hide a header block without an end within that allowance. For
-/// gRPC such a block is a stream that never becomes a call. While this state lasts, all bytes that
-/// gRPC reads count.
+/// A client with an open call could send a header block without an end within that allowance. gRPC
+/// shows such a block as an open stream that is not a call. While such a stream exists and no other
+/// stream begins and no message ends, every byte that gRPC reads counts as header, without credit
+/// or allowance.
 ///
 /// The methods `On...` are thread-safe. Examine is called by one thread.
 class ConnectionLedger {

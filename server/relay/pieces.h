@@ -12,7 +12,7 @@
 
 namespace partiemc::server {
 
-/// Below the default limit of NATS, one megabyte.
+/// Size of a piece. NATS accepts messages of at most one megabyte by default.
 inline constexpr std::size_t kPieceBytes = std::size_t{512} << 10;
 
 /// Calls `send` with each serialised partiemc.relay.v1.Piece of `message`, in order, until it

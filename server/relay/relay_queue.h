@@ -21,7 +21,7 @@ namespace partiemc::server {
 /// relay.
 class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
  public:
-  /// Messages whose senders are bounded apart from each other.
+  /// Each lane has its own limit of queued bytes, so a flood of fetches drops no results.
   enum Lane : std::size_t {
     kNews,   ///< Announcements, results and answers.
     kAsked,  ///< Fetches.

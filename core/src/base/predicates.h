@@ -14,8 +14,8 @@
 
 namespace partiemc {
 
-/// Coordinates are multiples of 2^-53 kMinMagnitude > 2^-452, and so are their differences;
-/// products of two are multiples of 2^-904, far above the smallest normal number, 2^-1022.
+/// Coordinates and their differences are multiples of 2^-451, the last bit of kMinMagnitude.
+/// Products of two are multiples of 2^-902, far above the smallest normal number, 2^-1022.
 inline constexpr double kMinMagnitude = 1e-120;
 /// Six products of two coordinates, and a coordinate times 2^27 + 1, stay below 2^1023.
 inline constexpr double kMaxMagnitude = 1e150;

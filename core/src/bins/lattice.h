@@ -42,7 +42,8 @@ class TileDirectory {
   /// average.
   std::uint32_t Insert(TileCoordinate tile);
 
-  /// Sorts the tiles. Indices become positions in the sorted order; later tiles are appended.
+  /// Sorts the tiles. The index of a tile is then its position in the sorted order. Insert appends
+  /// further tiles unsorted.
   void Sort();
 
   /// Sorts the tiles and links neighbours.

@@ -18,9 +18,9 @@ inline double LargerEigenvalue(double xx, double xy, double yy) {
 /// cells.
 ///   f: density; phi = |x - xbar| - r_0;
 ///   sigma: spread, the larger eigenvalue of sum k D D^T / (R^2 sum k), D = x_i - x.
-/// If f <= f_0 or f > f_1, the density alone decides the side. All terms are lengths. The same
-/// formula in vectors: NodeFormula (tile_kernels.cc); with its gradient: PointFormula
-/// (point_formula-inl.h).
+/// A point is outside if f <= f_0 and inside if f > f_1, whatever phi and sigma are. All terms are
+/// lengths. NodeFormula (tile_kernels.cc) computes the same formula in vectors, PointFormula
+/// (point_formula-inl.h) also its gradient.
 inline double LevelSetValue(const Scale& scale, double density, double phi, double spread) {
   // Positive if the density is below f_0.
   const double guard = (scale.guard - density) * scale.guard_slope;

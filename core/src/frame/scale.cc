@@ -10,9 +10,9 @@ constexpr double kFourOverPi = 1.27323954473516268615;
 // Over space it integrates to 64 pi R^3 / 315.
 constexpr double kSpaceNorm = 315.0 / 64 / 3.14159265358979323846;
 
-// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 = 0.9 / beta^2,
-// which is 0.10 at beta = 3. This is above f in the void between two components and below f of a
-// lone particle.
+// The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 is at most
+// 0.9 / beta^2, with beta = R / h; 0.10 at beta = 3. This value is above f in the void between two
+// components and below f at a lone particle.
 constexpr double kGuardFactor = 0.9;
 // A lone particle must survive: at most this share of the lightest particle's own f.
 constexpr double kGuardShareOfLightest = 0.7;

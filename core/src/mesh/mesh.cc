@@ -172,8 +172,9 @@ void TriangulateLoops(Work& w, TriangleClass triangle_class) {
   w.mesh.classes.resize(w.mesh.triangles.size() / 3, triangle_class);
 }
 
-// Triangulates the regions bounded by rings and staircases: the band, for `polygon` the whole
-// inside, and for `conforming` also the interior, whose boundary has only staircase corners.
+// Triangulates the regions bounded by rings and staircases. `polygon` uses no staircases: it
+// triangulates the whole inside of the rings. All other fills triangulate the band between rings
+// and staircases. `conforming` then also triangulates the interior, bounded by staircases only.
 void TriangulateByLoops(Work& w) {
   w.scratch.loops.Clear();
   AddRingLoops(w);
