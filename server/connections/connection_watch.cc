@@ -172,13 +172,14 @@ void ConnectionWatch::HandleEvents(int timeout_ms) {
   const MutexLock lock(mutex_);
   for (int k = 0; k < count; ++k) {
     const auto& event = events[static_cast<std::size_t>(k)];
-    if (event.data.u64 == kWakeKey) {
+    const std::uint64_t key = event.data.u64;  // A copy, because epoll_event is packed.
+    if (key == kWakeKey) {
       eventfd_t ignored = 0;
       eventfd_read(wake_.get(), &ignored);
     } else if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
       // gRPC or the peer has ended the connection. The kernel frees it when this descriptor is
       // closed too.
-      const auto found = by_key_.find(event.data.u64);
+      const auto found = by_key_.find(key);
       if (found != by_key_.end()) Remove(found->second);
     }
   }
