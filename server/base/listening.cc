@@ -45,7 +45,7 @@ absl::Status CheckUnix(const Address& address) {
   if (connect(probe.descriptor(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0) {
     return CannotListen(address, "another server listens there");
   }
-  if (errno == ECONNREFUSED) return absl::OkStatus();  // A stale file; gRPC replaces it.
+  if (errno == ECONNREFUSED) return absl::OkStatus();  // A stale file; the acceptor replaces it.
   if (errno != ENOENT) return CannotListen(address, ErrorText(errno));
   const Socket socket(AF_UNIX);
   if (bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) != 0) {
