@@ -8,7 +8,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <memory>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
@@ -56,18 +55,13 @@ absl::Status CheckUnix(const Address& address) {
 }
 
 absl::Status CheckTcp(const Address& address) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int failure =
-      getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found);
-  if (failure != 0) return CannotListen(address, gai_strerror(failure));
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(found, &freeaddrinfo);
+  const auto found = ResolveToListen(address);
+  if (!found.ok()) return CannotListen(address, std::string(found.status().message()));
   // Like gRPC, accepts one working address of several, unless the port is in use on another.
   int error = 0;
   bool any = false;
-  for (const addrinfo* candidate = found; candidate != nullptr; candidate = candidate->ai_next) {
+  for (const addrinfo* candidate = found->get(); candidate != nullptr;
+       candidate = candidate->ai_next) {
     const Socket socket(candidate->ai_family);
     const int yes = 1;
     setsockopt(socket.descriptor(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
@@ -82,6 +76,17 @@ absl::Status CheckTcp(const Address& address) {
 }
 
 }  // namespace
+
+absl::StatusOr<ResolvedAddresses> ResolveToListen(const Address& address) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int failure =
+      getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found);
+  if (failure != 0) return absl::UnavailableError(gai_strerror(failure));
+  return ResolvedAddresses(found, &freeaddrinfo);
+}
 
 absl::Status CheckCanListen(const Address& address) {
   return address.unix_path.empty() ? CheckTcp(address) : CheckUnix(address);

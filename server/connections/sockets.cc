@@ -16,10 +16,10 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
-#include <memory>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "server/base/listening.h"
 #include "server/security/peer_accounts.h"
 
 namespace partiemc::server {
@@ -80,16 +80,10 @@ absl::StatusOr<Listeners> ListenOnPath(const std::string& path,
 }
 
 absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int failure =
-      getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found);
-  if (failure != 0) return absl::UnavailableError(gai_strerror(failure));
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(found, &freeaddrinfo);
+  const auto found = ResolveToListen(address);
+  if (!found.ok()) return found.status();
   std::vector<SocketAddress> all;
-  for (const addrinfo* next = found; next != nullptr; next = next->ai_next) {
+  for (const addrinfo* next = found->get(); next != nullptr; next = next->ai_next) {
     SocketAddress one;
     std::memcpy(&one.storage, next->ai_addr, next->ai_addrlen);
     one.size = next->ai_addrlen;

@@ -1,5 +1,6 @@
 #include "server/stream/stream_token.h"
 
+#include <openssl/crypto.h>
 #include <openssl/sha.h>
 
 #include <algorithm>
@@ -50,12 +51,7 @@ std::string LineageOf(std::string_view token) {
 }
 
 bool SameToken(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned char difference = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    difference = static_cast<unsigned char>(difference | (a[k] ^ b[k]));
-  }
-  return difference == 0;
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 }  // namespace partiemc::server
