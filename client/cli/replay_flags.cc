@@ -169,6 +169,12 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("D")
       ->capture_default_str()
       ->group(kGroup);
+  app.add_option(
+         "--attribute-tolerance", flags.attribute_tolerance,
+         "Largest error of attributes across triangles of greedy, a fraction of their range")
+      ->type_name("T")
+      ->capture_default_str()
+      ->group(kGroup);
   app.add_flag("--no-normal-memory", flags.no_normal_memory,
                "Orient normals without the normals of the previous frame")
       ->group(kGroup);

@@ -39,6 +39,7 @@ struct ReplayFlags {
   double cell_size = 1;
   std::optional<double> reference_radius;
   double surface_offset = 0;
+  double attribute_tolerance = 0.01;
   bool no_normal_memory = false;
   std::string clean = "auto";
   double min_area = 0;

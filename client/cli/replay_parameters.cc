@@ -99,6 +99,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                       .cell_size = flags.cell_size,
                                       .reference_radius = flags.reference_radius,
                                       .surface_offset = flags.surface_offset,
+                                      .attribute_tolerance = flags.attribute_tolerance,
                                       .normal_memory = !flags.no_normal_memory,
                                       .min_component_area = flags.min_area,
                                       .min_component_particles = flags.min_particles};

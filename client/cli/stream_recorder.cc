@@ -37,6 +37,8 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --reference-radius ", ShortestNumber(*parameters.reference_radius));
   }
   AddFlag(flags, "--surface-offset", parameters.surface_offset, defaults.surface_offset);
+  AddFlag(flags, "--attribute-tolerance", parameters.attribute_tolerance,
+          defaults.attribute_tolerance);
   if (!parameters.normal_memory) AppendAll(flags, " --no-normal-memory");
   if (parameters.clean) AppendAll(flags, " --clean ", *parameters.clean ? "on" : "off");
   AddFlag(flags, "--min-area", parameters.min_component_area, defaults.min_component_area);

@@ -224,6 +224,9 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     }
     lines.emplace_back(Concat("section ", k + 1), std::move(text));
   }
+  if (parameters.attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
+    lines.emplace_back("attribute tolerance", ShortestNumber(parameters.attribute_tolerance));
+  }
   lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
   if (parameters.min_component_area > 0) {

@@ -137,6 +137,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "cell_size", parameters.cell_size);
   TakeInto(arguments, "reference_radius", parameters.reference_radius);
   TakeInto(arguments, "surface_offset", parameters.surface_offset);
+  TakeInto(arguments, "attribute_tolerance", parameters.attribute_tolerance);
   TakeInto(arguments, "normal_memory", parameters.normal_memory);
   TakeInto(arguments, "clean", parameters.clean);
   TakeInto(arguments, "min_component_area", parameters.min_component_area);
@@ -227,8 +228,10 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
       "plane"_a = named(parameters.plane), "spacing_rule"_a = named(parameters.spacing_rule),
       "spacing"_a = parameters.spacing, "kernel_radius"_a = parameters.kernel_radius,
       "cell_size"_a = parameters.cell_size, "reference_radius"_a = parameters.reference_radius,
-      "surface_offset"_a = parameters.surface_offset, "normal_memory"_a = parameters.normal_memory,
-      "clean"_a = parameters.clean, "min_component_area"_a = parameters.min_component_area,
+      "surface_offset"_a = parameters.surface_offset,
+      "attribute_tolerance"_a = parameters.attribute_tolerance,
+      "normal_memory"_a = parameters.normal_memory, "clean"_a = parameters.clean,
+      "min_component_area"_a = parameters.min_component_area,
       "min_component_particles"_a = parameters.min_component_particles,
       "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
       "sections"_a = sections);

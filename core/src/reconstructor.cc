@@ -126,7 +126,9 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  .tiles = b.bins.tiles.size(),
                  .segments = b.topology.segments.size(),
                  .attribute_values = AttributeValuesOf(frame)};
-  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
+  const bool has_blocks = parameters.fill == Fill::kGreedy && size.attribute_values > 0;
+  if (parameters.fill == Fill::kGrid || has_blocks)
+    size.grid_cells = CountCells(b.crossings.interior);
   return size;
 }
 
@@ -188,6 +190,24 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
+// For the stage mesh.
+class FrameAttributes final : public PointAttributes {
+ public:
+  FrameAttributes(const Frame& frame, const Scale& scale, Workspace::Buffers& buffers)
+      : frame_(frame), scale_(scale), buffers_(buffers) {}
+
+  std::span<const AttributeValues> At(std::span<const double> points) override {
+    InterpolateAttributes(frame_, buffers_.bins, scale_, points, buffers_.attribute_scratch,
+                          buffers_.node_attributes);
+    return buffers_.node_attributes;
+  }
+
+ private:
+  const Frame& frame_;
+  const Scale& scale_;
+  Workspace::Buffers& buffers_;
+};
+
 // Runs the stages from normals to mesh. Errors: INTERNAL for a bug in RepairRings or BuildMesh,
 // whose comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
@@ -215,9 +235,10 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
         {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size},
         previous.history, b.identity_scratch, b.next_history, result.rings);
   });
+  FrameAttributes attributes(frame, scale, b);
   const bool is_filled = InStage(observer, Stage::kMesh, [&] {
     return BuildMesh({b.bins.tiles, b.crossings, b.topology, b.planes, b.placed, result.rings,
-                      parameters, scale},
+                      parameters, scale, frame.attributes.empty() ? nullptr : &attributes},
                      b.mesh_scratch, result.mesh, result.statistics);
   });
   if (!is_filled) return absl::InternalError("rings cannot be triangulated");
@@ -253,8 +274,8 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
   if (!status.ok()) return status;
   if (!seen.attributes.empty()) {
     InStage(observer, Stage::kAttributes, [&] {
-      InterpolateAttributes(seen, b.bins, scale, result.rings, result.mesh, b.attribute_scratch,
-                            result.attributes);
+      InterpolateAttributes(seen, b.bins, scale, VerticesOf(result.rings, result.mesh),
+                            b.attribute_scratch, result.attributes);
     });
   }
   Summarise(b, result);

@@ -287,6 +287,9 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (message.has_cell_size()) parameters.cell_size = message.cell_size();
   if (message.has_reference_radius()) parameters.reference_radius = message.reference_radius();
   if (message.has_surface_offset()) parameters.surface_offset = message.surface_offset();
+  if (message.has_attribute_tolerance()) {
+    parameters.attribute_tolerance = message.attribute_tolerance();
+  }
   if (message.has_normal_memory()) parameters.normal_memory = message.normal_memory();
   if (message.has_clean()) parameters.clean = message.clean();
   if (message.has_min_component_area()) {
@@ -316,6 +319,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   message.set_cell_size(parameters.cell_size);
   if (parameters.reference_radius) message.set_reference_radius(*parameters.reference_radius);
   message.set_surface_offset(parameters.surface_offset);
+  message.set_attribute_tolerance(parameters.attribute_tolerance);
   message.set_normal_memory(parameters.normal_memory);
   if (parameters.clean) message.set_clean(*parameters.clean);
   message.set_plane(ToWire(parameters.plane));

@@ -228,6 +228,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
     if (Reconstructor::Create(parameters).ok()) response.add_fills(wire::ToWire(fill));
   }
   response.add_capabilities("attributes");
+  response.add_capabilities("attribute-meshes");
   if (context_.limits.max_parts > 0) response.add_capabilities("parts");
   response.add_capabilities("resume");
   response.add_capabilities("slices");

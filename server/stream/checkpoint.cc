@@ -35,8 +35,8 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Names each member: after a new member is added, this does not compile until it is hashed too.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
-               surface_offset, normal_memory, clean, min_component_area, min_component_particles,
-               plane, slice, isovalue, sections] = parameters;
+               surface_offset, attribute_tolerance, normal_memory, clean, min_component_area,
+               min_component_particles, plane, slice, isovalue, sections] = parameters;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
   const auto put_optional = [&](std::optional<double> value) {
@@ -68,8 +68,11 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Absent values add no bytes, so that checkpoints from before these parameters existed stay
-  // valid.
+  // Absent and default values add no bytes, so that checkpoints from before these parameters existed
+  // stay valid.
+  if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
+    PutNumber(attribute_tolerance, bytes);
+  }
   if (isovalue) PutNumber(*isovalue, bytes);
   for (const Section& section : sections) {
     put_small(section.slice.has_value());

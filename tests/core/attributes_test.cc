@@ -114,7 +114,8 @@ TEST(Attributes, KeepTheirNamesWithoutVertices) {
 TEST(Attributes, ChangeNothingElse) {
   const Cloud cloud(0.3);
   const std::vector<Attribute> attributes = {{"pressure", 1, cloud.linear}};
-  const Result with = Reconstructed({.positions = cloud.positions, .attributes = attributes});
+  const Result with = Reconstructed({.positions = cloud.positions, .attributes = attributes},
+                                    {.spacing = 1, .attribute_tolerance = 1});
   const Result without = Reconstructed({.positions = cloud.positions});
   EXPECT_EQ(with.rings, without.rings);
   EXPECT_EQ(with.mesh, without.mesh);

@@ -236,7 +236,7 @@ TEST(Mesh, RectangleAcrossTilesStaysWhole) {
   EXPECT_EQ(rectangles[0].width, 50);
   EXPECT_EQ(rectangles[0].height, 70);
   Staircases staircases;
-  TraceStaircases(directory, interior, staircases);
+  TraceStaircases(directory, interior, nullptr, staircases);
   EXPECT_EQ(staircases.corners.size(), 4u);
   EXPECT_EQ(staircases.pinches, 0u);
 }
@@ -250,7 +250,7 @@ TEST(Mesh, DiagonalCellsMakeAPinch) {
     interior[0][5] = rising ? 1u << 5 : 1u << 6;
     interior[0][6] = rising ? 1u << 6 : 1u << 5;
     Staircases staircases;
-    TraceStaircases(directory, interior, staircases);
+    TraceStaircases(directory, interior, nullptr, staircases);
     EXPECT_EQ(staircases.offsets, (std::vector<std::uint32_t>{0, 4, 8}));
     EXPECT_EQ(staircases.pinches, 1u);
   }

@@ -50,6 +50,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     sections: additional outlines of the particles (Result.sections): a list of at most 16 dicts of
         slice, isovalue or both. Other parameters are the same for all outlines:
         [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
+    attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
+        of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

@@ -107,8 +107,9 @@ class Reconstructor:
         placement: Optional[str] = ..., fill: Optional[str] = ..., plane: Optional[str] = ...,
         spacing_rule: Optional[str] = ..., kernel_radius: Optional[float] = ...,
         cell_size: Optional[float] = ..., reference_radius: Optional[float] = ...,
-        surface_offset: Optional[float] = ..., normal_memory: Optional[bool] = ...,
-        clean: Optional[bool] = ..., min_component_area: Optional[float] = ...,
+        surface_offset: Optional[float] = ..., attribute_tolerance: Optional[float] = ...,
+        normal_memory: Optional[bool] = ..., clean: Optional[bool] = ...,
+        min_component_area: Optional[float] = ...,
         min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...,
         isovalue: Optional[float] = ..., sections: Optional[List[Section]] = ...) -> None: ...
     def reconstruct(
@@ -175,8 +176,8 @@ def reconstruct(
     plane: Optional[str] = ..., spacing_rule: Optional[str] = ...,
     kernel_radius: Optional[float] = ..., cell_size: Optional[float] = ...,
     reference_radius: Optional[float] = ..., surface_offset: Optional[float] = ...,
-    normal_memory: Optional[bool] = ..., clean: Optional[bool] = ...,
-    min_component_area: Optional[float] = ...,
+    attribute_tolerance: Optional[float] = ..., normal_memory: Optional[bool] = ...,
+    clean: Optional[bool] = ..., min_component_area: Optional[float] = ...,
     min_component_particles: Optional[int] = ..., slice: Optional[Slice] = ...,
     isovalue: Optional[float] = ..., sections: Optional[List[Section]] = ...) -> Result: ...
 def connect(address: Optional[str] = ..., *, latest: bool = ..., **options: Any) -> Stream: ...

@@ -93,6 +93,11 @@ struct ReconstructionParameters {
   /// paper; 0.5 matches the volume.
   double surface_offset = 0.0;
 
+  /// If frames have attributes, the mesh of `greedy` is fine enough for them: values interpolated
+  /// across its triangles deviate at lattice nodes by at most this fraction of the attribute's range
+  /// inside the body, in [0, 1]. 1: rectangles as large as without attributes.
+  double attribute_tolerance = 0.01;
+
   /// Orient cell normals by the normals of the frame before (Eq. 11), not by the outline alone.
   bool normal_memory = true;
 

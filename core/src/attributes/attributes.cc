@@ -21,11 +21,6 @@ constexpr std::size_t kVerticesAtOnce = 256;
 
 constexpr double kLargest = std::numeric_limits<float>::max();
 
-// The points of the mesh begin with the points of the rings (guarantee M3).
-std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
-  return mesh.points.size() > rings.points.size() ? mesh.points : rings.points;
-}
-
 // Divides a tile into square buckets. Their side, a power of two of cells, is at most the radius.
 class Buckets {
  public:
@@ -243,10 +238,14 @@ class Interpolation {
 
 }  // namespace
 
+// The points of the mesh begin with the points of the rings (guarantee M3).
+std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
+  return mesh.points.size() > rings.points.size() ? mesh.points : rings.points;
+}
+
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
-                           const Rings& rings, const Mesh& mesh, AttributeScratch& scratch,
+                           std::span<const double> vertices, AttributeScratch& scratch,
                            std::vector<AttributeValues>& values) {
-  const std::span<const double> vertices = VerticesOf(rings, mesh);
   values.resize(frame.attributes.size());
   for (std::size_t k = 0; k < values.size(); ++k) {
     const Attribute& attribute = frame.attributes[k];

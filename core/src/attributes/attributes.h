@@ -28,10 +28,9 @@ struct AttributeScratch {
   std::vector<CarryingParticle> particles;
 };
 
-/// Interpolates the attributes of the particles to the vertices.
-///
-/// Vertices are the points of the rings, followed by the points that only the mesh has. `values`
-/// receives one entry for each attribute of `frame`, in the same order, and reuses its buffers.
+/// Interpolates the attributes of the particles to `vertices`, interleaved, in world units.
+/// `values` receives one entry for each attribute of `frame`, in the same order, and reuses its
+/// buffers.
 ///
 /// Fits a plane (attribute over x and y, in a slice also over the height) to the particles within
 /// the kernel radius, and evaluates it at the vertex. The fit is a least-squares fit with the
@@ -44,7 +43,11 @@ struct AttributeScratch {
 /// Deterministic: sums run by tile and bucket, then in the order of the frame. Parallel over
 /// vertices. Cost: linear in the particles near vertices, times the particles within the kernel.
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
-                           const Rings& rings, const Mesh& mesh, AttributeScratch& scratch,
+                           std::span<const double> vertices, AttributeScratch& scratch,
                            std::vector<AttributeValues>& values);
+
+/// The vertices that carry attributes: the points of the rings, followed by those that only the
+/// mesh has.
+std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh);
 
 }  // namespace partiemc

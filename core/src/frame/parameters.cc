@@ -142,6 +142,10 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   if (!Within(p.surface_offset, -1, 1)) {
     return OutOfRange("surface_offset", p.surface_offset, "must be in [-1, 1] spacings");
   }
+  if (!Within(p.attribute_tolerance, 0, 1)) {
+    return OutOfRange("attribute_tolerance", p.attribute_tolerance,
+                      "must be in [0, 1], a fraction of the attribute's range");
+  }
   if (!(p.min_component_area >= 0 && std::isfinite(p.min_component_area))) {
     return OutOfRange("min_component_area", p.min_component_area,
                       "must be 0 or more squared spacings, and finite");

@@ -26,6 +26,10 @@ struct Work {
   bool is_complete = true;  // Every group of loops has been triangulated.
 
   bool MovesVertices() const { return TraitsOf(input.parameters.placement).takes_particles; }
+  bool HasBlocks() const {
+    return input.attributes != nullptr && input.parameters.fill == Fill::kGreedy &&
+           input.parameters.attribute_tolerance < 1;
+  }
   bool HasBand() const {
     return input.parameters.fill != Fill::kNone && input.parameters.fill != Fill::kPolygon;
   }
@@ -92,6 +96,81 @@ void FillRectangles(Work& w) {
     std::ranges::transform(CornersOf(w.input.directory, rectangle), corners.begin(),
                            [&](const TilePlace& node) { return nodes.At(node); });
     for (const int corner : {0, 1, 2, 0, 2, 3}) *next++ = corners[corner];
+  });
+}
+
+// Finds blocks in which the attributes at the nodes are nearly linear.
+void FindAttributeBlocks(Work& w) {
+  const TileDirectory& directory = w.input.directory;
+  NodeVertices& nodes = w.scratch.attribute_nodes;
+  nodes.Clear(directory.size());
+  for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
+    for (int j = 0; j < kTileSize; ++j) {
+      for (std::uint32_t row = w.scratch.interior[tile][j]; row != 0; row &= row - 1) {
+        const CellRectangle cell{{tile, std::countr_zero(row), j}, 1, 1};
+        for (const TilePlace& corner : CornersOf(directory, cell)) nodes.Add(corner);
+      }
+    }
+  }
+  nodes.Number(0);
+  w.scratch.attribute_points.clear();
+  nodes.AppendPoints(directory, w.input.scale.cell_size, w.scratch.attribute_points);
+  const auto values = w.input.attributes->At(w.scratch.attribute_points);
+  FindBlocks(directory, w.scratch.interior,
+             {nodes, 0, values, w.input.parameters.attribute_tolerance}, w.scratch.blocks);
+}
+
+// The vertices of a block, counter-clockwise: its corners, and the middles of its edges that are
+// corners of other blocks.
+struct BlockOutline {
+  std::array<std::uint32_t, 8> vertices;
+  int count = 0;
+  int first_middle = -1;
+};
+
+BlockOutline OutlineOf(const TileDirectory& directory, const NodeVertices& nodes,
+                       const CellRectangle& block) {
+  BlockOutline outline;
+  const auto [tile, i, j] = block.corner;
+  const int side = block.width, half = side / 2;
+  const std::array<std::array<int, 2>, 8> steps = {{{0, 0},
+                                                    {half, 0},
+                                                    {side, 0},
+                                                    {side, half},
+                                                    {side, side},
+                                                    {half, side},
+                                                    {0, side},
+                                                    {0, half}}};
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const bool is_middle = k % 2 == 1;
+    if (is_middle && half == 0) continue;
+    const TilePlace node = Normalise(directory, tile, i + steps[k][0], j + steps[k][1]);
+    if (is_middle && !nodes.Contains(node)) continue;
+    if (is_middle && outline.first_middle < 0) outline.first_middle = outline.count;
+    outline.vertices[outline.count++] = nodes.At(node);
+  }
+  return outline;
+}
+
+// Numbers the corners of the blocks and makes triangles of each block: a fan around the first
+// middle of an edge, or two triangles.
+void FillBlocks(Work& w) {
+  FindAttributeBlocks(w);
+  w.interior_cells = CountCells(w.scratch.interior);
+  NodeVertices& nodes = w.scratch.nodes;
+  nodes.Clear(w.input.directory.size());
+  ForEachBlock(w.scratch.blocks, [&](const CellRectangle& block) {
+    for (const TilePlace& corner : CornersOf(w.input.directory, block)) nodes.Add(corner);
+  });
+  nodes.Number(static_cast<std::uint32_t>(w.ring_points));
+  w.scratch.triangles.clear();
+  ForEachBlock(w.scratch.blocks, [&](const CellRectangle& block) {
+    const BlockOutline outline = OutlineOf(w.input.directory, nodes, block);
+    const int first = std::max(outline.first_middle, 0);
+    const auto vertex = [&](int k) { return outline.vertices[(first + k) % outline.count]; };
+    for (int k = 1; k + 1 < outline.count; ++k) {
+      w.scratch.triangles.insert(w.scratch.triangles.end(), {vertex(0), vertex(k), vertex(k + 1)});
+    }
   });
 }
 
@@ -189,18 +268,24 @@ void TriangulateByLoops(Work& w) {
 // parallel with the band, because a single long ring uses only one thread. A single thread numbers
 // the nodes first, which avoids renumbering. Both ways produce the same triangles.
 void TriangulateAll(Work& w) {
-  const auto trace = [&] {
-    TraceStaircases(w.input.directory, w.scratch.interior, w.scratch.staircases);
+  const auto trace = [&](const NodeVertices* nodes) {
+    TraceStaircases(w.input.directory, w.scratch.interior, nodes, w.scratch.staircases);
   };
-  if (ThreadCount() == 1) {
-    trace();
+  if (w.HasBlocks()) {
+    FillBlocks(w);
+    trace(&w.scratch.nodes);
+    NumberCorners(w);
+    AppendNodes(w);
+    TriangulateByLoops(w);
+  } else if (ThreadCount() == 1) {
+    trace(nullptr);
     FillRectangles(w);
     NumberCorners(w);
     AppendNodes(w);
     TriangulateByLoops(w);
   } else {
     const auto sweep = [&] {
-      trace();
+      trace(nullptr);
       AppendCorners(w);
       TriangulateByLoops(w);
     };
@@ -270,7 +355,7 @@ bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
   w.mesh.Clear();
   FindInterior(w);
   if (w.input.parameters.fill == Fill::kNone) {
-    TraceStaircases(w.input.directory, w.scratch.interior, w.scratch.staircases);
+    TraceStaircases(w.input.directory, w.scratch.interior, nullptr, w.scratch.staircases);
     w.interior_cells = CountCells(w.scratch.interior);
   } else {
     CollectRingPoints(w);

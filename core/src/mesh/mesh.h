@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "crossings/crossings.h"
+#include "mesh/blocks.h"
 #include "mesh/loop_groups.h"
 #include "mesh/node_vertices.h"
 #include "mesh/rectangles.h"
@@ -26,9 +28,20 @@ struct MeshScratch {
   std::vector<CellRectangle> rectangles;
   LoopGroups loops;
   NodeVertices nodes;
+  Blocks blocks;
+  NodeVertices attribute_nodes;               // The corners of the interior cells.
+  std::vector<double> attribute_points;       // Their positions.
   std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: number of its node.
   std::vector<std::uint32_t> triangles;       // Two for each rectangle.
   std::vector<double> points;                 // Lattice nodes, while ring points are replaced.
+};
+
+/// Interpolates attributes to points.
+class PointAttributes {
+ public:
+  virtual ~PointAttributes() = default;
+  /// The values at points in world units, interleaved; valid until the next call.
+  virtual std::span<const AttributeValues> At(std::span<const double> points) = 0;
 };
 
 /// Results of the earlier stages.
@@ -41,13 +54,20 @@ struct MeshInput {
   const Rings& rings;
   const ReconstructionParameters& parameters;
   const Scale& scale;
+  PointAttributes* attributes = nullptr;  ///< Null: the mesh carries no attributes.
 };
 
 /// Fills the rings with triangles by `parameters.fill`. Sets `triangles`, `triangles_grid` and
 /// `folded_triangles` of the statistics.
 ///
 /// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points. It is the same for `grid`, `greedy` and `conforming`. Where vertices are particles
+/// points. It is the same for `grid`, `greedy` and `conforming`.
+///
+/// Rectangles of `greedy` are linear across any number of cells. If the mesh carries attributes,
+/// `greedy` covers the interior with blocks instead (blocks.h), whose triangles have no
+/// T-junctions; the band then also has the corners of blocks along the staircase.
+///
+/// Where vertices are particles
 /// (placement_traits.h), the middles of the segments are triangulated and moved to the vertices
 /// afterwards, so a triangle folds if its vertices do.
 /// Returns false if a component cannot be triangulated. That is a bug: rings are simple, and the

@@ -28,10 +28,17 @@ class NodeVertices {
   /// Numbers the nodes by tile, row and column, starting with `first`.
   void Number(std::uint32_t first);
 
+  /// Number of nodes, as of Number.
+  std::size_t count() const { return count_; }
+
   /// Appends the positions of the nodes in the order of their numbers, interleaved, in world units.
   /// Requires: Number was called after the last Add.
   void AppendPoints(const TileDirectory& directory, double cell_size,
                     std::vector<double>& points) const;
+
+  bool Contains(const TilePlace& node) const {
+    return (tiles_[node.tile].nodes[node.j] >> node.i & 1) != 0;
+  }
 
   /// The number of a node.
   /// Requires: the node was added before Number.

@@ -37,7 +37,7 @@ BitRows BottomEdges(const TileDirectory& directory, std::span<const BitRows> int
 
 // Traces one loop, starting to the right along the bottom edge of the cell at `start`.
 void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior,
-               const TilePlace& start, Staircases& staircases) {
+               const NodeVertices* nodes, const TilePlace& start, Staircases& staircases) {
   TilePlace node = start;
   int heading = kEast;
   do {
@@ -45,7 +45,10 @@ void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior
     node = Normalise(directory, node.tile, node.i + kStepX[heading], node.j + kStepY[heading]);
     const bool left = IsInterior(directory, interior, node, kLeftX[heading], kLeftY[heading]);
     const bool right = IsInterior(directory, interior, node, kRightX[heading], kRightY[heading]);
-    if (left && !right) continue;  // Straight on; `continue` evaluates the loop condition.
+    if (left && !right) {  // Straight on; `continue` evaluates the loop condition.
+      if (nodes != nullptr && nodes->Contains(node)) staircases.corners.push_back(node);
+      continue;
+    }
     if (right && !left) ++staircases.pinches;
     heading = (heading + (left ? 3 : 1)) & 3;
     staircases.corners.push_back(node);
@@ -56,7 +59,7 @@ void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior
 }  // namespace
 
 void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
-                     Staircases& staircases) {
+                     const NodeVertices* nodes, Staircases& staircases) {
   staircases.corners.clear();
   staircases.offsets.assign(1, 0);
   staircases.pinches = 0;
@@ -68,7 +71,7 @@ void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> in
     if (IsEmpty(rest)) continue;
     for (int j = 0; j < kTileSize; ++j) {
       while ((rest[j] = edges[j] & ~staircases.visited[tile][j]) != 0) {
-        TraceLoop(directory, interior, {tile, std::countr_zero(rest[j]), j}, staircases);
+        TraceLoop(directory, interior, nodes, {tile, std::countr_zero(rest[j]), j}, staircases);
       }
     }
   }

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "bins/lattice.h"
+#include "mesh/node_vertices.h"
 
 namespace partiemc {
 
 /// Closed loops along lattice edges with the interior cells on the left: outlines
-/// counter-clockwise, voids clockwise. Only corners are listed. At a pinch, a node at which two
+/// counter-clockwise, voids clockwise. Only corners are listed, and the nodes along straight parts
+/// that are requested. At a pinch, a node at which two
 /// interior cells touch diagonally, each loop stays with its cell.
 struct Staircases {
   std::vector<TilePlace> corners;
@@ -19,10 +21,11 @@ struct Staircases {
   std::vector<BitRows> visited;        ///< Scratch: bottom edges that a loop has passed.
 };
 
-/// Traces all loops. `interior` has one bit for each cell, by tile.
+/// Traces all loops. `interior` has one bit for each cell, by tile. Along straight parts, lists the
+/// nodes that `nodes` contains; null: none.
 /// Cost: linear in tiles and in the length of the loops.
 void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
-                     Staircases& staircases);
+                     const NodeVertices* nodes, Staircases& staircases);
 
 /// Euler characteristic of the region inside the loops: outlines - voids - pinches, since a pinch
 /// joins two cells.

@@ -113,6 +113,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     clean: sameField ? base?.clean : undefined,
     surfaceOffset: farthest ? settings.surfaceOffset ?? base?.surfaceOffset : undefined,
     normalMemory: base?.normalMemory,
+    attributeTolerance: base?.attributeTolerance,
     plane: base?.plane,
     minComponentArea: base?.minComponentArea,
     minComponentParticles: base?.minComponentParticles,
