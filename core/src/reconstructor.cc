@@ -126,9 +126,10 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  .tiles = b.bins.tiles.size(),
                  .segments = b.topology.segments.size(),
                  .attribute_values = AttributeValuesOf(frame)};
-  const bool has_blocks = parameters.fill == Fill::kGreedy && size.attribute_values > 0;
-  if (parameters.fill == Fill::kGrid || has_blocks)
-    size.grid_cells = CountCells(b.crossings.interior);
+  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
+  if (HasBlocks(parameters) && size.attribute_values > 0) {
+    size.block_cells = CountCells(b.crossings.interior);
+  }
   return size;
 }
 
@@ -190,7 +191,7 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// For the stage mesh.
+// Interpolates a frame's attributes for the stage mesh.
 class FrameAttributes final : public PointAttributes {
  public:
   FrameAttributes(const Frame& frame, const Scale& scale, Workspace::Buffers& buffers)
@@ -236,9 +237,10 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
         previous.history, b.identity_scratch, b.next_history, result.rings);
   });
   FrameAttributes attributes(frame, scale, b);
+  const bool has_blocks = HasBlocks(parameters) && !frame.attributes.empty();
   const bool is_filled = InStage(observer, Stage::kMesh, [&] {
     return BuildMesh({b.bins.tiles, b.crossings, b.topology, b.planes, b.placed, result.rings,
-                      parameters, scale, frame.attributes.empty() ? nullptr : &attributes},
+                      parameters, scale, has_blocks ? &attributes : nullptr},
                      b.mesh_scratch, result.mesh, result.statistics);
   });
   if (!is_filled) return absl::InternalError("rings cannot be triangulated");

@@ -49,8 +49,8 @@ struct Workspace::Buffers {
   RingHistory next_history;
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
-  std::vector<AttributeValues> node_attributes;
-  std::vector<NextState> next_states;  // By outline: the main one, then the sections.
+  std::vector<AttributeValues> node_attributes;  // At the nodes around interior cells.
+  std::vector<NextState> next_states;            // By outline: the main one, then the sections.
 };
 
 }  // namespace partiemc

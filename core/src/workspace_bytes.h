@@ -11,6 +11,7 @@ struct FrameSize {
   std::uint64_t tiles = 0;
   std::uint64_t segments = 0;          ///< Pieces of the outline, one per cell.
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
+  std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t attribute_values = 0;  ///< Per particle, and per vertex.
 };
 
@@ -28,6 +29,10 @@ inline constexpr std::uint64_t kBytesPerCarryingTile = 4'200;
 inline constexpr std::uint64_t kBytesPerValueOfSegment = 24;
 inline constexpr std::uint64_t kBytesPerValueOfGridCell = 8;
 
+/// A block of one cell has the bytes of a grid cell, and a node with its values.
+inline constexpr std::uint64_t kBytesPerBlockCell = kBytesPerGridCell + 24;
+inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
+
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
@@ -36,11 +41,12 @@ inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +
-                        kBytesPerGridCell * size.grid_cells;
+                        kBytesPerGridCell * size.grid_cells + kBytesPerBlockCell * size.block_cells;
   if (size.attribute_values > 0) {
     bytes += kBytesPerCarryingParticle * size.particles + kBytesPerCarryingTile * size.tiles +
              size.attribute_values * (kBytesPerValueOfSegment * size.segments +
-                                      kBytesPerValueOfGridCell * size.grid_cells);
+                                      kBytesPerValueOfGridCell * size.grid_cells +
+                                      kBytesPerValueOfBlockCell * size.block_cells);
   }
   return bytes;
 }

@@ -53,6 +53,14 @@ namespace {
 
 using support::Particles;
 
+// Values of an attribute, for which the mesh of `greedy` has the smallest blocks.
+std::vector<float> NoisyValues(std::size_t count) {
+  support::Random random(9);
+  std::vector<float> values(count);
+  for (float& value : values) value = static_cast<float>(random.Uniform(0, 1));
+  return values;
+}
+
 struct AllocationCase {
   Placement placement;
   Fill fill;
@@ -98,7 +106,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
     frames.push_back(frame);
   }
   frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
-  const std::vector<float> values(2 * frames[0].size() + 4000, 1.0f);
+  const std::vector<float> values = NoisyValues(2 * frames[0].size() + 4000);
   State state;
   Workspace workspace;
   Result result;
@@ -208,7 +216,7 @@ struct MemoryCase {
   std::string name;
   Particles particles;
   ReconstructionParameters parameters;
-  bool carries = false;  // Attributes.
+  enum { kNothing, kConstants, kNoise } carries = kNothing;  // Attributes.
 };
 
 // Frames that differ in their largest consumer of memory.
@@ -220,7 +228,9 @@ std::vector<MemoryCase> MemoryCases() {
     cases.push_back({name, particles, parameters});
     cases.push_back({absl::StrCat(name, ", ids"), particles, parameters});
     for (std::size_t k = 0; k < particles.size(); ++k) cases.back().particles.ids.push_back(k);
-    cases.push_back({absl::StrCat(name, ", attributes"), particles, parameters, true});
+    cases.push_back(
+        {absl::StrCat(name, ", constants"), particles, parameters, MemoryCase::kConstants});
+    cases.push_back({absl::StrCat(name, ", noise"), particles, parameters, MemoryCase::kNoise});
   };
   const auto spread = [](int side, double distance, double x0 = 0) {
     return support::Scaled(support::Lattice(side, side, x0 / distance, x0 / distance), distance);
@@ -245,11 +255,12 @@ TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
     SCOPED_TRACE(tested.name);
     const auto reconstructor = Reconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
-    const std::vector<float> values(3 * tested.particles.size(), 1.0f);
+    std::vector<float> values(3 * tested.particles.size(), 1.0f);
+    if (tested.carries == MemoryCase::kNoise) values = NoisyValues(values.size());
     const std::array<Attribute, 3> attributes = {
         {{"a", 3, values}, {"b", 3, values}, {"c", 3, values}}};
     Frame frame = tested.particles.AsFrame();
-    if (tested.carries) frame.attributes = attributes;
+    if (tested.carries != MemoryCase::kNothing) frame.attributes = attributes;
     const std::size_t before = live_bytes;
     Guard guard(100);
     std::size_t held = 0;

@@ -65,6 +65,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.cell_size = 0.5;
   parameters.reference_radius = 1.25;
   parameters.surface_offset = -0.5;
+  parameters.attribute_tolerance = 0.125;
   parameters.normal_memory = false;
   parameters.clean = false;
   parameters.min_component_area = 2.5;

@@ -42,25 +42,39 @@ void ForEachBlockIn(const BitRows& cells, int level, const Visit& visit) {
   }
 }
 
-// The values of one component at the nodes of a tile, also at those along its right and upper side.
+// The values of one part of an attribute at the nodes of a tile, including its right and upper
+// side.
 using TileValues = std::array<std::array<float, kNodesAlong>, kNodesAlong>;
 
+// The parts of an attribute: its components, and the length of a vector. Pictures are coloured by
+// the length, which is not linear near a zero of a linear vector field.
+int PartsOf(const AttributeValues& attribute) {
+  return attribute.components == 1 ? 1 : attribute.components + 1;
+}
+
+float PartOf(const AttributeValues& attribute, std::size_t node, int part) {
+  const float* const components = &attribute.values[node * attribute.components];
+  if (part < attribute.components) return components[part];
+  double sum = 0;
+  for (int c = 0; c < attribute.components; ++c) sum += double{components[c]} * components[c];
+  return static_cast<float>(std::sqrt(sum));
+}
+
 void Gather(const TileDirectory& directory, const NodeAttributes& attributes, std::uint32_t tile,
-            const AttributeValues& attribute, int component, TileValues& values) {
+            const AttributeValues& attribute, int part, TileValues& values) {
   for (int j = 0; j < kNodesAlong; ++j) {
     for (int i = 0; i < kNodesAlong; ++i) {
       const TilePlace node = Normalise(directory, tile, i, j);
       if (node.tile == kNoTile || !attributes.nodes.Contains(node)) continue;
-      const std::size_t number = attributes.nodes.At(node) - attributes.first;
-      values[j][i] = attribute.values[number * attribute.components + component];
+      values[j][i] = PartOf(attribute, attributes.nodes.At(node), part);
     }
   }
 }
 
 // Let D be the largest deviation of a node from the bilinear interpolation of the corners, and T
-// how far the two diagonals are apart in the centre. Triangles between corners and middles of edges
-// deviate from the bilinear interpolation by at most T / 2 and, at a middle, by D. So they deviate
-// from a node by at most 2 D + T / 2.
+// the distance of the two diagonals in the centre. Triangles between corners and middles of edges
+// deviate from the bilinear interpolation by at most T / 2 + D: T / 2 for the diagonals, D at the
+// middles. So they deviate from a node by at most 2 D + T / 2.
 bool IsLinear(const TileValues& values, int i, int j, int side, double tolerance) {
   const double a = values[j][i], b = values[j][i + side];
   const double c = values[j + side][i], d = values[j + side][i + side];
@@ -158,12 +172,12 @@ void FindBlocks(const TileDirectory& directory, std::span<const BitRows> interio
   });
   for (const AttributeValues& attribute : attributes.values) {
     const double tolerance = attributes.tolerance * RangeOf(attribute);
-    for (int c = 0; c < attribute.components; ++c) {
+    for (int part = 0; part < PartsOf(attribute); ++part) {
       ParallelFor(interior.size(), [&](std::size_t k) {
         const auto tile = static_cast<std::uint32_t>(k);
         if (IsEmpty(blocks.linear[tile][1])) return;
         TileValues values{};
-        Gather(directory, attributes, tile, attribute, c, values);
+        Gather(directory, attributes, tile, attribute, part, values);
         KeepLinearBlocks(values, tolerance, blocks.linear[tile]);
       });
     }

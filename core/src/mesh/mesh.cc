@@ -26,10 +26,7 @@ struct Work {
   bool is_complete = true;  // Every group of loops has been triangulated.
 
   bool MovesVertices() const { return TraitsOf(input.parameters.placement).takes_particles; }
-  bool HasBlocks() const {
-    return input.attributes != nullptr && input.parameters.fill == Fill::kGreedy &&
-           input.parameters.attribute_tolerance < 1;
-  }
+  bool HasBlocks() const { return input.attributes != nullptr; }
   bool HasBand() const {
     return input.parameters.fill != Fill::kNone && input.parameters.fill != Fill::kPolygon;
   }
@@ -116,8 +113,8 @@ void FindAttributeBlocks(Work& w) {
   w.scratch.attribute_points.clear();
   nodes.AppendPoints(directory, w.input.scale.cell_size, w.scratch.attribute_points);
   const auto values = w.input.attributes->At(w.scratch.attribute_points);
-  FindBlocks(directory, w.scratch.interior,
-             {nodes, 0, values, w.input.parameters.attribute_tolerance}, w.scratch.blocks);
+  FindBlocks(directory, w.scratch.interior, {nodes, values, w.input.parameters.attribute_tolerance},
+             w.scratch.blocks);
 }
 
 // The vertices of a block, counter-clockwise: its corners, and the middles of its edges that are
@@ -152,8 +149,8 @@ BlockOutline OutlineOf(const TileDirectory& directory, const NodeVertices& nodes
   return outline;
 }
 
-// Numbers the corners of the blocks and makes triangles of each block: a fan around the first
-// middle of an edge, or two triangles.
+// Numbers the corners of the blocks and divides each block into triangles: a fan around the first
+// middle of an edge, or two triangles. Two neighbours share all vertices of their common edge.
 void FillBlocks(Work& w) {
   FindAttributeBlocks(w);
   w.interior_cells = CountCells(w.scratch.interior);
@@ -163,13 +160,19 @@ void FillBlocks(Work& w) {
     for (const TilePlace& corner : CornersOf(w.input.directory, block)) nodes.Add(corner);
   });
   nodes.Number(static_cast<std::uint32_t>(w.ring_points));
-  w.scratch.triangles.clear();
+  std::size_t triangle_count = 0;
+  ForEachBlock(w.scratch.blocks, [&](const CellRectangle& block) {
+    triangle_count += OutlineOf(w.input.directory, nodes, block).count - 2;
+  });
+  w.scratch.triangles.resize(3 * triangle_count);
+  std::uint32_t* next = w.scratch.triangles.data();
   ForEachBlock(w.scratch.blocks, [&](const CellRectangle& block) {
     const BlockOutline outline = OutlineOf(w.input.directory, nodes, block);
     const int first = std::max(outline.first_middle, 0);
-    const auto vertex = [&](int k) { return outline.vertices[(first + k) % outline.count]; };
     for (int k = 1; k + 1 < outline.count; ++k) {
-      w.scratch.triangles.insert(w.scratch.triangles.end(), {vertex(0), vertex(k), vertex(k + 1)});
+      for (const int corner : {0, k, k + 1}) {
+        *next++ = outline.vertices[(first + corner) % outline.count];
+      }
     }
   });
 }
@@ -363,9 +366,11 @@ bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
     if (!w.is_complete) return false;
     if (w.MovesVertices()) MoveVertices(w);
   }
+  // Each node of a block along the staircase adds one triangle, which `grid` does not have.
   const auto band_triangles =
       w.HasBand() ? static_cast<std::uint64_t>(std::count(
-                        w.mesh.classes.begin(), w.mesh.classes.end(), TriangleClass::kBoundary))
+                        w.mesh.classes.begin(), w.mesh.classes.end(), TriangleClass::kBoundary)) -
+                        w.scratch.staircases.straight_nodes
                   : ExpectedBandTriangles(w);
   statistics.triangles = w.mesh.TriangleCount();
   statistics.triangles_grid = 2 * w.interior_cells + band_triangles;

@@ -32,7 +32,7 @@ struct MeshScratch {
   NodeVertices attribute_nodes;               // The corners of the interior cells.
   std::vector<double> attribute_points;       // Their positions.
   std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: number of its node.
-  std::vector<std::uint32_t> triangles;       // Two for each rectangle.
+  std::vector<std::uint32_t> triangles;       // Of the interior cells.
   std::vector<double> points;                 // Lattice nodes, while ring points are replaced.
 };
 
@@ -54,25 +54,24 @@ struct MeshInput {
   const Rings& rings;
   const ReconstructionParameters& parameters;
   const Scale& scale;
-  PointAttributes* attributes = nullptr;  ///< Null: the mesh carries no attributes.
+  PointAttributes* attributes = nullptr;  ///< Not null if HasBlocks.
 };
+
+/// Whether the mesh of `parameters` has blocks (blocks.h) if it carries attributes.
+inline bool HasBlocks(const ReconstructionParameters& parameters) {
+  return parameters.fill == Fill::kGreedy && parameters.attribute_tolerance < 1;
+}
 
 /// Fills the rings with triangles by `parameters.fill`. Sets `triangles`, `triangles_grid` and
 /// `folded_triangles` of the statistics.
 ///
 /// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points. It is the same for `grid`, `greedy` and `conforming`.
-///
-/// Rectangles of `greedy` are linear across any number of cells. If the mesh carries attributes,
-/// `greedy` covers the interior with blocks instead (blocks.h), whose triangles have no
-/// T-junctions; the band then also has the corners of blocks along the staircase.
-///
-/// Where vertices are particles
-/// (placement_traits.h), the middles of the segments are triangulated and moved to the vertices
-/// afterwards, so a triangle folds if its vertices do.
-/// Returns false if a component cannot be triangulated. That is a bug: rings are simple, and the
-/// remaining interior cells lie inside them.
-/// Cost: n log n in the points of rings and staircases, linear in cells.
+/// points. It is the same for `grid`, `greedy` without blocks, and `conforming`. With blocks, it
+/// also has the corners of blocks along the staircase, so the mesh has no T-junctions. Where
+/// vertices are particles (placement_traits.h), the middles of the segments are triangulated and
+/// moved to the vertices afterwards, so a triangle folds if its vertices do. Returns false if a
+/// component cannot be triangulated. That is a bug: rings are simple, and the remaining interior
+/// cells lie inside them. Cost: n log n in the points of rings and staircases, linear in cells.
 [[nodiscard]] bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
                              FrameStatistics& statistics);
 

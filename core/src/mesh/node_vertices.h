@@ -28,9 +28,6 @@ class NodeVertices {
   /// Numbers the nodes by tile, row and column, starting with `first`.
   void Number(std::uint32_t first);
 
-  /// Number of nodes, as of Number.
-  std::size_t count() const { return count_; }
-
   /// Appends the positions of the nodes in the order of their numbers, interleaved, in world units.
   /// Requires: Number was called after the last Add.
   void AppendPoints(const TileDirectory& directory, double cell_size,

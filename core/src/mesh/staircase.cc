@@ -46,7 +46,10 @@ void TraceLoop(const TileDirectory& directory, std::span<const BitRows> interior
     const bool left = IsInterior(directory, interior, node, kLeftX[heading], kLeftY[heading]);
     const bool right = IsInterior(directory, interior, node, kRightX[heading], kRightY[heading]);
     if (left && !right) {  // Straight on; `continue` evaluates the loop condition.
-      if (nodes != nullptr && nodes->Contains(node)) staircases.corners.push_back(node);
+      if (nodes != nullptr && nodes->Contains(node)) {
+        staircases.corners.push_back(node);
+        ++staircases.straight_nodes;
+      }
       continue;
     }
     if (right && !left) ++staircases.pinches;
@@ -62,6 +65,7 @@ void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> in
                      const NodeVertices* nodes, Staircases& staircases) {
   staircases.corners.clear();
   staircases.offsets.assign(1, 0);
+  staircases.straight_nodes = 0;
   staircases.pinches = 0;
   staircases.visited.assign(interior.size(), BitRows{});
   for (std::uint32_t tile = 0; tile < interior.size(); ++tile) {
