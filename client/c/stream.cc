@@ -69,6 +69,9 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   if (options.cell_size != 0) parameters.cell_size = options.cell_size;
   parameters.slice = SliceOf(options.slice);
   if (options.isovalue != 0) parameters.isovalue = options.isovalue;
+  if (options.attribute_tolerance != 0) {
+    parameters.attribute_tolerance = options.attribute_tolerance;
+  }
   for (std::size_t k = 0; k < options.section_count; ++k) {
     const partiemc_section& from = options.sections[k];
     Section& section = parameters.sections.emplace_back();

@@ -30,7 +30,11 @@ def to_path(rings):
 
 
 def to_triangulation(mesh):
-    """A matplotlib Triangulation, for triplot, tripcolor and tricontour."""
+    """A matplotlib Triangulation, for triplot, tripcolor and tricontour.
+
+    Its interpolators and get_trifinder refuse T-junctions. Without them are the fills "conforming" and
+    "polygon", and "greedy" if the particles carry attributes.
+    """
     from matplotlib.tri import Triangulation
 
     return Triangulation(mesh.points[:, 0], mesh.points[:, 1], mesh.triangles)

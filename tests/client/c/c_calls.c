@@ -367,6 +367,35 @@ static void try_attributes(const char* address) {
   partiemc_close(stream);
 }
 
+/* The default mesh is finer than one with the tolerance 1, if an attribute is not linear. */
+static void try_attribute_tolerance(const char* address) {
+  static float hill[kCount];
+  for (size_t k = 0; k < kCount; ++k) {
+    hill[k] = (float)exp(-.1 * (pow(x[k] - kSide / 2., 2) + pow(y[k] - kSide / 2., 2)));
+  }
+  const partiemc_attribute carried = {"hill", {hill, sizeof *hill, PARTIEMC_FLOAT32}, {0}, {0}};
+  partiemc_particles particles = plain();
+  particles.attributes = &carried;
+  particles.attribute_count = 1;
+  const double tolerances[] = {1, .1, 0};
+  uint64_t triangles[3];
+  for (int k = 0; k < 3; ++k) {
+    partiemc_options options;
+    partiemc_options_init(&options, sizeof options);
+    options.spacing = 1;
+    options.attributes = "hill";
+    options.attribute_tolerance = tolerances[k];
+    partiemc_stream* stream = NULL;
+    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+    partiemc_event event;
+    partiemc_event_init(&event, sizeof event);
+    EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+    triangles[k] = event.triangle_count;
+    partiemc_close(stream);
+  }
+  EXPECT(0 < triangles[0] && triangles[0] < triangles[1] && triangles[1] < triangles[2]);
+}
+
 /* The block, as one layer of a wall that stands on it. */
 static void try_slice(const char* address) {
   enum { kLayers = 9 };
@@ -425,6 +454,7 @@ int main(int argc, char** argv) {
   try_refusals(address);
   try_latest(address);
   try_attributes(address);
+  try_attribute_tolerance(address);
   try_slice(address);
   try_parts(address);
   try_sizes(address);

@@ -419,6 +419,73 @@ TEST(Replay, WritesAttributesAtTheVerticesOfFilesAndRecordings) {
             Column(Content(directory.Path("from_csv/frame_000000.csv")), "p"));
 }
 
+// A drop of 32 particles of another phase, far below the surface.
+TEST(Replay, ShowsASubmergedDropInEveryOutput) {
+  const support::TemporaryFolder directory;
+  std::ofstream file(directory.Path("frame_0.csv"));
+  file << "x,y,phase\n";
+  for (int row = 0; row < 60; ++row) {
+    for (int column = 0; column < 60; ++column) {
+      const bool in_drop = std::hypot(column - 30.3, row - 28.6) < 3.2;
+      file << column << "," << row << "," << in_drop << "\n";
+    }
+  }
+  file.close();
+  struct Seen {
+    double triangles, largest;
+    std::string svg;
+  };
+  const auto replay = [&](const std::string& tolerance) {
+    const std::string folder = directory.Path("tolerance_" + tolerance);
+    const Ran ran = RunPartiemc({"replay",
+                                 directory.Path("frame_0.csv"),
+                                 "--local",
+                                 "--spacing",
+                                 "1",
+                                 "--attributes",
+                                 "phase",
+                                 "--color-by",
+                                 "phase",
+                                 "--format",
+                                 "svg",
+                                 "--output-dir",
+                                 folder,
+                                 "--stats",
+                                 folder + ".csv",
+                                 "--report",
+                                 folder + ".html",
+                                 "--attribute-tolerance",
+                                 tolerance,
+                                 "--check",
+                                 "--quiet"});
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    Seen seen;
+    seen.triangles = std::stod(Column(Content(folder + ".csv"), "triangles").at(0));
+    const std::string report = Content(folder + ".html");
+    EXPECT_THAT(report, HasSubstr("\"mesh_shown\":true"));
+    std::smatch colors;
+    const std::string numbers = report.substr(report.find("class=\"frame-numbers\""), 2000);
+    EXPECT_TRUE(std::regex_search(numbers, colors, std::regex("\"colors\":\\[([^,]+),([^\\]]+)")));
+    seen.largest = std::stod(colors[2]);
+    seen.svg = Content(folder + "/frame_000000.svg");
+    return seen;
+  };
+  const Seen shown = replay("0.01"), hidden = replay("1");
+  EXPECT_GT(shown.largest, .95);
+  EXPECT_LT(hidden.largest, .1);
+  EXPECT_GT(shown.triangles, hidden.triangles);
+  const auto bands = [](const std::string& svg) {
+    const std::size_t begin = svg.find("class=\"bands\"");
+    const std::string group = svg.substr(begin, svg.find("</g>", begin) - begin);
+    return std::ranges::count(group, '\n');
+  };
+  EXPECT_GT(bands(shown.svg), bands(hidden.svg) + 3);
+  const Ran refused = RunPartiemc({"replay", directory.Path("frame_0.csv"), "--local", "--quiet",
+                                   "--attribute-tolerance", "1.5"});
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_THAT(refused.error, HasSubstr("attribute_tolerance"));
+}
+
 TEST(Replay, AnAttributeThatIsMissingIsTold) {
   const support::TemporaryFolder directory;
   WriteLinearFields(directory);

@@ -137,7 +137,7 @@ class Results(unittest.TestCase):
         self.assertEqual(plain.attributes, {})
         result = partiemc.reconstruct(
             particles, spacing=1, attributes={"pressure": wide[:, 1], "flow": (y, -x)})
-        self.assertEqual(digests(result), digests(plain))
+        self.assertEqual(result.rings.points.tolist(), plain.rings.points.tolist())
         pressure, flow = result.attributes["pressure"], result.attributes["flow"]
         at_x, at_y = result.mesh.points.T
         self.assertEqual((pressure.dtype, pressure.shape, flow.shape),
@@ -149,6 +149,9 @@ class Results(unittest.TestCase):
         outline = partiemc.reconstruct(particles, spacing=1, fill="none",
                                        attributes={"pressure": wide[:, 1]})
         points = outline.rings.points
+        coarse = partiemc.reconstruct(particles, spacing=1, attributes={"pressure": wide[:, 1]},
+                                      attribute_tolerance=1)
+        self.assertEqual(digests(coarse), digests(plain))
         self.assertEqual(outline.attributes["pressure"].tolist(), pressure[:len(points)].tolist())
 
     def test_wrong_attributes_are_told(self):
@@ -261,6 +264,29 @@ class Results(unittest.TestCase):
             numpy.testing.assert_array_equal(polygon, numpy.concatenate([ring, ring[:1]]))
         self.assertEqual(len(self.result.mesh.to_triangulation().triangles), len(self.result.mesh))
 
+    def test_matplotlib_interpolates_attributes(self):
+        try:
+            from matplotlib.tri import LinearTriInterpolator, TrapezoidMapTriFinder
+        except ImportError:
+            self.skipTest("NOT TESTED: there is no matplotlib (Debian: python3-matplotlib)")
+        particles = block()
+        x, y = particles.T
+        wave = numpy.sin(x / 3) + numpy.cos(y / 4)
+        for fill in ("greedy", "conforming", "polygon"):
+            for attributes in ({"wave": wave}, {}):
+                if fill == "greedy" and not attributes:
+                    continue
+                with self.subTest(fill=fill, attributes=list(attributes)):
+                    result = partiemc.reconstruct(particles, spacing=1, fill=fill,
+                                                  attributes=attributes)
+                    triangulation = result.mesh.to_triangulation()
+                    found = TrapezoidMapTriFinder(triangulation)(x, y)
+                    self.assertGreater((found >= 0).mean(), 0.99)
+                    if fill == "greedy":
+                        read = LinearTriInterpolator(triangulation, result.attributes["wave"])(x, y)
+                        error = numpy.abs(read - wave).mean()
+                        self.assertLess(error, 0.02 * numpy.ptp(wave))
+
     def test_meshio_takes_results(self):
         try:
             mesh = self.result.mesh.to_meshio()
@@ -316,6 +342,9 @@ class Errors(unittest.TestCase):
         self.assert_refused("UNSUPPORTED", "slice", slice=3)
         self.assert_refused("UNSUPPORTED", "sections[1]", sections=[{}, {"isovalues": 1}])
         self.assert_refused("OUT_OF_RANGE", "parameters.isovalue", isovalue=11)
+        for tolerance in (-0.1, 1.5, numpy.nan):
+            self.assert_refused("OUT_OF_RANGE", "parameters.attribute_tolerance",
+                                attribute_tolerance=tolerance)
         self.assert_refused("OUT_OF_RANGE", "parameters.sections[0].slice",
                             sections=[{"slice": ("z", 0)}])
         self.assert_refused("OUT_OF_RANGE", "parameters.slice.normal", spacing=1,

@@ -115,6 +115,8 @@ typedef struct partiemc_options {
   const partiemc_section* sections; /* Additional outlines of each frame, at most 16
                                        (partiemc_event_section). Each costs like a frame. */
   size_t section_count;
+  double attribute_tolerance; /* Largest error of attributes across triangles of "greedy", a
+                                 fraction of their range, at most 1; 0: the default, .01. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
