@@ -42,12 +42,14 @@ test('an invalid address shows nothing', () => {
 test('another placement gets its own reference radius', () => {
   const base = create(ReconstructionParametersSchema, {
     placement: Placement.VIRTUAL_PLANE, kernelRadius: 3, referenceRadius: 0.7, cellSize: 1, clean: true,
+    attributeTolerance: 0.1,
   });
   const other = parametersOf({ ...AS_STREAMED, placement: Placement.QEF }, base, 0.1);
   assert.deepEqual([other.placement, other.referenceRadius, other.clean, other.spacing],
                    [Placement.QEF, undefined, undefined, 0.1]);
   const same = parametersOf({ ...AS_STREAMED, cellSize: 2 }, base, null);
-  assert.deepEqual([same.referenceRadius, same.cellSize, same.kernelRadius], [0.7, 2, 3]);
+  assert.deepEqual([same.referenceRadius, same.cellSize, same.kernelRadius, same.attributeTolerance],
+                   [0.7, 2, 3, 0.1]);
   assert.equal(parametersOf({ ...AS_STREAMED, surfaceOffset: 0.5 }, base, null).surfaceOffset, undefined);
 });
 
