@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <map>
 #include <random>
 #include <string>
@@ -237,6 +238,17 @@ TEST(AttributeMeshes, OfNoiseAreTheGrid) {
   const Result grid = MeshOf(body, {.fill = Fill::kGrid});
   EXPECT_GE(mesh.mesh.TriangleCount(), grid.mesh.TriangleCount());
   EXPECT_EQ(CountTJunctions(mesh), 0u);
+}
+
+TEST(AttributeMeshes, OfTheLargestFloatsAreValid) {
+  std::mt19937 random(7);
+  const float most = std::numeric_limits<float>::max();
+  Body body([&](double, double) { return random() % 2 == 0 ? most : -most; }, 20);
+  body.values.insert(body.values.end(), body.values.rbegin(), body.values.rend());
+  for (const double tolerance : {0., .01, .9}) {
+    const Result mesh = MeshOf(body, {.attribute_tolerance = tolerance});
+    EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus()) << tolerance;
+  }
 }
 
 TEST(AttributeMeshes, OfAConstantHaveAFewLargeBlocks) {

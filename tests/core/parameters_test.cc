@@ -42,6 +42,9 @@ std::vector<BadParameters> AllBadParameters() {
   for (const double value : {-1.01, 1.01, kNan, kInfinity}) {
     all.push_back({"surface_offset", {.surface_offset = value}});
   }
+  for (const double value : {-1e-9, 1.01, kNan, kInfinity}) {
+    all.push_back({"attribute_tolerance", {.attribute_tolerance = value}});
+  }
   for (const double value : {-1e-9, -1.0, kNan, kInfinity}) {
     all.push_back({"min_component_area", {.min_component_area = value}});
   }
@@ -71,6 +74,8 @@ TEST(Parameters, AtTheEndsOfTheirRangesAreAccepted) {
                                                {.reference_radius = 2.999},
                                                {.surface_offset = -1},
                                                {.surface_offset = 1},
+                                               {.attribute_tolerance = 0},
+                                               {.attribute_tolerance = 1},
                                                {.min_component_area = 1e300},
                                                {.min_component_particles = ~std::uint64_t{0}}}) {
     EXPECT_TRUE(Validate(good).ok()) << Validate(good);

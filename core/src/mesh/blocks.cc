@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/parallel.h"
 #include "bins/cell_mask.h"
@@ -57,7 +58,7 @@ float PartOf(const AttributeValues& attribute, std::size_t node, int part) {
   if (part < attribute.components) return components[part];
   double sum = 0;
   for (int c = 0; c < attribute.components; ++c) sum += double{components[c]} * components[c];
-  return static_cast<float>(std::sqrt(sum));
+  return static_cast<float>(std::min<double>(std::sqrt(sum), std::numeric_limits<float>::max()));
 }
 
 void Gather(const TileDirectory& directory, const NodeAttributes& attributes, std::uint32_t tile,
