@@ -93,6 +93,7 @@ TEST_F(Operation, TheServerTellsWhatItIsAndWhatItAllows) {
   EXPECT_THAT(info.placements(), Not(Contains(v1::PLACEMENT_UNSPECIFIED)));
   EXPECT_THAT(info.fills(), Contains(v1::FILL_GREEDY));
   EXPECT_THAT(info.capabilities(), Contains("watch"));
+  EXPECT_THAT(info.capabilities(), Contains("attribute-meshes"));
   EXPECT_FALSE(info.draining());
 }
 
