@@ -25,9 +25,9 @@ enum class Placement : std::uint8_t {
 
 /// How the inside of the outline is filled with triangles (paper, sections 3.7-3.8).
 enum class Fill : std::uint8_t {
-  kNone,        ///< No mesh.
-  kGrid,        ///< Two triangles for each interior cell: the paper's "before".
-  kGreedy,      ///< Interior cells merged into rectangles: the paper's "after".
+  kNone,    ///< No mesh.
+  kGrid,    ///< Two triangles for each interior cell: the paper's "before".
+  kGreedy,  ///< Cells merged into rectangles (the paper's "after"); with attributes, into blocks.
   kConforming,  ///< Few triangles, like greedy, but without T-junctions.
   kPolygon,     ///< The rings triangulated, without interior vertices.
 };
@@ -93,9 +93,9 @@ struct ReconstructionParameters {
   /// paper; 0.5 matches the volume.
   double surface_offset = 0.0;
 
-  /// If frames have attributes, the mesh of `greedy` is fine enough for them: values interpolated
-  /// across its triangles deviate at lattice nodes by at most this fraction of the attribute's range
-  /// inside the body, in [0, 1]. 1: rectangles as large as without attributes.
+  /// Largest error of attributes in the mesh of `greedy`, a fraction in [0, 1] of the attribute's
+  /// range inside the body. Values interpolated across triangles keep it at lattice nodes. The mesh
+  /// has no T-junctions. 1: rectangles as in frames without attributes.
   double attribute_tolerance = 0.01;
 
   /// Orient cell normals by the normals of the frame before (Eq. 11), not by the outline alone.

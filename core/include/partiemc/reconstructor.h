@@ -17,7 +17,7 @@
 namespace partiemc {
 
 /// Raised whenever the same frames and parameters give other digests.
-inline constexpr std::uint32_t kMethodVersion = 10;
+inline constexpr std::uint32_t kMethodVersion = 11;
 
 /// Reusable buffers, one set for each thread that calls Reconstruct. Any workspace serves any
 /// reconstructor; its history never changes a result.

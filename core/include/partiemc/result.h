@@ -67,7 +67,7 @@ enum class TriangleClass : std::uint8_t {
 ///   M1 every triangle is counter-clockwise, none is folded or degenerate;
 ///   M2 triangles do not overlap and together cover exactly the inside of the rings;
 ///   M3 its first points are the points of the rings, bit for bit, in their order;
-///   M4 no vertex lies inside a side of a triangle or ring (Fill::kConforming and kPolygon only).
+///   M4 no vertex lies inside a side of a triangle or ring (Fill::kConforming, kPolygon, blocks).
 struct Mesh {
   std::vector<double> points;            ///< x0, y0, x1, y1, ... in world units.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each.
