@@ -68,8 +68,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Absent and default values add no bytes, so that checkpoints from before these parameters existed
-  // stay valid.
+  // Absent and default values add no bytes, so that checkpoints from before these parameters
+  // existed stay valid.
   if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     PutNumber(attribute_tolerance, bytes);
   }
