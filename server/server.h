@@ -87,7 +87,8 @@ struct ServerOptions {
   ServerLimits limits;
   /// Limits of the connections of `address`.
   ConnectionLimits connections;
-  /// Limit of the bytes of a connection that belong to no call and no message; 0: none.
+  /// Maximum received bytes of a connection that belong to no call and no message. A connection
+  /// that exceeds it is cut. 0: no limit, also none for its streams and headers.
   std::uint64_t unaccounted_bytes = ConnectionRules{}.unaccounted_bytes;
   Keepalive keepalive;
 };

@@ -108,7 +108,8 @@ class ResumingStream final : public Stream {
   std::string checkpoint_ ABSL_GUARDED_BY(monitor_.mutex);
   // The first frame after the checkpoint.
   std::uint64_t checkpoint_next_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
-  // The next frame to deliver, and the next frame that call_ answers.
+  // The next frame whose response the caller gets, and the next frame that call_ answers. After a
+  // reconnection call_ repeats responses, which are dropped.
   std::uint64_t next_answer_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   std::uint64_t next_of_call_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   // All parts below this frame are over, as reported by call_.

@@ -135,7 +135,8 @@ void EncodeMesh(const Result& result, std::size_t max_triangles, Encoder& encode
   }
 }
 
-/// Sorts particles into rows of two spacings, so that successive particles are close in space.
+/// Encodes at most `max_particles` particles, selected evenly. They are sorted in rows two spacings
+/// high, so that differences between successive particles are small.
 void EncodeParticles(std::span<const double> particles, std::size_t max_particles,
                      Encoder& encoder) {
   const std::size_t count = particles.size() / 2;

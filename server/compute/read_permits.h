@@ -127,7 +127,7 @@ class ReadPermits {
     std::optional<Clock::time_point> moved;  // When the connection last was not idle.
   };
   using Permits = std::map<const Reader*, Permit>;
-  // Permits a stream to have a frame beyond the budget.
+  // Allows one frame beyond the budget. All connections of a stream share its slot.
   struct Slot {
     std::uint64_t bytes = 0;       // Received bytes.
     bool reading = false;          // Whether one of the stream's connections reads.

@@ -41,7 +41,8 @@ class ImportedStream {
   const RemoteStream& stream() const { return stream_; }
   const std::shared_ptr<ResultBroadcaster>& broadcaster() const { return broadcaster_; }
   bool ended() const { return ended_; }
-  /// Whether it has had no watcher for long enough to be deleted.
+  /// True if the stream can be deleted: it has no watcher and no pending join, and it has ended or
+  /// has had no watcher for kLinger.
   bool IsIdle(TimePoint now) const;
 
   /// Whether a watcher from `from_sequence` gets the same results here as at the owner.

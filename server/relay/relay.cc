@@ -244,7 +244,7 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
 void Relay::LookAtExports(TimePoint now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
-    // While the bus is disconnected, no replica can request results.
+    // While the bus is disconnected, replicas cannot renew their requests: keep all exports.
     const bool may_be_wanted = !connected_ && now - disconnected_ < kBusPatience;
     const bool has_news = exported.ended_at() && now - *exported.ended_at() < kEndKept;
     const bool is_wanted = now < exported.wanted_until() || may_be_wanted || has_news;

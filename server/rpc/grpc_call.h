@@ -24,7 +24,7 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
  public:
   using Make = std::function<std::unique_ptr<ByteCall>(CallChannel&, const CallOrigin&)>;
 
-  /// Counts for its connection in `connections`, which outlives it.
+  /// Reports the call and its messages to the ledger of its connection, found in `connections`.
   GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections, CallKind kind,
            const Make& make);
 

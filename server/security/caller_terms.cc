@@ -15,7 +15,7 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
-// ListStreams compares each open stream with all patterns.
+// Limits the time of ListStreams, which compares each open stream with all patterns.
 constexpr std::size_t kMaxPatterns = 32;
 
 constexpr char kMayRule[] = "may= must have one or more of produce,watch,list, each once";

@@ -31,7 +31,8 @@ struct CallerTerms {
   std::vector<std::string> names = {"*"};  ///< Patterns of stream names (MatchesPattern).
   CallerQuota quota;
 
-  /// Whether the caller may produce, watch and list a stream of this name.
+  /// Whether a pattern of `names` matches the name. Does not check may_produce, may_watch,
+  /// may_list.
   bool MayUse(std::string_view stream_name) const;
 };
 

@@ -13,7 +13,8 @@ namespace {
 // In this time a fast connection brings 15 MB.
 constexpr std::chrono::milliseconds kPeriod(10);
 
-// Returning 100 MB of freed memory takes 15 ms, during which no other thread can allocate.
+// Minimum interval between two returns of freed memory to the system. Returning 100 MB takes 15 ms,
+// during which no other thread can allocate.
 constexpr std::chrono::milliseconds kBetweenGivingBack(250);
 
 // Interval between looks at the received bytes of all connections, which cost two system calls for

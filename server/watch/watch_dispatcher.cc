@@ -56,7 +56,7 @@ void WatchDispatcher::Run() {
     for (Dispatched* dispatched = TakeWaiting(); dispatched != nullptr;) {
       Dispatched* const next = dispatched->next_;
       const std::shared_ptr<Dispatched> held = std::move(dispatched->self_);
-      // Cleared before Serve, so that later events wake it again.
+      // `waiting_` is cleared before Serve, so that an event during Serve queues the object again.
       dispatched->waiting_.exchange(false);
       if (!stopping_) held->Serve();
       dispatched = next;

@@ -75,8 +75,9 @@ void WebConnection::CloseGently() {
   });
 }
 
-// A client that half-closes may still wait for the response. The last bytes of TLS are read, so
-// that a connection without a body closes at once.
+// Both directions are shut down. Closing with unread bytes would reset the connection, so a few
+// last bytes, such as the close_notify of TLS, are read first. With more bytes, the deadline closes
+// the connection.
 void WebConnection::CloseIfRead() {
   std::array<char, 1024> last;
   error_code error;

@@ -28,7 +28,7 @@ class ReplayOutputs {
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { frames_.AddRefused(); }
-  /// Report and table state that frames are missing, and why.
+  /// The report and the summary will say that the replay ended early, and why.
   void EndEarly(std::string why) { frames_.EndEarly(std::move(why)); }
 
   /// Writes statistics and report, each even if the other fails. Neither exists before.

@@ -41,7 +41,8 @@ struct AttributeScratch {
 ///
 /// Requires: a checked frame (frame/frame_view.h).
 /// Deterministic: sums run by tile and bucket, then in the order of the frame. Parallel over
-/// vertices. Cost: linear in the particles near vertices, times the particles within the kernel.
+/// vertices. Cost: linear in the particles of tiles near vertices, plus the particles within the
+/// kernel radius of each vertex.
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
                            std::span<const double> vertices, AttributeScratch& scratch,
                            std::vector<AttributeValues>& values);

@@ -1,4 +1,4 @@
-// The particles around a few points, as spans of memory.
+// References to the ranges of memory that contain the particles around a few points.
 #pragma once
 
 #include <array>

@@ -18,7 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace partiemc {
 namespace HWY_NAMESPACE {
 
-// The terms of a vector of particles: d, t and t^2. t is 0 beyond the kernel.
+// Terms of one SIMD vector of particles: d = particle - point, t = max(0, 1 - |d|^2 / radius^2),
+// t^2.
 struct Terms {
   Vector dx, dy, t, t2;
 };

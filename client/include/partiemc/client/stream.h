@@ -106,8 +106,9 @@ struct StreamOptions {
   /// Requires a name. All other options apply to part 0 only, except credentials, addresses and
   /// times.
   FrameParts parts = {};
-  /// Upper bound on the frames held for resending: `checkpoint_interval` frames plus the window. A
-  /// frame that does not fit is refused.
+  /// Maximum total bytes of the frames held for resending (up to `checkpoint_interval` frames plus
+  /// the window). Send waits for room. A frame that does not fit after all responses is refused
+  /// (HELD_BYTES).
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
