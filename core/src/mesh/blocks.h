@@ -33,12 +33,10 @@ struct Blocks {
 
 /// Covers the interior cells with disjoint blocks. The blocks are as large as two rules allow:
 /// 1. Every component of an attribute, and the length of a vector, is linear enough. A mesh with
-/// the
-///    nodes' values at the corners of blocks deviates from each node's value by at most the
+///    the nodes' values at the corners of blocks deviates from each node's value by at most the
 ///    tolerance, for any choice of diagonals.
 /// 2. A block and its neighbours along an edge differ by at most one level. So only the middle of
-/// an
-///    edge can be the corner of another block.
+///    an edge can be the corner of another block.
 /// Deterministic. Parallel over tiles. Cost: linear in cells, times values and levels.
 void FindBlocks(const TileDirectory& directory, std::span<const BitRows> interior,
                 const NodeAttributes& attributes, Blocks& blocks);
