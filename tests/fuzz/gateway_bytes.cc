@@ -115,7 +115,7 @@ class Connection {
   std::string ReadHeader() {
     std::string text;
     char byte;
-    while (!text.ends_with("\r\n\r\n") && ::recv(socket_, &byte, 1, 0) == 1) text += byte;
+    while (!text.ends_with("\r\n\r\n") && Receive(&byte, 1) == 1) text += byte;
     return text;
   }
   /// Sends nothing more, and reads until the gateway closes the connection. Returns the first
@@ -125,7 +125,7 @@ class Connection {
     std::string first;
     char buffer[4096];
     while (true) {
-      const auto count = ::recv(socket_, buffer, sizeof buffer, 0);
+      const auto count = Receive(buffer, sizeof buffer);
       Require(count >= 0 || errno == ECONNRESET, "a connection ends after its client");
       if (count <= 0) return first;
       if (first.size() < 16) first.append(buffer, static_cast<std::size_t>(count));
@@ -133,6 +133,15 @@ class Connection {
   }
 
  private:
+  // libFuzzer's timer interrupts calls that wait.
+  ssize_t Receive(char* buffer, std::size_t size) {
+    ssize_t count = -1;
+    do {
+      count = ::recv(socket_, buffer, size, 0);
+    } while (count < 0 && errno == EINTR);
+    return count;
+  }
+
   const int socket_;
 };
 
