@@ -1,9 +1,32 @@
 #include "client/cli/frame_outputs.h"
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
+#include "CLI/CLI.hpp"
+#include "client/output/text.h"
+#include "partiemc/gauges.h"
+
 namespace partiemc::client {
+
+CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
+  std::string kinds;
+  for (const GaugeTraits& traits : AllGauges()) {
+    AppendAll(kinds, kinds.empty() ? "" : ", ", traits.name);
+    char separator = ':';
+    for (const std::string_view number : traits.numbers) {
+      AppendAll(kinds, std::exchange(separator, ','), number);
+    }
+  }
+  return app
+      .add_option("--gauge", gauges,
+                  "Measurement of the outline, in columns of --stats: NAME=KIND:NUMBERS, such as "
+                  "level=height:0.5. Repeat for more. Kinds: " +
+                      kinds)
+      ->type_name("NAME=KIND:...")
+      ->allow_extra_args(false);
+}
 
 absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
   FrameOutputs outputs;
@@ -18,7 +41,9 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
     outputs.frames_ = *std::move(frames);
   }
   if (!places.stats.empty()) {
-    auto statistics = StatisticsWriter::Create(places.stats);
+    auto gauges = ParseGauges(places.gauges);
+    if (!gauges.ok()) return gauges.status();
+    auto statistics = StatisticsWriter::Create(places.stats, *std::move(gauges));
     if (!statistics.ok()) return statistics.status();
     outputs.statistics_.emplace(*std::move(statistics));
   }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -12,17 +13,26 @@
 #include "client/output/statistics_writer.h"
 #include "client/output/summary.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace partiemc::client {
+
+/// Adds --gauge, whose help lists the kinds.
+CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges);
 
 class FrameOutputs {
  public:
   /// The values of the flags with the same names. Empty: no such output.
   struct Places {
     std::string output_dir, format, stats, color_by;
+    std::vector<std::string> gauges = {};
   };
 
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: INVALID_ARGUMENT for a wrong format or extension; the errors of AtomicFile.
+  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge; the errors of AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether the files show the normals of the vertices.

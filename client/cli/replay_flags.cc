@@ -4,6 +4,7 @@
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
+#include "client/cli/frame_outputs.h"
 #include "client/cli/input_source.h"
 #include "client/output/frame_writer.h"
 #include "client/output/text.h"
@@ -215,9 +216,12 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
                  "are taken at the vertices: --fill grid has the most")
       ->type_name("NAME")
       ->group(kGroup);
-  app.add_option("--stats", flags.stats, "Statistics of every frame, as CSV or JSON by extension")
-      ->type_name("FILE")
-      ->group(kGroup);
+  CLI::Option* const stats =
+      app.add_option("--stats", flags.stats,
+                     "Statistics of every frame, as CSV or JSON by extension")
+          ->type_name("FILE")
+          ->group(kGroup);
+  AddGaugeFlag(app, flags.gauges)->needs(stats)->group(kGroup);
   app.add_option("--report", flags.report, "HTML page that shows every frame")
       ->type_name("FILE.html")
       ->group(kGroup);
@@ -248,6 +252,8 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "  partiemc replay drum.lammpstrj.gz --select type=1 --stats drum.csv --check\n"
       "  partiemc replay 'run/part_*.csv' --columns 'Points:0,Points:2' --frames 100:200 "
       "--rate 25\n"
+      "  partiemc replay dam_break.pemc --local --stats dam.csv --gauge front=front:1,0 "
+      "--gauge level=height:0.5\n"
       "  partiemc replay dam_break.pemc --local --isolines .2,.5,.8 --report dam_break.html\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
       "watch "

@@ -56,6 +56,7 @@ struct ReplayFlags {
   std::string format = "geojson";
   std::string color_by;
   std::string stats;
+  std::vector<std::string> gauges;  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
   std::string report;
 };
 

@@ -212,8 +212,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
           "Attribute of the stream that colours the pictures of svg; a vector by its length")
       ->type_name("NAME")
       ->needs(output_dir);
-  verb->add_option("--stats", flags.stats, "Statistics of every frame, as CSV or JSON by extension")
-      ->type_name("FILE");
+  auto* const stats = verb->add_option("--stats", flags.stats,
+                                       "Statistics of every frame, as CSV or JSON by extension")
+                          ->type_name("FILE");
+  AddGaugeFlag(*verb, flags.gauges)->needs(stats);
   verb->add_option(
           "--record", flags.record,
           "Record the particles that the producer sends; a replay of FILE.pemc has the same bits. "
@@ -241,7 +243,8 @@ int Watch(const WatchFlags& flags) {
   auto outputs = FrameOutputs::Create({.output_dir = flags.output_dir,
                                        .format = flags.format,
                                        .stats = flags.stats,
-                                       .color_by = flags.color_by});
+                                       .color_by = flags.color_by,
+                                       .gauges = flags.gauges});
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "client/cli/server_flags.h"
 
@@ -25,6 +26,7 @@ struct WatchFlags {
   std::string format = "geojson";
   std::string color_by;
   std::string stats;
+  std::vector<std::string> gauges;
   std::string record;  ///< A recording to write; empty: none.
   bool quiet = false;
 };

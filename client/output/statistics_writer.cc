@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
@@ -48,6 +50,14 @@ const std::array<std::string_view, kColumnCount>& Columns() {
   return columns;
 }
 
+// Appends the names of a gauge's columns.
+void AppendColumns(const Gauge& gauge, std::vector<std::string>& columns) {
+  const std::vector<std::string_view>& values = TraitsOf(gauge.kind).values;
+  for (const std::string_view value : values) {
+    columns.push_back(values.size() == 1 ? gauge.name : Concat(gauge.name, "_", value));
+  }
+}
+
 /// A line of CSV.
 template <typename Values>
 std::string CsvLine(const Values& values) {
@@ -59,7 +69,7 @@ std::string CsvLine(const Values& values) {
 /// The values of a frame as text, in the order of the columns.
 class Row {
  public:
-  Row(const FrameRecord& frame, bool json) : json_(json) {
+  Row(const FrameRecord& frame, std::span<const Gauge> gauges, bool json) : json_(json) {
     const FrameStatistics& statistics = frame.result.statistics;
     Number(frame.index);
     Number(statistics.particles);
@@ -81,14 +91,17 @@ class Row {
     Number(frame.time);
     Words(DoubtsText(statistics.doubts));
     Number(frame.section);
+    for (const Gauge& gauge : gauges) {
+      for (const double value : Measure(gauge, frame.result)) Number(value);
+    }
   }
 
   std::string Csv() const { return CsvLine(values_); }
 
-  std::string Json() const {
+  std::string Json(std::span<const std::string> columns) const {
     std::string out = "{";
-    for (std::size_t k = 0; k < kColumnCount; ++k) {
-      AppendAll(out, k == 0 ? "" : ",", "\"", Columns()[k], "\":", values_[k]);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      AppendAll(out, k == 0 ? "" : ",", "\"", columns[k], "\":", values_[k]);
     }
     out += '}';
     return out;
@@ -97,7 +110,7 @@ class Row {
  private:
   template <typename Value>
   void Number(Value value) {
-    std::string& text = values_[next_++];
+    std::string& text = values_.emplace_back();
     if (json_ && !std::isfinite(static_cast<double>(value))) {
       text = "null";
     } else {
@@ -107,19 +120,47 @@ class Row {
   void Digest(std::uint64_t value) { Words(DigestText(value)); }
   // Has no quote and no comma.
   void Words(const std::string& words) {
-    values_[next_++] = json_ ? Concat("\"", words, "\"") : words;
+    values_.push_back(json_ ? Concat("\"", words, "\"") : words);
   }
 
   bool json_;
-  std::array<std::string, kColumnCount> values_;
-  std::size_t next_ = 0;
+  std::vector<std::string> values_;
 };
 
 }  // namespace
 
 std::span<const std::string_view> StatisticsColumns() { return Columns(); }
 
-absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem::path& path) {
+absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts) {
+  std::vector<Gauge> gauges;
+  std::set<std::string> used(Columns().begin(), Columns().end());
+  for (const std::string& text : texts) {
+    absl::StatusOr<Gauge> gauge = ParseGauge(text);
+    if (!gauge.ok()) return gauge.status();
+    std::vector<std::string> columns;
+    AppendColumns(*gauge, columns);
+    for (const std::string& column : columns) {
+      if (!used.insert(column).second) {
+        return absl::InvalidArgumentError(Concat("gauge ", gauge->name,
+                                                 ": the statistics already have a column '", column,
+                                                 "'; choose another name"));
+      }
+    }
+    gauges.push_back(*std::move(gauge));
+  }
+  return gauges;
+}
+
+StatisticsWriter::StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges)
+    : file_(std::move(file)),
+      json_(json),
+      gauges_(std::move(gauges)),
+      columns_(Columns().begin(), Columns().end()) {
+  for (const Gauge& gauge : gauges_) AppendColumns(gauge, columns_);
+}
+
+absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem::path& path,
+                                                          std::vector<Gauge> gauges) {
   const std::string extension = absl::AsciiStrToLower(path.extension().native());
   const bool json = extension == ".json";
   if (!json && extension != ".csv") {
@@ -129,8 +170,8 @@ absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem:
   }
   absl::StatusOr<AtomicFile> file = AtomicFile::Create(path);
   if (!file.ok()) return file.status();
-  StatisticsWriter writer(*std::move(file), json);
-  absl::Status status = writer.file_.Append(json ? "[" : CsvLine(Columns()));
+  StatisticsWriter writer(*std::move(file), json, std::move(gauges));
+  absl::Status status = writer.file_.Append(json ? "[" : CsvLine(writer.columns_));
   if (!status.ok()) return status;
   return writer;
 }
@@ -144,9 +185,9 @@ absl::Status StatisticsWriter::Add(const FrameRecord& frame) {
 }
 
 absl::Status StatisticsWriter::AddRow(const FrameRecord& frame) {
-  const Row row(frame, json_);
+  const Row row(frame, gauges_, json_);
   const bool first = std::exchange(empty_, false);
-  return file_.Append(json_ ? Concat(first ? "\n" : ",\n", row.Json()) : row.Csv());
+  return file_.Append(json_ ? Concat(first ? "\n" : ",\n", row.Json(columns_)) : row.Csv());
 }
 
 absl::Status StatisticsWriter::Finish() {

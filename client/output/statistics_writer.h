@@ -3,12 +3,15 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/output/atomic_file.h"
 #include "client/output/frame_record.h"
+#include "partiemc/gauges.h"
 
 namespace partiemc::client {
 
@@ -16,9 +19,15 @@ namespace partiemc::client {
 /// milliseconds; one per stage, "bins_ms" to "attributes_ms"; perimeter, self_intersections,
 /// folded_triangles, dropped_holes, dropped_components, dropped_spray, rings_digest, mesh_digest,
 /// time, doubts (names separated by blanks), section (0: the frame's own outline; then a row per
-/// section). Digests have 16 hexadecimal digits, times are milliseconds of wall time, areas and
-/// lengths world units. `polylines` counts rings, `vertices` their vertices.
+/// section). Then the columns of the gauges: NAME for a gauge with one value, otherwise NAME_VALUE
+/// (partiemc/gauges.h); "nan" where the outline has no such point. Digests have 16 hexadecimal
+/// digits, times are milliseconds of wall time, areas and lengths world units. `polylines` counts
+/// rings, `vertices` their vertices.
 std::span<const std::string_view> StatisticsColumns();
+
+/// Parses gauges and checks that their columns differ from each other and from those above.
+/// Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
+absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts);
 
 /// Writes CSV with a header line, or a JSON array with one object per row, in which non-finite
 /// numbers are null. Rows are written at once; the file appears with Finish.
@@ -26,7 +35,8 @@ class StatisticsWriter {
  public:
   /// Selects CSV or JSON by the extension of `path`.
   /// Errors: INVALID_ARGUMENT for other extensions; as for AtomicFile.
-  static absl::StatusOr<StatisticsWriter> Create(const std::filesystem::path& path);
+  static absl::StatusOr<StatisticsWriter> Create(const std::filesystem::path& path,
+                                                 std::vector<Gauge> gauges = {});
 
   absl::Status Add(const FrameRecord& frame);
   absl::Status Finish();
@@ -34,10 +44,12 @@ class StatisticsWriter {
  private:
   absl::Status AddRow(const FrameRecord& frame);
 
-  StatisticsWriter(AtomicFile file, bool json) : file_(std::move(file)), json_(json) {}
+  StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges);
 
   AtomicFile file_;
   bool json_;
+  std::vector<Gauge> gauges_;
+  std::vector<std::string> columns_;
   bool empty_ = true;
 };
 

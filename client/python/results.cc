@@ -3,11 +3,18 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "client/python/arrays.h"
+#include "client/python/errors.h"
 #include "partiemc/doubt.h"
+#include "partiemc/gauges.h"
 #include "partiemc/stage.h"
 
 namespace partiemc::python {
@@ -42,6 +49,53 @@ py::array RingPoints(const RingsView& rings, py::ssize_t index) {
   const auto points = rings.part.RingPoints(static_cast<std::size_t>(index));
   return View<double>(points.data(), {static_cast<py::ssize_t>(points.size() / 2), 2},
                       {2 * sizeof(double), sizeof(double)}, rings.owner);
+}
+
+// The arguments of a gauge by name, in the order of its kind.
+Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
+  const std::span<const GaugeTraits> all = AllGauges();
+  const auto traits = std::ranges::find(all, kind, &GaugeTraits::name);
+  std::string rule = "must be one of";
+  if (traits == all.end()) {
+    for (const GaugeTraits& one : all)
+      rule.append(&one == all.data() ? " " : ", ").append(one.name);
+    Raise(Invalid(kReasonOutOfRange, "kind", kind, rule));
+  }
+  Gauge gauge{.name = kind, .kind = traits->kind};
+  rule = traits->numbers.empty() ? "takes no numbers" : "takes";
+  for (const std::string_view name : traits->numbers) {
+    rule.append(name == traits->numbers.front() ? " " : ", ").append(name);
+  }
+  for (const auto& [name, number] : numbers) {
+    if (std::ranges::count(traits->numbers, name.cast<std::string>()) == 0) {
+      Raise(Invalid(kReasonOutOfRange, "gauge " + kind, name.cast<std::string>(), rule));
+    }
+  }
+  for (const std::string_view name : traits->numbers) {
+    const py::str key{std::string(name)};
+    if (!numbers.contains(key)) {
+      Raise(Invalid(kReasonCount, "gauge " + kind, "no " + std::string(name), rule));
+    }
+    gauge.numbers.push_back(numbers[key].cast<double>());
+  }
+  return gauge;
+}
+
+py::dict Measured(const RingsView& rings, const std::string& kind, const py::kwargs& numbers) {
+  const Gauge gauge = GaugeOf(kind, numbers);
+  RaiseUnlessOk(Check(gauge));
+  const std::vector<double> values =
+      Measure(gauge, rings.owner.cast<const PythonResult&>().frame.result);
+  py::dict named;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    named[py::str(std::string(TraitsOf(gauge.kind).values[k]))] = values[k];
+  }
+  return named;
+}
+
+py::array Heights(const RingsView& rings, double x) {
+  const std::vector<double> heights = HeightsAt(rings.part, x);
+  return py::array_t<double>(static_cast<py::ssize_t>(heights.size()), heights.data());
 }
 
 static_assert(offsetof(RingMeasures, centroid_y) ==
@@ -91,7 +145,20 @@ void DefineRings(py::module_& module) {
       .def_property_readonly(
           "parent_offsets",
           [](R r) { return View<std::uint32_t>(r.part.parent_offsets, 1, r.owner); },
-          "(R + 1,) uint32; (1,) if rings are not tracked.");
+          "(R + 1,) uint32; (1,) if rings are not tracked.")
+      .def(
+          "gauge", &Measured, py::arg("kind"),
+          "A measurement of the outline as a dict of numbers, NaN where the outline has no such "
+          "point. Lengths are in world units, angles in degrees. gauge('height', x=): highest, "
+          "lowest, crossings. gauge('front', dx=, dy=): position, x, y of the farthest point. "
+          "gauge('wetted', x0=, y0=, x1=, y1=): length of the segment inside. gauge('box', min_x=, "
+          "min_y=, max_x=, max_y=): area and centroid x, y inside the box. gauge('contact', x=, "
+          "y=, dx=, dy=, reach=): start_angle, end_angle, start, end of the largest body on a "
+          "wall. "
+          "gauge('repose'): left_angle, right_angle of the largest body.")
+      .def("heights_at", &Heights, py::arg("x"),
+           "(C,) float64: heights at which the outline crosses the vertical line at x, ascending; "
+           "the inside is between heights 0 and 1, 2 and 3, and so on.");
 }
 
 void DefineMesh(py::module_& module) {

@@ -11,7 +11,8 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
   auto frames = FrameOutputs::Create({.output_dir = flags.output_dir,
                                       .format = flags.format,
                                       .stats = flags.stats,
-                                      .color_by = flags.color_by});
+                                      .color_by = flags.color_by,
+                                      .gauges = flags.gauges});
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));
   if (!flags.report.empty()) {

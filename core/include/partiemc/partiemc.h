@@ -14,6 +14,7 @@
 #include "partiemc/arena.h"
 #include "partiemc/doubt.h"
 #include "partiemc/frame.h"
+#include "partiemc/gauges.h"
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/result.h"

@@ -53,6 +53,31 @@ TEST(Statistics, CsvHasTheDocumentedColumns) {
                 "0123456789abcdef,000000000000000f,0.1,,0\n");
 }
 
+TEST(Statistics, GaugesAddColumns) {
+  support::TemporaryFolder directory;
+  const Result result = SquareWithHoleAndIsland();
+  const auto written = [&](const char* name) {
+    auto gauges = ParseGauges({"level=height:0.5", "wet=wetted:0,2,9,2"});
+    EXPECT_TRUE(gauges.ok()) << gauges.status();
+    auto writer = StatisticsWriter::Create(directory / name, *std::move(gauges));
+    EXPECT_TRUE(writer.ok() && writer->Add(Record(result)).ok() && writer->Finish().ok());
+    return ReadFile(directory / name);
+  };
+  const std::string csv = written("stats.csv");
+  EXPECT_THAT(
+      csv, HasSubstr(std::string(kHeader) + ",level_highest,level_lowest,level_crossings,wet\n"));
+  const auto row = ordered_json::parse(written("stats.json"))[0];
+  EXPECT_EQ(row["level_highest"], Measure(ParseGauge("level=height:0.5").value(), result)[0]);
+  EXPECT_GT(row["wet"], 0);
+}
+
+TEST(Statistics, RefusesGaugesWithColumnsThatExist) {
+  for (const auto& texts : std::vector<std::vector<std::string>>{
+           {"area=wetted:0,0,1,1"}, {"a=repose", "a=repose"}, {"a=depth:1"}}) {
+    EXPECT_EQ(ParseGauges(texts).status().code(), absl::StatusCode::kInvalidArgument);
+  }
+}
+
 TEST(Statistics, SectionsHaveRowsOfTheirOwn) {
   support::TemporaryFolder directory;
   Result result = SquareWithHoleAndIsland();

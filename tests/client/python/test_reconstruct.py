@@ -243,6 +243,29 @@ class Results(unittest.TestCase):
         self.assertEqual(result.rings.offsets.tolist(), [0])
         self.assertTrue(result.to_svg().startswith("<svg"))
 
+    def test_gauges_measure_the_outline(self):
+        rings = partiemc.reconstruct(block(), spacing=1).rings
+        (left, bottom), (right, top) = rings.points.min(axis=0), rings.points.max(axis=0)
+        middle = (left + right) / 2
+        heights = rings.heights_at(middle)
+        reading = rings.gauge("height", x=middle)
+        self.assertEqual((reading["lowest"], reading["highest"]), (heights[0], heights[-1]))
+        self.assertEqual(reading["crossings"], len(heights))
+        self.assertEqual(rings.gauge("front", dx=1, dy=0)["position"], right)
+        whole = rings.gauge("box", min_x=left - 1, min_y=bottom - 1, max_x=right + 1, max_y=top + 1)
+        self.assertAlmostEqual(whole["area"], rings.area.sum())
+        wetted = rings.gauge("wetted", x0=middle, y0=bottom - 1, x1=middle, y1=top + 1)
+        self.assertAlmostEqual(wetted["length"], (heights[1::2] - heights[::2]).sum())
+
+    def test_gauges_refuse_wrong_arguments(self):
+        rings = self.result.rings
+        for kind, numbers, field in (("depth", {}, "kind"), ("height", {}, "gauge height"),
+                                     ("height", {"y": 1}, "gauge height"),
+                                     ("height", {"x": float("nan")}, "gauge height.x")):
+            with self.assertRaises(partiemc.Error) as caught:
+                rings.gauge(kind, **numbers)
+            self.assertEqual(caught.exception.field, field)
+
     def test_others_take_results(self):
         try:
             shapes = self.result.rings.to_shapely()

@@ -1,0 +1,80 @@
+// Gauges: measurements of an outline, such as the height of a free surface or a contact angle.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/result.h"
+
+namespace partiemc {
+
+enum class GaugeKind {
+  /// Free surface above a position x: `highest`, `lowest` crossing of the outline with the vertical
+  /// line at x, number of `crossings`. Numbers: x.
+  kHeight,
+  /// Farthest point of the outline along a direction: its `position` (distance from the origin
+  /// along
+  /// the direction), `x`, `y`. Numbers: dx, dy.
+  kFront,
+  /// `length` of a line segment that lies inside the outline. Numbers: x0, y0, x1, y1.
+  kWetted,
+  /// `area` and centroid (`x`, `y`) of the inside of the outline in a box. Numbers: min_x, min_y,
+  /// max_x, max_y.
+  kBox,
+  /// Contact of the largest body with a straight wall through (x, y) with the direction (dx, dy)
+  /// and
+  /// the body on its left: `start_angle`, `end_angle` in degrees, measured inside the body, and
+  /// `start`, `end`, the coordinates of both contact points along the wall from (x, y). A circle is
+  /// fitted to the outline within `reach` of each contact point, without the last spacing before
+  /// the
+  /// wall, where outlines are rounded. Numbers: x, y, dx, dy, reach.
+  kContact,
+  /// Angle of repose of the largest body: `left_angle`, `right_angle` in degrees. Straight lines
+  /// are
+  /// fitted to its upper surface left and right of the peak, between 20 and 80 % of its height.
+  /// Numbers: none.
+  kRepose,
+};
+
+/// A measurement of an outline. Lengths are in world units, heights and upwards along y (in a
+/// section, along the second axis of the plane).
+struct Gauge {
+  std::string name;  ///< Letters, digits and "_", at most 40.
+  GaugeKind kind = GaugeKind::kHeight;
+  std::vector<double> numbers;  ///< As the kind requires.
+};
+
+/// Description of a kind: its name, the names of its numbers, and the names of its values.
+struct GaugeTraits {
+  GaugeKind kind;
+  std::string_view name;
+  std::vector<std::string_view> numbers, values;
+};
+
+/// All kinds, in the order of the enumerators.
+std::span<const GaugeTraits> AllGauges();
+const GaugeTraits& TraitsOf(GaugeKind kind);
+
+/// Errors: INVALID_ARGUMENT with a Violation for a bad name, a wrong count of numbers, a number
+/// that is not finite or out of range.
+absl::Status Check(const Gauge& gauge);
+
+/// Parses "NAME=KIND:NUMBER,NUMBER,...": "level=height:0.5", "slope=repose".
+/// Errors: as Check; INVALID_ARGUMENT for any other text.
+absl::StatusOr<Gauge> ParseGauge(std::string_view text);
+
+/// The values of a gauge, in the order of its traits; NaN where the outline has no such point.
+/// Intersections are computed for each segment, so the only error is that of the outline itself.
+/// Requires: Check(gauge).ok(). Cost: linear in the points, times log n for `height` and `wetted`;
+/// 200 times for `repose`.
+std::vector<double> Measure(const Gauge& gauge, const Result& result);
+
+/// The heights y at which the outline crosses the vertical line at `x`, ascending. The inside is
+/// between heights 0 and 1, 2 and 3, and so on.
+std::vector<double> HeightsAt(const Rings& rings, double x);
+
+}  // namespace partiemc

@@ -1,0 +1,23 @@
+// Angles between an outline and a wall or the ground.
+#pragma once
+
+#include <vector>
+
+#include "base/point.h"
+#include "partiemc/result.h"
+
+namespace partiemc {
+
+/// A straight wall. The body is on the left of its direction.
+struct Wall {
+  Point origin, direction;
+  double reach = 0;  ///< Distance from a contact point within which the outline is a circle.
+};
+
+/// The values of GaugeKind::kContact.
+std::vector<double> ContactAngles(const Result& result, const Wall& wall);
+
+/// The values of GaugeKind::kRepose.
+std::vector<double> AnglesOfRepose(const Result& result);
+
+}  // namespace partiemc

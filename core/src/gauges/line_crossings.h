@@ -1,0 +1,16 @@
+// Crossings of the rings with a straight line.
+#pragma once
+
+#include <vector>
+
+#include "base/point.h"
+#include "partiemc/result.h"
+
+namespace partiemc {
+
+/// The parameters t of the points origin + t direction where the rings cross the line, ascending. A
+/// vertex on the line belongs to its left side, so their number is even.
+/// Cost: linear in the points, n log n in the crossings.
+std::vector<double> LineCrossings(const Rings& rings, const Point& origin, const Point& direction);
+
+}  // namespace partiemc
