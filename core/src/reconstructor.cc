@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
+#include "bins/cell_mask.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
 #include "frame/placement_traits.h"
@@ -129,6 +130,8 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
   if (HasBlocks(parameters) && size.attribute_values > 0) {
     size.block_cells = CountCells(b.crossings.interior);
+    size.block_tiles =
+        b.crossings.interior.size() - std::ranges::count_if(b.crossings.interior, IsEmpty);
   }
   return size;
 }
@@ -191,24 +194,6 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// Interpolates a frame's attributes for the stage mesh.
-class FrameAttributes final : public PointAttributes {
- public:
-  FrameAttributes(const Frame& frame, const Scale& scale, Workspace::Buffers& buffers)
-      : frame_(frame), scale_(scale), buffers_(buffers) {}
-
-  std::span<const AttributeValues> At(std::span<const double> points) override {
-    InterpolateAttributes(frame_, buffers_.bins, scale_, points, buffers_.attribute_scratch,
-                          buffers_.node_attributes);
-    return buffers_.node_attributes;
-  }
-
- private:
-  const Frame& frame_;
-  const Scale& scale_;
-  Workspace::Buffers& buffers_;
-};
-
 // Runs the stages from normals to mesh. Errors: INTERNAL for a bug in RepairRings or BuildMesh,
 // whose comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
@@ -236,7 +221,15 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
         {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size},
         previous.history, b.identity_scratch, b.next_history, result.rings);
   });
-  FrameAttributes attributes(frame, scale, b);
+  b.attribute_scratch.sorted.clear();
+  const auto at_points = [&](std::span<const double> points) -> std::span<const AttributeValues> {
+    InterpolateAttributes(frame, b.bins, scale, points, b.attribute_scratch, b.node_attributes);
+    return b.node_attributes;
+  };
+  const AttributeSource attributes = {.frame = frame,
+                                      .bins = b.bins,
+                                      .at_points = at_points,
+                                      .tolerance = parameters.attribute_tolerance};
   const bool has_blocks = HasBlocks(parameters) && !frame.attributes.empty();
   const bool is_filled = InStage(observer, Stage::kMesh, [&] {
     return BuildMesh({b.bins.tiles, b.crossings, b.topology, b.planes, b.placed, result.rings,

@@ -12,6 +12,7 @@ struct FrameSize {
   std::uint64_t segments = 0;          ///< Pieces of the outline, one per cell.
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
+  std::uint64_t block_tiles = 0;       ///< Tiles with such cells.
   std::uint64_t attribute_values = 0;  ///< Per particle, and per vertex.
 };
 
@@ -33,6 +34,11 @@ inline constexpr std::uint64_t kBytesPerValueOfGridCell = 8;
 inline constexpr std::uint64_t kBytesPerBlockCell = kBytesPerGridCell + 24;
 inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
 
+/// Sums over the particles in the windows of a tile with interior cells, if the mesh has blocks. A
+/// vector of two components has three values.
+inline constexpr std::uint64_t kBytesPerBlockTile = 2'048;
+inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
+
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
@@ -47,6 +53,8 @@ inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
              size.attribute_values * (kBytesPerValueOfSegment * size.segments +
                                       kBytesPerValueOfGridCell * size.grid_cells +
                                       kBytesPerValueOfBlockCell * size.block_cells);
+    bytes +=
+        size.block_tiles * (kBytesPerBlockTile + kBytesPerValueOfBlockTile * size.attribute_values);
   }
   return bytes;
 }

@@ -94,8 +94,8 @@ struct ReconstructionParameters {
   double surface_offset = 0.0;
 
   /// Largest error of attributes in the mesh of `greedy`, a fraction in [0, 1] of the attribute's
-  /// range inside the body. Values interpolated across triangles keep it at lattice nodes. The mesh
-  /// has no T-junctions. 1: rectangles as in frames without attributes.
+  /// range over the particles (METHOD.md, "Mesh"). The mesh has no T-junctions. 1: rectangles as in
+  /// frames without attributes.
   double attribute_tolerance = 0.01;
 
   /// Orient cell normals by the normals of the frame before (Eq. 11), not by the outline alone.

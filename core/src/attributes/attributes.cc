@@ -112,12 +112,15 @@ class Interpolation {
     }
   }
 
-  // Sorts the particles of each wanted tile by bucket. Each tile keeps its range of the bins.
+  // Sorts the particles of each wanted tile by bucket, once. Each tile keeps its range of the bins.
   void SortParticles() {
     scratch_.particles.resize(bins_.particles.size());
     scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());
+    scratch_.sorted.resize(bins_.tiles.size());
     ParallelFor(bins_.tiles.size(), [&](std::size_t tile) {
-      if (scratch_.is_wanted[tile] != 0) SortTile(tile);
+      if (scratch_.is_wanted[tile] == 0 || scratch_.sorted[tile] != 0) return;
+      SortTile(tile);
+      scratch_.sorted[tile] = 1;
     });
   }
 

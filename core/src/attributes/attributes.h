@@ -24,6 +24,7 @@ struct CarryingParticle {
 struct AttributeScratch {
   std::vector<std::uint32_t> tile_of;   ///< By vertex.
   std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if it or a neighbour holds a vertex.
+  std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.
   std::vector<CarryingParticle> particles;
 };
@@ -39,7 +40,8 @@ struct AttributeScratch {
 /// slopes that the particles barely determine, such as in a drop of two particles. A vertex without
 /// a particle within the kernel radius gets the value 0.
 ///
-/// Requires: a checked frame (frame/frame_view.h).
+/// Requires: a checked frame (frame/frame_view.h). Several calls may share `scratch` and its sorted
+/// particles; before the first call for other bins, `scratch.sorted` is cleared.
 /// Deterministic: sums run by tile and bucket, then in the order of the frame. Parallel over
 /// vertices. Cost: linear in the particles of tiles near vertices, plus the particles within the
 /// kernel radius of each vertex.

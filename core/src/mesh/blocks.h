@@ -7,9 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
+#include "bins/bins.h"
 #include "bins/lattice.h"
 #include "mesh/node_vertices.h"
 #include "mesh/rectangles.h"
+#include "partiemc/frame.h"
 #include "partiemc/result.h"
 
 namespace partiemc {
@@ -17,29 +20,40 @@ namespace partiemc {
 /// A block of level l has 2^l cells along each side; the largest one is a tile.
 inline constexpr int kBlockLevels = kTileShift + 1;
 
-/// Attributes at the lattice nodes around the interior cells.
-struct NodeAttributes {
-  const NodeVertices& nodes;  ///< Numbered from 0.
-  std::span<const AttributeValues> values;
-  double tolerance;  ///< A fraction of each attribute's range over the nodes.
+/// The attributes of a frame.
+struct AttributeSource {
+  const Frame& frame;
+  const ParticleBins& bins;
+  /// Interpolates all attributes to points in world units, interleaved. The result is valid until
+  /// the next call.
+  absl::FunctionRef<std::span<const AttributeValues>(std::span<const double>)> at_points;
+  double tolerance;  ///< A fraction of each attribute's range over the particles.
 };
 
 /// The blocks that cover the interior cells. Keeps its memory warm from frame to frame.
 struct Blocks {
   using Levels = std::array<BitRows, kBlockLevels>;
   std::vector<Levels> at_least;  ///< By tile and level: the cells in blocks of at least this level.
-  std::vector<Levels> linear;    ///< Scratch: cells of blocks in which all attributes are linear.
+  // Scratch:
+  std::vector<Levels> linear;            ///< Cells of blocks in which all attributes are linear.
+  std::vector<std::uint32_t> window_of;  ///< By tile: its first window, if it has windows.
+  std::vector<double> windows;           ///< Sums over the particles of each window.
+  std::vector<double> tolerances;        ///< By part.
+  NodeVertices nodes;                    ///< Nodes of one level.
+  std::vector<double> node_points;       ///< Their positions.
 };
 
 /// Covers the interior cells with disjoint blocks. The blocks are as large as two rules allow:
-/// 1. Every component of an attribute, and the length of a vector, is linear enough. A mesh with
-///    the nodes' values at the corners of blocks deviates from each node's value by at most the
-///    tolerance, for any choice of diagonals.
+/// 1. Every component of an attribute, and the length of a vector, is linear enough: interpolation
+///    from the corners deviates by at most the tolerance. In blocks of up to 4 cells along a side
+///    this holds at every node, for any choice of diagonals. In larger blocks it holds at the
+///    middles of block and edges, and for the mean of the particles in each window of 4 x 4 cells.
 /// 2. A block and its neighbours along an edge differ by at most one level. So only the middle of
 ///    an edge can be the corner of another block.
-/// Deterministic. Parallel over tiles. Cost: linear in cells, times values and levels.
-void FindBlocks(const TileDirectory& directory, std::span<const BitRows> interior,
-                const NodeAttributes& attributes, Blocks& blocks);
+/// Deterministic. Parallel over tiles. Cost: linear in the particles, times values, and
+/// interpolation to the nodes that are tested: few where attributes are smooth.
+void FindBlocks(const TileDirectory& directory, std::span<const BitRows> interior, double cell_size,
+                const AttributeSource& attributes, Blocks& blocks);
 
 /// Calls visit(CellRectangle) for each block, by tile.
 template <typename Visit>

@@ -96,27 +96,6 @@ void FillRectangles(Work& w) {
   });
 }
 
-// Finds blocks in which the attributes at the nodes are nearly linear.
-void FindAttributeBlocks(Work& w) {
-  const TileDirectory& directory = w.input.directory;
-  NodeVertices& nodes = w.scratch.attribute_nodes;
-  nodes.Clear(directory.size());
-  for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
-    for (int j = 0; j < kTileSize; ++j) {
-      for (std::uint32_t row = w.scratch.interior[tile][j]; row != 0; row &= row - 1) {
-        const CellRectangle cell{{tile, std::countr_zero(row), j}, 1, 1};
-        for (const TilePlace& corner : CornersOf(directory, cell)) nodes.Add(corner);
-      }
-    }
-  }
-  nodes.Number(0);
-  w.scratch.attribute_points.clear();
-  nodes.AppendPoints(directory, w.input.scale.cell_size, w.scratch.attribute_points);
-  const auto values = w.input.attributes->At(w.scratch.attribute_points);
-  FindBlocks(directory, w.scratch.interior, {nodes, values, w.input.parameters.attribute_tolerance},
-             w.scratch.blocks);
-}
-
 // The vertices of a block, counter-clockwise: its corners, and the middles of its edges that are
 // corners of other blocks.
 struct BlockOutline {
@@ -152,7 +131,8 @@ BlockOutline OutlineOf(const TileDirectory& directory, const NodeVertices& nodes
 // Numbers the corners of the blocks and divides each block into triangles: a fan around the first
 // middle of an edge, or two triangles. Two neighbours share all vertices of their common edge.
 void FillBlocks(Work& w) {
-  FindAttributeBlocks(w);
+  FindBlocks(w.input.directory, w.scratch.interior, w.input.scale.cell_size, *w.input.attributes,
+             w.scratch.blocks);
   w.interior_cells = CountCells(w.scratch.interior);
   NodeVertices& nodes = w.scratch.nodes;
   nodes.Clear(w.input.directory.size());

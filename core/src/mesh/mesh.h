@@ -29,19 +29,9 @@ struct MeshScratch {
   LoopGroups loops;
   NodeVertices nodes;
   Blocks blocks;
-  NodeVertices attribute_nodes;               // The corners of the interior cells.
-  std::vector<double> attribute_points;       // Their positions.
   std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: number of its node.
   std::vector<std::uint32_t> triangles;       // Of the interior cells.
   std::vector<double> points;                 // Lattice nodes, while ring points are replaced.
-};
-
-/// Interpolates attributes to points.
-class PointAttributes {
- public:
-  virtual ~PointAttributes() = default;
-  /// The values at points in world units, interleaved; valid until the next call.
-  virtual std::span<const AttributeValues> At(std::span<const double> points) = 0;
 };
 
 /// Results of the earlier stages.
@@ -54,7 +44,7 @@ struct MeshInput {
   const Rings& rings;
   const ReconstructionParameters& parameters;
   const Scale& scale;
-  PointAttributes* attributes = nullptr;  ///< Not null if HasBlocks.
+  const AttributeSource* attributes = nullptr;  ///< Not null if HasBlocks.
 };
 
 /// Whether the mesh of `parameters` has blocks (blocks.h) if it carries attributes.
