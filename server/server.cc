@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "server/base/listening.h"
 #include "server/base/received_bytes.h"
 #include "server/calls/methods.h"
 #include "server/compute/heap.h"
@@ -176,7 +175,6 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   if (options.web) {
     if (auto status = CheckSecurity(options, options.web->address); !status.ok()) return status;
   }
-  if (auto status = CheckCanListen(options.address); !status.ok()) return status;
   std::unique_ptr<MessageBus> bus;
   if (options.nats) {
     auto connection = ConnectToNats(*options.nats);

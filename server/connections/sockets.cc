@@ -8,6 +8,7 @@
 #include <netinet/in.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -16,10 +17,10 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <memory>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
-#include "server/base/listening.h"
 #include "server/security/peer_accounts.h"
 
 namespace partiemc::server {
@@ -27,7 +28,11 @@ namespace {
 
 constexpr int kBacklog = 4'096;
 
-std::string ErrorText(int error) { return std::generic_category().message(error); }
+// ALREADY_EXISTS if the address is in use, otherwise UNAVAILABLE, with the system's reason.
+absl::Status ListenError(int error) {
+  const std::string why = std::generic_category().message(error);
+  return error == EADDRINUSE ? absl::AlreadyExistsError(why) : absl::UnavailableError(why);
+}
 
 struct SocketAddress {
   sockaddr_storage storage{};
@@ -49,7 +54,7 @@ void SetOption(int socket, int level, int name, int value) {
 
 absl::StatusOr<Descriptor> Listen(SocketAddress address, std::chrono::milliseconds dead_after) {
   Descriptor socket(::socket(address.family(), SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (socket.get() < 0) return absl::UnavailableError(ErrorText(errno));
+  if (socket.get() < 0) return ListenError(errno);
   if (address.family() != AF_UNIX) {
     // Accepted connections inherit these options.
     SetOption(socket.get(), SOL_SOCKET, SO_REUSEADDR, 1);
@@ -58,7 +63,7 @@ absl::StatusOr<Descriptor> Listen(SocketAddress address, std::chrono::millisecon
     if (address.family() == AF_INET6) SetOption(socket.get(), IPPROTO_IPV6, IPV6_V6ONLY, 0);
   }
   if (bind(socket.get(), address.get(), address.size) != 0 || listen(socket.get(), kBacklog) != 0) {
-    return absl::UnavailableError(ErrorText(errno));
+    return ListenError(errno);
   }
   return socket;
 }
@@ -71,7 +76,14 @@ absl::StatusOr<Listeners> ListenOnPath(const std::string& path,
   if (path.size() >= sizeof(name.sun_path)) return absl::UnavailableError("the path is too long");
   std::memcpy(name.sun_path, path.data(), path.size());
   address.size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path.size() + 1);
-  unlink(path.c_str());  // A stale file: CheckCanListen has found no running server.
+  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (connect(probe.get(), address.get(), address.size) == 0) {
+    return absl::AlreadyExistsError("another server listens there");
+  }
+  struct stat file {};
+  if (errno == ECONNREFUSED && stat(path.c_str(), &file) == 0 && S_ISSOCK(file.st_mode)) {
+    unlink(path.c_str());  // The socket of a server that has crashed.
+  }
   auto socket = Listen(address, dead_after);
   if (!socket.ok()) return socket.status();
   Listeners listeners;
@@ -80,10 +92,16 @@ absl::StatusOr<Listeners> ListenOnPath(const std::string& path,
 }
 
 absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
-  const auto found = ResolveToListen(address);
-  if (!found.ok()) return found.status();
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int failure =
+      getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found);
+  if (failure != 0) return absl::UnavailableError(gai_strerror(failure));
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> list(found, &freeaddrinfo);
   std::vector<SocketAddress> all;
-  for (const addrinfo* next = found->get(); next != nullptr; next = next->ai_next) {
+  for (const addrinfo* next = found; next != nullptr; next = next->ai_next) {
     SocketAddress one;
     std::memcpy(&one.storage, next->ai_addr, next->ai_addrlen);
     one.size = next->ai_addrlen;
@@ -130,6 +148,7 @@ absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::millisec
     if (listeners.port != 0) candidate.set_port(listeners.port);
     auto socket = Listen(candidate, dead_after);
     if (!socket.ok()) {
+      if (absl::IsAlreadyExists(socket.status())) return socket.status();
       error.Update(socket.status());
       continue;
     }

@@ -39,8 +39,9 @@ struct Listeners {
 };
 
 /// Listens as gRPC does. A host name: every address of this name. 0.0.0.0 and [::]: all addresses
-/// of IPv4 and IPv6. A Unix socket: replaces an existing file. A connection ends if its peer does
-/// not acknowledge sent bytes for `dead_after`. Errors: UNAVAILABLE with the system's reason.
+/// of IPv4 and IPv6. A Unix socket: replaces the file of a server that has crashed. A connection
+/// ends if its peer does not acknowledge sent bytes for `dead_after`. Errors: ALREADY_EXISTS if
+/// another server listens on one of the addresses; UNAVAILABLE with the system's reason.
 absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::milliseconds dead_after);
 
 struct Peer {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -281,6 +282,18 @@ TEST(Addresses, AUnixSocketServesAndIsNotTakenFromItsOwner) {
   const auto second = Server::Start(options);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("another server listens there"));
   EXPECT_TRUE(CheckHealth(server->address(), kHealthTimeout).ok());
+}
+
+TEST(Addresses, AFileThatIsNoSocketIsNotDeleted) {
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Path("notes.txt");
+  std::ofstream(path) << "kept";
+  ServerOptions options = TestOptions();
+  options.address = {.host = "", .port = 0, .unix_path = path};
+  EXPECT_EQ(Server::Start(options).status().code(), absl::StatusCode::kUnavailable);
+  std::string text;
+  std::ifstream(path) >> text;
+  EXPECT_EQ(text, "kept");
 }
 
 }  // namespace
