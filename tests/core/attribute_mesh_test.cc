@@ -215,6 +215,16 @@ TEST(AttributeMeshes, ShowASubmergedDrop) {
   EXPECT_LT(area(MeshOf(body, {.attribute_tolerance = 1})), .1 * fine);
 }
 
+// Large blocks are tested at few nodes, and a drop may lie between them.
+TEST(AttributeMeshes, ShowADropAtAnyPlace) {
+  for (int k = 0; k < 16; ++k) {
+    const double cx = -23 + 3.1 * k, cy = 19 - 2.3 * k;
+    const Result mesh = MeshOf(
+        Body([&](double x, double y) { return std::hypot(x - cx, y - cy) < 2.6 ? 1.0 : 0.0; }));
+    EXPECT_GT(*std::ranges::max_element(mesh.attributes[0].values), .85) << cx << ", " << cy;
+  }
+}
+
 // The speed of a rigid rotation is a cone, although both components are linear.
 TEST(AttributeMeshes, RepresentTheLengthOfVectors) {
   Body body([](double, double) { return 0; });
@@ -225,6 +235,11 @@ TEST(AttributeMeshes, RepresentTheLengthOfVectors) {
   const Result mesh = MeshOf(body);
   const Function speed = [](double x, double y) { return std::hypot(x, y); };
   EXPECT_LE(MeanError(mesh, speed, kLength), .02 * kRadius);
+  double largest = 0;  // At the centre, where the speed has a tip.
+  ForEachSample(mesh, kAside, kLength, [&](const Point& p, double value) {
+    largest = std::max(largest, std::abs(value - speed(p.x, p.y)));
+  });
+  EXPECT_LE(largest, .02 * 2 * kRadius);
   EXPECT_LE(MeanError(
                 mesh, [](double, double y) { return -y; }, 0),
             .001 * kRadius);
