@@ -57,8 +57,7 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
   AddAttributesFlag(*verb, flags.sequence,
                     "Particle attributes to keep: column names, or arrays of two or three "
                     "components; a recording keeps all of its attributes");
-  verb->add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
-      ->type_name("FILE");
+  AddTimeFlags(*verb, flags.sequence);
   verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B");
   AddExpansionFlag(*verb, flags.sequence);

@@ -20,7 +20,9 @@ namespace partiemc::client {
 struct RecordedFrame {
   std::size_t index = 0;  ///< Index in the input, counted from 0, before any selection.
   std::optional<double>
-      time;            ///< From the times file, else from the frame. A time step is not a time.
+      time;  ///< From the times file, else `step` times SequenceOptions::time_step, else the frame.
+  /// Number of the time step. Without `time` it orders the frames, but velocities are useless.
+  std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
   int components = 2;  ///< 3 with SequenceOptions::in_space.
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
@@ -65,6 +67,10 @@ struct SequenceOptions {
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present.
   std::string times = {};
 
+  /// Time of one time step, where frames have the number of their step (LAMMPS, GSD). A frame
+  /// without it is refused. Excludes `times`; a `times.csv` beside the files is not used.
+  std::optional<double> time_step = {};
+
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part is optional. "A" is one
   /// frame. Empty: all.
   std::string frames = {};
@@ -77,7 +83,8 @@ struct SequenceOptions {
 ///
 /// Reads CSV and other text tables, LAMMPS text dumps and LAMMPS xyz (each plain, .gz or .zst),
 /// NPY, NPZ, and, where built with VTK, legacy VTK, VTP and VTU. From a LAMMPS dump it
-/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled).
+/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled). Image flags ix iy iz unwrap
+/// x y and xs ys, unless `columns` names the positions.
 ///
 /// Data with three coordinates is 2D if one axis is constant to 1e-6 of the largest extent. The
 /// first frame with particles determines this axis; the other two axes become x and y in this
@@ -87,8 +94,9 @@ struct SequenceOptions {
 /// Errors are one line with the problem, the place (file, line, frame) and the remedy:
 /// kInvalidArgument: a wrong option; kNotFound, kPermissionDenied: the file; kUnimplemented: an
 /// unsupported format; kFailedPrecondition: the input is ambiguous (several series, columns without
-/// names, 3D); kDataLoss: damaged or truncated input; kResourceExhausted: it unpacks to too much.
-/// Files are not trusted: memory grows with the bytes read, never with a declared count.
+/// names, 3D) or `select` holds for no particle of all frames; kDataLoss: damaged or truncated
+/// input; kResourceExhausted: it unpacks to too much. Files are not trusted: memory grows with the
+/// bytes read, never with a declared count.
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.

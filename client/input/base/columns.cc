@@ -165,6 +165,11 @@ absl::Status PlanRecognisedPositions(const Names& names, const Names& canonical,
     if (CountFound(axes) < 2) continue;
     plan.positions = axes;
     plan.scaled = IsScaled(family);
+    if (family == Family::kPlain || family == Family::kScaled) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        plan.images[axis] = FindFirst(canonical, {Concat("i", "xyz"[axis])});
+      }
+    }
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(Concat("no position columns (x,y and the like) among ",

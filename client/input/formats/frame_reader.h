@@ -48,6 +48,7 @@ OpenReader OpenLammpsDump;  // lammps_dump.cc
 OpenReader OpenXyz;         // xyz.cc: element or type and x y z
 OpenReader OpenNpy;         // npy_reader.cc
 OpenReader OpenNpz;         // npz_reader.cc
+OpenReader OpenPly;         // ply.cc
 OpenReader OpenVtk;         // vtk_reader.cc, or vtk_absent.cc in a build without VTK
 
 }  // namespace partiemc::client::input

@@ -10,9 +10,6 @@
 namespace partiemc::client::input {
 namespace {
 
-// An array (N, K) with more components is not a particle attribute.
-constexpr std::size_t kMaxComponents = 16;
-
 struct NamedArray {
   ZipEntry entry;
   std::string name;
@@ -47,12 +44,12 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
       table.time = std::move(array);
       continue;
     }
-    if (dimensions != 1 && (dimensions != 2 || array.header.shape[1] > kMaxComponents)) continue;
+    if (dimensions != 1 && (dimensions != 2 || array.header.shape[1] > kMaxArrayComponents))
+      continue;
     array.first_column = table.column_names.size();
-    array.column_count = dimensions == 1 ? 1 : array.header.shape[1];
-    for (std::size_t k = 0; k < array.column_count; ++k) {
-      table.column_names.push_back(dimensions == 1 ? array.name : Concat(array.name, ":", k));
-    }
+    const std::vector<std::string> names = NpyTable(array.header, array.name, {}).names;
+    array.column_count = names.size();
+    table.column_names.insert(table.column_names.end(), names.begin(), names.end());
     table.arrays.push_back(std::move(array));
   }
   return table;
@@ -116,7 +113,7 @@ class NpzReader final : public OneFrameReader {
                                           "; arrays must have a row per particle"));
       }
       if (absl::Status status = Load(array, bytes[k]); !status.ok()) return status;
-      const std::vector<ArrayColumn> loaded = NpyColumns(array.header, bytes[k]);
+      const std::vector<ArrayColumn> loaded = NpyTable(array.header, array.name, bytes[k]).columns;
       std::copy(loaded.begin(), loaded.end(),
                 columns.begin() + static_cast<std::ptrdiff_t>(array.first_column));
     }
@@ -159,7 +156,7 @@ class NpzReader final : public OneFrameReader {
     std::vector<char> bytes;
     if (absl::Status status = Load(array, bytes); !status.ok()) return status;
     array.header.shape = {1};
-    time = NpyColumns(array.header, bytes)[0].Number(0);
+    time = NpyTable(array.header, array.name, bytes).columns[0].Number(0);
     return absl::OkStatus();
   }
 

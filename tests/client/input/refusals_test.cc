@@ -13,7 +13,6 @@ absl::Status Refusal(const std::string& name, const std::string& content) {
 TEST(Refusals, FormatsThatAreNotReadAreNamedWithWhatToDo) {
   using namespace std::string_literals;
   const auto code = absl::StatusCode::kUnimplemented;
-  ExpectRefused(Refusal("a.ply", "ply\nformat ascii 1.0\n"), code, {"PLY", "VTP, NPY or CSV"});
   ExpectRefused(Refusal("a", "BgeoV\0\0\0\x05"s), code, {"BGEO", "VTP, NPY or CSV"});
   ExpectRefused(Refusal("a.h5", "\x89HDF\r\n\x1a\n"), code, {"HDF5", "NPZ"});
   ExpectRefused(Refusal("a.pdb", "ATOM 1\n"), code, {"PDB"});
@@ -28,7 +27,6 @@ TEST(Refusals, FormatsThatAreNotReadAreNamedWithWhatToDo) {
 
 TEST(Refusals, TheSamplesOfOtherFormatsAreRefused) {
   const auto code = absl::StatusCode::kUnimplemented;
-  ExpectRefused(ReadAll(SamplePath("binary_le.ply")).status, code, {"PLY"});
   ExpectRefused(ReadAll(SamplePath("splashsurf_raw_f4.xyz")).status, code, {"raw binary xyz"});
   ExpectRefused(ReadAll(SamplePath("in.styles")).status, code, {"LAMMPS input script"});
 }
