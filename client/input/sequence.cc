@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_join.h"
 #include "client/input/base/text.h"
+#include "client/input/collection.h"
 #include "client/input/file_list.h"
 #include "client/input/formats/formats.h"
 #include "client/input/formats/frame_reader.h"
@@ -227,8 +228,32 @@ absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles fil
   return std::move(readable.series.front());
 }
 
+// Takes the files and the times of a collection. Returns false for another input.
+absl::StatusOr<bool> TakeCollection(const std::string& input, Recording& recording) {
+  auto collection = ReadCollection(input);
+  if (!collection.ok()) return collection.status();
+  if (!*collection) return false;
+  recording.files = std::move((*collection)->files);
+  for (const std::string& file : recording.files) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(file, error);
+    recording.bytes += error ? 0 : bytes;
+  }
+  const auto format = RecogniseFormat(recording.files.front());
+  if (!format.ok()) return WithPrefix(input, format.status());
+  if (!(*format)->one_frame_per_file) {
+    return absl::FailedPreconditionError(
+        Concat(input, ": lists ", (*format)->name, " files, which hold several frames; name them"));
+  }
+  if (recording.times_path.empty() && !recording.time_step) {
+    recording.times = std::move((*collection)->times);
+    recording.times_path = input;
+  }
+  return true;
+}
+
 absl::Status TakeTimes(const std::string& directory, Recording& recording) {
-  if (recording.time_step) return absl::OkStatus();
+  if (recording.time_step || recording.times) return absl::OkStatus();
   if (recording.times_path.empty()) {
     const std::string beside = (std::filesystem::path(directory) / "times.csv").string();
     const bool is_frame = recording.files.size() == 1 && recording.files.front() == beside;
@@ -267,13 +292,18 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
     return absl::InvalidArgumentError(
         Concat("--time-step: '", *options.time_step, "'; must be a positive number"));
   }
-  auto files = ListInput(input);
-  if (!files.ok()) return files.status();
-  const std::string directory = files->directory;
-  auto series = ChooseSeries(input, *std::move(files), recording);
-  if (!series.ok()) return series.status();
-  recording.files = std::move(series->files);
-  recording.bytes = series->bytes;
+  const auto collected = TakeCollection(input, recording);
+  if (!collected.ok()) return collected.status();
+  std::string directory;
+  if (!*collected) {
+    auto files = ListInput(input);
+    if (!files.ok()) return files.status();
+    directory = files->directory;
+    auto series = ChooseSeries(input, *std::move(files), recording);
+    if (!series.ok()) return series.status();
+    recording.files = std::move(series->files);
+    recording.bytes = series->bytes;
+  }
   const auto format = RecogniseFormat(recording.files.front());
   if (!format.ok()) return format.status();
   recording.format = *format;

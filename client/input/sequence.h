@@ -53,6 +53,10 @@ struct SequenceOptions {
   /// the
   ///   positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
   ///   skips a column.
+  /// - HDF5: datasets, "PartType0/Coordinates" or "run/x,run/y"; "*" in a path stands for the
+  /// groups
+  ///   of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses the
+  ///   particle array NAME instead of fluid.
   /// - VTK files define their positions; the option is refused.
   std::string columns = {};
 
@@ -81,8 +85,10 @@ struct SequenceOptions {
 
 /// The frames of one input, in natural order of the file names. Not thread-safe.
 ///
-/// Reads CSV and other text tables, LAMMPS text dumps and LAMMPS xyz (each plain, .gz or .zst),
-/// NPY, NPZ, and, where built with VTK, legacy VTK, VTP and VTU. From a LAMMPS dump it
+/// Reads, plain or packed (.gz, .zst): CSV and other text tables, LAMMPS text dumps, LAMMPS and
+/// extended xyz, PLY, BGEO. Reads also NPY, NPZ and GSD. Builds with VTK read legacy VTK, VTP, VTU.
+/// Builds with HDF5 read HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget. ParaView's collections
+/// .pvd and .series list files and their times. From a LAMMPS dump it
 /// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled). Image flags ix iy iz unwrap
 /// x y and xs ys, unless `columns` names the positions.
 ///
@@ -100,7 +106,7 @@ struct SequenceOptions {
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.
-  /// `input`: a file, a directory, or a pattern with * ? [ ].
+  /// `input`: a file, a collection, a directory, or a pattern with * ? [ ].
   static absl::StatusOr<std::unique_ptr<Sequence>> Open(const std::string& input,
                                                         const SequenceOptions& options);
   virtual ~Sequence() = default;
@@ -119,9 +125,5 @@ class Sequence {
   /// Notices for the user: skipped files, the recognised plane, ignored arrays. Grows with Next.
   virtual const std::vector<std::string>& notices() const = 0;
 };
-
-/// Order of names as people number them: runs of digits compare by value, "frame_2" < "frame_10".
-/// A strict weak order; names that differ only in leading zeros are ordered by them.
-bool NaturalLess(std::string_view a, std::string_view b);
 
 }  // namespace partiemc::client

@@ -79,6 +79,8 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"benchmark", {"libbenchmark-dev"}},
       {"Boost", {"libboost-dev"}},
       {"CLI11", {"libcli11-dev"}},
+      {"hdf5", {"libhdf5-dev"}},  // Its names in pkg-config.
+      {"hdf5-serial", {"libhdf5-dev"}},
       {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
       {"lammps", {"liblammps-dev"}},

@@ -317,6 +317,21 @@ absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnReq
   return PlanNamedColumns(names, by_name);
 }
 
+std::vector<bool> NeededColumns(const ColumnPlan& plan) {
+  std::vector<bool> needed(plan.column_count, false);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (plan.positions[axis]) needed[*plan.positions[axis]] = true;
+    if (plan.velocities[axis]) needed[*plan.velocities[axis]] = true;
+  }
+  if (plan.id) needed[*plan.id] = true;
+  if (plan.volume) needed[*plan.volume] = true;
+  for (const std::size_t column : plan.conditions) needed[column] = true;
+  for (const AttributeColumns& attribute : plan.attributes) {
+    for (const std::size_t column : attribute.columns) needed[column] = true;
+  }
+  return needed;
+}
+
 bool NamesHoldPositions(const Names& names) {
   const Names canonical = AllCanonical(names);
   return std::any_of(std::begin(kFamilies), std::end(kFamilies),

@@ -72,6 +72,9 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& name
 /// tables need request.columns.
 absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request);
 
+/// Marks the columns of the table that a plan uses.
+std::vector<bool> NeededColumns(const ColumnPlan& plan);
+
 /// Whether PlanNamedColumns would find positions by names alone.
 bool NamesHoldPositions(const std::vector<std::string>& names);
 

@@ -112,22 +112,25 @@ constexpr Entry kEntries[] = {
      {"LAMMPS dump", OpenLammpsDump, false},
      ""},
     {IsXyz, {"xyz", OpenXyz, false}, ""},
+    {[](const FileHead& head) { return head.extension == "pvd" || head.extension == "series"; },
+     {},
+     "a collection of files; name it alone"},
     {[](const FileHead& head) { return head.Holds("<VTKFile"); },
      {},
-     "a VTK file of a kind that holds no particles itself (a collection or a grid); name the .vtp "
-     "or .vtu files"},
+     "a VTK file of a kind that holds no particles itself (a grid); name .vtp or .vtu files"},
     {[](const FileHead& head) { return head.Begins("ply\n") || head.Begins("ply\r"); },
      {"PLY", OpenPly, true},
      ""},
-    {[](const FileHead& head) {
-       return head.Begins("Bgeo") || head.Begins("\x7fNSJ") || head.extension == "bgeo";
-     },
+    {[](const FileHead& head) { return head.Begins("BgeoV"); }, {"BGEO", OpenBgeo, true}, ""},
+    {[](const FileHead& head) { return head.Begins("\x7fNSJ") || head.extension == "bgeo"; },
      {},
-     "a Houdini BGEO file, which is not read; write the particles as VTP, NPY or CSV"},
-    {[](const FileHead& head) { return head.Begins("\x89HDF"); },
-     {},
-     "an HDF5 file, which is not read; write the particles as VTP, NPZ or CSV (PySPH: "
-     "pysph dump_vtk)"},
+     "a BGEO file of another version than 5, which is not read; write .bhclassic, VTP or CSV"},
+    {[](const FileHead& head) { return head.Begins("\x89HDF\r\n\x1a\n"); },
+     {"HDF5", OpenHdf5, false},
+     ""},
+    {[](const FileHead& head) { return head.Begins("\xDF\x65\xDF\x65\xDF\x65\xDF\x65"); },
+     {"GSD", OpenGsd, false},
+     ""},
     {[](const FileHead& head) { return head.extension == "pdb"; },
      {},
      "a PDB file, which is not read; write the particles as VTP, NPY or CSV"},
@@ -185,7 +188,7 @@ absl::StatusOr<const Format*> RecogniseFormat(const std::string& path) {
   return absl::UnimplementedError(
       Concat(path,
              ": is binary data of no known kind; PartiEMC reads CSV, LAMMPS text dumps, xyz, PLY, "
-             "NPY, NPZ, VTK, VTP and VTU"));
+             "NPY, NPZ, VTK, VTP, VTU, HDF5, GSD and BGEO"));
 }
 
 }  // namespace partiemc::client::input

@@ -49,6 +49,9 @@ OpenReader OpenXyz;         // xyz.cc: element or type and x y z
 OpenReader OpenNpy;         // npy_reader.cc
 OpenReader OpenNpz;         // npz_reader.cc
 OpenReader OpenPly;         // ply.cc
-OpenReader OpenVtk;         // vtk_reader.cc, or vtk_absent.cc in a build without VTK
+OpenReader OpenGsd;         // gsd.cc
+OpenReader OpenBgeo;        // bgeo.cc
+OpenReader OpenHdf5;        // hdf5_reader.cc, or absent.cc in a build without HDF5
+OpenReader OpenVtk;         // vtk_reader.cc, or absent.cc in a build without VTK
 
 }  // namespace partiemc::client::input

@@ -216,7 +216,7 @@ class LammpsDumpReader final : public FrameReader {
     return true;
   }
 
-  // Moves the last row by as many boxes as its image flags say.
+  // Adds the image flags of the last row, which count boxes, to its position.
   absl::Status UnwrapLast(ParticleRows& rows) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!plan_->images[axis]) continue;

@@ -184,8 +184,8 @@ std::size_t NpyHeader::element_count() const {
   return count;
 }
 
-absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name) {
-  std::vector<char> bytes;
+absl::Status ReadNpyHeaderText(ByteSource& source, const std::string& name,
+                               std::vector<char>& bytes) {
   if (absl::Status status = ReadNpyBytes(source, 8, name, bytes); !status.ok()) return status;
   if (!std::string_view(bytes.data(), 8).starts_with("\x93NUMPY")) {
     return DamagedNpy(name, "is no NPY array");
@@ -200,7 +200,12 @@ absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& n
     length = (length << 8) | static_cast<unsigned char>(bytes[k]);
   }
   if (length > kMaxHeaderBytes) return DamagedNpy(name, "the NPY header is over 64 KiB");
-  if (absl::Status status = ReadNpyBytes(source, length, name, bytes); !status.ok()) return status;
+  return ReadNpyBytes(source, length, name, bytes);
+}
+
+absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name) {
+  std::vector<char> bytes;
+  if (absl::Status status = ReadNpyHeaderText(source, name, bytes); !status.ok()) return status;
   const std::string_view text(bytes.data(), bytes.size());
   const auto type = ValueOf(text, "descr");
   const auto order = ValueOf(text, "fortran_order");

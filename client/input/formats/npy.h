@@ -36,6 +36,10 @@ struct NpyHeader {
 /// half precision).
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
 
+/// Reads the header up to the elements: the text of a Python dict. Errors: kDataLoss.
+absl::Status ReadNpyHeaderText(ByteSource& source, const std::string& name,
+                               std::vector<char>& bytes);
+
 /// Reads the elements that follow the header. kDataLoss if `source` holds fewer or more bytes.
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes);

@@ -6,6 +6,7 @@
 #include "client/input/base/zip_archive.h"
 #include "client/input/formats/frame_reader.h"
 #include "client/input/formats/npy.h"
+#include "client/input/formats/pysph.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -67,7 +68,7 @@ ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& t
   return expanded;
 }
 
-// Ignores optional arrays whose number of rows differs from that of the positions.
+// Ignores optional arrays with another number of rows than the positions.
 void DropForeignColumns(const NpzTable& table, ColumnPlan& plan) {
   std::vector<std::size_t> rows;
   for (const NamedArray& array : table.arrays) {
@@ -95,7 +96,7 @@ class NpzReader final : public OneFrameReader {
 
  private:
   absl::Status Read(ParticleRows& rows) override {
-    const std::vector<bool> needed = NeededColumns();
+    const std::vector<bool> needed = NeededColumns(plan_);
     std::vector<ArrayColumn> columns(table_.column_names.size());
     std::vector<std::vector<char>> bytes(table_.arrays.size());
     const NamedArray* first = nullptr;
@@ -123,21 +124,6 @@ class NpzReader final : public OneFrameReader {
         AppendArrayRows(columns, first->header.shape[0], plan_, request_, rows);
     if (!status.ok()) return WithPrefix(path_, status);
     return ReadTime(rows.time);
-  }
-
-  std::vector<bool> NeededColumns() const {
-    std::vector<bool> needed(table_.column_names.size(), false);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (plan_.positions[axis]) needed[*plan_.positions[axis]] = true;
-      if (plan_.velocities[axis]) needed[*plan_.velocities[axis]] = true;
-    }
-    if (plan_.id) needed[*plan_.id] = true;
-    if (plan_.volume) needed[*plan_.volume] = true;
-    for (const std::size_t column : plan_.conditions) needed[column] = true;
-    for (const AttributeColumns& attribute : plan_.attributes) {
-      for (const std::size_t column : attribute.columns) needed[column] = true;
-    }
-    return needed;
   }
 
   absl::Status Load(const NamedArray& array, std::vector<char>& bytes) const {
@@ -173,6 +159,7 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenNpz(const std::string& path,
                                                      const ColumnRequest& request) {
   auto archive = ZipArchive::Open(path);
   if (!archive.ok()) return archive.status();
+  if (IsPysphArchive(*archive)) return OpenPysphArchive(path, *archive, request);
   auto table = ReadTable(*archive, path);
   if (!table.ok()) return table.status();
   auto plan = PlanNamedColumns(table->column_names, WithArraysExpanded(request, *table));

@@ -18,7 +18,7 @@ constexpr std::size_t kMaxPlyHeaderLines = 10000;
 struct PlyProperty {
   std::string name;
   ElementType type = ElementType::kFloat32;
-  std::optional<ElementType> length;  // Of a list: the type of its number of elements.
+  std::optional<ElementType> length;  // Type of the number of elements, for a list.
 };
 
 struct PlyElement {
@@ -56,11 +56,16 @@ std::optional<ElementType> PlyType(std::string_view name) {
     std::string_view name, other;
     ElementType type;
   };
-  constexpr Known kKnown[] = {
-      {"char", "int8", ElementType::kInt8},        {"uchar", "uint8", ElementType::kUInt8},
-      {"short", "int16", ElementType::kInt16},     {"ushort", "uint16", ElementType::kUInt16},
-      {"int", "int32", ElementType::kInt32},       {"uint", "uint32", ElementType::kUInt32},
-      {"float", "float32", ElementType::kFloat32}, {"double", "float64", ElementType::kFloat64}};
+  constexpr Known kKnown[] = {{"char", "int8", ElementType::kInt8},
+                              {"uchar", "uint8", ElementType::kUInt8},
+                              {"short", "int16", ElementType::kInt16},
+                              {"ushort", "uint16", ElementType::kUInt16},
+                              {"int", "int32", ElementType::kInt32},
+                              {"uint", "uint32", ElementType::kUInt32},
+                              {"int64", "int64", ElementType::kInt64},
+                              {"uint64", "uint64", ElementType::kUInt64},  // meshio
+                              {"float", "float32", ElementType::kFloat32},
+                              {"double", "float64", ElementType::kFloat64}};
   for (const Known& known : kKnown) {
     if (name == known.name || name == known.other) return known.type;
   }
@@ -165,7 +170,7 @@ class PlyReader final : public OneFrameReader {
     return absl::OkStatus();
   }
 
-  // Returns whether the file has so many more bytes.
+  // Returns false if the file has fewer bytes left.
   absl::StatusOr<bool> Skip(std::uint64_t bytes) {
     char block[4096];
     while (bytes > 0) {

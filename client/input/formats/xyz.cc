@@ -132,9 +132,9 @@ class XyzReader final : public FrameReader {
   }
 
   std::unique_ptr<InputStream> stream_;
-  std::string comment_;  // Of the frame.
+  std::string comment_;  // Comment of the frame.
   bool planned_ = false;
-  std::string properties_;  // Of the plan.
+  std::string properties_;  // Properties that plan_ belongs to.
   ColumnPlan plan_;
   const ColumnRequest& request_;
   std::size_t frame_ = 0;
