@@ -57,12 +57,14 @@ class Formats(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def replay(self, source, *flags):
-        """The rows of --stats."""
+        """The rows of --stats, and the times of the frames."""
         table = self.folder / "stats.csv"
-        subprocess.run([PROGRAM, "replay", str(source), "--local", "--quiet", "--spacing", str(SPACING), "--stats",
-                        str(table), *flags], check=True)
+        with tempfile.TemporaryDirectory() as out:
+            subprocess.run([PROGRAM, "replay", str(source), "--local", "--quiet", "--spacing", str(SPACING), "--stats",
+                            str(table), "--output-dir", out, "--format", "geojson", *flags], check=True)
+            times = [json.loads(path.read_text())["time"] for path in sorted(pathlib.Path(out).glob("*.geojson"))]
         with open(table, newline="") as rows:
-            return list(csv.DictReader(rows))
+            return [{**row, "time": time} for row, time in zip(csv.DictReader(rows), times)]
 
     def csv_rows(self, columns, time):
         """The rows of the same frames as CSV with these columns."""
@@ -84,10 +86,32 @@ class Formats(unittest.TestCase):
         truth = self.csv_rows(columns, time)[:count]
         rows = self.replay(source, *flags)
         self.assertEqual(len(rows), count)
-        keys = [key for key in rows[0] if "digest" in key] + ["particles"] + (["time"] if "time" in rows[0] else [])
-        self.assertTrue(any("digest" in key for key in keys))
+        keys = [key for key in rows[0] if "digest" in key] + ["particles", "time"]
+        self.assertEqual(keys[:2], ["rings_digest", "mesh_digest"])
         for row, true in zip(rows, truth):
             self.assertEqual([row[key] for key in keys], [true[key] for key in keys])
+
+    # Text.
+
+    def test_lammps_dump(self):
+        """Wrapped into a box of 0.5 by 1 with image flags."""
+        lines = []
+        for step, positions in zip(STEPS, FRAMES):
+            lines += ["ITEM: TIMESTEP", str(step), "ITEM: NUMBER OF ATOMS", str(len(IDS)),
+                      "ITEM: BOX BOUNDS pp pp pp", "0 0.5", "0 1", "-0.5 0.5", "ITEM: ATOMS id x y z ix iy iz"]
+            for number, (x, y, z) in zip(IDS, positions):
+                i, j = int(x // 0.5), int(y // 1)
+                lines.append(f"{number} {float(x - i * 0.5)!r} {float(y - j)!r} {z} {i} {j} 0")
+        (self.folder / "a.lammpstrj").write_text("\n".join(lines) + "\n")
+        self.assert_same(self.folder / "a.lammpstrj", "--time-step", "0.005", columns=("x", "y", "id"))
+        self.assertEqual([row["time"] for row in self.replay(self.folder / "a.lammpstrj")], STEPS)
+
+    def test_extended_xyz(self):
+        with open(self.folder / "a.xyz", "w") as file:
+            for time, positions in zip(TIMES, FRAMES):
+                file.write(f"{len(IDS)}\nProperties=pos:R:3:id:I:1 Time={time}\n")
+                file.writelines(f"{x!r} {y!r} {z!r} {number}\n" for (x, y, z), number in zip(positions.tolist(), IDS))
+        self.assert_same(self.folder / "a.xyz", columns=("x", "y", "id"))
 
     # Arrays of NumPy.
 

@@ -15,6 +15,12 @@ TEST(Refusals, FormatsThatAreNotReadAreNamedWithWhatToDo) {
   const auto code = absl::StatusCode::kUnimplemented;
   ExpectRefused(Refusal("a", "\x7fNSJb"), code, {"BGEO", "VTP or CSV"});
   ExpectRefused(Refusal("a", "BgeoV\0\0\0\x13"s + std::string(32, '\0')), code, {"version 19"});
+  const absl::Status hdf5 = Refusal("a.h5", "\x89HDF\r\n\x1a\n and no more");
+  if (hdf5.code() == code) {  // A build without HDF5.
+    ExpectRefused(hdf5, code, {"a.h5", "libhdf5-dev", "-DPARTIEMC_HDF5=ON"});
+  } else {
+    ExpectRefused(hdf5, absl::StatusCode::kDataLoss, {"a.h5", "libhdf5", "truncated"});
+  }
   ExpectRefused(Refusal("a.pdb", "ATOM 1\n"), code, {"PDB"});
   ExpectRefused(Refusal("a.xyz", "\x01\x02\0\0\0\0\x80\x3f"s), code, {"raw binary xyz"});
   ExpectRefused(Refusal("in.dam", "# a script\nunits lj\n"), code, {"LAMMPS input script"});
