@@ -52,7 +52,8 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
                    "Keep the particles with COLUMN=VALUE: type=1")
       ->type_name("COLUMN=VALUE")
       ->allow_extra_args(false);
-  verb->add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+  verb->add_option("--columns", flags.sequence.columns,
+                   "Columns of the positions: x,y or 2,3; of HDF5 datasets: GROUP/x,GROUP/y")
       ->type_name("NAMES");
   AddAttributesFlag(*verb, flags.sequence,
                     "Particle attributes to keep: column names, or arrays of two or three "

@@ -45,7 +45,8 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("COLUMN=VALUE")
       ->allow_extra_args(false)
       ->group(kGroup);
-  app.add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+  app.add_option("--columns", flags.sequence.columns,
+                 "Columns of the positions: x,y or 2,3; of HDF5 datasets: GROUP/x,GROUP/y")
       ->type_name("NAMES")
       ->group(kGroup);
   AddAttributesFlag(

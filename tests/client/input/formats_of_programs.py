@@ -431,6 +431,11 @@ class Outputs(unittest.TestCase):
         self.assertEqual(shown.GetNumberOfPolys(), len(triangles))
         numpy.testing.assert_allclose(self.points_of(shown), read.points[:, :2], atol=1e-6)
 
+    def test_vtp_attributes(self):
+        array = self.vtp.GetPointData().GetArray("p x")
+        values = [array.GetValue(k) for k in range(array.GetNumberOfTuples())]
+        numpy.testing.assert_array_equal(meshio.read(self.path("ply")).point_data["p_x"], values)
+
     def test_stl(self):
         for points, triangles in ((lambda mesh: (mesh.points, mesh.cells[0].data))(meshio.read(self.path("stl"))),):
             self.assertEqual(len(triangles), self.vtp.GetNumberOfPolys())
