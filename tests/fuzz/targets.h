@@ -28,7 +28,7 @@ Attack AttackNpz;
 Attack AttackPacked;  // gzip, zstd and deflate, read as lines.
 // Parts of frames from several connections; the model is tests/server/parts_model.h.
 Attack AttackPartsOverConnections;
-Attack AttackPickle;          // A pickle of PySPH's NPZ.
+Attack AttackPickle;  // A pickle of PySPH's NPZ.
 Attack AttackPly;
 Attack AttackRecording;       // A .pemc file, or one with correctly compressed blocks.
 Attack AttackRelayMessages;   // Messages about another replica's stream.
