@@ -102,7 +102,7 @@ docker/install.sh demo
 echo
 echo "== 2 of 3: build in $build (some minutes for the first time)"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPARTIEMC_TESTS=OFF \
-  -DPARTIEMC_VTK=OFF -DPARTIEMC_VIEWER="$browser" \
+  -DPARTIEMC_VTK=OFF -DPARTIEMC_HDF5=OFF -DPARTIEMC_VIEWER="$browser" \
   >"$work/cmake.log" 2>&1 || {
   cat "$work/cmake.log" >&2
   fail "CMake could not configure the build; its words are above"

@@ -167,8 +167,8 @@ step_contract() {
 }
 
 step_release() {
-  check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON -DPARTIEMC_C=ON \
-    -DPARTIEMC_PYTHON=ON &&
+  check "release: configure" cmake --preset release -DPARTIEMC_VTK=ON -DPARTIEMC_HDF5=ON \
+    -DPARTIEMC_C=ON -DPARTIEMC_PYTHON=ON &&
     check "release: build" cmake --build build/release -j "$jobs" &&
     run_ctest release build/release
 }

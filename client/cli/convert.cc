@@ -52,13 +52,13 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
                    "Keep the particles with COLUMN=VALUE: type=1")
       ->type_name("COLUMN=VALUE")
       ->allow_extra_args(false);
-  verb->add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+  verb->add_option("--columns", flags.sequence.columns,
+                   "Columns of the positions: x,y or 2,3; of HDF5 datasets: GROUP/x,GROUP/y")
       ->type_name("NAMES");
   AddAttributesFlag(*verb, flags.sequence,
                     "Particle attributes to keep: column names, or arrays of two or three "
                     "components; a recording keeps all of its attributes");
-  verb->add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
-      ->type_name("FILE");
+  AddTimeFlags(*verb, flags.sequence);
   verb->add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B");
   AddExpansionFlag(*verb, flags.sequence);

@@ -59,7 +59,9 @@ absl::Status FrameOutputs::Write(const FrameRecord& frame) {
 }
 
 absl::Status FrameOutputs::Finish() {
-  return statistics_ ? statistics_->Finish() : absl::OkStatus();
+  const absl::Status listed = frames_ ? frames_->Finish() : absl::OkStatus();
+  const absl::Status counted = statistics_ ? statistics_->Finish() : absl::OkStatus();
+  return listed.ok() ? counted : listed;
 }
 
 }  // namespace partiemc::client

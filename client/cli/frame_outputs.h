@@ -42,7 +42,7 @@ class FrameOutputs {
   void AddRefused() { summary_.AddRefused(); }
   void EndEarly(std::string why) { summary_.EndEarly(std::move(why)); }
 
-  /// Writes the statistics file. It does not exist before.
+  /// Writes the collections of the frames and the statistics file, which do not exist before.
   absl::Status Finish();
 
   const Summary& summary() const { return summary_; }

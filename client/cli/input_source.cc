@@ -18,6 +18,7 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
   const char* refused = !options.select.empty()    ? "--select"
                         : !options.columns.empty() ? "--columns"
                         : !options.times.empty()   ? "--times"
+                        : options.time_step        ? "--time-step"
                                                    : nullptr;
   if (refused != nullptr) {
     return absl::InvalidArgumentError(
@@ -37,6 +38,15 @@ CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const st
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAMES");
+}
+
+std::vector<CLI::Option*> AddTimeFlags(CLI::App& app, SequenceOptions& options) {
+  return {app.add_option("--times", options.times, "CSV file with the times of the frames")
+              ->type_name("FILE"),
+          app.add_option("--time-step", options.time_step,
+                         "Time of one step of a LAMMPS or GSD file: the time of a frame is its "
+                         "step times DT")
+              ->type_name("DT")};
 }
 
 CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options) {

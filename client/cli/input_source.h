@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "client/input/sequence.h"
@@ -25,6 +26,9 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
 
 /// Adds --attributes, a list of names.
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
+
+/// Adds --times and --time-step.
+std::vector<CLI::Option*> AddTimeFlags(CLI::App& app, SequenceOptions& options);
 
 /// Adds --max-expansion, a bound for packed input.
 CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options);

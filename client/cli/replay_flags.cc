@@ -46,7 +46,8 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("COLUMN=VALUE")
       ->allow_extra_args(false)
       ->group(kGroup);
-  app.add_option("--columns", flags.sequence.columns, "Columns of the positions: x,y or 2,3")
+  app.add_option("--columns", flags.sequence.columns,
+                 "Columns of the positions: x,y or 2,3; of HDF5 datasets: GROUP/x,GROUP/y")
       ->type_name("NAMES")
       ->group(kGroup);
   AddAttributesFlag(
@@ -54,9 +55,7 @@ void AddInputFlags(CLI::App& app, ReplayFlags& flags) {
       "Particle attributes to interpolate to the vertices: column names, arrays of two or three "
       "components, or velocity")
       ->group(kGroup);
-  app.add_option("--times", flags.sequence.times, "CSV file with the times of the frames")
-      ->type_name("FILE")
-      ->group(kGroup);
+  for (CLI::Option* const flag : AddTimeFlags(app, flags.sequence)) flag->group(kGroup);
   app.add_option("--frames", flags.sequence.frames, "Frames A to B - 1, counted from 0: A:B")
       ->type_name("A:B")
       ->group(kGroup);

@@ -10,8 +10,8 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_join.h"
+#include "client/input/base/natural_order.h"
 #include "client/input/base/text.h"
-#include "client/input/sequence.h"
 
 namespace partiemc::client::input {
 namespace {

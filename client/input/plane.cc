@@ -103,6 +103,7 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
   CopyOptionalArrays(rows, *axes, frame, notices);
   frame.float32 = rows.float32;
   frame.time = rows.time;
+  frame.step = rows.step;
   frame.source = rows.source;
   return absl::OkStatus();
 }

@@ -1,11 +1,13 @@
 #include "client/input/sequence.h"
 
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
 #include "absl/strings/str_join.h"
 #include "client/input/base/text.h"
+#include "client/input/collection.h"
 #include "client/input/file_list.h"
 #include "client/input/formats/formats.h"
 #include "client/input/formats/frame_reader.h"
@@ -30,6 +32,7 @@ struct Recording {
   FrameRange range;
   std::optional<FrameTimes> times;
   std::string times_path;
+  std::optional<double> time_step;
   std::vector<std::string> notices;
 };
 
@@ -44,6 +47,7 @@ class FileSequence final : public Sequence {
   absl::StatusOr<bool> Next(RecordedFrame& frame) override {
     if (!failure_.ok()) return failure_;
     auto found = ReadNext(frame);
+    if (found.ok() && !*found && selected_ == 0 && unselected_ > 0) found = SelectsNothing();
     failure_ = found.status();
     return found;
   }
@@ -101,10 +105,22 @@ class FileSequence final : public Sequence {
           !status.ok()) {
         return status;
       }
-      TakeTime(frame);
+      selected_ += rows_.count;
+      unselected_ += rows_.unselected;
+      if (absl::Status status = TakeTime(frame); !status.ok()) return status;
       return true;
     }
     return false;
+  }
+
+  absl::Status SelectsNothing() const {
+    std::vector<std::string> conditions;
+    for (const Condition& condition : recording_.request.conditions) {
+      conditions.push_back(Concat("--select ", condition.column, "=", condition.text));
+    }
+    return absl::FailedPreconditionError(
+        Concat(recording_.files.front(), ": none of ", unselected_, " particles fulfils ",
+               absl::StrJoin(conditions, " "), "; check the values of the column"));
   }
 
   absl::Status OpenNextFile() {
@@ -117,8 +133,15 @@ class FileSequence final : public Sequence {
     return absl::OkStatus();
   }
 
-  void TakeTime(RecordedFrame& frame) {
-    if (!recording_.times) return;
+  absl::Status TakeTime(RecordedFrame& frame) {
+    if (recording_.time_step) {
+      if (!frame.step) {
+        return absl::FailedPreconditionError(
+            Concat(frame.source, ": has no time step for --time-step; give --times"));
+      }
+      frame.time = *frame.step * *recording_.time_step;
+    }
+    if (!recording_.times) return absl::OkStatus();
     const auto found = recording_.times->find(frame.index);
     if (found != recording_.times->end()) {
       frame.time = found->second;
@@ -126,6 +149,7 @@ class FileSequence final : public Sequence {
       recording_.notices.push_back(
           Concat(recording_.times_path, ": has no time for frame ", frame.index));
     }
+    return absl::OkStatus();
   }
 
   // Counts all frames without parsing them. Empty if a file is damaged; Next reports the place.
@@ -153,6 +177,8 @@ class FileSequence final : public Sequence {
   ParticleRows rows_;
   PlaneProjection projection_;
   absl::Status failure_;
+  std::uint64_t selected_ = 0;    // Particles of all frames.
+  std::uint64_t unselected_ = 0;  // Particles that --select left out.
   bool told_missing_time_ = false;
   bool counted_ = false;
   std::optional<std::size_t> count_;
@@ -174,6 +200,7 @@ absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles fil
   std::vector<std::string> reasons;
   for (FileSeries& series : files.series) {
     if (recording.times_path.empty() && IsTimesFile(series.files.front())) {
+      if (recording.time_step) continue;
       recording.times_path = series.files.front();
       continue;
     }
@@ -201,7 +228,32 @@ absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles fil
   return std::move(readable.series.front());
 }
 
+// Takes the files and the times of a collection. Returns false for another input.
+absl::StatusOr<bool> TakeCollection(const std::string& input, Recording& recording) {
+  auto collection = ReadCollection(input);
+  if (!collection.ok()) return collection.status();
+  if (!*collection) return false;
+  recording.files = std::move((*collection)->files);
+  for (const std::string& file : recording.files) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(file, error);
+    recording.bytes += error ? 0 : bytes;
+  }
+  const auto format = RecogniseFormat(recording.files.front());
+  if (!format.ok()) return WithPrefix(input, format.status());
+  if (!(*format)->one_frame_per_file) {
+    return absl::FailedPreconditionError(
+        Concat(input, ": lists ", (*format)->name, " files, which hold several frames; name them"));
+  }
+  if (recording.times_path.empty() && !recording.time_step) {
+    recording.times = std::move((*collection)->times);
+    recording.times_path = input;
+  }
+  return true;
+}
+
 absl::Status TakeTimes(const std::string& directory, Recording& recording) {
+  if (recording.time_step || recording.times) return absl::OkStatus();
   if (recording.times_path.empty()) {
     const std::string beside = (std::filesystem::path(directory) / "times.csv").string();
     const bool is_frame = recording.files.size() == 1 && recording.files.front() == beside;
@@ -232,13 +284,26 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   if (!range.ok()) return range.status();
   recording.range = *range;
   recording.times_path = options.times;
-  auto files = ListInput(input);
-  if (!files.ok()) return files.status();
-  const std::string directory = files->directory;
-  auto series = ChooseSeries(input, *std::move(files), recording);
-  if (!series.ok()) return series.status();
-  recording.files = std::move(series->files);
-  recording.bytes = series->bytes;
+  recording.time_step = options.time_step;
+  if (options.time_step && !options.times.empty()) {
+    return absl::InvalidArgumentError("--time-step: cannot be combined with --times");
+  }
+  if (options.time_step && !(std::isfinite(*options.time_step) && *options.time_step > 0)) {
+    return absl::InvalidArgumentError(
+        Concat("--time-step: '", *options.time_step, "'; must be a positive number"));
+  }
+  const auto collected = TakeCollection(input, recording);
+  if (!collected.ok()) return collected.status();
+  std::string directory;
+  if (!*collected) {
+    auto files = ListInput(input);
+    if (!files.ok()) return files.status();
+    directory = files->directory;
+    auto series = ChooseSeries(input, *std::move(files), recording);
+    if (!series.ok()) return series.status();
+    recording.files = std::move(series->files);
+    recording.bytes = series->bytes;
+  }
   const auto format = RecogniseFormat(recording.files.front());
   if (!format.ok()) return format.status();
   recording.format = *format;

@@ -20,7 +20,9 @@ namespace partiemc::client {
 struct RecordedFrame {
   std::size_t index = 0;  ///< Index in the input, counted from 0, before any selection.
   std::optional<double>
-      time;            ///< From the times file, else from the frame. A time step is not a time.
+      time;  ///< From the times file, else `step` times SequenceOptions::time_step, else the frame.
+  /// Number of the time step. Without `time` it orders the frames, but velocities are useless.
+  std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
   int components = 2;  ///< 3 with SequenceOptions::in_space.
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
@@ -51,6 +53,10 @@ struct SequenceOptions {
   /// the
   ///   positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
   ///   skips a column.
+  /// - HDF5: datasets, "PartType0/Coordinates" or "run/x,run/y"; "*" in a path stands for the
+  /// groups
+  ///   of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses the
+  ///   particle array NAME instead of fluid.
   /// - VTK files define their positions; the option is refused.
   std::string columns = {};
 
@@ -65,6 +71,10 @@ struct SequenceOptions {
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present.
   std::string times = {};
 
+  /// Time of one time step, where frames have the number of their step (LAMMPS, GSD). A frame
+  /// without it is refused. Excludes `times`; a `times.csv` beside the files is not used.
+  std::optional<double> time_step = {};
+
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part is optional. "A" is one
   /// frame. Empty: all.
   std::string frames = {};
@@ -75,9 +85,12 @@ struct SequenceOptions {
 
 /// The frames of one input, in natural order of the file names. Not thread-safe.
 ///
-/// Reads CSV and other text tables, LAMMPS text dumps and LAMMPS xyz (each plain, .gz or .zst),
-/// NPY, NPZ, and, where built with VTK, legacy VTK, VTP and VTU. From a LAMMPS dump it
-/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled).
+/// Reads, plain or packed (.gz, .zst): CSV and other text tables, LAMMPS text dumps, LAMMPS and
+/// extended xyz, PLY, BGEO. Reads also NPY, NPZ and GSD. Builds with VTK read legacy VTK, VTP, VTU.
+/// Builds with HDF5 read HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget. ParaView's collections
+/// .pvd and .series list files and their times. From a LAMMPS dump it
+/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled). Image flags ix iy iz unwrap
+/// x y and xs ys, unless `columns` names the positions.
 ///
 /// Data with three coordinates is 2D if one axis is constant to 1e-6 of the largest extent. The
 /// first frame with particles determines this axis; the other two axes become x and y in this
@@ -87,12 +100,13 @@ struct SequenceOptions {
 /// Errors are one line with the problem, the place (file, line, frame) and the remedy:
 /// kInvalidArgument: a wrong option; kNotFound, kPermissionDenied: the file; kUnimplemented: an
 /// unsupported format; kFailedPrecondition: the input is ambiguous (several series, columns without
-/// names, 3D); kDataLoss: damaged or truncated input; kResourceExhausted: it unpacks to too much.
-/// Files are not trusted: memory grows with the bytes read, never with a declared count.
+/// names, 3D) or `select` holds for no particle of all frames; kDataLoss: damaged or truncated
+/// input; kResourceExhausted: it unpacks to too much. Files are not trusted: memory grows with the
+/// bytes read, never with a declared count.
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.
-  /// `input`: a file, a directory, or a pattern with * ? [ ].
+  /// `input`: a file, a collection, a directory, or a pattern with * ? [ ].
   static absl::StatusOr<std::unique_ptr<Sequence>> Open(const std::string& input,
                                                         const SequenceOptions& options);
   virtual ~Sequence() = default;
@@ -111,9 +125,5 @@ class Sequence {
   /// Notices for the user: skipped files, the recognised plane, ignored arrays. Grows with Next.
   virtual const std::vector<std::string>& notices() const = 0;
 };
-
-/// Order of names as people number them: runs of digits compare by value, "frame_2" < "frame_10".
-/// A strict weak order; names that differ only in leading zeros are ordered by them.
-bool NaturalLess(std::string_view a, std::string_view b);
 
 }  // namespace partiemc::client

@@ -12,6 +12,9 @@ std::string EncodeGeoJson(const FrameRecord& frame);
 std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& options);
 std::string EncodeObj(const FrameRecord& frame);
 std::string EncodeCsv(const FrameRecord& frame);
+std::string EncodePly(const FrameRecord& frame);
+std::string EncodeStl(const FrameRecord& frame);
+std::string EncodeGlb(const FrameRecord& frame);
 #ifdef PARTIEMC_HAVE_VTK
 /// Errors: INTERNAL if VTK's writer fails.
 absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame);

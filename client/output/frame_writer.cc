@@ -22,7 +22,7 @@ constexpr std::array kFormats = {
 #ifdef PARTIEMC_HAVE_VTK
     FrameFormat::kVtp,
 #endif
-    FrameFormat::kCsv,
+    FrameFormat::kCsv,     FrameFormat::kPly, FrameFormat::kStl, FrameFormat::kGlb,
 };
 
 bool AllFinite(std::span<const double> values) {
@@ -46,6 +46,12 @@ std::string_view Name(FrameFormat format) {
       return "vtp";
     case FrameFormat::kCsv:
       return "csv";
+    case FrameFormat::kPly:
+      return "ply";
+    case FrameFormat::kStl:
+      return "stl";
+    case FrameFormat::kGlb:
+      return "glb";
   }
   return "";
 }
@@ -95,6 +101,12 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
       return EncodeObj(frame);
     case FrameFormat::kCsv:
       return EncodeCsv(frame);
+    case FrameFormat::kPly:
+      return EncodePly(frame);
+    case FrameFormat::kStl:
+      return EncodeStl(frame);
+    case FrameFormat::kGlb:
+      return EncodeGlb(frame);
     case FrameFormat::kVtp:
 #ifdef PARTIEMC_HAVE_VTK
       return EncodeVtp(frame);
@@ -118,7 +130,7 @@ absl::StatusOr<FrameWriter> FrameWriter::Create(FrameWriterOptions options) {
   return FrameWriter(std::move(options));
 }
 
-absl::Status FrameWriter::Write(const FrameRecord& frame) const {
+absl::Status FrameWriter::Write(const FrameRecord& frame) {
   absl::Status status = WriteOutline(frame);
   for (std::size_t k = 0; status.ok() && k < frame.result.sections.size(); ++k) {
     status = WriteOutline(SectionOf(frame, k));
@@ -126,11 +138,39 @@ absl::Status FrameWriter::Write(const FrameRecord& frame) const {
   return status;
 }
 
-absl::Status FrameWriter::WriteOutline(const FrameRecord& frame) const {
+absl::Status FrameWriter::WriteOutline(const FrameRecord& frame) {
   for (const FrameFormat format : options_.formats) {
     absl::StatusOr<std::string> bytes = EncodeFrame(format, frame, options_);
     if (!bytes.ok()) return bytes.status();
-    absl::Status status = WriteFileAtomically(PathOf(frame, format), *bytes);
+    const std::filesystem::path path = PathOf(frame, format);
+    absl::Status status = WriteFileAtomically(path, *bytes);
+    if (!status.ok()) return status;
+    if (format == FrameFormat::kVtp) {
+      const double time = std::isfinite(frame.time) ? frame.time : static_cast<double>(frame.index);
+      listed_[frame.section].push_back({path.filename().string(), time});
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FrameWriter::Finish() const {
+  for (const auto& [section, files] : listed_) {
+    std::string pvd =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n";
+    std::string series = "{\"file-series-version\":\"1.0\",\"files\":[";
+    for (std::size_t k = 0; k < files.size(); ++k) {
+      AppendAll(pvd, "<DataSet timestep=\"", files[k].time, "\" part=\"0\" file=\"", files[k].file,
+                "\"/>\n");
+      AppendAll(series, k == 0 ? "\n" : ",\n", "{\"name\":\"", files[k].file,
+                "\",\"time\":", files[k].time, "}");
+    }
+    pvd += "</Collection>\n</VTKFile>\n";
+    series += "\n]}\n";
+    const std::string stem = section > 0 ? Concat("frames_section_", section) : "frames";
+    absl::Status status = WriteFileAtomically(options_.directory / Concat(stem, ".pvd"), pvd);
+    if (status.ok()) {
+      status = WriteFileAtomically(options_.directory / Concat(stem, ".vtp.series"), series);
+    }
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,9 +21,9 @@ enum class FrameFormat : std::uint8_t {
   /// RFC 7946 FeatureCollection: one Polygon per outer ring with its holes, outer rings
   /// counter-clockwise, holes clockwise in any case, first point repeated at the end. Properties:
   /// area
-  /// (without holes), perimeter (with holes), particles, ring, identity, parents, frame, time. A
-  /// ring
-  /// of `farthest-particle` that crosses itself is written unchanged.
+  /// (without holes), perimeter (with holes), particles, ring, identity, parents, frame, time, and
+  /// of each attribute at the vertices NAME_mean, NAME_min and NAME_max (NAME:0_mean for a vector).
+  /// A ring of `farthest-particle` that crosses itself is written unchanged.
   kGeoJson,
   /// A picture of mesh edges, outline and particles; y up; longer side 1000 units, rounded to
   /// 0.001.
@@ -37,12 +38,21 @@ enum class FrameFormat : std::uint8_t {
   /// column
   /// for each attribute; NAME:0, NAME:1 and NAME:2 for a vector.
   kCsv,
+  /// Binary PLY: the mesh with its attributes, NAME_0, NAME_1 and NAME_2 for a vector; without a
+  /// mesh the rings as edges.
+  kPly,
+  /// Binary STL: the triangles of the mesh in float32. It cannot hold rings and attributes.
+  kStl,
+  /// Binary glTF: triangles and the lines of the rings, in float32 relative to the node's
+  /// translation; attributes as _NAME.
+  kGlb,
 };
 
 /// The formats of this build.
 std::span<const FrameFormat> AllFrameFormats();
 
-/// "geojson", "svg", "obj", "vtp", "csv": the name on command lines and the file's extension.
+/// "geojson", "svg", "obj", "vtp", "csv", "ply", "stl", "glb": the name on command lines and the
+/// file's extension.
 std::string_view Name(FrameFormat format);
 
 /// Formats from a list of names separated by commas, each once, in the order given.
@@ -73,18 +83,29 @@ class FrameWriter {
   static absl::StatusOr<FrameWriter> Create(FrameWriterOptions options);
 
   /// Errors: as for EncodeFrame and AtomicFile. Formats before the failed one are written.
-  absl::Status Write(const FrameRecord& frame) const;
+  absl::Status Write(const FrameRecord& frame);
+
+  /// Writes ParaView's collections of the VTP files with their times: DIR/frames.pvd and
+  /// DIR/frames.vtp.series; DIR/frames_section_K.* of section K. Nothing without VTP files.
+  absl::Status Finish() const;
 
   /// DIR/frame_%06d.EXT, with more digits for larger indices; DIR/frame_%06d_section_K.EXT for
   /// section K.
   std::filesystem::path PathOf(const FrameRecord& frame, FrameFormat format) const;
 
  private:
-  absl::Status WriteOutline(const FrameRecord& frame) const;
+  // A file of a collection. The time of a frame without a finite one is its index.
+  struct Listed {
+    std::string file;
+    double time;
+  };
+
+  absl::Status WriteOutline(const FrameRecord& frame);
 
   explicit FrameWriter(FrameWriterOptions options) : options_(std::move(options)) {}
 
   FrameWriterOptions options_;
+  std::map<std::size_t, std::vector<Listed>> listed_;  // VTP files, by section; 0: the outlines.
 };
 
 }  // namespace partiemc::client

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "client/output/formats.h"
@@ -34,11 +36,44 @@ void AppendRing(std::string& out, std::span<const double> ring, bool counter_clo
   out += ']';
 }
 
-void AppendTime(std::string& out, double time) {
-  if (std::isfinite(time)) {
-    AppendNumber(out, time);
+template <typename Number>
+void AppendFinite(std::string& out, Number number) {
+  if (std::isfinite(number)) {
+    AppendNumber(out, number);
   } else {
     out += "null";  // JSON has no infinity and no NaN.
+  }
+}
+
+// The mean, least and largest value of each number of the attributes at the vertices of `rings_of`.
+void AppendAttributes(std::string& out, const FrameRecord& frame,
+                      std::span<const std::size_t> rings_of) {
+  const Rings& rings = frame.result.rings;
+  for (const AttributeValues& attribute : frame.result.attributes) {
+    const auto components = static_cast<std::size_t>(attribute.components);
+    for (std::size_t c = 0; c < components; ++c) {
+      double sum = 0, count = 0;
+      float low = std::numeric_limits<float>::infinity(), high = -low;
+      for (const std::size_t ring : rings_of) {
+        for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+          const float value = attribute.values[components * k + c];
+          sum += value;
+          count += 1;
+          low = std::min(low, value);
+          high = std::max(high, value);
+        }
+      }
+      const std::string name = components == 1 ? attribute.name : Concat(attribute.name, ":", c);
+      const auto append = [&](std::string_view figure, auto value) {
+        out += ",\"";
+        AppendJsonEscaped(out, name);
+        AppendAll(out, figure, "\":");
+        AppendFinite(out, value);
+      };
+      append("_mean", sum / count);
+      append("_min", low);
+      append("_max", high);
+    }
   }
 }
 
@@ -63,7 +98,10 @@ void AppendFeature(std::string& out, const FrameRecord& frame, std::size_t outer
     first = false;
   }
   AppendAll(out, R"(],"frame":)", frame.index, R"(,"time":)");
-  AppendTime(out, frame.time);
+  AppendFinite(out, frame.time);
+  std::vector<std::size_t> rings_of(holes.begin(), holes.end());
+  rings_of.push_back(outer);
+  AppendAttributes(out, frame, rings_of);
   out += R"(},"geometry":{"type":"Polygon","coordinates":[)";
   AppendRing(out, rings.RingPoints(outer), true);
   for (const std::size_t hole : holes) {
@@ -84,7 +122,7 @@ std::string EncodeGeoJson(const FrameRecord& frame) {
   std::string out = R"({"type":"FeatureCollection","frame":)";
   AppendNumber(out, frame.index);
   out += R"(,"time":)";
-  AppendTime(out, frame.time);
+  AppendFinite(out, frame.time);
   out += R"(,"features":[)";
   bool first = true;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {

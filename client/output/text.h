@@ -44,6 +44,18 @@ std::string Concat(const Parts&... parts) {
   return out;
 }
 
+/// Appends the characters of a JSON string, without its quotes.
+inline void AppendJsonEscaped(std::string& out, std::string_view text) {
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      AppendAll(out, "\\u00", "01"[c >> 4 & 1], "0123456789abcdef"[c & 15]);
+    } else {
+      out += c;
+    }
+  }
+}
+
 /// "1 frame", "2 frames".
 inline std::string Plural(std::uint64_t count, std::string_view noun) {
   return Concat(count, " ", noun, count == 1 ? "" : "s");

@@ -52,8 +52,8 @@ class RecordingWriter {
   ~RecordingWriter();
 
   /// Appends a frame with its arrays. Frames are numbered in the order of calls. A frame without a
-  /// time gets its number as time and loses its velocities. Errors: INVALID_ARGUMENT (float32 is
-  /// too coarse); the errors of AtomicFile.
+  /// time gets its time step, or else its number, as time and loses its velocities. Errors:
+  /// INVALID_ARGUMENT (float32 is too coarse); the errors of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();

@@ -76,12 +76,12 @@ class RecordingWriter::Impl {
 
   absl::Status Add(const RecordedFrame& frame) {
     message_.set_sequence(frame_count_);
-    message_.set_time(frame.time.value_or(static_cast<double>(frame_count_)));
+    message_.set_time(frame.time.value_or(frame.step.value_or(static_cast<double>(frame_count_))));
     const absl::Status status = SetPositions(frame);
     if (!status.ok()) return status;
     wire::AssignBytes(std::span<const std::uint64_t>(frame.ids), *message_.mutable_ids());
     wire::AssignBytes(std::span<const float>(frame.volumes), *message_.mutable_volumes());
-    // Velocities are useless with an index instead of a time.
+    // Velocities are useless with a time step or an index instead of a time.
     wire::AssignBytes(
         frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
         *message_.mutable_velocities());

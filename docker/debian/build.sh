@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 out=$(realpath -m "${1:-build/debian/packages}")
 
 cmake -S . -B build/debian -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr \
-  -DPARTIEMC_TESTS=OFF -DPARTIEMC_VTK=OFF -DPARTIEMC_VIEWER=ON -DPARTIEMC_C=ON -DPARTIEMC_PYTHON=ON \
+  -DPARTIEMC_TESTS=OFF -DPARTIEMC_VTK=OFF -DPARTIEMC_HDF5=OFF -DPARTIEMC_VIEWER=ON -DPARTIEMC_C=ON -DPARTIEMC_PYTHON=ON \
   -DPARTIEMC_DEBIAN=ON
 cmake --build build/debian
 mkdir -p "$out"

@@ -79,6 +79,8 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"benchmark", {"libbenchmark-dev"}},
       {"Boost", {"libboost-dev"}},
       {"CLI11", {"libcli11-dev"}},
+      {"hdf5", {"libhdf5-dev"}},  // Its names in pkg-config.
+      {"hdf5-serial", {"libhdf5-dev"}},
       {"gRPC", {"libgrpc++-dev", "protobuf-compiler-grpc"}},
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
       {"lammps", {"liblammps-dev"}},
@@ -193,7 +195,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
        {"client/input/",
         "",
         {"base", "formats"},
-        {"file_list", "frame_range", "natural_order", "plane", "sequence", "times"}}}};
+        {"collection", "file_list", "frame_range", "plane", "sequence", "times"}}}};
   Violations violations;
   for (const House& house : kHouses) {
     const auto room_of = [&](const std::string& path) {
@@ -378,12 +380,13 @@ Violations PackageSetsAreComplete(const SourceTree& tree) {
         violations.push_back(path + ": looks for " + name + ", which no package is known for");
         continue;
       }
-      const std::string set = Room(path) == "core"    ? "core"
-                              : Room(path) == "tests" ? "tests"
-                              : name == "VTK"         ? "vtk"
-                              : name == "pybind11"    ? "python"
-                              : name == "Python3"     ? "python"
-                                                      : "service";
+      const std::string set = Room(path) == "core"       ? "core"
+                              : Room(path) == "tests"    ? "tests"
+                              : name == "VTK"            ? "vtk"
+                              : name.starts_with("hdf5") ? "hdf5"
+                              : name == "pybind11"       ? "python"
+                              : name == "Python3"        ? "python"
+                                                         : "service";
       const auto listed = PackageSet(tree, set);
       for (const std::string& package : packages->second) {
         if (!listed.contains(package)) {

@@ -64,7 +64,7 @@ def recordings(data, target):
         yield f"sample {path.name}", path, []
     yield "sample dump.multi", f"{samples}/lammps/dump.multi.*.txt", []
     for name in ["header.csv", "noheader.csv", "semicolon_units_xz.csv", "pos_f8_C.npy", "pos_f4_fortran.npy",
-                 "frame.npz", "frame_deflate.npz"]:
+                 "frame.npz", "frame_deflate.npz", "ascii.ply", "binary_le.ply", "pysph_native.npz"]:
         yield f"sample {name}", samples / "other" / name, []
     yield "sample numpy_savetxt_default.txt", samples / "other/numpy_savetxt_default.txt", ["--columns", "2,3"]
 

@@ -5,6 +5,7 @@
 
 #include "client/cli/replay_parameters.h"
 #include "client/input/base/columns.h"
+#include "client/input/base/natural_order.h"
 #include "client/input/base/number_text.h"
 #include "client/input/frame_range.h"
 #include "client/input/sequence.h"

@@ -2,6 +2,7 @@
 
 #include "absl/strings/match.h"
 #include "client/input/formats/formats.h"
+#include "client/input/formats/pickle.h"
 #include "client/input/plane.h"
 #include "fuzz/choices.h"
 #include "fuzz/memory_file.h"
@@ -94,6 +95,24 @@ void AttackReader(client::input::OpenReader& open, std::uint8_t choice, std::str
   }
   ParticleRows rows;
   ReadAll(**reader, file.path(), choice & 0x80 ? nullptr : &rows);
+}
+
+void AttackBgeo(Bytes bytes) { AttackFile(client::input::OpenBgeo, bytes); }
+void AttackGsd(Bytes bytes) { AttackFile(client::input::OpenGsd, bytes); }
+void AttackHdf5(Bytes bytes) { AttackFile(client::input::OpenHdf5, bytes); }
+void AttackPly(Bytes bytes) { AttackFile(client::input::OpenPly, bytes); }
+
+void AttackPickle(Bytes bytes) {
+  const std::string path = "frame.npz";
+  const auto pickle = client::input::Pickle::Parse({bytes.begin(), bytes.end()}, path);
+  if (!pickle.ok()) {
+    RequireMessage(pickle.status(), path);
+    return;
+  }
+  client::input::ArrayColumn column;
+  std::size_t rows = 0;
+  if (!client::input::ColumnOf((*pickle)->root(), column, rows)) return;
+  for (std::size_t row = 0; row < rows; ++row) column.Number(row);
 }
 
 void AttackLammpsDump(Bytes bytes) { AttackFile(client::input::OpenLammpsDump, bytes); }

@@ -20,11 +20,16 @@ Attack AttackExpressions;   // Values of --select, --columns, --frames, ...
 Attack AttackFrameMessage;  // A ReconstructFrameRequest, decoded, reconstructed, encoded.
 Attack AttackFrames;        // Frames with hostile coordinates; checks every guarantee.
 Attack AttackLammpsDump;    // The readers of client/input, with the bytes as a file.
+Attack AttackBgeo;
+Attack AttackGsd;
+Attack AttackHdf5;  // Refuses all without HDF5.
 Attack AttackNpy;
 Attack AttackNpz;
 Attack AttackPacked;  // gzip, zstd and deflate, read as lines.
 // Parts of frames from several connections; the model is tests/server/parts_model.h.
 Attack AttackPartsOverConnections;
+Attack AttackPickle;  // A pickle of PySPH's NPZ.
+Attack AttackPly;
 Attack AttackRecording;       // A .pemc file, or one with correctly compressed blocks.
 Attack AttackRelayMessages;   // Messages about another replica's stream.
 Attack AttackRelayPeers;      // Messages of several replicas, through the queues.

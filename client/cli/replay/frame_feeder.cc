@@ -9,7 +9,7 @@ namespace partiemc::client {
 namespace {
 
 double TimeOf(const RecordedFrame& recorded) {
-  return recorded.time.value_or(static_cast<double>(recorded.index));
+  return recorded.time.value_or(recorded.step.value_or(static_cast<double>(recorded.index)));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <utility>
 
 #include "client/input/base/text.h"
@@ -38,6 +39,30 @@ class FileSource final : public ByteSource {
   std::unique_ptr<std::FILE, CloseFile> file_;
 };
 
+// A byte range of a file.
+class FilePart final : public ByteSource {
+ public:
+  FilePart(const std::string& path, std::uint64_t offset, std::uint64_t size)
+      : path_(path), file_(path, std::ios::binary), left_(size) {
+    file_.seekg(static_cast<std::streamoff>(offset));
+  }
+
+  absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
+    const std::size_t wanted = static_cast<std::size_t>(std::min<std::uint64_t>(size, left_));
+    if (wanted == 0) return std::size_t{0};
+    file_.read(bytes, static_cast<std::streamsize>(wanted));
+    const std::size_t count = static_cast<std::size_t>(file_.gcount());
+    left_ -= count;
+    if (count == 0) return absl::DataLossError(Concat(path_, ": cannot be read"));
+    return count;
+  }
+
+ private:
+  std::string path_;
+  std::ifstream file_;
+  std::uint64_t left_;
+};
+
 absl::Status CannotOpen(const std::string& path, int error) {
   if (error == ENOENT || error == ENOTDIR) {
     return absl::NotFoundError(Concat(path, ": no such file; check the path"));
@@ -66,6 +91,19 @@ absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path) {
   std::FILE* const file = std::fopen(path.c_str(), "rb");
   if (file == nullptr) return CannotOpen(path, errno);
   return std::make_unique<FileSource>(path, file);
+}
+
+std::unique_ptr<ByteSource> OpenFilePart(const std::string& path, std::uint64_t offset,
+                                         std::uint64_t size) {
+  return std::make_unique<FilePart>(path, offset, size);
+}
+
+absl::StatusOr<std::string> ReadFilePart(const std::string& path, std::uint64_t offset,
+                                         std::size_t size) {
+  FilePart part(path, offset, size);
+  std::vector<char> bytes;
+  if (absl::Status status = ReadUpTo(part, size, bytes); !status.ok()) return status;
+  return std::string(bytes.begin(), bytes.end());
 }
 
 absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string& path,

@@ -37,6 +37,12 @@ class ByteSource {
 /// A regular file. Errors: kNotFound, kPermissionDenied, kFailedPrecondition (not a regular file).
 absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path);
 
+/// The bytes [offset, offset + size) of a file. Reading fails behind its end.
+std::unique_ptr<ByteSource> OpenFilePart(const std::string& path, std::uint64_t offset,
+                                         std::uint64_t size);
+absl::StatusOr<std::string> ReadFilePart(const std::string& path, std::uint64_t offset,
+                                         std::size_t size);
+
 /// A file of text or binary data, plain, gzip or zstd (recognised by its first bytes, not its
 /// name). Reads ahead by blocks of 256 KiB. The bytes before a damaged place are delivered
 /// first.

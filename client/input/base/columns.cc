@@ -165,6 +165,11 @@ absl::Status PlanRecognisedPositions(const Names& names, const Names& canonical,
     if (CountFound(axes) < 2) continue;
     plan.positions = axes;
     plan.scaled = IsScaled(family);
+    if (family == Family::kPlain || family == Family::kScaled) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        plan.images[axis] = FindFirst(canonical, {Concat("i", "xyz"[axis])});
+      }
+    }
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(Concat("no position columns (x,y and the like) among ",
@@ -310,6 +315,21 @@ absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnReq
     by_name.columns.clear();
   }
   return PlanNamedColumns(names, by_name);
+}
+
+std::vector<bool> NeededColumns(const ColumnPlan& plan) {
+  std::vector<bool> needed(plan.column_count, false);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (plan.positions[axis]) needed[*plan.positions[axis]] = true;
+    if (plan.velocities[axis]) needed[*plan.velocities[axis]] = true;
+  }
+  if (plan.id) needed[*plan.id] = true;
+  if (plan.volume) needed[*plan.volume] = true;
+  for (const std::size_t column : plan.conditions) needed[column] = true;
+  for (const AttributeColumns& attribute : plan.attributes) {
+    for (const std::size_t column : attribute.columns) needed[column] = true;
+  }
+  return needed;
 }
 
 bool NamesHoldPositions(const Names& names) {

@@ -53,6 +53,9 @@ struct ColumnPlan {
   std::optional<std::size_t> volume;
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
+  /// LAMMPS's ix iy iz: how many boxes a wrapped position has left behind. Not set with
+  /// ColumnRequest::columns, which keeps positions as they are.
+  std::array<std::optional<std::size_t>, 3> images;
   std::size_t column_count = 0;
   bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.
 };
@@ -68,6 +71,9 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& name
 /// Makes a plan for a table of `count` columns without names: two are x y, three are x y z; other
 /// tables need request.columns.
 absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request);
+
+/// Marks the columns of the table that a plan uses.
+std::vector<bool> NeededColumns(const ColumnPlan& plan);
 
 /// Whether PlanNamedColumns would find positions by names alone.
 bool NamesHoldPositions(const std::vector<std::string>& names);

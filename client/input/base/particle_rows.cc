@@ -99,8 +99,10 @@ void ParticleRows::Begin(const ColumnPlan& plan) {
   has_volumes = plan.volume.has_value();
   float32 = false;
   time.reset();
+  step.reset();
   source.clear();
   count = 0;
+  unselected = 0;
 }
 
 absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
@@ -110,7 +112,9 @@ absl::Status AppendTextRow(std::span<const std::string_view> cells, const Column
                                       " values; the file is truncated or damaged"));
   }
   for (std::size_t k = 0; k < request.conditions.size(); ++k) {
-    if (!request.conditions[k].Holds(cells[plan.conditions[k]])) return absl::OkStatus();
+    if (request.conditions[k].Holds(cells[plan.conditions[k]])) continue;
+    ++rows.unselected;
+    return absl::OkStatus();
   }
   if (rows.count == kMaxParticles) {
     return absl::DataLossError(Concat("the frame has more than ", kMaxParticles, " particles"));
@@ -225,6 +229,7 @@ absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t r
     rows.ids.push_back(id.value_or(0));
   }
   rows.count += selected->size();
+  rows.unselected += row_count - selected->size();
   return absl::OkStatus();
 }
 

@@ -28,8 +28,10 @@ struct ParticleRows {
   bool has_volumes = false;
   bool float32 = false;
   std::optional<double> time;
+  std::optional<double> step;  ///< Number of the time step.
   std::string source;
   std::size_t count = 0;
+  std::size_t unselected = 0;  ///< Rows that do not fulfil the conditions.
 
   /// Clears the arrays, keeps their memory, and records which of them `plan` fills.
   void Begin(const ColumnPlan& plan);

@@ -1,4 +1,4 @@
-// What readers of files need beside common/text.h.
+// Text for readers of files, beside common/text.h.
 #pragma once
 
 #include <string_view>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "client/input/base/columns.h"
 #include "client/input/base/number_text.h"
 #include "client/input/base/text.h"
 
@@ -12,6 +13,8 @@ constexpr std::string_view kBlanks = " \t";
 
 // Most columns of a table. A line of binary data has many more.
 constexpr std::size_t kMaxColumns = 4096;
+
+constexpr std::size_t kPreambleBytes = std::size_t{64} << 10;
 
 std::string_view Trim(std::string_view cell) {
   cell = Strip(cell);
@@ -39,7 +42,91 @@ std::size_t CellEnd(std::string_view line, std::size_t begin, char separator) {
   return std::min(line.find(separator, std::min(close, line.size())), line.size());
 }
 
+// The separator between the cells of `line`.
+char Separator(std::string_view line) {
+  std::vector<std::string_view> cells;
+  SplitAtBlanks(line, cells);
+  if (AllNumbers(cells)) return ' ';
+  for (const char separator : {';', '\t', ','}) {
+    if (CellEnd(line, 0, separator) != line.size()) return separator;
+  }
+  return ' ';
+}
+
+void SplitCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
+  cells.clear();
+  if (separator == ' ') {
+    line = Strip(line);
+    for (std::size_t begin = 0; begin < line.size();) {
+      const std::size_t end = CellEnd(line, begin, '\t');
+      const std::size_t blank = CellEnd(line, begin, ' ');
+      cells.push_back(Trim(line.substr(begin, std::min(end, blank) - begin)));
+      begin = std::min(line.find_first_not_of(kBlanks, std::min(end, blank)), line.size());
+    }
+    return;
+  }
+  std::size_t begin = 0;
+  while (true) {
+    const std::size_t end = CellEnd(line, begin, separator);
+    cells.push_back(Trim(line.substr(begin, end - begin)));
+    if (end == line.size()) break;
+    begin = end + 1;
+  }
+  if (cells.size() > 1 && cells.back().empty()) cells.pop_back();
+}
+
+std::size_t CountCells(std::string_view line, char separator) {
+  std::vector<std::string_view> cells;
+  SplitCells(line, separator, cells);
+  return cells.size();
+}
+
+struct NumberedLine {
+  std::size_t index;
+  std::string_view text;
+};
+
+// The lines with content, without the last one, which may be cut off.
+std::vector<NumberedLine> ContentLines(std::string_view head) {
+  std::vector<NumberedLine> lines;
+  for (std::size_t index = 0; !head.empty(); ++index) {
+    const std::size_t end = head.find('\n');
+    if (end == std::string_view::npos) break;
+    const std::string_view line = Strip(head.substr(0, end));
+    if (!line.empty() && !IsComment(line)) lines.push_back({index, line});
+    head.remove_prefix(end + 1);
+  }
+  return lines;
+}
+
+bool IsHeader(std::string_view line, char separator, const std::vector<std::string>& columns) {
+  std::vector<std::string_view> cells;
+  SplitCells(line, separator, cells);
+  if (cells.size() < 2 || cells.size() > kMaxColumns) return false;
+  const std::vector<std::string> names(cells.begin(), cells.end());
+  if (NamesHoldPositions(names)) return true;
+  return !columns.empty() && std::all_of(columns.begin(), columns.end(), [&](const auto& column) {
+    return std::find(names.begin(), names.end(), column) != names.end();
+  });
+}
+
 }  // namespace
+
+absl::StatusOr<std::size_t> CountPreambleLines(InputStream& stream,
+                                               const std::vector<std::string>& columns) {
+  const auto head = stream.Peek(kPreambleBytes);
+  if (!head.ok()) return head.status();
+  const std::vector<NumberedLine> lines = ContentLines(*head);
+  for (std::size_t k = 0; k + 1 < lines.size(); ++k) {
+    const char separator = Separator(lines[k].text);
+    if (!IsHeader(lines[k].text, separator, columns)) continue;
+    if (k > 0 && CountCells(lines[k].text, separator) != CountCells(lines[k + 1].text, separator)) {
+      continue;
+    }
+    return k == 0 ? 0 : lines[k].index;
+  }
+  return std::size_t{0};
+}
 
 void SplitAtBlanks(std::string_view line, std::vector<std::string_view>& cells) {
   cells.clear();
@@ -60,9 +147,9 @@ absl::StatusOr<TextTable> TextTable::Open(InputStream& stream) {
     return absl::DataLossError(
         Concat(stream.path(), ": is empty; a frame without particles is a header without rows"));
   }
-  table.RecogniseDialect(line);
+  table.separator_ = Separator(line);
   std::vector<std::string_view> cells;
-  table.Split(line, cells);
+  SplitCells(line, table.separator_, cells);
   table.column_count_ = cells.size();
   if (cells.empty() || cells.size() > kMaxColumns) {
     return stream.ErrorAtLine(absl::StatusCode::kDataLoss, "is no table of numbers");
@@ -81,7 +168,7 @@ void TextTable::TakeHeader(const std::vector<std::string_view>& first) {
     return;
   }
   std::vector<std::string_view> words;
-  Split(comment_, words);
+  SplitCells(comment_, separator_, words);
   if (words.size() != column_count_) SplitAtBlanks(comment_, words);
   if (words.size() == column_count_ && !AllNumbers(words))
     names_.assign(words.begin(), words.end());
@@ -98,50 +185,16 @@ absl::StatusOr<bool> TextTable::ReadContentLine(std::string_view& line) {
   }
 }
 
-void TextTable::RecogniseDialect(std::string_view line) {
-  separator_ = ' ';
-  std::vector<std::string_view> cells;
-  SplitAtBlanks(line, cells);
-  if (AllNumbers(cells)) return;
-  for (const char separator : {';', '\t', ','}) {
-    if (CellEnd(line, 0, separator) == line.size()) continue;
-    separator_ = separator;
-    return;
-  }
-}
-
-void TextTable::Split(std::string_view line, std::vector<std::string_view>& cells) const {
-  cells.clear();
-  if (separator_ == ' ') {
-    line = Strip(line);
-    for (std::size_t begin = 0; begin < line.size();) {
-      const std::size_t end = CellEnd(line, begin, '\t');
-      const std::size_t blank = CellEnd(line, begin, ' ');
-      cells.push_back(Trim(line.substr(begin, std::min(end, blank) - begin)));
-      begin = std::min(line.find_first_not_of(kBlanks, std::min(end, blank)), line.size());
-    }
-    return;
-  }
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t end = CellEnd(line, begin, separator_);
-    cells.push_back(Trim(line.substr(begin, end - begin)));
-    if (end == line.size()) break;
-    begin = end + 1;
-  }
-  if (cells.size() > 1 && cells.back().empty()) cells.pop_back();
-}
-
 absl::StatusOr<bool> TextTable::ReadRow(std::vector<std::string_view>& cells) {
   if (first_row_waits_) {
     first_row_waits_ = false;
-    Split(first_row_, cells);
+    SplitCells(first_row_, separator_, cells);
     return true;
   }
   std::string_view line;
   const auto found = ReadContentLine(line);
   if (!found.ok() || !*found) return found;
-  Split(line, cells);
+  SplitCells(line, separator_, cells);
   return true;
 }
 

@@ -13,6 +13,13 @@ namespace partiemc::client::input {
 /// Splits `line` at runs of blanks. `cells` are views into `line`.
 void SplitAtBlanks(std::string_view line, std::vector<std::string_view>& cells);
 
+/// Number of lines of `stream` before the header of its table: titles and settings that programs
+/// write first. The header is the first line with names of positions (or, with `columns`, with all
+/// of these names) that has the cells of the line that follows. 0 without such a line in the first
+/// 64 KiB, or if the table begins at once. Consumes nothing.
+absl::StatusOr<std::size_t> CountPreambleLines(InputStream& stream,
+                                               const std::vector<std::string>& columns);
+
 /// A text table with comma, semicolon, tab or blanks between cells; cells may be quoted. Skips
 /// empty lines and lines that begin with # or %. The first other line is a header unless all of its
 /// cells are numbers. Without such a header, the last comment before the first row is the header,
@@ -34,8 +41,6 @@ class TextTable {
   explicit TextTable(InputStream& stream) : stream_(&stream) {}
 
   absl::StatusOr<bool> ReadContentLine(std::string_view& line);
-  void RecogniseDialect(std::string_view line);
-  void Split(std::string_view line, std::vector<std::string_view>& cells) const;
   void TakeHeader(const std::vector<std::string_view>& first);
 
   InputStream* stream_;

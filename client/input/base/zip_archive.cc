@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
+#include "client/input/base/little_endian.h"
 #include "client/input/base/text.h"
 #include "client/input/base/unpack.h"
 
@@ -27,38 +27,6 @@ constexpr std::string_view kEndSignature = "PK\x05\x06";
 constexpr std::uint16_t kStored = 0;
 constexpr std::uint16_t kDeflated = 8;
 constexpr std::uint32_t kInZip64 = 0xFFFFFFFF;
-
-std::uint64_t LittleEndian(std::string_view bytes, std::size_t at, std::size_t size) {
-  std::uint64_t value = 0;
-  for (std::size_t k = size; k-- > 0;) {
-    value = (value << 8) | static_cast<unsigned char>(bytes[at + k]);
-  }
-  return value;
-}
-
-// A byte range of a file.
-class FilePart final : public ByteSource {
- public:
-  FilePart(const std::string& path, std::uint64_t offset, std::uint64_t size)
-      : path_(path), file_(path, std::ios::binary), left_(size) {
-    file_.seekg(static_cast<std::streamoff>(offset));
-  }
-
-  absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
-    const std::size_t wanted = static_cast<std::size_t>(std::min<std::uint64_t>(size, left_));
-    if (wanted == 0) return std::size_t{0};
-    file_.read(bytes, static_cast<std::streamsize>(wanted));
-    const std::size_t count = static_cast<std::size_t>(file_.gcount());
-    left_ -= count;
-    if (count == 0) return absl::DataLossError(Concat(path_, ": cannot be read"));
-    return count;
-  }
-
- private:
-  std::string path_;
-  std::ifstream file_;
-  std::uint64_t left_;
-};
 
 // An entry, unpacked: ends after the bytes that the directory says, and checks them.
 class CheckedEntry final : public ByteSource {
@@ -85,9 +53,9 @@ class CheckedEntry final : public ByteSource {
     return absl::DataLossError(Concat(name_, ": the checksum is wrong; the file is damaged"));
   }
 
-  // 0, or the error of an entry that goes on behind its size.
+  // Returns 0. An entry that is longer than its size is an error.
   absl::StatusOr<std::size_t> CheckEnd() {
-    if (seen_crc_ != crc_) return WrongChecksum();  // Of an empty one.
+    if (seen_crc_ != crc_) return WrongChecksum();  // The entry is empty.
     char surplus = 0;
     const auto count = source_->Read(&surplus, 1);
     if (!count.ok() || *count == 0) return count;
@@ -104,14 +72,6 @@ class CheckedEntry final : public ByteSource {
 
 absl::Status Damaged(const std::string& path, std::string_view what) {
   return absl::DataLossError(Concat(path, ": ", what, "; the zip archive is damaged"));
-}
-
-absl::StatusOr<std::string> ReadPart(const std::string& path, std::uint64_t offset,
-                                     std::size_t size) {
-  FilePart part(path, offset, size);
-  std::vector<char> bytes;
-  if (absl::Status status = ReadUpTo(part, size, bytes); !status.ok()) return status;
-  return std::string(bytes.begin(), bytes.end());
 }
 
 absl::StatusOr<std::vector<ZipEntry>> ParseDirectory(const std::string& path,
@@ -158,7 +118,7 @@ absl::StatusOr<ZipArchive> ZipArchive::Open(const std::string& path) {
   if (error) return absl::NotFoundError(Concat(path, ": ", error.message()));
   const std::size_t tail_bytes = static_cast<std::size_t>(
       std::min<std::uint64_t>(archive.file_bytes_, kEndBytes + kMaxCommentBytes));
-  const auto tail = ReadPart(path, archive.file_bytes_ - tail_bytes, tail_bytes);
+  const auto tail = ReadFilePart(path, archive.file_bytes_ - tail_bytes, tail_bytes);
   if (!tail.ok()) return tail.status();
   const std::size_t end = tail->rfind(kEndSignature);
   if (end == std::string::npos || end + kEndBytes > tail->size()) {
@@ -172,7 +132,7 @@ absl::StatusOr<ZipArchive> ZipArchive::Open(const std::string& path) {
   }
   if (offset + bytes > archive.file_bytes_)
     return Damaged(path, "the directory is out of the file");
-  const auto directory = ReadPart(path, offset, static_cast<std::size_t>(bytes));
+  const auto directory = ReadFilePart(path, offset, static_cast<std::size_t>(bytes));
   if (!directory.ok()) return directory.status();
   auto entries = ParseDirectory(path, *directory, count);
   if (!entries.ok()) return entries.status();
@@ -183,7 +143,7 @@ absl::StatusOr<ZipArchive> ZipArchive::Open(const std::string& path) {
 absl::StatusOr<std::unique_ptr<ByteSource>> ZipArchive::OpenEntry(const ZipEntry& entry) const {
   const std::string name = Concat(path_, ": ", entry.name);
   if (entry.offset + kLocalHeaderBytes > file_bytes_) return Damaged(name, "is out of the file");
-  const auto header = ReadPart(path_, entry.offset, kLocalHeaderBytes);
+  const auto header = ReadFilePart(path_, entry.offset, kLocalHeaderBytes);
   if (!header.ok()) return header.status();
   if (header->size() != kLocalHeaderBytes || header->substr(0, 4) != kLocalSignature) {
     return Damaged(name, "has no local header");
@@ -196,8 +156,7 @@ absl::StatusOr<std::unique_ptr<ByteSource>> ZipArchive::OpenEntry(const ZipEntry
                                            "; write it with numpy.savez_compressed"));
   }
   const Packing packing = entry.method == kStored ? Packing::kNone : Packing::kDeflate;
-  auto unpacked =
-      Unpack(packing, name, std::make_unique<FilePart>(path_, data, entry.packed_bytes));
+  auto unpacked = Unpack(packing, name, OpenFilePart(path_, data, entry.packed_bytes));
   if (!unpacked.ok()) return unpacked.status();
   return std::make_unique<CheckedEntry>(name, *std::move(unpacked), entry);
 }

@@ -36,6 +36,18 @@ struct FileHead {
   }
 };
 
+// Whether an NPY array has an extent more than one frame needs.
+bool HasFramesInNpy(const FileHead& head) {
+  constexpr std::string_view kShape = "'shape': (";
+  const std::size_t at = head.bytes.find(kShape);
+  if (!head.Begins("\x93NUMPY") || at == std::string_view::npos) return false;
+  const std::string_view shape = head.bytes.substr(at + kShape.size());
+  const auto extents = Split(shape.substr(0, shape.find(')')), ',');
+  const auto count = std::count_if(extents.begin(), extents.end(),
+                                   [](std::string_view extent) { return !extent.empty(); });
+  return count == (head.Holds("'descr': [") ? 2 : 3);
+}
+
 bool IsXyz(const FileHead& head) {
   if (!head.text || !ParseCount(head.Line(0))) return false;
   return head.extension == "xyz" || head.Line(1).starts_with("Atoms. Timestep:");
@@ -82,6 +94,7 @@ struct Entry {
 
 // The first match decides: signatures in the content, then names, then any text.
 constexpr Entry kEntries[] = {
+    {HasFramesInNpy, {"NPY", OpenNpy, false}, ""},
     {[](const FileHead& head) { return head.Begins("\x93NUMPY"); }, {"NPY", OpenNpy, true}, ""},
     {[](const FileHead& head) { return head.Begins("PK\x03\x04") || head.Begins("PK\x05\x06"); },
      {"NPZ", OpenNpz, true},
@@ -99,22 +112,25 @@ constexpr Entry kEntries[] = {
      {"LAMMPS dump", OpenLammpsDump, false},
      ""},
     {IsXyz, {"xyz", OpenXyz, false}, ""},
+    {[](const FileHead& head) { return head.extension == "pvd" || head.extension == "series"; },
+     {},
+     "a collection of files; name it alone"},
     {[](const FileHead& head) { return head.Holds("<VTKFile"); },
      {},
-     "a VTK file of a kind that holds no particles itself (a collection or a grid); name the .vtp "
-     "or .vtu files"},
+     "a VTK file of a kind that holds no particles itself (a grid); name .vtp or .vtu files"},
     {[](const FileHead& head) { return head.Begins("ply\n") || head.Begins("ply\r"); },
+     {"PLY", OpenPly, true},
+     ""},
+    {[](const FileHead& head) { return head.Begins("BgeoV"); }, {"BGEO", OpenBgeo, true}, ""},
+    {[](const FileHead& head) { return head.Begins("\x7fNSJ") || head.extension == "bgeo"; },
      {},
-     "a PLY file, which is not read; write the particles as VTP, NPY or CSV"},
-    {[](const FileHead& head) {
-       return head.Begins("Bgeo") || head.Begins("\x7fNSJ") || head.extension == "bgeo";
-     },
-     {},
-     "a Houdini BGEO file, which is not read; write the particles as VTP, NPY or CSV"},
-    {[](const FileHead& head) { return head.Begins("\x89HDF"); },
-     {},
-     "an HDF5 file, which is not read; write the particles as VTP, NPZ or CSV (PySPH: "
-     "pysph dump_vtk)"},
+     "a BGEO file of another version than 5, which is not read; write .bhclassic, VTP or CSV"},
+    {[](const FileHead& head) { return head.Begins("\x89HDF\r\n\x1a\n"); },
+     {"HDF5", OpenHdf5, false},
+     ""},
+    {[](const FileHead& head) { return head.Begins("\xDF\x65\xDF\x65\xDF\x65\xDF\x65"); },
+     {"GSD", OpenGsd, false},
+     ""},
     {[](const FileHead& head) { return head.extension == "pdb"; },
      {},
      "a PDB file, which is not read; write the particles as VTP, NPY or CSV"},
@@ -171,8 +187,8 @@ absl::StatusOr<const Format*> RecogniseFormat(const std::string& path) {
   }
   return absl::UnimplementedError(
       Concat(path,
-             ": is binary data of no known kind; PartiEMC reads CSV, LAMMPS text dumps, NPY, NPZ, "
-             "VTK, VTP and VTU"));
+             ": is binary data of no known kind; PartiEMC reads CSV, LAMMPS text dumps, xyz, PLY, "
+             "NPY, NPZ, VTK, VTP, VTU, HDF5, GSD and BGEO"));
 }
 
 }  // namespace partiemc::client::input

@@ -48,6 +48,10 @@ OpenReader OpenLammpsDump;  // lammps_dump.cc
 OpenReader OpenXyz;         // xyz.cc: element or type and x y z
 OpenReader OpenNpy;         // npy_reader.cc
 OpenReader OpenNpz;         // npz_reader.cc
-OpenReader OpenVtk;         // vtk_reader.cc, or vtk_absent.cc in a build without VTK
+OpenReader OpenPly;         // ply.cc
+OpenReader OpenGsd;         // gsd.cc
+OpenReader OpenBgeo;        // bgeo.cc
+OpenReader OpenHdf5;        // hdf5_reader.cc, or absent.cc in a build without HDF5
+OpenReader OpenVtk;         // vtk_reader.cc, or absent.cc in a build without VTK
 
 }  // namespace partiemc::client::input

@@ -194,6 +194,7 @@ class LammpsDumpReader final : public FrameReader {
       if (absl::Status status = PlanColumns(columns); !status.ok()) return status;
       rows->Begin(*plan_);
       rows->time = head_.time;
+      rows->step = ParseNumber(head_.step);
       rows->source = Concat(stream_->path(), ", ", FrameName());
     }
     std::string_view line;
@@ -203,15 +204,41 @@ class LammpsDumpReader final : public FrameReader {
       if (!*found || line.starts_with("ITEM:")) return EndsAfter(atom);
       if (rows == nullptr) continue;
       SplitAtBlanks(line, cells_);
-      if (absl::Status status = AppendTextRow(cells_, *plan_, request_, *rows); !status.ok()) {
-        return Error(std::string(status.message()), status.code());
-      }
+      const std::size_t count = rows->count;
+      absl::Status status = AppendTextRow(cells_, *plan_, request_, *rows);
+      if (status.ok() && rows->count > count) status = UnwrapLast(*rows);
+      if (!status.ok()) return Error(std::string(status.message()), status.code());
     }
     if (rows != nullptr && plan_->scaled) {
       if (absl::Status status = Unscale(*rows); !status.ok()) return status;
     }
     ++frame_;
     return true;
+  }
+
+  // Adds the image flags of the last row, which count boxes, to its position.
+  absl::Status UnwrapLast(ParticleRows& rows) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!plan_->images[axis]) continue;
+      const std::string_view cell = cells_[*plan_->images[axis]];
+      const auto image = ParseNumber(cell);
+      if (!image || std::trunc(*image) != *image) {
+        return absl::DataLossError(
+            Concat("the image flag '", cell, "' must be a whole number; the file is damaged"));
+      }
+      if (*image == 0) continue;
+      if (plan_->scaled) {
+        if (rows.has_position[axis]) rows.positions[axis].back() += *image;
+        continue;
+      }
+      if (!head_.box) {
+        return absl::DataLossError("image flags (ix iy) without BOX BOUNDS");
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (rows.has_position[k]) rows.positions[k].back() += *image * head_.box->edges[axis][k];
+      }
+    }
+    return absl::OkStatus();
   }
 
   // Converts fractions of the box to coordinates. An axis that the dump lacks counts as 0.

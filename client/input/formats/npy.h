@@ -6,15 +6,25 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/input/base/array_table.h"
 #include "client/input/base/byte_source.h"
-#include "client/input/base/particle_rows.h"
 
 namespace partiemc::client::input {
 
+/// A field of a structured array; the only, unnamed one of a plain array.
+struct NpyField {
+  std::string name;
+  ElementType type = ElementType::kFloat64;
+  bool swapped = false;  ///< Byte order other than this machine's.
+  std::size_t components = 1;
+  std::size_t offset = 0;  ///< In bytes, from the begin of an element.
+};
+
 /// The header of an array of numbers.
 struct NpyHeader {
-  ElementType type = ElementType::kFloat64;
-  bool swapped = false;       ///< Byte order other than this machine's.
+  bool structured = false;
+  std::vector<NpyField> fields;  ///< Fields of numbers.
+  std::size_t element_bytes = 0;
   bool column_major = false;  ///< Fortran order.
   std::vector<std::size_t> shape;
 
@@ -22,15 +32,25 @@ struct NpyHeader {
 };
 
 /// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a size
-/// over 4 GiB; kUnimplemented for elements that are not plain numbers (Python objects, structures,
-/// complex, half precision).
+/// over 4 GiB; kUnimplemented for elements without plain numbers (Python objects, text, complex,
+/// half precision).
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
+
+/// Reads the header up to the elements: the text of a Python dict. Errors: kDataLoss.
+absl::Status ReadNpyHeaderText(ByteSource& source, const std::string& name,
+                               std::vector<char>& bytes);
 
 /// Reads the elements that follow the header. kDataLoss if `source` holds fewer or more bytes.
 absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const std::string& name,
                              std::vector<char>& bytes);
 
-/// Columns of an array of shape (N,) or (N, K): views into `bytes`.
-std::vector<ArrayColumn> NpyColumns(const NpyHeader& header, const std::vector<char>& bytes);
+/// Reads exactly `size` bytes. kDataLoss if `source` holds fewer.
+absl::Status ReadNpyBytes(ByteSource& source, std::size_t size, const std::string& name,
+                          std::vector<char>& bytes);
+
+/// The table of an array of shape (N,) or (N, K), a view into `bytes`. Columns of a structured
+/// array have the names of its fields, others the names `name`, or `name`:0, `name`:1, ...
+ArrayTable NpyTable(const NpyHeader& header, const std::string& name,
+                    const std::vector<char>& bytes);
 
 }  // namespace partiemc::client::input

@@ -1,4 +1,4 @@
-// One frame per file: an NPY array with a row per particle.
+// NPY: an array with a row per particle, or with such an array per frame.
 #include <utility>
 
 #include "absl/strings/str_join.h"
@@ -10,36 +10,72 @@ namespace partiemc::client::input {
 namespace {
 
 // A row has a few columns. More columns indicate a transposed array.
-constexpr std::size_t kMaxColumns = 4096;
+constexpr std::size_t kMaxNpyColumns = 4096;
 
-class NpyReader final : public OneFrameReader {
+// Frames without particles take no bytes, so their number is limited.
+constexpr std::size_t kMaxEmptyFrames = 65536;
+
+class NpyReader final : public FrameReader {
  public:
-  NpyReader(std::unique_ptr<InputStream> stream, NpyHeader header, ColumnPlan plan,
-            const ColumnRequest& request)
+  // `frame`: header of one frame; `count`: number of frames, or nothing for an array of one frame.
+  NpyReader(std::unique_ptr<InputStream> stream, NpyHeader frame, std::optional<std::size_t> count,
+            ColumnPlan plan, const ColumnRequest& request)
       : stream_(std::move(stream)),
-        header_(std::move(header)),
+        header_(std::move(frame)),
+        count_(count),
         plan_(std::move(plan)),
         request_(request) {}
 
- private:
-  absl::Status Read(ParticleRows& rows) override {
-    std::vector<char> bytes;
-    if (absl::Status status = ReadNpyElements(*stream_, header_, stream_->path(), bytes);
-        !status.ok()) {
-      return status;
-    }
-    rows.Begin(plan_);
-    rows.source = stream_->path();
-    const absl::Status status =
-        AppendArrayRows(NpyColumns(header_, bytes), header_.shape[0], plan_, request_, rows);
-    return status.ok() ? status : WithPrefix(stream_->path(), status);
+  absl::StatusOr<bool> Next(ParticleRows* rows) override {
+    if (frame_ == count_.value_or(1)) return false;
+    const std::string source =
+        count_ ? Concat(stream_->path(), ", frame ", frame_) : stream_->path();
+    ++frame_;
+    if (rows == nullptr && !count_) return true;
+    absl::Status status = frame_ == count_.value_or(1)
+                              ? ReadNpyElements(*stream_, header_, source, bytes_)
+                              : ReadNpyBytes(*stream_, FrameBytes(), source, bytes_);
+    if (!status.ok()) return status;
+    if (rows == nullptr) return true;
+    rows->Begin(plan_);
+    rows->source = source;
+    const ArrayTable table = NpyTable(header_, "", bytes_);
+    status = AppendArrayRows(table.columns, table.rows, plan_, request_, *rows);
+    if (!status.ok()) return WithPrefix(source, status);
+    return true;
   }
+
+ private:
+  std::size_t FrameBytes() const { return header_.element_count() * header_.element_bytes; }
 
   std::unique_ptr<InputStream> stream_;
   NpyHeader header_;
+  std::optional<std::size_t> count_;
+  std::size_t frame_ = 0;
+  std::vector<char> bytes_;
   ColumnPlan plan_;
   const ColumnRequest& request_;
 };
+
+// Removes the first extent of an array of frames.
+absl::StatusOr<std::optional<std::size_t>> TakeFrameCount(NpyHeader& header,
+                                                          const std::string& path) {
+  if (header.shape.size() != (header.structured ? 2 : 3)) return std::nullopt;
+  if (header.column_major) {
+    return absl::UnimplementedError(
+        Concat(path,
+               ": holds frames in Fortran order, which is not read; save "
+               "numpy.ascontiguousarray(frames)"));
+  }
+  const std::size_t count = header.shape.front();
+  header.shape.erase(header.shape.begin());
+  if (count == 0) return absl::DataLossError(Concat(path, ": holds no frame"));
+  if (count > kMaxEmptyFrames && header.element_count() == 0) {
+    return absl::DataLossError(
+        Concat(path, ": has ", count, " frames without particles; at most ", kMaxEmptyFrames));
+  }
+  return count;
+}
 
 }  // namespace
 
@@ -49,17 +85,23 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenNpy(const std::string& path,
   if (!stream.ok()) return stream.status();
   auto header = ReadNpyHeader(**stream, path);
   if (!header.ok()) return header.status();
-  if (header->shape.size() != 2 || header->shape[1] > kMaxColumns) {
+  const std::vector<std::size_t> shape = header->shape;
+  const auto count = TakeFrameCount(*header, path);
+  if (!count.ok()) return count.status();
+  const bool plain = !header->structured;
+  if (header->shape.size() != (plain ? 2 : 1) || (plain && shape.back() > kMaxNpyColumns)) {
     return absl::FailedPreconditionError(
-        Concat(path, ": has the shape (", absl::StrJoin(header->shape, ", "),
-               "); save one frame per file with one row per particle, shape (N, 2) or (N, 3)"));
+        Concat(path, ": has the shape (", absl::StrJoin(shape, ", "),
+               "); save one frame per file with one row per particle, shape (N, 2) or (N, 3), or "
+               "frames of the shape (frames, N, 2) or (frames, N, 3)"));
   }
-  auto plan = PlanUnnamedColumns(header->shape[1], request);
+  auto plan = header->structured ? PlanNamedColumns(NpyTable(*header, "", {}).names, request)
+                                 : PlanUnnamedColumns(header->shape[1], request);
   if (!plan.ok()) {
     return WithPrefix(path, plan.status());
   }
-  return std::make_unique<NpyReader>(*std::move(stream), *std::move(header), *std::move(plan),
-                                     request);
+  return std::make_unique<NpyReader>(*std::move(stream), *std::move(header), *count,
+                                     *std::move(plan), request);
 }
 
 }  // namespace partiemc::client::input

@@ -6,12 +6,10 @@
 #include "client/input/base/zip_archive.h"
 #include "client/input/formats/frame_reader.h"
 #include "client/input/formats/npy.h"
+#include "client/input/formats/pysph.h"
 
 namespace partiemc::client::input {
 namespace {
-
-// An array (N, K) with more components is not a particle attribute.
-constexpr std::size_t kMaxComponents = 16;
 
 struct NamedArray {
   ZipEntry entry;
@@ -47,12 +45,12 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
       table.time = std::move(array);
       continue;
     }
-    if (dimensions != 1 && (dimensions != 2 || array.header.shape[1] > kMaxComponents)) continue;
+    if (dimensions != 1 && (dimensions != 2 || array.header.shape[1] > kMaxArrayComponents))
+      continue;
     array.first_column = table.column_names.size();
-    array.column_count = dimensions == 1 ? 1 : array.header.shape[1];
-    for (std::size_t k = 0; k < array.column_count; ++k) {
-      table.column_names.push_back(dimensions == 1 ? array.name : Concat(array.name, ":", k));
-    }
+    const std::vector<std::string> names = NpyTable(array.header, array.name, {}).names;
+    array.column_count = names.size();
+    table.column_names.insert(table.column_names.end(), names.begin(), names.end());
     table.arrays.push_back(std::move(array));
   }
   return table;
@@ -70,7 +68,7 @@ ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& t
   return expanded;
 }
 
-// Ignores optional arrays whose number of rows differs from that of the positions.
+// Ignores optional arrays with another number of rows than the positions.
 void DropForeignColumns(const NpzTable& table, ColumnPlan& plan) {
   std::vector<std::size_t> rows;
   for (const NamedArray& array : table.arrays) {
@@ -98,7 +96,7 @@ class NpzReader final : public OneFrameReader {
 
  private:
   absl::Status Read(ParticleRows& rows) override {
-    const std::vector<bool> needed = NeededColumns();
+    const std::vector<bool> needed = NeededColumns(plan_);
     std::vector<ArrayColumn> columns(table_.column_names.size());
     std::vector<std::vector<char>> bytes(table_.arrays.size());
     const NamedArray* first = nullptr;
@@ -116,7 +114,7 @@ class NpzReader final : public OneFrameReader {
                                           "; arrays must have a row per particle"));
       }
       if (absl::Status status = Load(array, bytes[k]); !status.ok()) return status;
-      const std::vector<ArrayColumn> loaded = NpyColumns(array.header, bytes[k]);
+      const std::vector<ArrayColumn> loaded = NpyTable(array.header, array.name, bytes[k]).columns;
       std::copy(loaded.begin(), loaded.end(),
                 columns.begin() + static_cast<std::ptrdiff_t>(array.first_column));
     }
@@ -126,21 +124,6 @@ class NpzReader final : public OneFrameReader {
         AppendArrayRows(columns, first->header.shape[0], plan_, request_, rows);
     if (!status.ok()) return WithPrefix(path_, status);
     return ReadTime(rows.time);
-  }
-
-  std::vector<bool> NeededColumns() const {
-    std::vector<bool> needed(table_.column_names.size(), false);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (plan_.positions[axis]) needed[*plan_.positions[axis]] = true;
-      if (plan_.velocities[axis]) needed[*plan_.velocities[axis]] = true;
-    }
-    if (plan_.id) needed[*plan_.id] = true;
-    if (plan_.volume) needed[*plan_.volume] = true;
-    for (const std::size_t column : plan_.conditions) needed[column] = true;
-    for (const AttributeColumns& attribute : plan_.attributes) {
-      for (const std::size_t column : attribute.columns) needed[column] = true;
-    }
-    return needed;
   }
 
   absl::Status Load(const NamedArray& array, std::vector<char>& bytes) const {
@@ -159,7 +142,7 @@ class NpzReader final : public OneFrameReader {
     std::vector<char> bytes;
     if (absl::Status status = Load(array, bytes); !status.ok()) return status;
     array.header.shape = {1};
-    time = NpyColumns(array.header, bytes)[0].Number(0);
+    time = NpyTable(array.header, array.name, bytes).columns[0].Number(0);
     return absl::OkStatus();
   }
 
@@ -176,6 +159,7 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenNpz(const std::string& path,
                                                      const ColumnRequest& request) {
   auto archive = ZipArchive::Open(path);
   if (!archive.ok()) return archive.status();
+  if (IsPysphArchive(*archive)) return OpenPysphArchive(path, *archive, request);
   auto table = ReadTable(*archive, path);
   if (!table.ok()) return table.status();
   auto plan = PlanNamedColumns(table->column_names, WithArraysExpanded(request, *table));

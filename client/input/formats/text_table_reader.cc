@@ -43,6 +43,12 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenTextTable(const std::string& pa
                                                            const ColumnRequest& request) {
   auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
+  const auto preamble = CountPreambleLines(**stream, request.columns);
+  if (!preamble.ok()) return preamble.status();
+  std::string_view line;
+  for (std::size_t k = 0; k < *preamble; ++k) {
+    if (const auto found = (*stream)->ReadLine(line); !found.ok()) return found.status();
+  }
   auto table = TextTable::Open(**stream);
   if (!table.ok()) return table.status();
   auto plan = table->names().empty() ? PlanUnnamedColumns(table->column_count(), request)

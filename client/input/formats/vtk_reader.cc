@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "client/input/base/array_table.h"
 #include "client/input/base/byte_source.h"
 #include "client/input/base/number_text.h"
 #include "client/input/base/text.h"
@@ -31,9 +32,6 @@
 
 namespace partiemc::client::input {
 namespace {
-
-// Arrays with more components are ignored.
-constexpr int kMaxComponents = 16;
 
 // Size of the head that is searched for declared counts: the XML of usual files, or the POINTS line
 // of a legacy file.
@@ -147,31 +145,22 @@ std::optional<ElementType> TypeOf(int vtk_type) {
   }
 }
 
-struct VtkTable {
-  std::vector<std::string> names;
-  std::vector<ArrayColumn> columns;
-};
-
 // Adds the components of `array` as columns, if it has `rows` tuples of numbers.
-void AddArray(vtkDataArray* array, const std::string& name, vtkIdType rows, VtkTable& table) {
+void AddArray(vtkDataArray* array, const std::string& name, vtkIdType rows, ArrayTable& table) {
   if (array == nullptr || array->GetNumberOfTuples() != rows || !array->HasStandardMemoryLayout()) {
     return;
   }
   const auto type = TypeOf(array->GetDataType());
-  const int components = array->GetNumberOfComponents();
-  if (!type || components > kMaxComponents) return;
-  const std::size_t element = ElementBytes(*type);
-  const auto* const data = static_cast<const char*>(array->GetVoidPointer(0));
-  for (int k = 0; k < components; ++k) {
-    table.names.push_back(components == 1 ? name : Concat(name, ":", k));
-    table.columns.push_back({*type, false, data + static_cast<std::size_t>(k) * element,
-                             element * static_cast<std::size_t>(components)});
-  }
+  const auto components = static_cast<std::size_t>(array->GetNumberOfComponents());
+  if (!type || components > kMaxArrayComponents) return;
+  table.Add(name, components,
+            {*type, false, static_cast<const char*>(array->GetVoidPointer(0)),
+             ElementBytes(*type) * components});
 }
 
-VtkTable TableOf(vtkPointSet& points) {
-  VtkTable table;
+ArrayTable TableOf(vtkPointSet& points) {
   const vtkIdType rows = points.GetNumberOfPoints();
+  ArrayTable table{.rows = static_cast<std::size_t>(rows)};
   AddArray(points.GetPoints()->GetData(), "Points", rows, table);
   vtkPointData* const arrays = points.GetPointData();
   for (int k = 0; k < arrays->GetNumberOfArrays(); ++k) {
@@ -251,7 +240,7 @@ class VtkReader final : public OneFrameReader {
       return Error(absl::StatusCode::kFailedPrecondition,
                    "holds no particles; PartiEMC reads POLYDATA and UNSTRUCTURED_GRID");
     }
-    VtkTable table;
+    ArrayTable table;
     if (points->GetPoints() != nullptr && points->GetNumberOfPoints() > 0) {
       table = TableOf(*points);
     } else {
@@ -263,16 +252,9 @@ class VtkReader final : public OneFrameReader {
       table.names.insert(table.names.end(), request_.attributes.begin(), request_.attributes.end());
       table.columns.resize(table.names.size());
     }
-    const auto plan = PlanNamedColumns(table.names, request_);
-    if (!plan.ok()) return Error(plan.status().code(), std::string(plan.status().message()));
-    rows.Begin(*plan);
-    rows.source = path_;
+    const absl::Status status = FillRows(table, request_, path_, rows);
     rows.time = TimeOf(*data);
-    const absl::Status status =
-        AppendArrayRows(table.columns, static_cast<std::size_t>(points->GetNumberOfPoints()), *plan,
-                        request_, rows);
-    if (!status.ok()) return Error(status.code(), std::string(status.message()));
-    return absl::OkStatus();
+    return status;
   }
 
   std::string path_;

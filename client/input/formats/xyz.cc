@@ -1,4 +1,5 @@
-// XYZ text: a count, a line of comment, then lines of "type x y z"; frame after frame.
+// XYZ text: a count, a line of comment, then lines of "type x y z"; frame after frame. In extended
+// XYZ the comment holds KEY=VALUE pairs and describes the columns: Properties=species:S:1:pos:R:3.
 #include <utility>
 
 #include "client/input/base/byte_source.h"
@@ -10,17 +11,22 @@
 namespace partiemc::client::input {
 namespace {
 
+constexpr std::size_t kMaxXyzColumns = 4096;
+
 class XyzReader final : public FrameReader {
  public:
-  XyzReader(std::unique_ptr<InputStream> stream, ColumnPlan plan, const ColumnRequest& request)
-      : stream_(std::move(stream)), plan_(std::move(plan)), request_(request) {}
+  XyzReader(std::unique_ptr<InputStream> stream, const ColumnRequest& request)
+      : stream_(std::move(stream)), request_(request) {}
 
   absl::StatusOr<bool> Next(ParticleRows* rows) override {
     std::uint64_t count = 0;
     const auto found = ReadHead(count);
     if (!found.ok() || !*found) return found;
     if (rows != nullptr) {
+      if (absl::Status status = PlanColumns(); !status.ok()) return status;
       rows->Begin(plan_);
+      rows->time = ValueOf(comment_, "Time=");
+      rows->step = ValueOf(comment_, "Timestep: ");
       rows->source = Concat(stream_->path(), ", frame ", frame_);
     }
     std::string_view line;
@@ -67,15 +73,68 @@ class XyzReader final : public FrameReader {
     const auto comment = stream_->ReadLine(line);
     if (!comment.ok()) return comment;
     if (!*comment) return Error("the file ends after the number of particles; it is truncated");
-    if (Contains(line, "Properties=") && !Contains(line, "Properties=species:S:1:pos:R:3 ")) {
-      return stream_->ErrorAtLine(absl::StatusCode::kUnimplemented,
-                                  "extended XYZ with other columns than species and pos is not "
-                                  "read; write it as CSV");
-    }
+    comment_ = line;
     return true;
   }
 
+  // Makes a new plan only if the columns have changed.
+  absl::Status PlanColumns() {
+    const std::string properties(Value(comment_, "Properties="));
+    if (planned_ && properties == properties_) return absl::OkStatus();
+    std::vector<std::string> names = {"type", "x", "y", "z"};
+    if (!properties.empty() && !NamesOf(properties, names)) {
+      return stream_->ErrorAtLine(
+          absl::StatusCode::kDataLoss,
+          Concat("Properties=", properties, " must list NAME:TYPE:COLUMNS of at most ",
+                 kMaxXyzColumns, " columns"));
+    }
+    auto plan = PlanNamedColumns(names, request_);
+    if (!plan.ok()) return WithPrefix(stream_->path(), plan.status());
+    plan_ = *std::move(plan);
+    properties_ = properties;
+    planned_ = true;
+    return absl::OkStatus();
+  }
+
+  // Names of the columns of "species:S:1:pos:R:3". Returns false if it has another form.
+  static bool NamesOf(const std::string& properties, std::vector<std::string>& names) {
+    names.clear();
+    const std::vector<std::string_view> parts = partiemc::Split(properties, ':');
+    if (parts.size() % 3 != 0) return false;
+    for (std::size_t k = 0; k < parts.size(); k += 3) {
+      const auto count = ParseCount(parts[k + 2]);
+      if (!count || *count > kMaxXyzColumns - names.size()) return false;
+      // "velo" is the name of OVITO and others.
+      const std::string_view name = parts[k] == "velo" ? "velocity" : parts[k];
+      for (std::uint64_t c = 0; c < *count; ++c) {
+        names.push_back(*count == 1 ? std::string(name) : Concat(name, ":", c));
+      }
+    }
+    return !names.empty();
+  }
+
+  // The text after `key` in the comment, which begins the comment or follows a blank; up to a blank
+  // or, if it is quoted, up to the closing quote.
+  static std::string_view Value(std::string_view comment, std::string_view key) {
+    for (std::size_t at = comment.find(key); at != std::string_view::npos;
+         at = comment.find(key, at + 1)) {
+      if (at > 0 && comment[at - 1] != ' ') continue;
+      std::string_view value = comment.substr(at + key.size());
+      const bool quoted = value.starts_with('"');
+      if (quoted) value.remove_prefix(1);
+      return value.substr(0, value.find(quoted ? '"' : ' '));
+    }
+    return {};
+  }
+
+  static std::optional<double> ValueOf(std::string_view comment, std::string_view key) {
+    return ParseNumber(Value(comment, key));
+  }
+
   std::unique_ptr<InputStream> stream_;
+  std::string comment_;  // Comment of the frame.
+  bool planned_ = false;
+  std::string properties_;  // Properties that plan_ belongs to.
   ColumnPlan plan_;
   const ColumnRequest& request_;
   std::size_t frame_ = 0;
@@ -88,11 +147,7 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenXyz(const std::string& path,
                                                      const ColumnRequest& request) {
   auto stream = InputStream::Open(path, request.max_expansion);
   if (!stream.ok()) return stream.status();
-  auto plan = PlanNamedColumns({"type", "x", "y", "z"}, request);
-  if (!plan.ok()) {
-    return WithPrefix(path, plan.status());
-  }
-  return std::make_unique<XyzReader>(*std::move(stream), *std::move(plan), request);
+  return std::make_unique<XyzReader>(*std::move(stream), request);
 }
 
 }  // namespace partiemc::client::input

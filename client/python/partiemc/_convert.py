@@ -40,14 +40,18 @@ def to_triangulation(mesh):
     return Triangulation(mesh.points[:, 0], mesh.points[:, 1], mesh.triangles)
 
 
-def to_meshio(mesh):
-    """A meshio Mesh with z = 0. meshio writes VTK, VTU, STL, Gmsh and other formats."""
+def to_meshio(mesh, attributes=None):
+    """A meshio Mesh with z = 0. meshio writes VTK, VTU, STL, Gmsh and other formats.
+
+    attributes: those of the result, at the vertices of its mesh.
+    """
     import meshio
     import numpy
 
     # Some of its writers require three coordinates; Gmsh requires signed indices.
     points = numpy.pad(mesh.points, ((0, 0), (0, 1)))
-    return meshio.Mesh(points, [("triangle", mesh.triangles.astype(numpy.int64))])
+    return meshio.Mesh(points, [("triangle", mesh.triangles.astype(numpy.int64))],
+                       point_data=dict(attributes or {}))
 
 
 def to_svg(result, width=800):

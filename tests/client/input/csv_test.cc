@@ -63,7 +63,6 @@ TEST(Csv, OnlySelectedParticlesAreRead) {
   const std::string rows = "x,y,type,mk\n1,2,fluid,1\n3,4,wall,1\n5,6,fluid,2\n";
   EXPECT_THAT(Read(rows, {.select = {"type=fluid"}}).positions, ElementsAre(1, 2, 5, 6));
   EXPECT_THAT(Read(rows, {.select = {"type=fluid", "mk=2.0"}}).positions, ElementsAre(5, 6));
-  EXPECT_THAT(Read(rows, {.select = {"type=gas"}}).positions, IsEmpty());
 }
 
 TEST(Csv, AHeaderWithoutRowsIsAFrameWithoutParticles) {
@@ -145,6 +144,31 @@ TEST(Csv, AMissingAttributeIsToldWithTheColumnsThereAre) {
                 absl::StatusCode::kFailedPrecondition, {"'velocity'"});
   ExpectRefused(Refusal("x,y,p\n1,2,high\n", {.attributes = {"p"}}), absl::StatusCode::kDataLoss,
                 {"'high' is not a number"});
+}
+
+TEST(Csv, LinesBeforeTheHeaderAreSkipped) {
+  const std::string rows = "1,2,3\n4,5,6\n";
+  for (const std::string preamble : {"[Name]\nPoints\n\n[Data]\n", "time,0.5\n",
+                                     "Case: dam, dt: 1e-3\n\n", "587\n", "a title\n1 2 3 4\n"}) {
+    const RecordedFrame frame = Read(preamble + "X [ m ], Y [ m ], id\n" + rows);
+    EXPECT_THAT(frame.positions, ElementsAre(1, 2, 4, 5)) << preamble;
+    EXPECT_THAT(frame.ids, ElementsAre(3, 6)) << preamble;
+  }
+  EXPECT_THAT(Read("a title\n\nright;up;id\n1;2;3\n", {.columns = "right,up"}).positions,
+              ElementsAre(1, 2));
+}
+
+TEST(Csv, OnlyAHeaderWithRowsEndsAPreamble) {
+  const support::TemporaryFolder directory;
+  const auto refusal = [&](const std::string& content) {
+    return ReadAll(directory.Write("a.csv", content)).status;
+  };
+  // A damaged row is no preamble, and a table without a header has none.
+  ExpectRefused(refusal("a,b,c\n1,2\n3,4\n"), absl::StatusCode::kFailedPrecondition,
+                {"no position columns"});
+  ExpectRefused(refusal("a title\nx,y\n1,2,3\n"), absl::StatusCode::kFailedPrecondition,
+                {"no position columns"});
+  ExpectRefused(refusal("a title\nx,y\n1,2\n3\n"), absl::StatusCode::kDataLoss, {"a.csv:4"});
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <limits>
 #include <string>
 
 #include "client/input/fixtures.h"
@@ -35,6 +36,83 @@ TEST(LammpsDump, FramesFollowEachOtherAndMayDifferInCountAndColumns) {
   EXPECT_EQ(read.frames[2].ParticleCount(), 0u);
   EXPECT_THAT(read.frames[1].source, testing::EndsWith("dump.txt, frame 1 (timestep 500)"));
   EXPECT_FALSE(read.frames[0].time.has_value());
+  EXPECT_EQ(read.frames[1].step, 500);
+}
+
+TEST(LammpsDump, TheTimeStepTimesItsLengthIsTheTime) {
+  const std::string dump =
+      Frame("500", "1", "x y\n1 2\n") + "ITEM: TIME\n7\n" + Frame("1500", "1", "x y\n1 2\n");
+  const ReadSequence read = Read(dump, {.time_step = 0.002});
+  ASSERT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.frames[0].time, 1);
+  EXPECT_EQ(read.frames[1].time, 3) << "the option is the user's word against the file's";
+}
+
+TEST(LammpsDump, TheLengthOfATimeStepNeedsStepsAndExcludesTimes) {
+  const support::TemporaryFolder directory;
+  const std::string table = directory.Write("a.csv", "x,y\n1,2\n");
+  ExpectRefused(ReadAll(table, {.time_step = 0.1}).status, absl::StatusCode::kFailedPrecondition,
+                {"a.csv", "--time-step", "--times"});
+  ExpectRefused(ReadAll(table, {.times = table, .time_step = 0.1}).status,
+                absl::StatusCode::kInvalidArgument, {"--time-step", "--times"});
+  for (const double wrong : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    ExpectRefused(ReadAll(table, {.time_step = wrong}).status, absl::StatusCode::kInvalidArgument,
+                  {"--time-step", "positive"});
+  }
+}
+
+TEST(LammpsDump, ImageFlagsUnwrapPositions) {
+  const ReadSequence read =
+      Read(Frame("0", "3", "id x y ix iy iz\n1 1 2 0 0 0\n2 1 2 3 -1 0\n3 1 2 -1 2 0\n"));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(1, 2, 31, -18, -9, 42));
+  const ReadSequence scaled = Read(Frame("0", "2", "xs ys ix iy\n0.5 0.5 0 0\n0.5 0.5 1 -1\n"));
+  ASSERT_EQ(scaled.frames.size(), 1u) << scaled.status;
+  EXPECT_THAT(scaled.frames[0].positions, ElementsAre(5, 5, 15, -15));
+  const ReadSequence unwrapped = Read(Frame("0", "1", "xu yu ix iy\n1 2 5 5\n"));
+  ASSERT_EQ(unwrapped.frames.size(), 1u) << unwrapped.status;
+  EXPECT_THAT(unwrapped.frames[0].positions, ElementsAre(1, 2));
+}
+
+TEST(LammpsDump, ImageFlagsFollowTheEdgesOfATiltedBox) {
+  const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
+  const ReadSequence read = Read(Frame("0", "1", "x y ix iy\n1 2 1 1\n", tilted));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(15, 22));
+}
+
+TEST(LammpsDump, NamedColumnsStayWrapped) {
+  const ReadSequence read = Read(Frame("0", "1", "x y ix iy\n1 2 1 1\n"), {.columns = "x,y"});
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].positions, ElementsAre(1, 2));
+}
+
+TEST(LammpsDump, ImageFlagsNeedABoxAndWholeNumbers) {
+  ExpectRefused(Read(Frame("0", "1", "x y ix iy\n1 2 0.5 0\n")).status, absl::StatusCode::kDataLoss,
+                {"0.5", "whole number"});
+  ExpectRefused(
+      Read("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n1\nITEM: ATOMS x y ix iy\n1 2 1 0\n").status,
+      absl::StatusCode::kDataLoss, {"without BOX BOUNDS"});
+}
+
+TEST(LammpsDump, ASelectionThatHoldsForNoParticleIsRefused) {
+  const std::string dump =
+      Frame("0", "1", "type x y\n1 1 2\n") + Frame("1", "2", "type x y\n1 1 2\n2 3 4\n");
+  const ReadSequence late = Read(dump, {.select = {"type=2"}});
+  ASSERT_TRUE(late.status.ok()) << "particles may come later: " << late.status;
+  EXPECT_EQ(late.frames[0].ParticleCount(), 0u);
+  EXPECT_EQ(late.frames[1].ParticleCount(), 1u);
+  ExpectRefused(Read(dump, {.select = {"type=3"}}).status, absl::StatusCode::kFailedPrecondition,
+                {"dump.txt", "none of 3 particles", "--select type=3"});
+  const ReadSequence empty = Read(Frame("0", "0", "type x y\n"), {.select = {"type=3"}});
+  EXPECT_TRUE(empty.status.ok()) << "no particle, nothing to select: " << empty.status;
+}
+
+TEST(Csv, ASelectionThatHoldsForNoRowIsRefused) {
+  const support::TemporaryFolder directory;
+  ExpectRefused(
+      ReadAll(directory.Write("a.csv", "x,y,kind\n1,2,wall\n"), {.select = {"kind=fluid"}}).status,
+      absl::StatusCode::kFailedPrecondition, {"none of 1 particles", "--select kind=fluid"});
 }
 
 TEST(LammpsDump, UnitsAndTimeMayComeBeforeTheTimeStep) {

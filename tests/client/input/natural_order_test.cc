@@ -1,3 +1,5 @@
+#include "client/input/base/natural_order.h"
+
 #include <algorithm>
 #include <random>
 

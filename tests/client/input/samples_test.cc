@@ -46,6 +46,7 @@ std::string NameOf(const testing::TestParamInfo<Sample>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Arrays, Samples,
                          testing::Values(Sample{"pos_f4_fortran.npy", true, false, false},
+                                         Sample{"binary_le.ply", true, false, false},
                                          Sample{"frame_deflate.npz", true, false, false}),
                          NameOf);
 

@@ -298,8 +298,8 @@ TEST(Vtp, HasLinesBeforePolygonsWithClasses) {
 
 TEST(FrameWriter, NumbersFilesByTheIndexInTheInput) {
   support::TemporaryFolder directory;
-  const auto writer = FrameWriter::Create({.directory = directory / "made/on/the/way",
-                                           .formats = {FrameFormat::kGeoJson, FrameFormat::kObj}});
+  auto writer = FrameWriter::Create({.directory = directory / "made/on/the/way",
+                                     .formats = {FrameFormat::kGeoJson, FrameFormat::kObj}});
   ASSERT_TRUE(writer.ok()) << writer.status();
   const Result result = SquareWithHoleAndIsland();
   ASSERT_TRUE(writer->Write({.index = 42, .result = result}).ok());
@@ -351,7 +351,7 @@ TEST(FrameWriter, WritesSectionsAsFilesAndAsLines) {
 
 TEST(FrameWriter, ReportsAVanishedDirectory) {
   support::TemporaryFolder directory;
-  const auto writer =
+  auto writer =
       FrameWriter::Create({.directory = directory / "out", .formats = {FrameFormat::kSvg}});
   ASSERT_TRUE(writer.ok());
   std::filesystem::remove(directory / "out");
@@ -365,7 +365,7 @@ TEST(FrameWriter, ReportsAVanishedDirectory) {
 TEST(FrameWriter, RefusesAFileInsteadOfADirectory) {
   support::TemporaryFolder directory;
   std::ofstream(directory / "out") << "a file";
-  const auto writer = FrameWriter::Create({.directory = directory / "out"});
+  auto writer = FrameWriter::Create({.directory = directory / "out"});
   EXPECT_FALSE(writer.ok());
   EXPECT_EQ(ReadFile(directory / "out"), "a file");
 }
@@ -377,7 +377,7 @@ TEST(FrameFormats, ListsKeepTheirOrderWithoutDuplicates) {
 }
 
 TEST(FrameFormats, NamesAnUnknownFormatAndTheKnownOnes) {
-  for (const char* list : {"svg,stl", "stl", "svg,", ""}) {
+  for (const char* list : {"svg,dxf", "dxf", "svg,", ""}) {
     const auto formats = ParseFrameFormats(list);
     ASSERT_EQ(formats.status().code(), absl::StatusCode::kInvalidArgument) << list;
     EXPECT_THAT(std::string(formats.status().message()), HasSubstr("must be some of geojson,svg"));
@@ -431,6 +431,108 @@ TEST(Svg, ColoursTheOutlineWithoutAMesh) {
   const std::string colored = Encode(FrameFormat::kSvg, {.result = result}, {.color_by = "a,b"});
   EXPECT_THAT(colored, HasSubstr("class=\"lines\""));
   EXPECT_THAT(colored, Not(HasSubstr("class=\"bands\"")));
+}
+
+TEST(GeoJson, PolygonsHaveTheMeanAndTheRangeOfTheirAttributes) {
+  const Result result = WithAttributes();
+  const json file = json::parse(Encode(FrameFormat::kGeoJson, {.result = result}));
+  const json properties = file["features"][0].at("properties");
+  // The square has the heights 0, 0, 4, 4, and its hole is inside.
+  EXPECT_EQ(properties.at("height_min"), 0);
+  EXPECT_EQ(properties.at("height_max"), 4);
+  EXPECT_GT(properties.at("height_mean"), 1);
+  EXPECT_LT(properties.at("height_mean"), 3);
+  EXPECT_EQ(properties.at("a,b:0_max"), 4);
+  EXPECT_TRUE(properties.contains("a,b:1_mean"));
+}
+
+std::uint32_t Number32(const std::string& bytes, std::size_t at) {
+  std::uint32_t number;
+  std::memcpy(&number, bytes.data() + at, sizeof(number));
+  return number;
+}
+
+// The JSON of a GLB, whose chunks must fill it.
+json JsonOf(const std::string& glb) {
+  EXPECT_EQ(glb.substr(0, 4), "glTF");
+  EXPECT_EQ(Number32(glb, 8), glb.size());
+  const std::uint32_t size = Number32(glb, 12);
+  EXPECT_EQ(size % 4, 0u);
+  if (20 + size < glb.size()) {
+    EXPECT_EQ(28 + size + Number32(glb, 20 + size), glb.size());
+  }
+  return json::parse(glb.substr(20, size));
+}
+
+TEST(Glb, HasTrianglesLinesAndAttributes) {
+  Result result = WithAttributes();
+  result.attributes[1].name = "a\"b\n";
+  const json file = JsonOf(Encode(FrameFormat::kGlb, {.index = 3, .time = 0.5, .result = result}));
+  EXPECT_EQ(file.at("extras"), (json{{"frame", 3}, {"time", 0.5}}));
+  const json primitives = file.at("meshes")[0].at("primitives");
+  ASSERT_EQ(primitives.size(), 2u);
+  EXPECT_EQ(primitives[0].at("mode"), 4);
+  EXPECT_EQ(primitives[1].at("mode"), 1);
+  const json& accessors = file.at("accessors");
+  EXPECT_EQ(accessors[primitives[0].at("indices").get<std::size_t>()].at("count"), 27);
+  EXPECT_EQ(accessors[primitives[1].at("indices").get<std::size_t>()].at("count"), 22);
+  const json attributes = primitives[0].at("attributes");
+  EXPECT_EQ(accessors[attributes.at("_height").get<std::size_t>()].at("type"), "SCALAR");
+  EXPECT_EQ(accessors[attributes.at("_a\"b\n").get<std::size_t>()].at("type"), "VEC2");
+  EXPECT_EQ(accessors[attributes.at("POSITION").get<std::size_t>()].at("count"), 11);
+}
+
+TEST(Glb, KeepsItsPrecisionFarFromTheOrigin) {
+  constexpr double kFar = 1e6;
+  Result result;
+  AddRing(result.rings, {kFar, kFar, kFar + 0.25, kFar, kFar, kFar + 0.25}, kNoRing);
+  const json file = JsonOf(Encode(FrameFormat::kGlb, {.result = result}));
+  EXPECT_EQ(file.at("nodes")[0].at("translation"), (json{kFar + 0.125, kFar + 0.125, 0}));
+  EXPECT_EQ(file.at("accessors")[0].at("max"), (json{0.125, 0.125, 0}));
+}
+
+TEST(Glb, AnEmptyFrameIsAnEmptyScene) {
+  const Result result;
+  const json file = JsonOf(Encode(FrameFormat::kGlb, {.result = result}));
+  EXPECT_FALSE(file.contains("meshes"));
+  EXPECT_EQ(file.at("scenes").size(), 1u);
+}
+
+TEST(Ply, WithoutAMeshTheRingsAreEdges) {
+  Result result = SquareWithHoleAndIsland();
+  result.mesh = {};
+  const std::string ply = Encode(FrameFormat::kPly, {.result = result});
+  EXPECT_THAT(ply, HasSubstr("element vertex 11\n"));
+  EXPECT_THAT(ply, HasSubstr("element edge 11\n"));
+  EXPECT_EQ(ply.size(), ply.find("end_header\n") + 11 + 11 * 24 + 11 * 8);
+}
+
+TEST(Stl, HasOneRecordForEachTriangle) {
+  const Result result = SquareWithHoleAndIsland();
+  const std::string stl = Encode(FrameFormat::kStl, {.result = result});
+  EXPECT_EQ(Number32(stl, 80), 9u);
+  EXPECT_EQ(stl.size(), 84u + 9 * 50);
+}
+
+TEST(FrameWriter, ListsVtpFilesWithTheirTimes) {
+  const auto formats = AllFrameFormats();
+  if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) return;
+  support::TemporaryFolder directory;
+  auto writer =
+      FrameWriter::Create({.directory = directory / "out", .formats = {FrameFormat::kVtp}});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  Result result = SquareWithHoleAndIsland();
+  result.sections.resize(1);
+  ASSERT_TRUE(writer->Write({.index = 4, .time = 0.5, .result = result}).ok());
+  ASSERT_TRUE(writer->Write({.index = 6, .time = 0.75, .result = result}).ok());
+  ASSERT_TRUE(writer->Finish().ok());
+  const json series = json::parse(ReadFile(directory / "out/frames.vtp.series"));
+  EXPECT_EQ(series.at("files"), (json{{{"name", "frame_000004.vtp"}, {"time", 0.5}},
+                                      {{"name", "frame_000006.vtp"}, {"time", 0.75}}}));
+  EXPECT_THAT(ReadFile(directory / "out/frames.pvd"),
+              HasSubstr("<DataSet timestep=\"0.75\" part=\"0\" file=\"frame_000006.vtp\"/>"));
+  EXPECT_THAT(ReadFile(directory / "out/frames_section_1.pvd"),
+              HasSubstr("file=\"frame_000004_section_1.vtp\""));
 }
 
 }  // namespace

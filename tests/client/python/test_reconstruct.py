@@ -325,6 +325,20 @@ class Results(unittest.TestCase):
                              extension)
 
 
+    def test_meshio_takes_attributes(self):
+        try:
+            import meshio
+        except ImportError:
+            self.skipTest("NOT TESTED: there is no meshio (Debian: python3-meshio)")
+        positions = block()
+        result = partiemc.reconstruct(positions, spacing=1, attributes={"p": positions[:, 0], "xy": positions})
+        with tempfile.TemporaryDirectory() as folder:
+            result.mesh.to_meshio(result.attributes).write(f"{folder}/mesh.vtu")
+            read = meshio.read(f"{folder}/mesh.vtu")
+        for name, values in result.attributes.items():
+            numpy.testing.assert_array_equal(read.point_data[name], values)
+
+
 class Errors(unittest.TestCase):
     def assert_refused(self, reason, field, **arguments):
         arguments.setdefault("positions", block())

@@ -1,8 +1,9 @@
+#include "client/input/base/natural_order.h"
+
 #include <algorithm>
 #include <string_view>
 
 #include "absl/strings/ascii.h"
-#include "client/input/sequence.h"
 
 namespace partiemc::client {
 namespace {

@@ -1,0 +1,53 @@
+// A binary table: named columns of one length.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/input/base/columns.h"
+#include "client/input/base/particle_rows.h"
+
+namespace partiemc::client::input {
+
+/// Arrays with more components are no attributes of particles.
+inline constexpr std::size_t kMaxArrayComponents = 16;
+
+struct ArrayTable {
+  std::vector<std::string> names;
+  std::vector<ArrayColumn> columns;  ///< Parallel to `names`.
+  std::size_t rows = 0;
+
+  /// Adds the components of an array, interleaved from `first` on: NAME, or NAME:0, NAME:1, ...
+  void Add(std::string_view name, std::size_t components, ArrayColumn first);
+};
+
+/// An array of a file that is loaded only if the particles need it: `components` per row,
+/// interleaved.
+struct StoredArray {
+  std::string name;
+  std::size_t components = 1;
+  ElementType type = ElementType::kFloat64;
+  bool swapped = false;
+  std::function<absl::Status(std::vector<char>& bytes)> load;
+};
+
+/// As below, of arrays with `row_count` rows each.
+absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count,
+                      const ColumnRequest& request, const std::string& source, ParticleRows& rows);
+
+/// The index of the array with the first position. Errors: as PlanNamedColumns.
+absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
+                                          const ColumnRequest& request);
+
+/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects its
+/// components. `source` begins errors and becomes rows.source.
+absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
+                      const std::string& source, ParticleRows& rows);
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,26 @@
+// Collections: files that list the files of frames with their times.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/input/times.h"
+
+namespace partiemc::client::input {
+
+struct Collection {
+  std::vector<std::string> files;  ///< At least one, ordered by time.
+  FrameTimes times;                ///< By index in `files`.
+};
+
+/// Reads ParaView's collections: NAME.pvd and NAME.EXTENSION.series. Nothing for a file with
+/// another name. Paths in it are relative to its folder. Errors: kDataLoss for damage, a file
+/// without a time or several files at one time; kNotFound.
+absl::StatusOr<std::optional<Collection>> ReadCollection(const std::string& path);
+
+/// Whether a file has the name of a collection.
+bool IsCollectionName(const std::string& path);
+
+}  // namespace partiemc::client::input

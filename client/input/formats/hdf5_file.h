@@ -1,0 +1,58 @@
+// Reads HDF5 files with libhdf5. Not thread-safe in Debian: the functions here share one lock.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/input/base/particle_rows.h"
+
+namespace partiemc::client::input {
+
+/// A dataset of numbers with one or two extents.
+struct Hdf5Array {
+  ElementType type = ElementType::kFloat64;  ///< As read: in this machine's byte order.
+  std::uint64_t rows = 0;
+  std::size_t components = 1;
+};
+
+/// A file. Paths have the form "group/dataset". Links to other files, virtual datasets and external
+/// data are not followed: a file is read alone.
+class Hdf5File {
+ public:
+  /// Errors: kDataLoss if libhdf5 cannot open it.
+  static absl::StatusOr<std::shared_ptr<const Hdf5File>> Open(const std::string& path,
+                                                              double max_expansion);
+  ~Hdf5File();
+
+  const std::string& path() const { return path_; }
+
+  /// Names of the members of a group, "" for the root, in natural order. Empty if there is no such
+  /// group.
+  std::vector<std::string> Members(const std::string& group) const;
+
+  bool IsGroup(const std::string& path) const;
+
+  /// The description of a dataset. Empty if there is no dataset of numbers.
+  std::optional<Hdf5Array> Describe(const std::string& dataset) const;
+
+  /// Reads rows [begin, begin + count). Errors: kDataLoss if the file holds fewer bytes.
+  absl::Status Read(const std::string& dataset, std::uint64_t begin, std::uint64_t count,
+                    std::vector<char>& bytes) const;
+
+  /// The first number of an attribute of an object.
+  std::optional<double> Attribute(const std::string& object, const std::string& name) const;
+
+ private:
+  Hdf5File(std::string path, std::int64_t id, double max_expansion)
+      : path_(std::move(path)), id_(id), max_expansion_(max_expansion) {}
+
+  std::string path_;
+  std::int64_t id_;
+  double max_expansion_;
+};
+
+}  // namespace partiemc::client::input

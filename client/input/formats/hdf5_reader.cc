@@ -1,0 +1,481 @@
+// HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget, and of other programs by the names of
+// datasets. In each a frame is a group of arrays with a row per particle.
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_join.h"
+#include "client/input/base/array_table.h"
+#include "client/input/base/number_text.h"
+#include "client/input/base/text.h"
+#include "client/input/formats/frame_reader.h"
+#include "client/input/formats/hdf5_file.h"
+#include "client/input/formats/pysph.h"
+
+namespace partiemc::client::input {
+namespace {
+
+constexpr std::size_t kMaxListed = 12;  // Datasets in a message.
+constexpr std::size_t kMaxVtkArrays = std::size_t{1} << 20;
+constexpr std::size_t kMaxVisited = 10000;  // Objects that are searched for them.
+
+std::string JoinPath(std::string_view group, std::string_view name) {
+  return group.empty() ? std::string(name) : Concat(group, "/", name);
+}
+
+std::string ParentOf(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
+// A dataset, or rows of it, as an array of a frame.
+struct Hdf5Column {
+  std::string name;
+  std::string dataset;
+  std::uint64_t begin = 0;
+  std::optional<std::uint64_t> count = {};  // All rows if absent.
+};
+
+struct Hdf5Frame {
+  std::string place;  // For messages: a group, or "step 3".
+  std::string group;  // The group of its arrays; empty if `columns` lists them.
+  std::vector<Hdf5Column> columns;
+  std::optional<double> time;
+  std::optional<double> step;
+};
+
+// The frames of a file.
+struct Hdf5Content {
+  std::vector<Hdf5Frame> frames;
+  ColumnRequest request;  // With names relative to the group of a frame.
+  bool pysph = false;
+};
+
+// The number behind the last character that is no digit: 12 of "Step#12".
+std::optional<double> NumberAtEnd(std::string_view name) {
+  const std::size_t begin = name.find_last_not_of("0123456789") + 1;
+  return ParseNumber(name.substr(begin));
+}
+
+class Hdf5Survey {
+ public:
+  Hdf5Survey(const Hdf5File& file, const ColumnRequest& request)
+      : file_(file), content_{.frames = {}, .request = request} {}
+
+  absl::StatusOr<Hdf5Content> Take() {
+    absl::Status status = TakeFrames();
+    if (!status.ok()) return status;
+    if (content_.frames.empty()) {
+      return absl::DataLossError(Concat(file_.path(), ": holds no frame"));
+    }
+    return std::move(content_);
+  }
+
+ private:
+  absl::Status TakeFrames() {
+    if (file_.IsGroup("particles") && file_.IsGroup("solver_data")) return TakePysph();
+    if (NamesDatasets()) return TakeNamedGroups();
+    if (file_.IsGroup("VTKHDF")) return TakeVtk();
+    const std::vector<std::string> members = file_.Members("");
+    std::vector<std::string> kinds;
+    for (const std::string& name : members) {
+      if (name.starts_with("Step#")) AddGroup(name, NumberAtEnd(name));
+      if (name.starts_with("PartType")) kinds.push_back(name);
+    }
+    if (!content_.frames.empty()) return absl::OkStatus();
+    if (kinds.size() == 1) {
+      AddGroup(kinds.front(), std::nullopt);
+      return absl::OkStatus();
+    }
+    if (file_.IsGroup("data")) {
+      if (absl::Status status = TakeOpenPmd(); !status.ok() || !content_.frames.empty()) {
+        return status;
+      }
+    }
+    return AskForNames();
+  }
+
+  absl::Status Refuse(std::string_view message) const {
+    return absl::FailedPreconditionError(Concat(file_.path(), ": ", message));
+  }
+
+  void AddGroup(const std::string& group, std::optional<double> step) {
+    content_.frames.push_back(
+        {.place = group, .group = group, .time = TimeOf(group), .step = step});
+  }
+
+  // The time is an attribute of the group or of a group around it, or in Gadget's header.
+  std::optional<double> TimeOf(std::string group) const {
+    while (true) {
+      for (const char* name : {"TimeValue", "time", "Time"}) {
+        if (const auto time = file_.Attribute(group, name)) return time;
+      }
+      if (group.empty()) return file_.Attribute("Header", "Time");
+      group = ParentOf(group);
+    }
+  }
+
+  absl::Status TakePysph() {
+    std::vector<std::string> arrays = file_.Members("particles");
+    const auto array = ChoosePysphArray(arrays, content_.request, file_.path());
+    if (!array.ok()) return array.status();
+    content_.pysph = true;
+    const std::string group = Concat("particles/", *array, "/arrays");
+    content_.frames.push_back({.place = group,
+                               .group = group,
+                               .time = file_.Attribute("solver_data", "t"),
+                               .step = file_.Attribute("solver_data", "count")});
+    return absl::OkStatus();
+  }
+
+  bool NamesDatasets() const {
+    const auto& columns = content_.request.columns;
+    return !columns.empty() && std::all_of(columns.begin(), columns.end(), [](const auto& column) {
+      return absl::StrContains(column, "/");
+    });
+  }
+
+  // "--columns PartType0/Coordinates" or "data/*/particles/fluid/position": the group before the
+  // last slash, where * stands for each name in its place.
+  absl::Status TakeNamedGroups() {
+    auto& columns = content_.request.columns;
+    while (columns.front().starts_with('/')) columns.front().erase(0, 1);
+    const std::string pattern = ParentOf(columns.front());
+    for (std::string& column : columns) {
+      while (column.starts_with('/')) column.erase(0, 1);
+      if (ParentOf(column) != pattern) {
+        return Refuse(Concat("--columns names datasets of the groups ", pattern, " and ",
+                             ParentOf(column), "; the positions must be in one"));
+      }
+      column = column.substr(column.rfind('/') + 1);
+    }
+    std::vector<std::string> groups = {""};
+    for (const std::string_view part : Split(pattern, '/')) {
+      std::vector<std::string> next;
+      for (const std::string& group : groups) {
+        if (part != "*") next.push_back(JoinPath(group, part));
+        if (part != "*") continue;
+        for (const std::string& name : file_.Members(group)) next.push_back(JoinPath(group, name));
+      }
+      groups = std::move(next);
+    }
+    const bool several = absl::StrContains(pattern, "*");
+    for (const std::string& group : groups) {
+      if (!file_.IsGroup(group)) continue;
+      AddGroup(group, several ? StepOf(group, pattern) : std::nullopt);
+    }
+    if (!content_.frames.empty()) return absl::OkStatus();
+    return Refuse(Concat("has no group ", pattern, "; the datasets are ", Listed()));
+  }
+
+  // The number in the place of the first * of `pattern`.
+  static std::optional<double> StepOf(const std::string& group, const std::string& pattern) {
+    const std::vector<std::string_view> parts = Split(pattern, '/');
+    const auto star = std::find(parts.begin(), parts.end(), "*") - parts.begin();
+    const std::vector<std::string_view> names = Split(group, '/');
+    return static_cast<std::size_t>(star) < names.size()
+               ? NumberAtEnd(names[static_cast<std::size_t>(star)])
+               : std::nullopt;
+  }
+
+  // data/ITERATION/particles/SPECIES; with one species.
+  absl::Status TakeOpenPmd() {
+    std::string species;
+    for (const std::string& iteration : file_.Members("data")) {
+      const std::string particles = Concat("data/", iteration, "/particles");
+      const std::vector<std::string> names = file_.Members(particles);
+      if (names.empty()) continue;
+      if (species.empty()) species = names.front();
+      if (names.size() > 1) {
+        return Refuse(Concat("has the species ", absl::StrJoin(names, ", "),
+                             "; choose one by --columns 'data/*/particles/", species,
+                             "/position'"));
+      }
+      AddGroup(JoinPath(particles, names.front()), ParseNumber(iteration));
+    }
+    return absl::OkStatus();
+  }
+
+  // https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format: one frame, or ranges of the
+  // arrays for each step.
+  absl::Status TakeVtk() {
+    std::vector<Hdf5Column> columns = {{"Points", "VTKHDF/Points"}};
+    for (const std::string& name : file_.Members("VTKHDF/PointData")) {
+      columns.push_back({name, Concat("VTKHDF/PointData/", name)});
+    }
+    const auto steps = file_.Attribute("VTKHDF/Steps", "NSteps");
+    if (!steps) {
+      content_.frames.push_back({.place = "VTKHDF", .columns = columns, .time = TimeOf("VTKHDF")});
+      return absl::OkStatus();
+    }
+    std::vector<std::uint64_t> counts, parts, first_parts, points;
+    std::vector<double> times;
+    const auto count = IdOfNumber(*steps);
+    absl::Status status = Whole("VTKHDF/NumberOfPoints", counts);
+    if (status.ok()) status = Whole("VTKHDF/Steps/PartOffsets", first_parts);
+    if (status.ok()) status = Whole("VTKHDF/Steps/PointOffsets", points);
+    if (status.ok() && file_.Describe("VTKHDF/Steps/NumberOfParts")) {
+      status = Whole("VTKHDF/Steps/NumberOfParts", parts);
+    }
+    if (status.ok()) status = Numbers("VTKHDF/Steps/Values", times);
+    if (!status.ok()) return status;
+    std::vector<std::vector<std::uint64_t>> offsets(columns.size(), points);
+    for (std::size_t k = 1; k < columns.size(); ++k) {
+      const std::string name = Concat("VTKHDF/Steps/PointDataOffsets/", columns[k].name);
+      if (!file_.Describe(name)) continue;
+      if (status = Whole(name, offsets[k]); !status.ok()) return status;
+    }
+    if (parts.empty()) parts.assign(first_parts.size(), 1);
+    const auto fits = [&](const auto& values) { return count && values.size() >= *count; };
+    if (!fits(first_parts) || !fits(points) || !fits(parts) || !fits(times) ||
+        !std::all_of(offsets.begin(), offsets.end(), fits)) {
+      return absl::DataLossError(
+          Concat(file_.path(), ": the arrays of VTKHDF/Steps have fewer values than steps"));
+    }
+    if (*count * columns.size() > kMaxVtkArrays) {
+      return absl::DataLossError(Concat(file_.path(), ": has ", *count, " steps of ",
+                                        columns.size(), " arrays; at most ", kMaxVtkArrays,
+                                        " together"));
+    }
+    for (std::size_t step = 0; step < *count; ++step) {
+      if (first_parts[step] > counts.size() || parts[step] > counts.size() - first_parts[step]) {
+        return absl::DataLossError(
+            Concat(file_.path(), ": step ", step, " has parts beyond NumberOfPoints"));
+      }
+      std::uint64_t rows = 0;
+      for (std::uint64_t k = 0; k < parts[step]; ++k) rows += counts[first_parts[step] + k];
+      Hdf5Frame frame{.place = Concat("step ", step), .columns = columns, .time = times[step]};
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        frame.columns[k].begin = offsets[k][step];
+        frame.columns[k].count = rows;
+      }
+      content_.frames.push_back(std::move(frame));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Numbers(const std::string& dataset, std::vector<double>& values) const {
+    const auto array = file_.Describe(dataset);
+    if (!array || array->components != 1) {
+      return absl::DataLossError(Concat(file_.path(), ": has no numbers ", dataset));
+    }
+    std::vector<char> bytes;
+    if (absl::Status status = file_.Read(dataset, 0, array->rows, bytes); !status.ok()) {
+      return status;
+    }
+    const ArrayColumn column{array->type, false, bytes.data(), ElementBytes(array->type)};
+    for (std::size_t k = 0; k < array->rows; ++k) values.push_back(column.Number(k));
+    return absl::OkStatus();
+  }
+
+  absl::Status Whole(const std::string& dataset, std::vector<std::uint64_t>& values) const {
+    std::vector<double> numbers;
+    if (absl::Status status = Numbers(dataset, numbers); !status.ok()) return status;
+    values.clear();
+    for (const double number : numbers) {
+      const auto whole = IdOfNumber(number);
+      if (!whole || *whole > (std::uint64_t{1} << 48)) {
+        return absl::DataLossError(Concat(file_.path(), ": ", dataset, " has the value ", number));
+      }
+      values.push_back(*whole);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status AskForNames() const {
+    return Refuse(
+        Concat("is HDF5 of no known kind; name the datasets of the positions by --columns "
+               "(GROUP/x,GROUP/y or GROUP/positions; * for a group per frame): the "
+               "datasets are ",
+               Listed()));
+  }
+
+  // The first datasets of numbers of the file.
+  std::string Listed() const {
+    std::vector<std::string> found, queue = {""};
+    for (std::size_t k = 0; k < queue.size() && queue.size() < kMaxVisited; ++k) {
+      if (!queue[k].empty() && file_.Describe(queue[k])) found.push_back(queue[k]);
+      if (found.size() == kMaxListed) return Concat(absl::StrJoin(found, ", "), ", ...");
+      for (const std::string& name : file_.Members(queue[k])) {
+        queue.push_back(JoinPath(queue[k], name));
+      }
+    }
+    return found.empty() ? "none" : absl::StrJoin(found, ", ");
+  }
+
+  const Hdf5File& file_;
+  Hdf5Content content_;
+};
+
+class Hdf5Reader final : public FrameReader {
+ public:
+  Hdf5Reader(std::shared_ptr<const Hdf5File> file, Hdf5Content content)
+      : file_(std::move(file)), content_(std::move(content)) {}
+
+  absl::StatusOr<bool> Next(ParticleRows* rows) override {
+    if (frame_ == content_.frames.size()) return false;
+    const Hdf5Frame& frame = content_.frames[frame_++];
+    if (rows == nullptr) return true;
+    const std::string source =
+        content_.frames.size() == 1
+            ? file_->path()
+            : Concat(file_->path(), ", frame ", frame_ - 1, " (", frame.place, ")");
+    std::vector<StoredArray> arrays;
+    const auto count = ArraysOf(frame, source, arrays);
+    if (!count.ok()) return count.status();
+    ColumnRequest request = content_.request;
+    if (content_.pysph) CompletePysphArrays(*count, arrays, request);
+    if (absl::Status status = FillRows(arrays, *count, request, source, *rows); !status.ok()) {
+      return status;
+    }
+    rows->time = frame.time;
+    rows->step = frame.step;
+    return true;
+  }
+
+ private:
+  struct Candidate {
+    Hdf5Column column;
+    Hdf5Array array;
+    std::optional<double> constant;  // openPMD's constant component.
+    std::optional<Hdf5Column> offset;
+  };
+
+  // The arrays with as many rows as the positions, and this number.
+  absl::StatusOr<std::size_t> ArraysOf(const Hdf5Frame& frame, const std::string& source,
+                                       std::vector<StoredArray>& arrays) const {
+    std::vector<Candidate> candidates;
+    for (const Hdf5Column& column : frame.columns) AddDataset(column, candidates);
+    if (frame.columns.empty()) AddGroup(frame.group, "", candidates);
+    std::vector<StoredArray> all;
+    for (const Candidate& candidate : candidates) {
+      all.push_back({.name = candidate.column.name, .components = candidate.array.components});
+    }
+    const auto positions = PositionArray(all, content_.request);
+    if (!positions.ok()) return WithPrefix(source, positions.status());
+    const std::uint64_t rows = candidates[*positions].array.rows;
+    // A constant has any number of rows in no bytes.
+    if (std::none_of(candidates.begin(), candidates.end(), [&](const Candidate& candidate) {
+          return !candidate.constant && candidate.array.rows == rows;
+        })) {
+      return absl::DataLossError(Concat(source, ": has no array of ", rows, " particles"));
+    }
+    for (const Candidate& candidate : candidates) {
+      if (candidate.array.rows == rows) arrays.push_back(Stored(candidate, rows));
+    }
+    return static_cast<std::size_t>(rows);
+  }
+
+  void AddDataset(const Hdf5Column& column, std::vector<Candidate>& candidates) const {
+    auto array = file_->Describe(column.dataset);
+    if (!array) return;
+    if (column.count) array->rows = *column.count;
+    candidates.push_back({column, *array, std::nullopt, std::nullopt});
+  }
+
+  // The datasets of `group`, and of the groups in it: openPMD's position/x has the name position:x.
+  void AddGroup(const std::string& group, const std::string& prefix,
+                std::vector<Candidate>& candidates) const {
+    for (const std::string& name : file_->Members(group)) {
+      const std::string path = JoinPath(group, name);
+      if (name == "positionOffset") continue;
+      const std::size_t before = candidates.size();
+      AddDataset({Concat(prefix, name), path}, candidates);
+      if (candidates.size() > before) {
+        AddOffset(group, name, candidates.back());
+        continue;
+      }
+      const auto value = file_->Attribute(path, "value");
+      const auto extent = file_->Attribute(path, "shape");
+      if (value && extent) {
+        Candidate constant{{Concat(prefix, name), path}, {}, *value, std::nullopt};
+        constant.array.rows = IdOfNumber(*extent).value_or(0);
+        AddOffset(group, name, constant);
+        candidates.push_back(std::move(constant));
+      } else if (prefix.empty() && file_->IsGroup(path)) {
+        AddGroup(path, Concat(name, ":"), candidates);
+      }
+    }
+  }
+
+  // openPMD's positions are position + positionOffset, each in its unit.
+  void AddOffset(const std::string& group, const std::string& name, Candidate& candidate) const {
+    if (!group.ends_with("/position")) return;
+    const std::string path = Concat(ParentOf(group), "/positionOffset/", name);
+    if (file_->Describe(path)) candidate.offset = Hdf5Column{name, path};
+    const double value = file_->Attribute(path, "value").value_or(0);
+    if (value != 0) candidate.offset = Hdf5Column{name, path};
+  }
+
+  double UnitOf(const std::string& path) const {
+    return file_->Attribute(path, "unitSI").value_or(1);
+  }
+
+  StoredArray Stored(const Candidate& candidate, std::uint64_t rows) const {
+    const Hdf5Column column = candidate.column;
+    const auto load = [file = file_, column, constant = candidate.constant,
+                       rows](std::vector<char>& bytes) {
+      if (!constant) return file->Read(column.dataset, column.begin, rows, bytes);
+      bytes.clear();
+      AppendRepeated(*constant, rows, bytes);
+      return absl::OkStatus();
+    };
+    const ElementType type = candidate.constant ? ElementType::kFloat64 : candidate.array.type;
+    StoredArray stored{column.name, candidate.array.components, type, false, load};
+    if (!candidate.offset) return stored;
+    StoredArray sum{column.name, 1, ElementType::kFloat64, false, {}};
+    sum.load = [this, stored, path = candidate.offset->dataset, rows,
+                unit = UnitOf(candidate.offset->dataset) / UnitOf(column.dataset)](
+                   std::vector<char>& bytes) { return LoadSum(stored, path, unit, rows, bytes); };
+    return sum;
+  }
+
+  static void AppendRepeated(double value, std::uint64_t rows, std::vector<char>& bytes) {
+    const char* const raw = reinterpret_cast<const char*>(&value);
+    for (std::uint64_t k = 0; k < rows; ++k) bytes.insert(bytes.end(), raw, raw + sizeof(value));
+  }
+
+  // position + unit * positionOffset, which is a dataset or constant.
+  absl::Status LoadSum(const StoredArray& stored, const std::string& path, double unit,
+                       std::uint64_t rows, std::vector<char>& bytes) const {
+    std::vector<char> near, far;
+    if (absl::Status status = stored.load(near); !status.ok()) return status;
+    const auto array = file_->Describe(path);
+    if (array) {
+      if (absl::Status status = file_->Read(path, 0, rows, far); !status.ok()) return status;
+    }
+    const double constant = file_->Attribute(path, "value").value_or(0);
+    const ArrayColumn a{stored.type, false, near.data(), ElementBytes(stored.type)};
+    bytes.clear();
+    for (std::size_t k = 0; k < rows; ++k) {
+      const double offset =
+          array ? ArrayColumn{array->type, false, far.data(), ElementBytes(array->type)}.Number(k)
+                : constant;
+      AppendRepeated(a.Number(k) + unit * offset, 1, bytes);
+    }
+    return absl::OkStatus();
+  }
+
+  std::shared_ptr<const Hdf5File> file_;
+  Hdf5Content content_;
+  std::size_t frame_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<FrameReader>> OpenHdf5(const std::string& path,
+                                                      const ColumnRequest& request) {
+  const auto stream = InputStream::Open(path);
+  if (!stream.ok()) return stream.status();
+  if ((*stream)->compressed()) {
+    return absl::UnimplementedError(
+        Concat(path, ": HDF5 files are not read packed; unpack it first"));
+  }
+  auto file = Hdf5File::Open(path, request.max_expansion);
+  if (!file.ok()) return file.status();
+  auto content = Hdf5Survey(**file, request).Take();
+  if (!content.ok()) return content.status();
+  return std::make_unique<Hdf5Reader>(*std::move(file), *std::move(content));
+}
+
+}  // namespace partiemc::client::input

@@ -1,0 +1,237 @@
+// Binary files of meshes: PLY, STL and GLB. Numbers in them are little-endian.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/ascii.h"
+#include "client/output/formats.h"
+#include "client/output/text.h"
+
+namespace partiemc::client {
+namespace {
+
+template <typename T>
+void Put(T value, std::string& out) {
+  auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+  if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
+  out.append(raw.data(), raw.size());
+}
+
+// The vertices of mesh and rings, which share points if they can.
+struct SharedVertices {
+  std::vector<double> points;
+  std::uint32_t first_of_rings = 0;
+  bool have_attributes = false;  // A value for each vertex.
+
+  std::size_t Count() const { return points.size() / 2; }
+};
+
+SharedVertices VerticesOf(const Result& result) {
+  SharedVertices vertices{.points = result.mesh.points};
+  const bool shared = MeshSharesRingPoints(result);
+  vertices.have_attributes = shared || result.mesh.points.empty();
+  if (shared) return vertices;
+  vertices.first_of_rings = static_cast<std::uint32_t>(result.mesh.PointCount());
+  vertices.points.insert(vertices.points.end(), result.rings.points.begin(),
+                         result.rings.points.end());
+  return vertices;
+}
+
+// The two vertices of each side of the rings.
+std::vector<std::uint32_t> SidesOf(const Rings& rings, std::uint32_t first) {
+  std::vector<std::uint32_t> sides;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const std::uint32_t begin = rings.offsets[ring], end = rings.offsets[ring + 1];
+    for (std::uint32_t k = begin; k < end; ++k) {
+      sides.push_back(first + k);
+      sides.push_back(first + (k + 1 == end ? begin : k + 1));
+    }
+  }
+  return sides;
+}
+
+// A name of letters, digits and "_", as PLY requires.
+std::string PlyName(std::string_view name) {
+  std::string plain(name);
+  for (char& c : plain) {
+    if (!absl::ascii_isalnum(static_cast<unsigned char>(c))) c = '_';
+  }
+  return plain;
+}
+
+std::string JsonText(std::string_view text) {
+  std::string out = "\"";
+  AppendJsonEscaped(out, text);
+  return out + '"';
+}
+
+// Collects the buffer of a GLB and the JSON that describes it.
+class GlbBuffer {
+ public:
+  // Adds an array and returns the index of its accessor. `more` ends the accessor's members.
+  template <typename T>
+  std::size_t Add(std::span<const T> values, std::size_t components, std::string_view more = "") {
+    constexpr bool kFloats = std::is_same_v<T, float>;
+    constexpr std::array<std::string_view, 3> kTypes = {"SCALAR", "VEC2", "VEC3"};
+    AppendAll(views_, views_.empty() ? "" : ",", R"({"buffer":0,"byteOffset":)", bytes_.size(),
+              R"(,"byteLength":)", values.size() * sizeof(T), R"(,"target":)",
+              kFloats ? 34962 : 34963, "}");
+    AppendAll(accessors_, accessors_.empty() ? "" : ",", R"({"bufferView":)", count_,
+              R"(,"componentType":)", kFloats ? 5126 : 5125, R"(,"count":)",
+              values.size() / components, R"(,"type":")", kTypes[components - 1], "\"", more, "}");
+    for (const T value : values) Put(value, bytes_);
+    return count_++;
+  }
+
+  // The file with `scene`, the members of the JSON besides the buffer's.
+  std::string File(std::string_view scene) const {
+    std::string json = Concat(R"({"asset":{"version":"2.0","generator":"PartiEMC"},)", scene);
+    if (count_ > 0) {
+      AppendAll(json, R"(,"accessors":[)", accessors_, R"(],"bufferViews":[)", views_,
+                R"(],"buffers":[{"byteLength":)", bytes_.size(), "}]");
+    }
+    json += '}';
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    const std::size_t size = 12 + 8 + json.size() + (count_ > 0 ? 8 + bytes_.size() : 0);
+    std::string file = "glTF";
+    Put(std::uint32_t{2}, file);
+    Put(static_cast<std::uint32_t>(size), file);
+    Put(static_cast<std::uint32_t>(json.size()), file);
+    file += "JSON";
+    file += json;
+    if (count_ == 0) return file;
+    Put(static_cast<std::uint32_t>(bytes_.size()), file);
+    file.append("BIN\0", 4);
+    return file + bytes_;
+  }
+
+ private:
+  std::string bytes_, views_, accessors_;
+  std::size_t count_ = 0;
+};
+
+// The point that the coordinates of a GLB are relative to, so that float32 is enough far away.
+std::array<double, 2> CentreOf(std::span<const double> points) {
+  Box box;
+  box.Include(points);
+  return {(box.min_x + box.max_x) / 2, (box.min_y + box.max_y) / 2};
+}
+
+std::size_t AddPositions(const SharedVertices& vertices, std::array<double, 2> centre,
+                         GlbBuffer& buffer) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  std::vector<float> positions;
+  std::array<float, 2> low = {kInfinity, kInfinity}, high = {-kInfinity, -kInfinity};
+  for (std::size_t k = 0; k < vertices.points.size(); ++k) {
+    const auto value = static_cast<float>(vertices.points[k] - centre[k % 2]);
+    low[k % 2] = std::min(low[k % 2], value);
+    high[k % 2] = std::max(high[k % 2], value);
+    positions.push_back(value);
+    if (k % 2 == 1) positions.push_back(0);
+  }
+  return buffer.Add<float>(
+      positions, 3,
+      Concat(R"(,"min":[)", low[0], ",", low[1], R"(,0],"max":[)", high[0], ",", high[1], ",0]"));
+}
+
+}  // namespace
+
+std::string EncodePly(const FrameRecord& frame) {
+  const Mesh& mesh = frame.result.mesh;
+  const SharedVertices vertices = VerticesOf(frame.result);
+  const bool has_mesh = mesh.TriangleCount() > 0;
+  std::string out = Concat("ply\nformat binary_little_endian 1.0\ncomment frame ", frame.index,
+                           "\ncomment time ", frame.time, "\nelement vertex ", vertices.Count(),
+                           "\nproperty double x\nproperty double y\nproperty double z\n");
+  std::vector<const AttributeValues*> attributes;
+  for (const AttributeValues& one : frame.result.attributes) {
+    if (!vertices.have_attributes) break;
+    attributes.push_back(&one);
+    for (int c = 0; c < one.components; ++c) {
+      AppendAll(out, "property float ", PlyName(one.name));
+      if (one.components > 1) AppendAll(out, "_", c);
+      out += '\n';
+    }
+  }
+  const std::vector<std::uint32_t> sides =
+      has_mesh ? std::vector<std::uint32_t>()
+               : SidesOf(frame.result.rings, vertices.first_of_rings);
+  AppendAll(out, "element face ", mesh.TriangleCount(),
+            "\nproperty list uchar int vertex_indices\n");
+  if (!has_mesh) {
+    AppendAll(out, "element edge ", sides.size() / 2,
+              "\nproperty int vertex1\nproperty int vertex2\n");
+  }
+  out += "end_header\n";
+  for (std::size_t k = 0; k < vertices.Count(); ++k) {
+    Put(vertices.points[2 * k], out);
+    Put(vertices.points[2 * k + 1], out);
+    Put(0.0, out);
+    for (const AttributeValues* const one : attributes) {
+      const auto components = static_cast<std::size_t>(one->components);
+      for (std::size_t c = 0; c < components; ++c) Put(one->values[components * k + c], out);
+    }
+  }
+  for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
+    if (k % 3 == 0) Put(std::uint8_t{3}, out);
+    Put(mesh.triangles[k], out);
+  }
+  for (const std::uint32_t vertex : sides) Put(vertex, out);
+  return out;
+}
+
+std::string EncodeStl(const FrameRecord& frame) {
+  const Mesh& mesh = frame.result.mesh;
+  std::string out = Concat("PartiEMC frame ", frame.index, ", time ", frame.time);
+  out.resize(80, ' ');
+  Put(static_cast<std::uint32_t>(mesh.TriangleCount()), out);
+  for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
+    if (k % 3 == 0) {
+      for (const float component : {0.0F, 0.0F, 1.0F}) Put(component, out);
+    }
+    const std::size_t point = mesh.triangles[k];
+    Put(static_cast<float>(mesh.points[2 * point]), out);
+    Put(static_cast<float>(mesh.points[2 * point + 1]), out);
+    Put(0.0F, out);
+    if (k % 3 == 2) Put(std::uint16_t{0}, out);
+  }
+  return out;
+}
+
+std::string EncodeGlb(const FrameRecord& frame) {
+  const Result& result = frame.result;
+  const SharedVertices vertices = VerticesOf(result);
+  GlbBuffer buffer;
+  std::string scene = Concat(R"("extras":{"frame":)", frame.index);
+  if (std::isfinite(frame.time)) AppendAll(scene, R"(,"time":)", frame.time);
+  if (vertices.Count() == 0) {
+    return buffer.File(scene + R"(},"scene":0,"scenes":[{"name":"empty"}])");
+  }
+  const std::array<double, 2> centre = CentreOf(vertices.points);
+  std::string members = Concat(R"("POSITION":)", AddPositions(vertices, centre, buffer));
+  for (const AttributeValues& one : result.attributes) {
+    if (!vertices.have_attributes) break;
+    const std::size_t index =
+        buffer.Add<float>(one.values, static_cast<std::size_t>(one.components));
+    AppendAll(members, ",", JsonText(Concat("_", one.name)), ":", index);
+  }
+  const auto primitive = [&](const std::vector<std::uint32_t>& indices, int mode) {
+    return Concat(R"({"attributes":{)", members, R"(},"indices":)",
+                  buffer.Add<std::uint32_t>(indices, 1), R"(,"mode":)", mode, "}");
+  };
+  constexpr int kLines = 1, kTriangles = 4;
+  std::string primitives;
+  if (!result.mesh.triangles.empty()) primitives = primitive(result.mesh.triangles, kTriangles);
+  const std::vector<std::uint32_t> sides = SidesOf(result.rings, vertices.first_of_rings);
+  if (!sides.empty()) {
+    AppendAll(primitives, primitives.empty() ? "" : ",", primitive(sides, kLines));
+  }
+  AppendAll(scene, R"(},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":[)",
+            centre[0], ",", centre[1], R"(,0]}],"meshes":[{"name":"frame )", frame.index,
+            R"(","primitives":[)", primitives, "]}]");
+  return buffer.File(scene);
+}
+
+}  // namespace partiemc::client
