@@ -145,7 +145,10 @@ void ConnectionWatch::Run() {
     }
     const MutexLock lock(mutex_);
     if (now >= end_all_at_) {
-      for (const Connection& connection : connections_) Abort(connection.socket.get());
+      while (!connections_.empty()) {
+        Abort(connections_.front().socket.get());
+        Remove(connections_.begin());
+      }
     }
     if (now >= examine_at_) ExamineAll(now);
     if (now >= forget_at_) {

@@ -190,10 +190,10 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
   }
   int waiting = 0;
   if (ioctl(socket, SIOCINQ, &waiting) != 0 || waiting < 0) waiting = 0;
-  // Bytes arrive between the two calls, so the difference could decrease; std::max prevents this.
+  // No count decreases: bytes arrive between the two calls, and Abort resets the kernel's counts.
   const std::uint64_t received = info.tcpi_bytes_received;
   const auto unread = static_cast<std::uint64_t>(waiting);
-  reading.bytes_received = received;
+  reading.bytes_received = std::max(reading.bytes_received, received);
   reading.bytes_read = std::max(reading.bytes_read, received - std::min(received, unread));
   reading.bytes_sent = std::max<std::uint64_t>(reading.bytes_sent, info.tcpi_bytes_acked);
   return true;
