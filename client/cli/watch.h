@@ -26,6 +26,7 @@ struct WatchFlags {
   std::string color_by;
   std::string stats;
   std::string record;  ///< A recording to write; empty: none.
+  bool wait = false;   ///< Wait for the stream to start.
   bool quiet = false;
 };
 
