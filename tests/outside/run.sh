@@ -2,6 +2,7 @@
 # usage: tests/outside/run.sh BIN_DIR CHECK...
 # Checks the contract with clients of others, by hand; tests/outside/README.md says how to install
 # them. BIN_DIR has partiemc and partiemc-server. Each CHECK prints its log and ends with "CHECK: good":
+#   grpcurl  reflection, a unary call with a token over TLS, and refusals without the token
 #   python   protocol_client.py with grpcio-tools of PyPI: streams the dam break
 #   go       a client generated for Go streams the dam break
 set -euo pipefail
@@ -22,7 +23,7 @@ fail() { echo "$*" >&2; exit 1; }
 
 # start FLAG...: a server; its address is $address.
 start() {
-  "$bin/partiemc-server" --address localhost:0 --port-file "$work/address" --log-level warn "$@" &
+  "$bin/partiemc-server" --address localhost:0 --port-file "$work/address" --log-level error "$@" &
   server=$!
   for ((k = 0; k < 100; ++k)); do
     [[ ! -s $work/address ]] || break
@@ -37,6 +38,53 @@ stop() {
   wait "$server" || fail "the server ended with $?"
   server=
   rm -f "$work/address"
+}
+
+# Prints a command without its secrets, and runs it.
+show() {
+  local words=" $* "
+  words=${words//$address/ADDRESS}
+  words=${words//$work/DIR}
+  printf '\n$%s\n' "${words//${token:-no token}/TOKEN}"
+  "$@" 2>&1 | sed "s/$address/ADDRESS/g"
+  return "${PIPESTATUS[0]}"
+}
+
+check_grpcurl() {
+  go version -m "$(command -v grpcurl)" | sed -n -E 's,^\tmod\t(.*)\t.*,\1,p'
+  "$root/docker/try_tls.sh" "$work/tls"
+  token=$(<"$work/tls/tokens")
+  start --tls-cert "$work/tls/server.crt" --tls-key "$work/tls/server.key" --token-file "$work/tls/tokens"
+  local service=partiemc.v1.ReconstructionService
+  local call=(grpcurl -cacert "$work/tls/ca.pem") with_token=(-H "authorization: Bearer $token")
+  show "${call[@]}" "${with_token[@]}" "$address" list | tee "$work/list"
+  grep -q "^$service\$" "$work/list"
+  show "${call[@]}" "${with_token[@]}" "$address" describe "$service" | tee "$work/described"
+  (($(grep -c '^  rpc ' "$work/described") == $(grep -c '^  rpc ' "$root/proto/partiemc/v1/reconstruction.proto")))
+  show "${call[@]}" "${with_token[@]}" "$address" "$service/GetServerInfo" >"$work/info"
+  grep -E '^\$|version"' "$work/info"
+  grep -q '"method_version"' "$work/info"
+  # 400 particles of spacing 1 have the area 400.
+  python3 - >"$work/frame.json" <<'PYTHON'
+import base64, json, struct
+positions = [float(n) for k in range(400) for n in (k % 20, k // 20)]
+print(json.dumps({"parameters": {"spacing": 1, "fill": "FILL_CONFORMING"}, "frame": {
+    "positionFormat": "POSITION_FORMAT_FLOAT64_2",
+    "positions": base64.b64encode(struct.pack("<800d", *positions)).decode()}}))
+PYTHON
+  show "${call[@]}" "${with_token[@]}" -d @ "$address" "$service/ReconstructFrame" <"$work/frame.json" \
+    >"$work/result"
+  grep -E '^\$|^ {4}"(rings|mesh)_digest"|^ {6}"(particles|area)"' "$work/result"
+  python3 - "$work/result" <<'PYTHON'
+import json, sys
+frame = json.loads(open(sys.argv[1]).read().split("\n", 2)[2])["frame"]
+assert abs(frame["statistics"]["area"] - 400) < 4, frame["statistics"]
+PYTHON
+  ! show "${call[@]}" "$address" "$service/GetServerInfo" >"$work/refused" || fail "no token is needed"
+  cat "$work/refused"
+  grep -q 'code = Unauthenticated .* authorization: absent' "$work/refused"
+  ! show grpcurl -plaintext "$address" list || fail "TLS is not needed"
+  stop
 }
 
 # Requires: grpcio and grpcio-tools in the Python of $PYTHON.
