@@ -1,10 +1,10 @@
 #!/bin/bash
 # usage: tests/outside/run.sh BIN_DIR CHECK...
 # Checks the contract with clients of others, by hand; tests/outside/README.md says how to install
-# them. BIN_DIR has partiemc and partiemc-server. Each CHECK prints its log and ends with "CHECK: good":
-#   grpcurl  reflection, a unary call with a token over TLS, and refusals without the token
-#   python   protocol_client.py with grpcio-tools of PyPI: streams the dam break
-#   go       a client generated for Go streams the dam break
+# them. BIN_DIR has partiemc and partiemc-server. Each CHECK prints its log and ends with "CHECK: good".
+# `grpcurl`: reflection, a unary call with a token over TLS, refusals.
+# `python`: protocol_client.py, compiled by grpcio-tools of PyPI, streams the dam break.
+# `go`: a client generated for Go streams the dam break.
 set -euo pipefail
 bin=$(cd "$1" && pwd)
 shift
