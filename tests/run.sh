@@ -259,7 +259,7 @@ step_core-alone() {
     check "core alone: consumer" tests/consumer/run.sh build/core-alone core
 }
 
-step_consumer() { check "consumer" tests/consumer/run.sh build/release core client; }
+step_consumer() { check "consumer" tests/consumer/run.sh build/release core client c; }
 
 step_bench() { check "bench" tests/bench/run.py --quick --check; }
 

@@ -1,5 +1,10 @@
 /* usage: example PICTURE.svg [ADDRESS]. A simplified dam break; without an address it is computed
- * in this process. */
+ * in this process. To build it against an installed PartiEMC, by pkg-config or CMake:
+ *
+ *   cc example.c $(pkg-config --cflags --libs partiemc-c) -o example
+ *
+ *   find_package(partiemc REQUIRED COMPONENTS c)
+ *   target_link_libraries(example PRIVATE partiemc::c) */
 #include <inttypes.h>
 #include <stdio.h>
 

@@ -1,4 +1,10 @@
 ! usage: example_fortran. The dam break of example.c in Fortran with iso_c_binding, in this process.
+! To build it against an installed PartiEMC, by pkg-config or CMake:
+!
+!   gfortran example.f90 $(pkg-config --libs partiemc-c) -o example_fortran
+!
+!   find_package(partiemc REQUIRED COMPONENTS c)
+!   target_link_libraries(example_fortran PRIVATE partiemc::c)
 program example
   use, intrinsic :: iso_c_binding
   implicit none

@@ -65,9 +65,10 @@ absl::StatusOr<StreamRecorder> StreamRecorder::Create(const std::string& path,
 absl::Status StreamRecorder::Add(WatchedFrame& frame) {
   if (frame.particles.empty() && frame.frame.result.statistics.particles > 0) {
     return absl::FailedPreconditionError(
-        "--record: the stream does not echo its particles; its producer must set echo_particles, "
-        "as "
-        "`partiemc replay --echo-particles` does");
+        "--record: the producer does not send its particles to watchers; set this at the producer, "
+        "not here: `partiemc replay --echo-particles`, in Python "
+        "`partiemc.connect(..., echo_particles=True)`, in C `options.echo_particles = 1`, in C++ "
+        "`StreamOptions::outputs.echo_particles`");
   }
   if (writer_->frame_count() == 0) first_sequence_ = frame.sequence;
   missed_ += frame.dropped + frame.gap;

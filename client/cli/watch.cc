@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,9 @@ using Clock = std::chrono::steady_clock;
 
 // Poll interval for Ctrl-C while waiting for a frame.
 constexpr std::chrono::milliseconds kPollInterval(100);
+
+// Pause between two searches for a stream that has not started, in poll intervals.
+constexpr int kSearchPause = 2;
 
 FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sections_in_plane) {
   return {.index = frame.sequence - 1,  // A replay numbers its files in the same way.
@@ -138,6 +142,25 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
                         .deadline = ToMilliseconds(flags.deadline_seconds)});
 }
 
+// Opens the watch; with --wait as soon as the stream exists. While waiting, a server may restart.
+// Errors: those of Watcher::Open; CANCELLED after Ctrl-C.
+absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags) {
+  Progress::Options options = Progress::ForStandardError();
+  options.quiet = flags.quiet;
+  Progress progress(std::move(options));
+  for (bool waited = false;; waited = true) {
+    auto watcher = OpenWatcher(flags);
+    const bool absent =
+        absl::IsNotFound(watcher.status()) || (waited && absl::IsUnavailable(watcher.status()));
+    if (!flags.wait || !absent) return watcher;
+    progress.Wait(Concat("waiting for the stream to start: ", OneLine(watcher.status())));
+    for (int k = 0; k < kSearchPause; ++k) {
+      if (Interrupted()) return absl::CancelledError("interrupted");
+      std::this_thread::sleep_for(kPollInterval);
+    }
+  }
+}
+
 void PrintSummary(const Summary& summary, const Ended& ended, double seconds) {
   if (summary.frame_count() == 0) return;
   std::fputs(summary.Table(seconds).c_str(), stdout);
@@ -216,11 +239,13 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
                                        "Statistics of every frame, as CSV or JSON by extension")
                           ->type_name("FILE");
   AddGaugeFlag(*verb, flags.gauges)->needs(stats);
-  verb->add_option(
-          "--record", flags.record,
-          "Record the particles that the producer sends; a replay of FILE.pemc has the same bits. "
-          "Sets --mode every and, unless --from is given, --from oldest")
+  verb->add_option("--record", flags.record,
+                   "Record the particles that the producer sends to watchers (its "
+                   "--echo-particles); a replay "
+                   "of FILE.pemc has the same bits. "
+                   "Sets --mode every and, unless --from is given, --from oldest")
       ->type_name("FILE");
+  verb->add_flag("--wait", flags.wait, "Wait for the stream to start, until Ctrl-C");
   verb->add_flag("--quiet", flags.quiet, "No progress and no table");
   verb->footer(
       "A watcher never slows the stream. A watcher that joins late receives the newest frame at\n"
@@ -232,7 +257,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       "  partiemc watch dam-break --mode every --output-dir out --format geojson,svg\n"
       "  partiemc watch dam-break --from oldest --mode every --stats dam.csv\n"
       "  partiemc watch dam-break --frames 1 --quiet --output-dir now\n"
-      "  partiemc watch dam-break --record dam.pemc\n"
+      "  partiemc watch dam-break --wait --record dam.pemc\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
   verb->parse_complete_callback([&flags, mode] { CompleteRecording(flags, mode->count() > 0); });
   return verb;
@@ -249,7 +274,8 @@ int Watch(const WatchFlags& flags) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
-  const auto watcher = OpenWatcher(flags);
+  const auto watcher = OpenOrWait(flags);
+  if (absl::IsCancelled(watcher.status())) return Complain(kInterrupted, watcher.status());
   if (!watcher.ok()) return ComplainOfServer(watcher.status());
   std::optional<StreamRecorder> recorder;
   if (!flags.record.empty()) {

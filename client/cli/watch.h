@@ -28,6 +28,7 @@ struct WatchFlags {
   std::string stats;
   std::vector<std::string> gauges;
   std::string record;  ///< A recording to write; empty: none.
+  bool wait = false;   ///< Wait for the stream to start.
   bool quiet = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <span>
 #include <string>
@@ -107,6 +108,13 @@ absl::StatusOr<wire::AttributeRows> RowsOf(const AttributeArrays& attribute, std
 
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time) {
   const auto& [count, x, y, z, volumes, ids, vx, vy, vz, attributes] = particles;
+  if (!std::isfinite(time)) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {.reason = std::string(kReasonNotFinite),
+                           .field = "time",
+                           .value = ShortestNumber(time),
+                           .rule = "must be finite"});
+  }
   wire::FrameRows rows;
   rows.scalars = {
       .positions = std::span<const float>(), .components = z.empty() ? 2 : 3, .time = time};

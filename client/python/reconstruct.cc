@@ -52,6 +52,7 @@ class Sequence {
       status = Compute(particles.arrays(), time, *result);
     }
     RaiseUnlessOk(status);
+    WarnOfDoubts(*result, warned_);
     return result;
   }
 
@@ -92,6 +93,7 @@ class Sequence {
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::optional<Reconstructor> reconstructor_;
   std::unique_ptr<Arena> arena_;  // Null: all threads.
+  Doubts warned_;                 // With the GIL.
 
   Mutex mutex_;
   State state_ ABSL_GUARDED_BY(mutex_);

@@ -16,6 +16,7 @@
 #include "partiemc/doubt.h"
 #include "partiemc/gauges.h"
 #include "partiemc/stage.h"
+#include "wire/codec.h"
 
 namespace partiemc::python {
 namespace {
@@ -98,6 +99,15 @@ py::array Heights(const RingsView& rings, double x) {
   return py::array_t<double>(static_cast<py::ssize_t>(heights.size()), heights.data());
 }
 
+// Pickles a part of a result as an attribute of the result.
+template <typename View>
+auto Reduce(const char* attribute) {
+  return [attribute](const View& view) {
+    return py::make_tuple(py::module_::import("builtins").attr("getattr"),
+                          py::make_tuple(view.owner, attribute));
+  };
+}
+
 static_assert(offsetof(RingMeasures, centroid_y) ==
               offsetof(RingMeasures, centroid_x) + sizeof(double));
 
@@ -106,7 +116,8 @@ void DefineRings(py::module_& module) {
   py::class_<RingsView>(module, "Rings",
                         "Closed polylines as flat points and offsets, as in contourpy. All arrays "
                         "are read-only views that keep the result alive. rings[k] is the (P, 2) "
-                        "array of ring k.")
+                        "array of ring k. Pickled and copied with its result.")
+      .def("__reduce__", Reduce<RingsView>("rings"))
       .def("__len__", [](R r) { return r.part.RingCount(); })
       .def("__getitem__", &RingPoints)
       .def_property_readonly(
@@ -165,7 +176,8 @@ void DefineMesh(py::module_& module) {
   using M = const MeshView&;
   py::class_<MeshView>(module, "Mesh",
                        "Triangles that cover the inside. All arrays are read-only views that keep "
-                       "the result alive.")
+                       "the result alive. Pickled and copied with its result.")
+      .def("__reduce__", Reduce<MeshView>("mesh"))
       .def("__len__", [](M m) { return m.part.TriangleCount(); })
       .def_property_readonly(
           "points", [](M m) { return View<double>(m.part.points, 2, m.owner); },
@@ -236,7 +248,61 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
   return result.sections;
 }
 
+// The state of a pickled result: the message of the protocol, and the values that it lacks.
+py::tuple ToState(PythonResult& result) {
+  const auto& sections = SectionsOf(result);  // Leaves empty results in their places in the frame.
+  const client::FrameResult& frame = result.frame;
+  v1::ReconstructedFrame message;
+  RaiseUnlessOk(wire::EncodeResult(frame.result, {frame.times.stages_ms, frame.times.total_ms},
+                                   {.normals = true}, message));
+  message.set_sequence(result.sequence);
+  message.set_time(result.time);
+  if (result.has_digests) {
+    message.set_rings_digest(frame.rings_digest);
+    message.set_mesh_digest(frame.mesh_digest);
+  }
+  std::string bytes;
+  if (!message.SerializeToString(&bytes)) {
+    throw py::value_error("pickle: the result has more than 2 GiB");
+  }
+  return py::make_tuple(py::bytes(bytes), sections, result.particles, result.dropped, result.gap,
+                        result.rejoined);
+}
+
+std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
+  if (state.size() != 6) throw py::value_error("pickle: not the state of a partiemc Result");
+  v1::ReconstructedFrame message;
+  if (!message.ParseFromString(state[0].cast<std::string>())) {
+    throw py::value_error("pickle: the message of a partiemc Result is damaged");
+  }
+  wire::ReconstructedFrame decoded;
+  RaiseUnlessOk(wire::DecodeResult(message, decoded));
+  auto result = std::make_shared<PythonResult>();
+  result->sequence = decoded.sequence;
+  result->time = decoded.time;
+  result->frame.result = std::move(decoded.result);
+  result->frame.times = {decoded.times.stages_ms, decoded.times.total_ms};
+  result->frame.rings_digest = decoded.rings_digest;
+  result->frame.mesh_digest = decoded.mesh_digest;
+  result->sections = state[1].cast<std::vector<std::shared_ptr<PythonResult>>>();
+  result->particles = state[2].cast<std::vector<double>>();
+  result->dropped = state[3].cast<std::uint64_t>();
+  result->gap = state[4].cast<std::uint64_t>();
+  result->rejoined = state[5].cast<std::string>();
+  return result;
+}
+
 }  // namespace
+
+void WarnOfDoubts(const PythonResult& result, Doubts& warned) {
+  const Doubts doubts = result.frame.result.statistics.doubts;
+  for (const Doubt doubt : kAllDoubts) {
+    if (!doubts.Has(doubt) || warned.Has(doubt)) continue;
+    warned.Add(doubt);
+    const std::string text = std::string(Name(doubt)) + ": " + std::string(Explanation(doubt));
+    py::module_::import("partiemc._errors").attr("warn")(text);
+  }
+}
 
 std::shared_ptr<PythonResult> ResultPool::Take() {
   const auto give_back = [pool = shared_from_this()](PythonResult* result) {
@@ -257,8 +323,9 @@ void DefineResults(py::module_& module) {
   DefineRings(module);
   DefineMesh(module);
   // Views hold the object they come from, so that their memory stays valid.
-  py::class_<PythonResult, std::shared_ptr<PythonResult>>(module, "Result",
-                                                          "The result of one frame.")
+  py::class_<PythonResult, std::shared_ptr<PythonResult>>(
+      module, "Result", "The result of one frame. It can be pickled and copied.")
+      .def(py::pickle(&ToState, &FromState))
       .def_property_readonly(
           "rings",
           [](py::object self) {
@@ -293,7 +360,7 @@ void DefineResults(py::module_& module) {
       .def_property_readonly("particle_count", Statistic(&FrameStatistics::particles))
       .def_property_readonly("doubts", &DoubtsOf,
                              "Names of suspicious properties of the input, such as "
-                             "'spacing-provisional'.")
+                             "'spacing-provisional'; the first of each is a PartiemcWarning.")
       .def_property_readonly("times", &TimesOf, "Milliseconds of each stage, and 'total'.")
       .def_property_readonly(
           "rings_digest", [](PythonResult& r) { return WithDigests(r).rings_digest; },

@@ -11,6 +11,7 @@
 
 #include "common/mutex.h"
 #include "partiemc/client/frame_stream.h"
+#include "partiemc/doubt.h"
 
 namespace partiemc::python {
 
@@ -40,6 +41,10 @@ class ResultPool : public std::enable_shared_from_this<ResultPool> {
   Mutex mutex_;
   std::vector<client::FrameResult> kept_ ABSL_GUARDED_BY(mutex_);
 };
+
+/// Issues a PartiemcWarning for each doubt of the result that is not in `warned`, and adds it.
+/// Requires the GIL. Throws if warnings are errors.
+void WarnOfDoubts(const PythonResult& result, Doubts& warned);
 
 void DefineResults(pybind11::module_& module);
 

@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
@@ -34,6 +36,9 @@ using std::chrono::milliseconds;
 
 // Poll interval for Ctrl-C while waiting for a response.
 constexpr milliseconds kSlice(100);
+
+// How long `send` waits for a thread that receives, if it has seen none, and its poll interval.
+constexpr milliseconds kReceiverWait(500), kReceiverPoll(5);
 
 std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
   constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
@@ -93,6 +98,10 @@ class ProducerStream {
   }
   ~ProducerStream() {
     const py::gil_scoped_release others_may_run;
+    if (finisher_.joinable()) {
+      stream_->Cancel();
+      finisher_.join();
+    }
     latest_.reset();
     stream_.reset();
   }
@@ -107,8 +116,10 @@ class ProducerStream {
       const MutexLock lock(sending_);
       const double instant = time.value_or(static_cast<double>(frames_));
       if (latest_ != nullptr) {
-        const absl::Status offered = latest_->OfferArrays(particles.arrays(), instant);
+        const absl::Status offered = Offer(particles.arrays(), instant);
         if (!offered.ok()) sent = offered;
+      } else if (const absl::Status ready = ExpectReceiver(); !ready.ok()) {
+        sent = ready;
       } else {
         sent = stream_->SendArrays(particles.arrays(), instant);
       }
@@ -121,6 +132,7 @@ class ProducerStream {
   // None if no event arrives in time, and for an accepted part.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
+    const ReceiveMark mark(*this);
     for (;;) {
       Event event;
       event.frame = std::move(result->frame);
@@ -134,12 +146,15 @@ class ProducerStream {
       if (*received == Received::kNothingYet) return nullptr;
       if (*received == Received::kEnd) RaiseEnd();
       if (event.kind == Event::Kind::kRefusal) {
+        ++answered_;
         Raise(event.message, event.violation, event.sequence);
       }
       if (event.kind == Event::Kind::kPartTaken) return nullptr;
       if (event.kind != Event::Kind::kResult) continue;
+      ++answered_;
       result->sequence = event.sequence;
       result->time = event.time;
+      WarnOfDoubts(*result, warned_);
       return result;
     }
   }
@@ -158,8 +173,13 @@ class ProducerStream {
     {
       const py::gil_scoped_release others_may_run;
       const MutexLock lock(sending_);
-      if (!std::exchange(finished_, true)) {
-        status = latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
+      if (std::exchange(finished_, true)) return;
+      if (latest_ == nullptr) {
+        status = stream_->FinishSending();
+      } else {
+        // Waits until the newest frame is sent, so it needs a receiver: maybe the calling thread.
+        // `Receive` reports the error that ends the stream.
+        finisher_ = std::thread([this] { static_cast<void>(latest_->Finish()); });
       }
     }
     RaiseUnlessOk(status);
@@ -184,6 +204,7 @@ class ProducerStream {
       }
     }
     receiver.join();
+    if (finisher_.joinable()) finisher_.join();
   }
 
   void Cancel() {
@@ -191,7 +212,14 @@ class ProducerStream {
     stream_->Cancel();
   }
 
-  std::size_t InFlight() const { return stream_->InFlight(); }
+  // With `latest`, frames that wait to be sent count, too.
+  std::uint64_t InFlight() const {
+    if (latest_ == nullptr) return stream_->InFlight();
+    const std::uint64_t answered = answered_;
+    const client::OfferCounts counts = latest_->counts();
+    return offered_ - answered - counts.skipped - counts.refused;
+  }
+  bool IsLatest() const { return latest_ != nullptr; }
   std::size_t Window() const { return stream_->info().frames_in_flight; }
   std::string Id() const { return stream_->info().stream_id; }
   py::dict Parameters() const { return ToDict(stream_->info().parameters); }
@@ -203,11 +231,66 @@ class ProducerStream {
   }
 
  private:
+  // Marks the calling thread as the receiver.
+  class ReceiveMark {
+   public:
+    explicit ReceiveMark(ProducerStream& stream) : stream_(stream) {
+      stream_.last_receiver_ = std::this_thread::get_id();
+      ++stream_.receives_;
+    }
+    ~ReceiveMark() { --stream_.receives_; }
+    ReceiveMark(const ReceiveMark&) = delete;
+    ReceiveMark& operator=(const ReceiveMark&) = delete;
+
+   private:
+    ProducerStream& stream_;
+  };
+
+  absl::Status Offer(const client::ParticleArrays& particles, double time)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(sending_) {
+    if (finished_) return absl::FailedPreconditionError("frame: sent after finish()");
+    ++offered_;  // Before the frame can be answered.
+    absl::Status status = latest_->OfferArrays(particles, time);
+    if (!status.ok()) --offered_;
+    return status;
+  }
+
+  // Whether the calling thread is the only one that has received, or none has.
+  bool NoOtherReceives() const {
+    const std::thread::id last = last_receiver_;
+    return receives_ == 0 && (last == std::thread::id() || last == std::this_thread::get_id());
+  }
+
+  // Fails if the window is full and only the calling thread could receive: SendArrays would wait
+  // for its own caller. A thread that receives for the first time gets kReceiverWait.
+  absl::Status ExpectReceiver() const {
+    const auto until = std::chrono::steady_clock::now() + kReceiverWait;
+    while (stream_->InFlight() >= Window() && NoOtherReceives()) {
+      if (std::chrono::steady_clock::now() >= until) {
+        return ViolationError(
+            absl::StatusCode::kFailedPrecondition,
+            {.reason = "SEND_TIMEOUT",
+             .field = "frame",
+             .value = "not sent",
+             .rule =
+                 absl::StrCat("as ", Window(), " frames are in flight, the whole window, and ",
+                              "no thread receives: call receive() before send(), or use map()")});
+      }
+      std::this_thread::sleep_for(kReceiverPoll);
+    }
+    return absl::OkStatus();
+  }
+
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::unique_ptr<client::Stream> stream_;
-  std::unique_ptr<client::LatestSender> latest_;  // Destroyed before the stream.
-  std::timed_mutex receiving_;                    // Held by the receiving thread.
-  Mutex sending_;                                 // Held by the sending thread.
+  std::unique_ptr<client::LatestSender> latest_;           // Destroyed before the stream.
+  std::thread finisher_;                                   // Runs LatestSender::Finish.
+  Doubts warned_;                                          // With the GIL.
+  std::atomic<std::uint64_t> offered_ = 0, answered_ = 0;  // With `latest`; answers of any stream.
+  std::atomic<int> receives_ = 0;                          // Threads in Receive.
+  std::atomic<std::thread::id> last_receiver_;             // The default: none.
+  std::timed_mutex receiving_;                             // Held by the receiving thread.
+  Mutex sending_;                                          // Held by the sending thread.
   std::uint64_t frames_ ABSL_GUARDED_BY(sending_) = 0;
   bool finished_ ABSL_GUARDED_BY(sending_) = false;
 };
@@ -334,8 +417,9 @@ void DefineStreams(py::module_& module) {
            "Sends a frame and returns its number. The arrays (see partiemc.reconstruct) are copied "
            "once, into the message, before it returns. `time` defaults to the number of earlier "
            "frames.\n\nWaits while `window` frames are sent and not received: a program with "
-           "one thread must receive when in_flight has reached window. With latest=True it never "
-           "waits and returns None.")
+           "one thread must receive when in_flight has reached window; otherwise partiemc.Error "
+           "with reason SEND_TIMEOUT after half a second. With latest=True it never waits and "
+           "returns None.")
       .def("receive", &ProducerStream::Receive, "wait"_a = py::none(),
            "The next Result. None if no event arrives within `wait` seconds, and for each accepted "
            "part of a part other than 0. Raises partiemc.Error with a reason for a refused frame "
@@ -344,8 +428,8 @@ void DefineStreams(py::module_& module) {
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &ProducerStream::Next)
       .def("finish", &ProducerStream::Finish,
-           "Declares that no frame follows: iteration ends with the last result. With latest=True "
-           "it waits until the newest frame has been sent, so another thread must receive.")
+           "Declares that no frame follows: iteration ends with the last result. Never waits. With "
+           "latest=True the newest frame is still sent.")
       .def("cancel", &ProducerStream::Cancel, "Ends the stream at once, from any thread.")
       .def("__enter__", [](py::object self) { return self; })
       .def(
@@ -358,7 +442,10 @@ void DefineStreams(py::module_& module) {
             }
           })
       .def_property_readonly("in_flight", &ProducerStream::InFlight,
-                             "Frames sent and not yet received.")
+                             "Frames sent and not yet received. With latest=True also the newest "
+                             "frame, if it waits to be sent.")
+      .def_property_readonly("latest", &ProducerStream::IsLatest,
+                             "Whether only the newest frame is kept while the stream is busy.")
       .def_property_readonly("window", &ProducerStream::Window, "Limit of in_flight.")
       .def_property_readonly("id", &ProducerStream::Id, "The id in the server's log.")
       .def_property_readonly("parameters", &ProducerStream::Parameters,

@@ -4,10 +4,12 @@ alone, and a test of both: streams the bundled dam break to a server of its own,
 the middle, resumes, and computes every digest itself.
 
 usage: protocol_client.py --server build/release/bin/partiemc-server
-Exit code 0 if every check passed, 77 where python3-grpcio or zstd is not installed.
+Exit code 0 if every check passed, 77 where python3-grpcio or zstd is not installed. Uses the compiler
+of PyPI's grpcio-tools where it is installed (tests/outside).
 """
 import argparse
 import collections
+import importlib.util
 import pathlib
 import queue
 import re
@@ -25,16 +27,21 @@ try:
     import grpc
 except ImportError:
     sys.exit(77)
-if not shutil.which("zstd") or not shutil.which("protoc") or not pathlib.Path(PLUGIN).exists():
+COMPILER = ["protoc", f"--plugin=protoc-gen-grpc={PLUGIN}"]
+GRPC_OUT = "--grpc_out"
+if importlib.util.find_spec("grpc_tools"):
+    COMPILER, GRPC_OUT = [sys.executable, "-m", "grpc_tools.protoc"], "--grpc_python_out"
+elif not shutil.which("protoc") or not pathlib.Path(PLUGIN).exists():
+    sys.exit(77)
+if not shutil.which("zstd"):
     sys.exit(77)
 
 SECONDS = 60  # Deadline of every call and wait.
 
 
 def stubs(folder):
-    subprocess.run(["protoc", f"-I{ROOT}/proto", f"--python_out={folder}", f"--grpc_out={folder}",
-                    f"--plugin=protoc-gen-grpc={PLUGIN}", "partiemc/v1/reconstruction.proto"],
-                   check=True)
+    subprocess.run([*COMPILER, f"-I{ROOT}/proto", f"--python_out={folder}", f"{GRPC_OUT}={folder}",
+                    "partiemc/v1/reconstruction.proto"], check=True)
     sys.path.insert(0, folder)
     from partiemc.v1 import reconstruction_pb2, reconstruction_pb2_grpc
     return reconstruction_pb2, reconstruction_pb2_grpc

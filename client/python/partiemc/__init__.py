@@ -16,12 +16,12 @@ that keep the memory of their result alive.
 """
 
 from . import _convert
-from ._errors import Error
+from ._errors import Error, PartiemcWarning
 from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Watch, server, streams,
                       version as __version__)
 
-__all__ = ["Error", "Mesh", "Reconstructor", "Result", "Rings", "Stream", "Watch", "connect",
-           "read_pysph", "reconstruct", "server", "streams", "watch"]
+__all__ = ["Error", "Mesh", "PartiemcWarning", "Reconstructor", "Result", "Rings", "Stream", "Watch",
+           "connect", "read_pysph", "reconstruct", "server", "streams", "watch"]
 
 
 def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
@@ -34,11 +34,13 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     ids: (N,) integers of 32 or 64 bits; a particle has the same id in every frame.
     velocities: same shape as positions, world units per unit of time.
     attributes: particle attributes to interpolate to the vertices (Result.attributes): a dict from
-        names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}.
+        names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}. `fill` and
+        `attribute_tolerance` decide how well triangles represent them.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
     threads: number of compute threads; one per processor if None.
     placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
-    fill: "greedy", "conforming", "polygon", "grid" or "none".
+    fill: "greedy", "conforming", "polygon", "grid" or "none": the triangles, and thereby the points
+        at which attributes are given. client/python/README.md compares them.
     kernel_radius, cell_size, reference_radius: lengths in spacings.
     plane: "xy", "xz" or "yz", for (N, 3) positions.
     slice: section plane for (N, 3) positions that fill space: ("z", 0.5), or a point of the plane
@@ -56,7 +58,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         see core/include/partiemc/parameters.h.
 
     Lists and arrays of other types are converted, which copies them. Use a Reconstructor for the
-    frames of a simulation: it keeps outlines steady, tracks rings and is faster. Raises Error.
+    frames of a simulation: it keeps outlines steady, tracks rings and is faster. Raises Error. A
+    doubt, such as a wrong spacing, is a PartiemcWarning.
     """
     return Reconstructor(**parameters).reconstruct(positions, volumes=volumes, ids=ids,
                                                    velocities=velocities, attributes=attributes)
@@ -67,7 +70,7 @@ def connect(address=None, *, latest=False, **options):
 
     address: if None, the value of PARTIEMC_SERVER, or 127.0.0.1:50051.
 
-    latest: send never waits; while the stream is busy, only the newest frame is kept.
+    latest: send and map never wait to send; while the stream is busy, only the newest frame is kept.
     name: name for watchers. labels: a dict of strings, shown in lists of streams.
     attributes: attributes given to send that results have at their vertices: names; "velocity" are
         the velocities.
@@ -131,19 +134,38 @@ def read_pysph(path, *, array="fluid"):
     return _pysph.read(path, array)
 
 
-def _map(self, frames, times=None):
-    """Yields the results of `frames`, an iterable of positions, in order.
+# The arguments of Stream.send.
+_SENT = {"positions", "time", "volumes", "ids", "velocities", "attributes"}
 
-    Sends up to a window of frames ahead, in one thread. times: an iterable; 0, 1, ... if None.
-    A refused frame raises Error.
+
+def _map(self, frames, times=None):
+    """Yields the results of `frames`, an iterable, in order.
+
+    A frame is its positions, or a dict of arguments of send: {"positions": positions, "ids": ids,
+    "volumes": volumes, "velocities": velocities, "attributes": {...}, "time": time}.
+    times: an iterable, for frames without a time; 0, 1, ... if None.
+
+    Sends up to a window of frames ahead, in one thread. With latest=True it never waits to send:
+    skipped frames have no result, the last frame always has one. A refused frame raises Error.
     """
     times = None if times is None else iter(times)
-    for positions in frames:
-        while self.in_flight >= self.window:
+    for frame in frames:
+        while not self.latest and self.in_flight >= self.window:
             yield self.receive()
-        self.send(positions, None if times is None else next(times))
+        if not isinstance(frame, dict):
+            frame = {"positions": frame}
+        elif "positions" not in frame or not frame.keys() <= _SENT:
+            raise TypeError(f"map: a frame with the keys {', '.join(map(repr, frame))}; must have "
+                            f"'positions' and may have {', '.join(sorted(_SENT - {'positions'}))}")
+        if times is not None:
+            frame = {"time": next(times), **frame}
+        self.send(**frame)
+        while self.latest and (result := self.receive(wait=0)) is not None:
+            yield result
     while self.in_flight:
-        yield self.receive()
+        result = self.receive(wait=0.1 if self.latest else None)
+        if result is not None or not self.latest:  # None is the answer to a part.
+            yield result
 
 
 Stream.map = _map

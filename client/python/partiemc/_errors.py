@@ -1,3 +1,7 @@
+import sys
+import warnings
+
+
 class Error(Exception):
     """An error of PartiEMC: a refused argument or frame, or a failed stream.
 
@@ -20,3 +24,18 @@ class Error(Exception):
     def __reduce__(self):
         return type(self), (str(self), self.code, self.reason, self.field, self.value, self.rule,
                             self.sequence)
+
+
+class PartiemcWarning(UserWarning):
+    """A doubt: suspicious but legal input. README.md lists the kinds.
+
+    Each Reconstructor and Stream warns once of each kind; Result.doubts has the names in every frame.
+    """
+
+
+def warn(text):
+    """Warns at the line of the caller outside of this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, PartiemcWarning, stacklevel=level)

@@ -1,6 +1,7 @@
 // `partiemc watch --record`: records a live stream that replays to the same bits.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <chrono>
 #include <filesystem>
@@ -143,11 +144,47 @@ TEST_F(Record, BegunInTheMiddleSaysThatAReplayDiffers) {
   EXPECT_THAT(ran.out, HasSubstr("begins with frame 5: a replay lacks"));
 }
 
+TEST_F(Record, WaitsForTheStreamToStart) {
+  Program watch(PARTIEMC_PROGRAM, {"watch", "block", "--server", server_.address(), "--wait",
+                                   "--record", Path("seen.pemc")});
+  for (int k = 0; k < 1000 && watch.Running() && watch.Error().empty(); ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_THAT(watch.Error(), HasSubstr("waiting for the stream to start: "));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // Long enough for two attempts.
+  EXPECT_TRUE(watch.Running());
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles"}));
+  EXPECT_EQ(watch.Wait(), 0) << watch.Error();
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_THAT(watch.Out(), HasSubstr("recorded: 40 frames;"));
+}
+
+TEST_F(Record, WaitEndsByCtrlC) {
+  Program watch(PARTIEMC_PROGRAM, {"watch", "block", "--server", server_.address(), "--wait"});
+  for (int k = 0; k < 1000 && watch.Running() && watch.Error().empty(); ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  watch.Signal(SIGINT);
+  EXPECT_EQ(watch.Wait(), 130);
+  EXPECT_EQ(LastLine(watch.Error()), "partiemc: interrupted");
+}
+
+TEST_F(Record, WaitNeedsAServer) {
+  EXPECT_EQ(RunPartiemc({"watch", "block", "--server", "unix:/nowhere.sock", "--wait"}).exit_code,
+            4);
+  EXPECT_EQ(RunPartiemc({"watch", "block", "--server", server_.address()}).exit_code, 4);
+}
+
 TEST_F(Record, OfAStreamThatDoesNotShowItsParticlesIsRefused) {
   Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20"}));
   const Ran ran = Watch({"--record", Path("seen.pemc")});
   EXPECT_EQ(ran.exit_code, 1);
-  EXPECT_THAT(ran.error, HasSubstr("--record: the stream does not echo its particles"));
+  EXPECT_THAT(ran.error, HasSubstr("set this at the producer, not here"));
+  for (const char* way :
+       {"partiemc replay --echo-particles", "partiemc.connect(..., echo_particles=True)",
+        "options.echo_particles = 1", "outputs.echo_particles"}) {
+    EXPECT_THAT(ran.error, HasSubstr(way));
+  }
   EXPECT_FALSE(std::filesystem::exists(Path("seen.pemc")));
 }
 

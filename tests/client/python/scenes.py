@@ -64,7 +64,11 @@ class Server:
         self.folder.cleanup()
 
 
+def document(path):
+    """The text of a file of the project."""
+    return pathlib.Path(os.environ["PARTIEMC_SOURCE_DIR"], path).read_text()
+
+
 def readme():
     """The script of client/python/README.md."""
-    text = pathlib.Path(os.environ["PARTIEMC_SOURCE_DIR"], "client/python/README.md").read_text()
-    return text.split("```python\n")[1].split("```")[0]
+    return document("client/python/README.md").split("```python\n")[1].split("```")[0]

@@ -1,20 +1,23 @@
 """The core in this process: arrays in, views out."""
 
 import contextlib
+import copy
 import gc
 import io
 import pickle
+import re
 import subprocess
 import sys
 import tempfile
 import threading
 import tracemalloc
 import unittest
+import warnings
 
 import numpy
 import partiemc
 
-from scenes import ball, block, digests, digests_of_replay
+from scenes import ball, block, digests, digests_of_replay, document
 
 
 class Layouts(unittest.TestCase):
@@ -236,6 +239,89 @@ class Results(unittest.TestCase):
             tracemalloc.stop()
         self.assertEqual(len(seen), 3)
 
+    def assert_equal(self, one, other):
+        """Equal in every public property."""
+        for name in ("sequence", "time", "area", "perimeter", "spacing", "cell_size", "doubts", "times",
+                     "particle_count", "rings_digest", "mesh_digest", "dropped", "gap", "rejoined"):
+            self.assertEqual(getattr(one, name), getattr(other, name), name)
+        for part, names in (("rings", "points offsets outer_of normals area perimeter centroids "
+                             "particle_counts identities parents parent_offsets"),
+                            ("mesh", "points triangles classes")):
+            for name in names.split():
+                mine, its = (getattr(getattr(each, part), name) for each in (one, other))
+                self.assertEqual((mine.dtype, mine.tolist()), (its.dtype, its.tolist()), name)
+        self.assertEqual(one.particles.tolist(), other.particles.tolist())
+        self.assertEqual({name: values.tolist() for name, values in one.attributes.items()},
+                         {name: values.tolist() for name, values in other.attributes.items()})
+        self.assertEqual(len(one.sections), len(other.sections))
+        for mine, its in zip(one.sections, other.sections):
+            self.assert_equal(mine, its)
+
+    def test_they_pickle_and_copy(self):
+        particles = block()
+        x, y = particles.T
+        sequence = partiemc.Reconstructor(spacing=1, sections=[{"isovalue": 0.3}])
+        sequence.reconstruct(particles, 0.5)
+        result = sequence.reconstruct(particles, 1.5, attributes={"p": x, "v": (y, x)})
+        for fresh in (True, False):  # Sections as Python objects are made at the first access.
+            again = pickle.loads(pickle.dumps(result))
+            self.assert_equal(again, result)
+            self.assertIs(again.rings.points.base, again)
+        for copied in (copy.copy(result), copy.deepcopy(result), pickle.loads(pickle.dumps(again))):
+            self.assert_equal(copied, result)
+        for part in ("rings", "mesh"):
+            mine = getattr(result, part)
+            for its in (pickle.loads(pickle.dumps(mine)), copy.copy(mine), copy.deepcopy(mine)):
+                self.assertEqual(its.points.tolist(), mine.points.tolist())
+        state = result.__getstate__()
+        for damaged in (state[:5], (state[0][:-1], *state[1:])):
+            with self.assertRaises(ValueError):
+                result.__class__.__new__(result.__class__).__setstate__(damaged)
+        for outline in (partiemc.reconstruct(particles, spacing=1, fill="none", attributes={"p": x}),
+                        partiemc.reconstruct(particles[:0], spacing=1)):
+            self.assert_equal(pickle.loads(pickle.dumps(outline)), outline)
+
+    def test_fills_have_attributes_as_the_readme_says(self):
+        table = re.findall(r'^\| `"(\w+)"`.*?\| at `(\w+)\.points`(.*?) \| (.*?) \|$',
+                           document("client/python/README.md"), re.MULTILINE)
+        self.assertEqual([row[0] for row in table],
+                         ["greedy", "conforming", "polygon", "grid", "none"])
+        particles = block(side=60)
+
+        def wave(points):
+            return numpy.sin(points[:, 0] / 6) * numpy.cos(points[:, 1] / 8)
+
+        errors, triangles = {}, {}
+        for fill, part, more, interpolates in table:
+            result = partiemc.reconstruct(particles, spacing=1, fill=fill,
+                                          attributes={"wave": wave(particles)})
+            at = getattr(result, part).points
+            self.assertEqual(result.attributes["wave"].shape, (len(at),))
+            if "equal to `rings.points`" in more:
+                self.assertEqual(at.tolist(), result.rings.points.tolist())
+            if fill == "none":
+                self.assertEqual(len(result.mesh), 0)
+                continue
+            triangles[fill] = len(result.mesh)
+            corners = at[result.mesh.triangles]
+            sides = corners[:, 1:] - corners[:, :1]
+            area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+            found = result.attributes["wave"][result.mesh.triangles].mean(axis=1)
+            errors[fill] = numpy.average(abs(found - wave(corners.mean(axis=1))), weights=area)
+            try:
+                from matplotlib.tri import TrapezoidMapTriFinder
+            except ImportError:
+                continue
+            if interpolates == "no":
+                with self.assertRaises(RuntimeError):
+                    TrapezoidMapTriFinder(result.mesh.to_triangulation())
+            else:
+                TrapezoidMapTriFinder(result.mesh.to_triangulation())
+        self.assertLess(3 * max(errors["greedy"], errors["grid"]),
+                        min(errors["conforming"], errors["polygon"]))
+        self.assertLess(triangles["polygon"], triangles["grid"])
+        self.assertLess(triangles["greedy"], triangles["grid"])
+
     def test_no_particles_are_an_empty_result(self):
         result = partiemc.reconstruct(numpy.zeros((0, 2)), spacing=1)
         self.assertEqual((len(result.rings), len(result.mesh)), (0, 0))
@@ -374,6 +460,10 @@ class Errors(unittest.TestCase):
         self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count, 3)))
         self.assert_refused("COUNT", "velocities", velocities=numpy.zeros((count - 1, 2)))
         self.assert_refused("OUT_OF_RANGE", "parameters.spacing", spacing=-1)
+        for time in (numpy.nan, numpy.inf, -numpy.inf):
+            with self.assertRaises(partiemc.Error) as caught:
+                partiemc.Reconstructor(spacing=1).reconstruct(block(), time)
+            self.assertEqual((caught.exception.reason, caught.exception.field), ("NOT_FINITE", "time"))
         self.assert_refused("UNSUPPORTED", "slice", slice=("w", 1))
         self.assert_refused("UNSUPPORTED", "slice", slice=((0, 0), (0, 0, 1)))
         self.assert_refused("UNSUPPORTED", "slice", slice=3)
@@ -406,6 +496,50 @@ class Errors(unittest.TestCase):
             partiemc.reconstruct(block(), spaceing=1)
         with self.assertRaisesRegex(TypeError, "spacing"):
             partiemc.reconstruct(block(), spacing="wide")
+
+
+class Doubts(unittest.TestCase):
+    def doubts_of(self, call):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            result = call()
+        for one in caught:
+            self.assertIs(one.category, partiemc.PartiemcWarning)
+            self.assertEqual(one.filename, __file__)
+        kinds = [str(one.message).split(":")[0] for one in caught]
+        return result, kinds
+
+    def test_each_kind_warns_once(self):
+        sequence = partiemc.Reconstructor(spacing=9)
+        result, kinds = self.doubts_of(lambda: sequence.reconstruct(block()))
+        self.assertEqual(kinds, ["spacing-contradicted"])
+        self.assertEqual(result.doubts, kinds)
+        small = numpy.full(len(block()), 1e-3)
+        result, kinds = self.doubts_of(lambda: sequence.reconstruct(block(), volumes=small))
+        self.assertEqual(kinds, ["volumes-contradict-spacing"])
+        self.assertEqual(result.doubts, ["spacing-contradicted", "volumes-contradict-spacing"])
+        _, kinds = self.doubts_of(lambda: sequence.reconstruct(block(), volumes=small))
+        self.assertEqual(kinds, [])
+        _, kinds = self.doubts_of(lambda: partiemc.reconstruct(block(), spacing=9))
+        self.assertEqual(kinds, ["spacing-contradicted"])
+        _, kinds = self.doubts_of(lambda: partiemc.reconstruct(block(), spacing=1))
+        self.assertEqual(kinds, [])
+
+    def test_a_warning_can_be_an_error(self):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", partiemc.PartiemcWarning)
+            with self.assertRaises(partiemc.PartiemcWarning):
+                partiemc.reconstruct(block(), spacing=9)
+
+    def test_the_readme_lists_every_kind(self):
+        header = document("core/include/partiemc/doubt.h")
+        kinds = re.search(r"enum class Doubt.*?};", header, re.DOTALL).group()
+        names = [re.sub("(?<!^)([A-Z])", r"-\1", name).lower()
+                 for name in re.findall(r"^  k(\w+),$", kinds, re.MULTILINE)]
+        self.assertEqual(len(names), 4)
+        readme = document("client/python/README.md")
+        self.assertIn("PartiemcWarning", readme)
+        self.assertEqual([name for name in names if f"| `{name}` |" not in readme], [])
 
 
 class Threads(unittest.TestCase):

@@ -1,12 +1,15 @@
 """Streams to a real server."""
 
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 import tracemalloc
 import unittest
+import warnings
 
 import numpy
 import partiemc
@@ -82,6 +85,75 @@ class Streams(unittest.TestCase):
         self.assertEqual(results[3].rings.normals.shape, results[3].rings.points.shape)
         lengths = numpy.hypot(*results[3].rings.normals.T)
         self.assertLess(abs(lengths - 1).max(), 1e-5)
+
+    def test_map_takes_dicts_of_arrays(self):
+        ids = numpy.arange(len(block()))
+        frames = [{"positions": block(0.3 * k), "ids": ids, "volumes": numpy.full(len(ids), 1.1),
+                   "velocities": numpy.full((len(ids), 2), 0.3), "attributes": {"p": 1.0 * ids},
+                   "time": 2.0 * k} for k in range(6)]
+        here = partiemc.Reconstructor(spacing=1)
+        expected = [here.reconstruct(**frame) for frame in frames]
+        with partiemc.connect(self.address, spacing=1, attributes=["p"]) as stream:
+            results = list(stream.map(frames))
+            for result, one in zip(results, expected):
+                self.assertEqual(digests(result), digests(one))
+                self.assertEqual(result.time, one.time)
+                self.assertTrue((result.rings.identities == one.rings.identities).all())
+                self.assertTrue((result.attributes["p"] == one.attributes["p"]).all())
+            self.assertEqual(len(results), 6)
+            untimed = [{"positions": block(), "attributes": {"p": ids}}, frames[1]]
+            self.assertEqual([result.time for result in stream.map(untimed, [70, 80])], [70, 2])
+            for wrong in ({"positions": block(), "id": ids}, {"ids": ids}):
+                with self.assertRaisesRegex(TypeError, "'positions'.*volumes"):
+                    list(stream.map([wrong]))
+
+    def test_a_full_window_that_nobody_empties_is_refused_within_a_second(self):
+        with partiemc.connect(self.address, spacing=1) as stream:
+            for received in (False, True):
+                start = time.monotonic()
+                with self.assertRaises(partiemc.Error) as caught:
+                    for k in range(8 * stream.window):
+                        stream.send(block(0.1 * k))
+                self.assertLess(time.monotonic() - start, 1)
+                self.assertEqual(caught.exception.reason, "SEND_TIMEOUT")
+                self.assertIn("receive()", str(caught.exception))
+                self.assertEqual(stream.in_flight, stream.window)
+                while stream.in_flight:
+                    stream.receive()
+            self.assertEqual(len(list(stream.map([block()] * 9))), 9)  # The stream continues.
+            stream.finish()
+
+    def test_a_sender_waits_for_a_slow_receiver(self):
+        with partiemc.connect(self.address, spacing=1) as stream:
+            def send():
+                for k in range(3 * stream.window):
+                    stream.send(block(0.1 * k))
+                stream.finish()
+
+            sender = threading.Thread(target=send)
+            sender.start()
+            stream.receive()
+            time.sleep(0.8)  # Longer than a sender waits for a first receiver.
+            self.assertEqual(len(list(stream)), 3 * stream.window - 1)
+            sender.join()
+
+    def test_time_must_be_finite(self):
+        for latest in (False, True):
+            with partiemc.connect(self.address, spacing=1, latest=latest) as stream:
+                with self.assertRaises(partiemc.Error) as caught:
+                    stream.send(block(), numpy.nan)
+                self.assertEqual(caught.exception.field, "time")
+                self.assertEqual(caught.exception.reason, "NOT_FINITE")
+                self.assertEqual([result.time for result in stream.map([block()], [7])], [7])
+
+    def test_doubts_warn_once_per_stream(self):
+        with partiemc.connect(self.address, spacing=9) as stream:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                results = [result.doubts for result in stream.map([block()] * 3)]
+        self.assertEqual(results, [["spacing-contradicted"]] * 3)
+        self.assertEqual([one.category for one in caught], [partiemc.PartiemcWarning])
+        self.assertEqual(caught[0].filename, __file__)
 
     def test_parts_of_several_connections_make_whole_frames(self):
         frames = [block(0.3 * k) for k in range(12)]
@@ -179,6 +251,40 @@ class Streams(unittest.TestCase):
         self.assertEqual(digests(results[0]), digests(partiemc.reconstruct(frames[int(
             results[0].time)], spacing=1)))
 
+    def test_latest_maps_to_the_results_of_the_frames_that_were_sent(self):
+        frames = [block(0.1 * k, side=60) for k in range(40)]
+        with partiemc.connect(self.address, spacing=1, latest=True) as stream:
+            results = list(stream.map(frames, range(40)))
+            counts = stream.counts
+            self.assertEqual(stream.in_flight, 0)
+            self.assertEqual(counts["sent"] + counts["skipped"], 40)
+            self.assertEqual(len(results), counts["sent"])
+            self.assertEqual(results[-1].time, 39)
+            self.assertEqual(digests(results[0]),
+                             digests(partiemc.reconstruct(frames[int(results[0].time)], spacing=1)))
+            self.assertEqual([result.time for result in stream.map([frames[0]], [50])], [50])
+            with self.assertRaises(partiemc.Error):
+                list(stream.map([numpy.full((3, 2), numpy.nan)]))
+
+    def test_latest_finishes_without_a_receive(self):
+        for received in (True, False):
+            with partiemc.connect(self.address, spacing=1, latest=True) as stream:
+                last = 2 * stream.window
+                for k in range(last + 1):
+                    stream.send(block(0.1 * k), k)
+                    time.sleep(0.02)  # Fills the window: most frames are sent, the last one waits.
+                self.assertEqual(stream.in_flight, stream.window + 2)
+                start = time.monotonic()
+                stream.finish()
+                self.assertLess(time.monotonic() - start, 1)
+                stream.finish()  # Again does nothing.
+                with self.assertRaisesRegex(partiemc.Error, "finish"):
+                    stream.send(block())
+                if received:
+                    times = [result.time for result in stream]
+                    self.assertEqual(times[-1], last)
+                    self.assertEqual(len(times), stream.counts["sent"])
+
     def test_frames_that_nobody_receives_arrive_at_the_end_of_with(self):
         for latest in (False, True):
             seen = []
@@ -207,6 +313,9 @@ class Streams(unittest.TestCase):
                     self.assertTrue((seen.particles == block(0.3 * k)).all())
                     self.assertIs(seen.particles.base, seen)
                     self.assertEqual((seen.dropped, seen.gap, seen.rejoined), (0, 0, ""))
+                    again = pickle.loads(pickle.dumps(seen))
+                    self.assertEqual((digests(again), again.particles.tolist()),
+                                     (digests(seen), seen.particles.tolist()))
                 stream.finish()
                 self.assertEqual(list(watch), [])
                 self.assertEqual(watch.end, "FINISHED")

@@ -187,9 +187,10 @@ void partiemc_set_float64(partiemc_particles* particles, const double* coordinat
 
 /* ---- Sending ---- */
 
-/* Sends a frame. Waits while partiemc_window frames are sent and not yet received; with `latest` it
- * never waits. Stores the frame's number (0 with `latest`) in `sequence`, which may be NULL.
- * Errors: see partiemc_error. DEADLINE_EXCEEDED if no thread receives. */
+/* Sends a frame; `time` is finite. Waits while partiemc_window frames are sent and not yet
+ * received; with `latest` it never waits. Stores the frame's number (0 with `latest`) in
+ * `sequence`, which may be NULL. Errors: see partiemc_error. DEADLINE_EXCEEDED if no thread
+ * receives. */
 partiemc_code partiemc_send(partiemc_stream* stream, const partiemc_particles* particles,
                             double time, uint64_t* sequence);
 

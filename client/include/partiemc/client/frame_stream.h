@@ -104,7 +104,7 @@ class FrameStream {
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
 
   /// Same as Send for arrays with arbitrary strides. Errors: also INVALID_ARGUMENT with a Violation
-  /// (reason COUNT) if a coordinate is missing.
+  /// if a coordinate is missing (reason COUNT) or the time is not finite (NOT_FINITE).
   virtual absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles,
                                                    double time) = 0;
 

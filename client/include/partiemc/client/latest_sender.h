@@ -54,8 +54,8 @@ class LatestSender {
   /// Copies the frame and returns. Never waits for the stream.
   /// Errors: the status that ended the stream; FAILED_PRECONDITION after Finish.
   absl::Status Offer(const Frame& frame, double time);
-  /// Same as Offer for arrays with arbitrary strides. Errors: also INVALID_ARGUMENT with a
-  /// Violation (reason COUNT) if a coordinate is missing; such an offer is not counted.
+  /// Same as Offer for arrays with arbitrary strides. Errors: also those of
+  /// FrameStream::SendArrays for the arrays and the time; such an offer is not counted.
   absl::Status OfferArrays(const ParticleArrays& particles, double time);
 
   /// Waits until the newest frame has been sent, then calls FinishSending on the stream. Errors:
