@@ -9,6 +9,12 @@ export const STAGES = [
 /** Frames since the start of a track. */
 export interface Counts { received: number; drawn: number; dropped: number }
 
+/** Rings and holes, by the sign of their areas. */
+export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
+  const holes = areas.filter((area) => area < 0).length;
+  return { rings: areas.length - holes, holes };
+}
+
 /** `counts`: null for a frame fetched from the server's history. */
 export function summarise(frame: ReconstructedFrame, counts: Counts | null): Summary {
   const statistics = frame.statistics;
@@ -16,7 +22,7 @@ export function summarise(frame: ReconstructedFrame, counts: Counts | null): Sum
     (name) => statistics?.stages.find(({ stage }) => stage === name)?.milliseconds ?? 0);
   return {
     area: statistics?.area ?? 0,
-    rings: frame.rings?.measures.length ?? 0,
+    ...ringCounts(frame.rings?.measures.map(({ area }) => area) ?? []),
     triangles: Number(statistics?.triangles ?? 0),
     trianglesGrid: Number(statistics?.trianglesGrid ?? 0),
     milliseconds: statistics?.milliseconds ?? 0,
