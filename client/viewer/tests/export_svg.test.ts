@@ -139,7 +139,7 @@ test('particles have the colours of an attribute', () => {
   assert.ok(text.includes(stops[0]) && text.includes(stops[stops.length - 1]));
   assert.ok(text.includes(hex(theme(false).missing)), 'NaN is grey');
   assert.ok(!text.includes(hex(theme(false).particle)));
-  assert.equal(count(text, /h0/g), particles.length / 2);
+  assert.equal(count(text, /h0/g), particles.length, 'rims and dots');
   const grey = draw({ particles: true, colour: 'x', map: 'grey' }, frame);
   assert.ok(grey.includes(rampStops({ dark: false, map: 'grey' })[0]) && !grey.includes(stops[0]));
 });

@@ -16,7 +16,7 @@ const MARGIN = 10;
 const BAR_WIDTH = 160;
 const BAR_HEIGHT = 8;
 /** Rectangles of the legend's bar per colour. */
-const STEPS_PER_STOP = 8;
+const STEPS_PER_STOP = 10;
 
 /** Caption, scale and legend. `caption`: name, frame and time of the picture. */
 export function marksOf(

@@ -147,7 +147,9 @@ function dots(
     const colour = colourAt(extent, values[k], look);
     paths.set(colour, (paths.get(colour) ?? '') + dotPath(particles.subarray(2 * k, 2 * k + 2), at));
   }
-  return Array.from(paths, ([colour, path]) => stroke(path, colour, diameter, PARTICLE_ALPHA));
+  const rim = line(dotPath(particles, at), theme(look.dark).background, diameter, PARTICLE_ALPHA);
+  const dot = diameter > 4 ? diameter - 1.5 : diameter;
+  return [rim, ...Array.from(paths, ([colour, path]) => stroke(path, colour, dot, PARTICLE_ALPHA))];
 }
 
 /** Colour of a number, in steps. */

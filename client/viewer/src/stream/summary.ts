@@ -1,4 +1,5 @@
 import type { ReconstructedFrame } from '@proto/v1/reconstruction_pb';
+import type { Frame } from '../protocol/frame';
 import type { Summary } from './history';
 
 /** Names of the stages in statistics. */
@@ -13,6 +14,15 @@ export interface Counts { received: number; drawn: number; dropped: number }
 export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
   const holes = areas.filter((area) => area < 0).length;
   return { rings: areas.length - holes, holes };
+}
+
+/** Figures of a frame that is no entry of a history: of other settings, or of a section. */
+export function summaryOf({ statistics, rings }: Frame): Summary {
+  const { area, triangles, trianglesGrid, milliseconds } = statistics;
+  return {
+    area, ...ringCounts([...rings.area]), triangles, trianglesGrid, milliseconds,
+    stages: STAGES.map(() => NaN), received: NaN, drawn: NaN, dropped: NaN, latency: NaN,
+  };
 }
 
 /** `counts`: null for a frame fetched from the server's history. */

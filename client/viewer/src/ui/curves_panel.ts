@@ -89,6 +89,9 @@ export class CurvesPanel {
   private track: Track | null = null;
   private lastRefresh = -Infinity;
   private position = NaN;
+  /** Figures under the picture, and their text when the captions were written. */
+  private shown: Summary | null = null;
+  private captioned: string | null = null;
   /** Index of the entry under the pointer. */
   private hovered: number | null = null;
   private colours = COLOURS.light;
@@ -114,7 +117,14 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  refresh(track: Track | null, now: number): void {
+  /** `shown`: the figures under the picture. */
+  refresh(track: Track | null, shown: Summary | null, now: number): void {
+    const frame = shown && JSON.stringify(shown);
+    if (frame !== this.captioned && this.hovered === null) {
+      this.captioned = frame;
+      this.shown = shown;
+      this.showCaptions();
+    }
     if (now - this.lastRefresh < REFRESH_MS) return;
     this.lastRefresh = now;
     this.track = track;
@@ -125,10 +135,9 @@ export class CurvesPanel {
     this.showCaptions();
   }
 
-  /** The values at the pointer, or else at the current frame, in the colours of the lines. */
+  /** The values at the pointer, or else those under the picture, in the colours of the lines. */
   private showCaptions(): void {
-    const entry = this.hovered === null ? this.track?.entryAt(this.position) : this.entries[this.hovered];
-    const summary = entry?.summary ?? null;
+    const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     this.curves.forEach(({ title, lines, isWide, total }, k) => {
       const parts: (Node | string)[] = [title];
       if (total && summary) parts.push(' ', make('b', {}, milliseconds(total(summary))));
@@ -157,6 +166,7 @@ export class CurvesPanel {
       width: Math.max(60, holder.clientWidth),
       height: Math.max(40, holder.clientHeight),
       legend: { show: false },
+      padding: [6, 8, 0, 0],
       cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
       scales: {
         x: { time: false },
@@ -165,7 +175,10 @@ export class CurvesPanel {
       axes: [
         {
           ...axis, size: 16, gap: 1, splits: (_, __, min, max) => ticks(min, max),
-          values: (_, all) => all.map((tick) => number(tick, Math.max(5, tickDigits(all)))),
+          values: (self, all) => {
+            const every = self.bbox.width / devicePixelRatio / all.length < 36 ? 2 : 1;  // Labels would overlap.
+            return all.map((tick, k) => (k % every === 0 ? number(tick, Math.max(5, tickDigits(all))) : ''));
+          },
         },
         {
           ...axis, size: 48, gap: 2, splits: (_, __, min, max) => ticks(min, max),

@@ -2,11 +2,12 @@ import { attachNavigation, Scene, type Look, type Picked } from '../draw';
 import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
-import type { Entry } from '../stream/history';
+import type { Entry, Summary } from '../stream/history';
 import {
   FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
 } from '../stream/settings';
 import type { Method, Track } from '../stream/track';
+import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
 import { make, setText } from './dom';
 import { count, number } from './format';
@@ -135,6 +136,13 @@ export class Pane {
     this.scene.view = { ...view };
     this.isFree = false;
     this.dirty = true;
+  }
+
+  /** Figures of the frame shown; null without one. */
+  get summary(): Summary | null {
+    if (!this.frame) return null;
+    const isEntry = this.shown !== null && 'summary' in this.shown && (this.look?.outlineShown ?? 0) === 0;
+    return isEntry ? (this.shown as Entry).summary : summaryOf(this.frame);
   }
 
   /** The outlines of the frame. */

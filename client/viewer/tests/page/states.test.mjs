@@ -127,7 +127,7 @@ test('the most severe state is in the status line, with its picture', async () =
   await reference.fill('7');
   await reference.blur();
   await becomes('Refused', 1);
-  await viewer.pane(0).locator('canvas').click();
+  await viewer.pane(0).locator('canvas').focus();
   await until('the first picture is chosen', async () =>
     await viewer.pane(0).evaluate((element) => element.classList.contains('active')));
   assert.match(await viewer.status(), /^Picture 2: .*reference_radius/);

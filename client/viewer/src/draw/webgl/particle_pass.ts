@@ -21,13 +21,18 @@ void main() {
 const FRAGMENT = `
 uniform float diameter;
 uniform vec4 ink;
+uniform vec4 ground;   // Rim of a dot that has the colour of its surroundings.
 flat in float value;
 out vec4 colour;
 
 void main() {
   float away = length(gl_PointCoord - 0.5) * (diameter + 2.0);
   float alpha = ink.a * clamp(0.5 * diameter + 0.5 - away, 0.0, 1.0);
-  vec3 base = byAttribute ? attributeColour(value).rgb : ink.rgb;
+  vec3 base = ink.rgb;
+  if (byAttribute) {
+    float inside = clamp(0.5 * diameter - 0.75 - away, 0.0, 1.0);
+    base = mix(ground.rgb, attributeColour(value).rgb, diameter > 4.0 ? inside : 1.0);
+  }
   colour = vec4(base * alpha, alpha);
 }
 `;
@@ -51,6 +56,7 @@ export class ParticlePass {
     program.attribute(
       textures.hasParticleColours ? attribute : null, textures.particleNumbers, textures.ramp);
     program.number('diameter', diameter);
+    program.colour('ground', theme(dark).background);
     program.colour('ink', theme(dark).particle, PARTICLE_ALPHA);
     this.gl.drawArrays(this.gl.POINTS, 0, count);
   }
