@@ -55,6 +55,8 @@ const COLOURS = {
   dark: ['#6bb5ff', '#fb923c', '#4ade80', '#c084fc', '#facc15', '#f472b6', '#2dd4bf', '#aab4c4', '#a3e635'],
 };
 const REFRESH_MS = 300;
+/** Width of a digit on an axis. */
+const LABEL_PIXELS = 6;
 
 /** Values of the lines at each entry; null for gaps. Bands are sums from the top band down. */
 function valuesOf({ lines, total }: Curve, entries: readonly (Entry | null)[]): (number | null)[][] {
@@ -176,8 +178,10 @@ export class CurvesPanel {
         {
           ...axis, size: 16, gap: 1, splits: (_, __, min, max) => ticks(min, max),
           values: (self, all) => {
-            const every = self.bbox.width / devicePixelRatio / all.length < 36 ? 2 : 1;  // Labels would overlap.
-            return all.map((tick, k) => (k % every === 0 ? number(tick, Math.max(5, tickDigits(all))) : ''));
+            const texts = all.map((tick) => number(tick, Math.max(5, tickDigits(all))));
+            const widest = LABEL_PIXELS * (1 + Math.max(...texts.map(({ length }) => length)));
+            const isNarrow = self.bbox.width / devicePixelRatio / all.length < widest;
+            return texts.map((text, k) => (isNarrow && k % 2 === 1 ? '' : text));
           },
         },
         {
