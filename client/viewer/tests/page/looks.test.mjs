@@ -38,7 +38,7 @@ for (const colorScheme of ['light', 'dark']) {
         await viewer.page.getByLabel('Fill', { exact: true }).selectOption('grid');
         await viewer.page.getByLabel('Mesh edges').check();
         await viewer.page.getByLabel('Particles', { exact: true }).check();
-        await viewer.page.getByLabel('Colour').selectOption('identity');
+        await viewer.page.getByLabel('Colour', { exact: true }).selectOption('identity');
         await until('the other fill', async () => await viewer.value('fill', 1) === 'grid' &&
           await viewer.value('triangles', 1) === await viewer.value('grid', 1));
         await viewer.page.mouse.move(width * 0.45, 300);

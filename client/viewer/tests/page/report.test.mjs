@@ -114,7 +114,7 @@ for (const colorScheme of ['light', 'dark']) {
   test(`colours and isolines of an attribute (${colorScheme})`, () =>
     inReport('discs.html', { colorScheme }, async (report) => {
       const { page } = report;
-      assert.equal(await page.getByLabel('Colour').inputValue(), 'p');
+      assert.equal(await page.getByLabel('Colour', { exact: true }).inputValue(), 'p');
       assert.match(await page.locator('#legend-min').textContent(), /^-1(\.0\d+)?$/);
       assert.deepEqual(await violations(page), []);
       await page.screenshot({ path: path.join(screenshots, `report_${colorScheme}.png`), fullPage: true });
