@@ -154,7 +154,7 @@ class Report {
     player.tick(now);
     this.pane.refresh(now);
     this.time.refresh();
-    this.curves.refresh(this.track, this.pane.summary, now);
+    this.curves.refresh(this.track, this.pane.summary, this.pane.isStreamed, now);
     this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl);
     this.look.setOutlines(this.track.outlines);
     this.look.setLegend(this.pane.scene.legend());

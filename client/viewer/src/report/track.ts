@@ -138,7 +138,7 @@ export class ReportTrack implements Track {
     const colors = numbers.colors ? { name: this.color, ranges: numbers.colors } : null;
     const { sections, ...geometry } = decodeGeometry(this.geometryOf(sequence - 1), colors);
     const frame: Frame = {
-      ...geometry, sequence: BigInt(sequence), time: orNaN(numbers.time),
+      ...geometry, particles: geometry.particles.length > 0 ? geometry.particles : null, sequence: BigInt(sequence), time: orNaN(numbers.time),
       rings: measured(geometry.rings, numbers.measures), sections: [], isolines: [],
       statistics: this.statistics(numbers),
       ringsDigest: BigInt(`0x${numbers.rings_digest}`), meshDigest: BigInt(`0x${numbers.mesh_digest}`),

@@ -271,7 +271,7 @@ export class App {
     this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.scene.legend() ?? null);
     this.time.refresh();
-    this.curves.refresh(this.track, pane?.summary ?? null, now);
+    this.curves.refresh(this.track, pane?.summary ?? null, pane?.isStreamed ?? true, now);
     this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,
       this.track, now);
   }

@@ -93,7 +93,8 @@ export class CurvesPanel {
   private position = NaN;
   /** Figures under the picture, and their text when the captions were written. */
   private shown: Summary | null = null;
-  private captioned: string | null = null;
+  private note = '';
+  private captioned = '';
   /** Index of the entry under the pointer. */
   private hovered: number | null = null;
   private colours = COLOURS.light;
@@ -119,12 +120,13 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  /** `shown`: the figures under the picture. */
-  refresh(track: Track | null, shown: Summary | null, now: number): void {
-    const frame = shown && JSON.stringify(shown);
+  /** `shown`: the figures under the picture. `isStreamed`: whether they are points of the curves. */
+  refresh(track: Track | null, shown: Summary | null, isStreamed: boolean, now: number): void {
+    const frame = JSON.stringify([shown, isStreamed]);
     if (frame !== this.captioned && this.hovered === null) {
       this.captioned = frame;
       this.shown = shown;
+      this.note = isStreamed ? '' : ' (line: as streamed)';
       this.showCaptions();
     }
     if (now - this.lastRefresh < REFRESH_MS) return;
@@ -141,7 +143,7 @@ export class CurvesPanel {
   private showCaptions(): void {
     const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     this.curves.forEach(({ title, lines, isWide, total }, k) => {
-      const parts: (Node | string)[] = [title];
+      const parts: (Node | string)[] = [title + (this.hovered === null ? this.note : '')];
       if (total && summary) parts.push(' ', make('b', {}, milliseconds(total(summary))));
       lines.forEach((line, i) => {
         const value = summary && (!total || this.isDetailed) ? line.text(line.value(summary)) : '';
@@ -176,7 +178,7 @@ export class CurvesPanel {
       },
       axes: [
         {
-          ...axis, size: 16, gap: 1, splits: (_, __, min, max) => ticks(min, max),
+          ...axis, size: 19, gap: 4, splits: (_, __, min, max) => ticks(min, max),
           values: (self, all) => {
             const texts = all.map((tick) => number(tick, Math.max(5, tickDigits(all))));
             const widest = LABEL_PIXELS * (1 + Math.max(...texts.map(({ length }) => length)));

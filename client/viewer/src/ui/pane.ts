@@ -141,8 +141,15 @@ export class Pane {
   /** Figures of the frame shown; null without one. */
   get summary(): Summary | null {
     if (!this.frame) return null;
-    const isEntry = this.shown !== null && 'summary' in this.shown && (this.look?.outlineShown ?? 0) === 0;
-    return isEntry ? (this.shown as Entry).summary : summaryOf(this.frame);
+    return this.entry?.summary ?? summaryOf(this.frame);
+  }
+
+  /** Whether the frame shown is one of the track, and not of other settings or a section. */
+  get isStreamed(): boolean { return this.frame === null || this.entry !== null; }
+
+  private get entry(): Entry | null {
+    const isOwn = this.frame !== null && (this.frame === this.whole || (this.look?.outlineShown ?? 0) === 0);
+    return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
   }
 
   /** The outlines of the frame. */

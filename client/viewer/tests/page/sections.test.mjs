@@ -106,10 +106,10 @@ for (const colorScheme of ['light', 'dark']) {
     const viewer = await Viewer.open(browser, pathToFileURL(report).href, { colorScheme, hash: '#frame=1' });
     try {
       await until('a frame is shown', () => viewer.value('rings-digest'));
+      assert.ok(await viewer.page.getByLabel('Particles', { exact: true }).isDisabled(),
+                'particles in space are not drawn as if they were in the plane');
       const digests = await showsAll(viewer, 'report', colorScheme);
       assert.deepEqual(digests, truth);
-      assert.ok(await viewer.page.getByLabel('Particles', { exact: true }).isDisabled(),
-                'particles of a section are not drawn as if they were in its plane');
       assert.deepEqual(viewer.errors, []);
     } finally {
       await viewer.close();
