@@ -98,7 +98,7 @@ export class LookPanel {
     const label = make('label', {}, box, swatch, name + note);
     label.title = index === shown ? 'This outline is the picture.'
       : isParallel ? `Draws ${name} as lines.`
-        : 'Its plane is not parallel to the plane of the picture. Choose it under "Picture of".';
+        : 'Its plane is not parallel to the plane of the picture, so choose it under "Picture of".';
     return make('li', {}, label);
   }
 

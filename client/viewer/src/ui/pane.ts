@@ -46,7 +46,7 @@ export class Pane {
   private shownText = '';
   /** Why the frame of the track is refused, or empty. */
   private refusal = '';
-  private readonly closeButton = make('button', { type: 'button', class: 'icon' }, '✕');
+  private readonly closeButton = make('button', { type: 'button', class: 'icon', title: 'Closes this picture.' }, '✕');
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
   private readonly variant: Variant | null;

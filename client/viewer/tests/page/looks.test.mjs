@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, violations, World } from './support.mjs';
+import { launch, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser;
 
@@ -78,6 +78,7 @@ test('every control can be reached and has a name', async () => {
                              element.labels?.length))
       .map((element) => element.outerHTML));
     assert.deepEqual(unnamed, []);
+    assert.deepEqual(await withoutTooltip(viewer.page), []);
     const seen = new Set();
     for (let k = 0; k < 60; ++k) {
       await viewer.page.keyboard.press('Tab');

@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { launch, recording, replay, screenshots, until, Viewer, violations } from './support.mjs';
+import { launch, recording, replay, screenshots, until, Viewer, violations, withoutTooltip } from './support.mjs';
 
 let browser, folder, truth;
 const file = (name) => path.join(folder, name);
@@ -82,6 +82,10 @@ test('buttons, keys, slider and curves go to a frame', () => inReport('dam.html'
   const box = await plot.boundingBox();
   await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
   await shows(report, 37);
+}));
+
+test('every control has a tooltip', () => inReport('discs.html', {}, async (report) => {
+  assert.deepEqual(await withoutTooltip(report.page), []);
 }));
 
 test('links have frame, view and layers, also former ones', () =>
