@@ -8,7 +8,8 @@
 namespace partiemc::client {
 namespace {
 
-// rampStops(false) of client/viewer/src/draw/ramp.ts; a test there compares both.
+// rampStops of the light `violet-yellow` of client/viewer/src/draw/ramp.ts; a test there compares
+// both.
 constexpr std::array<std::array<double, 3>, 9> kStops{{{0x3d, 0x00, 0x6f},
                                                        {0x28, 0x26, 0x88},
                                                        {0x03, 0x47, 0x7c},
@@ -58,6 +59,21 @@ std::vector<double> MagnitudesOf(const AttributeValues& attribute) {
     magnitudes[k] = std::sqrt(sum);
   }
   return magnitudes;
+}
+
+std::size_t ChannelCount(const AttributeValues& attribute) {
+  const auto components = static_cast<std::size_t>(attribute.components);
+  return components == 1 ? 1 : components + 1;
+}
+
+std::vector<double> ChannelOf(const AttributeValues& attribute, std::size_t channel) {
+  if (channel == 0) return MagnitudesOf(attribute);
+  const auto components = static_cast<std::size_t>(attribute.components);
+  std::vector<double> values(attribute.values.size() / components);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    values[k] = attribute.values[components * k + channel - 1];
+  }
+  return values;
 }
 
 ValueRange RangeOf(std::span<const double> values) {

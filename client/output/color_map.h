@@ -23,6 +23,13 @@ const AttributeValues* FindAttribute(const Result& result, const std::string& na
 /// One number per point: the value of a scalar, the length of a vector.
 std::vector<double> MagnitudesOf(const AttributeValues& attribute);
 
+/// Number of channels: 1 for a scalar; for a vector the length and each component.
+std::size_t ChannelCount(const AttributeValues& attribute);
+
+/// One number per point: channel 0 is MagnitudesOf, channel k is component k - 1.
+/// Requires: channel < ChannelCount(attribute).
+std::vector<double> ChannelOf(const AttributeValues& attribute, std::size_t channel);
+
 /// Range of the colours.
 struct ValueRange {
   double low = 0, high = 0;

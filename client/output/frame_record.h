@@ -29,6 +29,8 @@ struct FrameRecord {
   std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
   /// Indices of the sections that the picture of the frame shows as thin lines.
   std::span<const std::size_t> sections_in_plane = {};
+  /// The attribute that colours the particles in a report, with its values at them; or null.
+  const AttributeValues* particle_color = nullptr;
   std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
 };
 

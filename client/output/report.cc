@@ -108,6 +108,23 @@ void AppendMeasures(std::string& out, const Rings& rings) {
   out += ']';
 }
 
+void AppendSections(std::string& out, const FrameRecord& frame) {
+  out += R"(,"sections":[)";
+  for (std::size_t k = 0; k < frame.result.sections.size(); ++k) {
+    const FrameRecord section = SectionOf(frame, k);
+    const FrameStatistics& statistics = section.result.statistics;
+    AppendAll(out, k == 0 ? "" : ",", R"({"particles":)", statistics.particles,
+              R"(,"rings_digest":")", DigestText(section.rings_digest), R"(","area":)");
+    AppendShown(out, statistics.area);
+    out += R"(,"perimeter":)";
+    AppendShown(out, statistics.perimeter);
+    out += R"(,"measures":)";
+    AppendMeasures(out, section.result.rings);
+    out += '}';
+  }
+  out += ']';
+}
+
 std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options) {
   const Result& result = frame.result;
   const FrameStatistics& statistics = result.statistics;
@@ -149,15 +166,20 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
             DigestText(frame.mesh_digest), R"(","box":)");
   AppendBox(out, MainBox(frame));
   if (const AttributeValues* color = FindAttribute(result, options.color_by); color != nullptr) {
-    const ValueRange range = RangeOf(MagnitudesOf(*color));
     out += R"(,"colors":[)";
-    AppendShown(out, range.low);
-    out += ',';
-    AppendShown(out, range.high);
+    for (std::size_t channel = 0; channel < ChannelCount(*color); ++channel) {
+      const ValueRange range = ReportRange(frame, *color, channel);
+      out += channel == 0 ? "[" : ",[";
+      AppendShown(out, range.low);
+      out += ',';
+      AppendShown(out, range.high);
+      out += ']';
+    }
     out += ']';
   }
   out += R"(,"measures":)";
   AppendMeasures(out, result.rings);
+  AppendSections(out, frame);
   out += '}';
   return out;
 }

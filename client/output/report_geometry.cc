@@ -33,9 +33,7 @@ class Encoder {
     Box box;
     box.Include(frame.result.rings.points);
     box.Include(frame.result.mesh.points);
-    for (const std::size_t k : frame.sections_in_plane) {
-      box.Include(frame.result.sections[k].rings.points);
-    }
+    for (const Result& section : frame.result.sections) box.Include(section.rings.points);
     for (std::size_t k = 0; k + 1 < frame.particles.size(); k += 2) {
       if (std::isfinite(frame.particles[k]) && std::isfinite(frame.particles[k + 1])) {
         box.Include(frame.particles[k], frame.particles[k + 1]);
@@ -94,13 +92,17 @@ class Encoder {
   std::pair<std::int64_t, std::int64_t> last_ = {0, 0};
 };
 
-void EncodeRings(const Rings& rings, Encoder& encoder) {
+void EncodeRingPoints(const Rings& rings, Encoder& encoder) {
   encoder.Count(rings.RingCount());
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     encoder.Count(rings.offsets[ring + 1] - rings.offsets[ring]);
     encoder.Count(rings.outer_of[ring] == kNoRing ? 0 : std::uint64_t{rings.outer_of[ring]} + 1);
   }
   encoder.Points(rings.points);
+}
+
+void EncodeRings(const Rings& rings, Encoder& encoder) {
+  EncodeRingPoints(rings, encoder);
   encoder.Count(rings.normals.size() / 2);
   for (std::size_t k = 0; k + 1 < rings.normals.size(); k += 2) {
     const double turn =
@@ -135,59 +137,78 @@ void EncodeMesh(const Result& result, std::size_t max_triangles, Encoder& encode
   }
 }
 
-/// Encodes at most `max_particles` particles, selected evenly. They are sorted in rows two spacings
-/// high, so that differences between successive particles are small.
-void EncodeParticles(std::span<const double> particles, std::size_t max_particles,
-                     Encoder& encoder) {
+/// Indices of at most `max_particles` particles, selected evenly. They are sorted in rows two
+/// spacings high, so that differences between successive particles are small.
+std::vector<std::size_t> ShownParticles(std::span<const double> particles,
+                                        std::size_t max_particles, const Encoder& encoder) {
   const std::size_t count = particles.size() / 2;
   const std::size_t shown = std::min(count, max_particles);
-  std::vector<std::pair<std::int64_t, std::int64_t>> points;
-  points.reserve(shown);
+  std::vector<std::tuple<std::int64_t, std::int64_t, std::int64_t, std::size_t>> places;
+  places.reserve(shown);
   for (std::size_t k = 0; k < shown; ++k) {
-    // An even selection of `shown` particles.
     const std::size_t particle = shown == count ? k : k * count / shown;
     const double x = particles[2 * particle], y = particles[2 * particle + 1];
-    if (std::isfinite(x) && std::isfinite(y)) points.push_back(encoder.Quantise(x, y));
+    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    const auto [column, height] = encoder.Quantise(x, y);
+    places.emplace_back(height / kParticleRow, column, height, particle);
   }
-  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
-    return std::tuple(a.second / kParticleRow, a.first, a.second) <
-           std::tuple(b.second / kParticleRow, b.first, b.second);
-  });
-  encoder.Count(points.size());
-  for (const auto& point : points) encoder.Point(point);
+  std::sort(places.begin(), places.end());
+  std::vector<std::size_t> indices(places.size());
+  std::ranges::transform(places, indices.begin(),
+                         [](const auto& place) { return std::get<3>(place); });
+  return indices;
 }
 
-void EncodeIsolines(const FrameRecord& frame, Encoder& encoder) {
-  std::uint64_t count = 0;
-  for (const std::size_t k : frame.sections_in_plane) {
-    count += frame.result.sections[k].rings.RingCount();
-  }
-  encoder.Count(count);
-  for (const std::size_t k : frame.sections_in_plane) {
-    const Rings& rings = frame.result.sections[k].rings;
-    for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-      encoder.Count(rings.offsets[ring + 1] - rings.offsets[ring]);
-    }
-  }
-  for (const std::size_t k : frame.sections_in_plane) {
-    encoder.Points(frame.result.sections[k].rings.points);
+void EncodeParticles(std::span<const double> particles, std::span<const std::size_t> shown,
+                     Encoder& encoder) {
+  encoder.Count(shown.size());
+  for (const std::size_t particle : shown) {
+    encoder.Point(encoder.Quantise(particles[2 * particle], particles[2 * particle + 1]));
   }
 }
 
-void EncodeColors(const Result& result, const ReportGeometryOptions& options, Encoder& encoder) {
+void EncodeSections(const Result& result, Encoder& encoder) {
+  encoder.Count(result.sections.size());
+  for (const Result& section : result.sections) EncodeRingPoints(section.rings, encoder);
+}
+
+/// Values of `attribute` at the particles of the frame; null if they are unknown.
+const AttributeValues* ParticleValues(const FrameRecord& frame, const AttributeValues& attribute) {
+  const AttributeValues* const values = frame.particle_color;
+  const bool fits = values != nullptr && values->name == attribute.name &&
+                    values->components == attribute.components &&
+                    values->values.size() / static_cast<std::size_t>(values->components) ==
+                        frame.particles.size() / 2;
+  return fits ? values : nullptr;
+}
+
+void EncodeColors(const FrameRecord& frame, const ReportGeometryOptions& options,
+                  std::span<const std::size_t> shown, Encoder& encoder) {
+  const Result& result = frame.result;
   const AttributeValues* const attribute = FindAttribute(result, options.color_by);
   if (attribute == nullptr) return encoder.Count(0);
-  const std::vector<double> values = MagnitudesOf(*attribute);
-  const ValueRange range = RangeOf(values);
+  const std::size_t points =
+      attribute->values.size() / static_cast<std::size_t>(attribute->components);
   // Values of the rings' points come first. A mesh that shares these points continues them.
   const bool has_mesh = result.mesh.TriangleCount() > 0 &&
                         result.mesh.TriangleCount() <= options.max_triangles &&
-                        values.size() == result.mesh.PointCount();
-  const std::size_t count = has_mesh ? values.size() : result.rings.PointCount();
-  if (count > values.size()) return encoder.Count(0);
-  encoder.Count(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    encoder.Byte(static_cast<std::uint8_t>(std::lround(255 * range.ShareOf(values[k]))));
+                        points == result.mesh.PointCount();
+  const std::size_t count = has_mesh ? points : result.rings.PointCount();
+  if (count > points) return encoder.Count(0);
+  const AttributeValues* const of_particles = ParticleValues(frame, *attribute);
+  encoder.Count(ChannelCount(*attribute));
+  for (std::size_t channel = 0; channel < ChannelCount(*attribute); ++channel) {
+    const ValueRange range = ReportRange(frame, *attribute, channel);
+    const auto share = [&](double value) {
+      encoder.Byte(static_cast<std::uint8_t>(std::lround(255 * range.ShareOf(value))));
+    };
+    const std::vector<double> values = ChannelOf(*attribute, channel);
+    encoder.Count(count);
+    for (std::size_t k = 0; k < count; ++k) share(values[k]);
+    encoder.Count(of_particles == nullptr ? 0 : shown.size());
+    if (of_particles == nullptr) continue;
+    const std::vector<double> at_particles = ChannelOf(*of_particles, channel);
+    for (const std::size_t particle : shown) share(at_particles[particle]);
   }
 }
 
@@ -197,10 +218,22 @@ std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryO
   Encoder encoder(frame);
   EncodeRings(frame.result.rings, encoder);
   EncodeMesh(frame.result, options.max_triangles, encoder);
-  EncodeParticles(frame.particles, options.max_particles, encoder);
-  EncodeIsolines(frame, encoder);
-  EncodeColors(frame.result, options, encoder);
+  const std::vector<std::size_t> shown =
+      ShownParticles(frame.particles, options.max_particles, encoder);
+  EncodeParticles(frame.particles, shown, encoder);
+  EncodeSections(frame.result, encoder);
+  EncodeColors(frame, options, shown, encoder);
   return encoder.Take();
+}
+
+ValueRange ReportRange(const FrameRecord& frame, const AttributeValues& attribute,
+                       std::size_t channel) {
+  std::vector<double> values = ChannelOf(attribute, channel);
+  if (const AttributeValues* particles = ParticleValues(frame, attribute); particles != nullptr) {
+    const std::vector<double> more = ChannelOf(*particles, channel);
+    values.insert(values.end(), more.begin(), more.end());
+  }
+  return RangeOf(values);
 }
 
 }  // namespace partiemc::client

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 
+#include "client/output/color_map.h"
 #include "client/output/frame_record.h"
 
 namespace partiemc::client {
@@ -27,10 +28,16 @@ struct ReportGeometryOptions {
 ///   triangles   shared (1 if the mesh shares the points of the rings), count; per triangle
 ///               (a - previous a) * 2 + interior, b - a, c - a
 ///   particles   count; x, y differences, in an order that keeps them small
-///   isolines    count of rings; number of points of each; x, y differences of all points
-///   colours     count (0, points of the mesh, or points of the rings); per point one byte, the
-///   position
-///               in the frame's range of the attribute from 0 to 255
+///   sections    count; per section: count of rings, per ring as above; x, y differences of all
+///   points colours     count of channels (color_map.h, 0 without an attribute); per channel twice:
+///   count,
+///               and per point one byte, the position in the frame's range of the channel from 0 to
+///               255. First the points of the mesh, or of the rings alone; then the particles, or
+///               none if their values are unknown
 std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryOptions& options);
+
+/// Range of a channel of `attribute` at the vertices and at the particles.
+ValueRange ReportRange(const FrameRecord& frame, const AttributeValues& attribute,
+                       std::size_t channel);
 
 }  // namespace partiemc::client

@@ -122,21 +122,41 @@ class Receiver {
       if (flags_.check) Check(frame->source);
       // A loop has no outputs.
       if (!flags_.loop) {
+        const AttributeValues color = ParticleColor(*frame);
         status = outputs_.Write({.index = frame->index,
                                  .time = event_.time,
                                  .result = event_.frame.result,
-                                 .particles = frame->positions,
+                                 .particles = PlaneParticles(*frame),
                                  .stages_ms = event_.frame.times.stages_ms,
                                  .total_ms = event_.frame.times.total_ms,
                                  .rings_digest = event_.frame.rings_digest,
                                  .mesh_digest = event_.frame.mesh_digest,
                                  .section_digests = event_.frame.section_digests,
-                                 .sections_in_plane = sections_in_plane_});
+                                 .sections_in_plane = sections_in_plane_,
+                                 .particle_color = &color});
       }
     }
     feeder_.Recycle(std::move(frame));
     progress_.Update(++answered_);
     return status;
+  }
+
+  /// Particles of 3D frames are not in the plane of the outline, so that no output draws them.
+  static std::span<const double> PlaneParticles(const RecordedFrame& frame) {
+    if (frame.components != 2) return {};
+    return frame.positions;
+  }
+
+  /// The attribute of --color-by at the particles, for the report; empty without one.
+  AttributeValues ParticleColor(const RecordedFrame& frame) const {
+    if (flags_.color_by.empty() || flags_.report.empty()) return {};
+    for (const ParticleAttribute& attribute : frame.attributes) {
+      if (attribute.name == flags_.color_by) {
+        return {attribute.name, attribute.components, attribute.values};
+      }
+    }
+    if (flags_.color_by != kVelocityAttribute || frame.velocities.empty()) return {};
+    return {flags_.color_by, frame.components, frame.velocities};
   }
 
   void Check(const std::string& source) {

@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import {
   hex, identityColour, packed, rgb, type Rgb, theme, unpacked,
 } from '../src/draw/colours';
-import { rampColour, rampStops, rampTexels, rangeOf } from '../src/draw/ramp';
+import { MAP_NAMES, rampColour, rampStops, rampTexels, rangeOf } from '../src/draw/ramp';
 
 /** Relative luminance and contrast ratio, as in WCAG 2. */
 function luminance(colour: Rgb): number {
@@ -37,12 +37,15 @@ for (const dark of [false, true]) {
 
   test(`attribute colours contrast, in even lightness steps (${name})`, () => {
     const shares = Array.from({ length: 33 }, (_, k) => k / 32);
-    for (const share of shares) {
-      const ratio = contrast(rampColour(share, dark), theme(dark).background);
-      assert.ok(ratio >= 3, `${share}: ${ratio}`);
+    for (const map of MAP_NAMES) {
+      for (const share of shares) {
+        const ratio = contrast(rampColour(share, { dark, map }), theme(dark).background);
+        assert.ok(ratio >= 3, `${map} ${share}: ${ratio}`);
+      }
     }
     // The cube root of luminance is close to perceived lightness.
-    const light = shares.map((share) => Math.cbrt(luminance(rampColour(share, dark))));
+    const light = shares.map((share) => 
+      Math.cbrt(luminance(rampColour(share, { dark, map: 'violet-yellow' }))));
     const steps = light.slice(1).map((one, k) => one - light[k]);
     assert.ok(Math.min(...steps) > 0.3 * Math.max(...steps), steps.join(' '));
   });
@@ -74,17 +77,17 @@ test('a colour converts to text and number and back', () => {
 });
 
 test('legend stops cover the range', () => {
-  const stops = rampStops(true);
-  assert.equal(stops[0], hex(rampColour(0, true)));
-  assert.equal(stops[stops.length - 1], hex(rampColour(1, true)));
-  const texels = rampTexels(256, true);
+  const stops = rampStops({ dark: true, map: 'violet-yellow' });
+  assert.equal(stops[0], hex(rampColour(0, { dark: true, map: 'violet-yellow' })));
+  assert.equal(stops[stops.length - 1], hex(rampColour(1, { dark: true, map: 'violet-yellow' })));
+  const texels = rampTexels(256, { dark: true, map: 'violet-yellow' });
   assert.equal(hex([texels[0] / 255, texels[1] / 255, texels[2] / 255]), stops[0]);
 });
 
 test('SVG pictures of the command line have the same colours', () => {
   const read = (name: string) => readFileSync(new URL(`../../../output/${name}`, import.meta.url), 'utf8');
   const bytes = [...read('color_map.cc').matchAll(/\{?0x(\w\w), 0x(\w\w), 0x(\w\w)\}/g)];
-  assert.deepEqual(bytes.map(([, ...parts]) => `#${parts.join('')}`), rampStops(false));
+  assert.deepEqual(bytes.map(([, ...parts]) => `#${parts.join('')}`), rampStops({ dark: false, map: 'violet-yellow' }));
   const { interior, edge, particle, outline, isoline } = theme(false);
   for (const colour of [interior, edge, particle, outline, isoline]) {
     assert.ok(read('svg.cc').includes(hex(colour)), hex(colour));

@@ -197,10 +197,12 @@ function frameOf(
       normals,
       attributes: new Map([['speed', speed]]),
     },
-    isolines: null,
+    sections: [],
+    isolines: [],
     mesh: meshOf(
       Float32Array.from(points), Uint32Array.from(triangles), Uint8Array.from(classes)),
     particles: Float32Array.from(particles),
+    particleAttributes: null,
     statistics: {
       particles: particles.length / 2, triangles: classes.length, trianglesGrid: classes.length,
       area: sum(area), perimeter: sum(perimeter), spacing, milliseconds: 0, droppedHoles: 0,

@@ -2,7 +2,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { hex, theme } from '../src/draw/colours';
 import { DEFAULT_LOOK, type Look } from '../src/draw/look';
+import { isolineColour } from '../src/draw/look_colours';
 import { rampStops } from '../src/draw/ramp';
+import { marksOf } from '../src/export/marks';
 import { svg } from '../src/export/svg';
 import type { Frame } from '../src/protocol/frame';
 import { makeFrame, meshOf } from './draw_frames';
@@ -88,7 +90,7 @@ test('each identity has its colour', () => {
 });
 
 test('an attribute colours the outline; NaN is grey', () => {
-  const stops = rampStops(false);
+  const stops = rampStops(DEFAULT_LOOK);
   const values = Float32Array.from(FRAME.rings.points, (one) => one).filter((_, k) => k % 2 === 0);
   const rings = { ...FRAME.rings, attributes: new Map([['x', values]]) };
   const text = draw({ outline: true, colour: 'x' }, { ...FRAME, rings });
@@ -114,12 +116,45 @@ test('an attribute colours the mesh in bands', () => {
 });
 
 test('isolines and selected rings are lines', () => {
-  const isolines = FRAME.rings;
-  assert.ok(draw({ isolines: true }, { ...FRAME, isolines }).includes(hex(theme(false).isoline)));
+  const isolines = [1, 2].map((index) => ({ index, rings: FRAME.rings, origin: FRAME.origin }));
+  const lines = draw({ sections: true }, { ...FRAME, isolines });
+  for (const index of [1, 2]) assert.ok(lines.includes(hex(isolineColour(index, false))));
+  const one = draw({ sections: true, hidden: [1] }, { ...FRAME, isolines });
+  assert.ok(!one.includes(hex(isolineColour(1, false))) && one.includes(hex(isolineColour(2, false))));
+  assert.equal(count(draw({ sections: false }, { ...FRAME, isolines }), /<path/g), 0);
   const text = svg(FRAME, NOTHING, VIEW, SIZE, null, [0]);
   assert.ok(text.includes(hex(theme(false).accent)));
 });
 
 test('a missing attribute leaves the outline plain', () => {
   assert.ok(draw({ outline: true, colour: 'nowhere' }).includes(hex(theme(false).outline)));
+});
+
+test('particles have the colours of an attribute', () => {
+  const particles = FRAME.particles!;
+  const values = Float32Array.from({ length: particles.length / 2 }, (_, k) => (k === 0 ? NaN : particles[2 * k]));
+  const frame = { ...FRAME, particleAttributes: new Map([['x', values]]) };
+  const text = draw({ particles: true, colour: 'x' }, frame);
+  const stops = rampStops(DEFAULT_LOOK);
+  assert.ok(text.includes(stops[0]) && text.includes(stops[stops.length - 1]));
+  assert.ok(text.includes(hex(theme(false).missing)), 'NaN is grey');
+  assert.ok(!text.includes(hex(theme(false).particle)));
+  assert.equal(count(text, /h0/g), particles.length, 'rims and dots');
+  const grey = draw({ particles: true, colour: 'x', map: 'grey' }, frame);
+  assert.ok(grey.includes(rampStops({ dark: false, map: 'grey' })[0]) && !grey.includes(stops[0]));
+});
+
+test('caption, scale and legend are on the picture', () => {
+  const legend = { name: 'velocity, magnitude', min: 0.5, max: 2, stops: rampStops(DEFAULT_LOOK) };
+  const marks = marksOf('dam <1>, frame 12, time 0.5', SIZE, VIEW, legend, false);
+  const text = svg(FRAME, NOTHING, VIEW, SIZE, legend, [], marks);
+  for (const part of ['dam &#60;1&#62;, frame 12, time 0.5', 'velocity, magnitude', '>0.5<', '>2<']) {
+    assert.ok(text.includes(part), part);
+  }
+  const bars = [...text.matchAll(/<rect [^>]*width="([\d.]+)" height="(\d+)" fill="(#\w+)"/g)];
+  assert.ok(bars.some(([, width, height]) => width === '100' && height === '2'), 'two units of length are 100 pixels');
+  const colours = bars.filter(([, , height]) => height === '8').map(([, , , colour]) => colour);
+  assert.deepEqual([...new Set(colours)], legend.stops);
+  const plain = marksOf('dam', SIZE, VIEW, null, true);
+  assert.equal(plain.length, 3, 'caption, length and bar');
 });

@@ -7,7 +7,7 @@ const ENTRY = 600;  // Size of an entry without its message.
 function entry(sequence: number, bytes = 400): Entry {
   return {
     sequence, time: sequence / 10, receivedAt: 0, bytes,
-    summary: { area: 0, rings: 0, triangles: 0, trianglesGrid: 0, milliseconds: 0, stages: [],
+    summary: { area: 0, rings: 0, holes: 0, triangles: 0, trianglesGrid: 0, milliseconds: 0, stages: [],
                received: 0, drawn: 0, dropped: 0, latency: NaN },
     frame: () => { throw new Error('unused'); },
   };

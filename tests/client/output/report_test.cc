@@ -90,9 +90,9 @@ struct Decoded {
   std::vector<double> points, mesh_points, particles;
   std::vector<std::uint8_t> normals;
   std::vector<std::int64_t> triangles, interior;
-  std::vector<std::uint64_t> isoline_sizes;
-  std::vector<double> isoline_points;
-  std::vector<std::uint8_t> colors;
+  std::vector<std::vector<std::uint64_t>> section_sizes;
+  std::vector<double> section_points;
+  std::vector<std::vector<std::uint8_t>> colors, particle_colors;  // By channel.
 };
 
 Decoded Decode(const std::string& bytes) {
@@ -134,14 +134,24 @@ Decoded Decode(const std::string& bytes) {
     out.triangles.insert(out.triangles.end(), {a, b, c});
   }
   points(reader.Count(), out.particles);
-  std::uint64_t isoline_points = 0;
-  for (std::uint64_t rings = reader.Count(); rings > 0; --rings) {
-    out.isoline_sizes.push_back(reader.Count());
-    isoline_points += out.isoline_sizes.back();
+  for (std::uint64_t sections = reader.Count(); sections > 0; --sections) {
+    std::uint64_t section_points = 0;
+    std::vector<std::uint64_t>& sizes = out.section_sizes.emplace_back();
+    for (std::uint64_t rings = reader.Count(); rings > 0; --rings) {
+      sizes.push_back(reader.Count());
+      reader.Count();  // The outer ring.
+      section_points += sizes.back();
+    }
+    points(section_points, out.section_points);
   }
-  points(isoline_points, out.isoline_points);
-  for (std::uint64_t count = reader.Count(); count > 0; --count) {
-    out.colors.push_back(reader.Byte());
+  const auto shares = [&reader] {
+    std::vector<std::uint8_t> bytes;
+    for (std::uint64_t count = reader.Count(); count > 0; --count) bytes.push_back(reader.Byte());
+    return bytes;
+  };
+  for (std::uint64_t channels = reader.Count(); channels > 0; --channels) {
+    out.colors.push_back(shares());
+    out.particle_colors.push_back(shares());
   }
   EXPECT_TRUE(reader.AtEnd());
   return out;
@@ -268,7 +278,7 @@ TEST(Report, HasNameAndRangeOfTheAttribute) {
   result.attributes[0] = {.name = "<p>", .values = std::vector<float>(11, 1.0f)};
   result.attributes[0].values[3] = 3;
   const std::string page = Page({.title = "t", .color_by = "<p>"}, {{.result = result}});
-  EXPECT_EQ(json::parse(Numbers(page).at(0)).at("colors"), (json{1.0, 3.0}));
+  EXPECT_EQ(json::parse(Numbers(page).at(0)).at("colors"), (json{{1.0, 3.0}}));
   EXPECT_THAT(page, HasSubstr("data-color=\"&lt;p&gt;\""));
   const std::string plain = Page({.title = "t"}, {{.result = result}});
   EXPECT_FALSE(json::parse(Numbers(plain).at(0)).contains("colors"));
@@ -331,13 +341,26 @@ Result WithSections() {
   return result;
 }
 
-TEST(ReportGeometry, IsolinesAreSectionsInThePlane) {
+TEST(ReportGeometry, HasAllSections) {
   const Result result = WithSections();
-  const std::vector<std::size_t> in_plane = {1};
-  const Decoded decoded = DecodeFrame({.result = result, .sections_in_plane = in_plane});
-  EXPECT_THAT(decoded.isoline_sizes, ElementsAre(4));
-  ExpectNear(decoded.isoline_points, result.sections[1].rings.points, decoded.step * 0.5001);
-  EXPECT_THAT(DecodeFrame({.result = result}).isoline_sizes, IsEmpty());
+  const Decoded decoded = DecodeFrame({.result = result});
+  EXPECT_THAT(decoded.section_sizes, ElementsAre(ElementsAre(3), ElementsAre(4)));
+  std::vector<double> points = result.sections[0].rings.points;
+  points.insert(points.end(), result.sections[1].rings.points.begin(),
+                result.sections[1].rings.points.end());
+  ExpectNear(decoded.section_points, points, decoded.step * 0.5001);
+}
+
+TEST(Report, HasNumbersOfSections) {
+  Result result = WithSections();
+  result.sections[1].statistics.area = 36;
+  const OutlineDigests digests[] = {{.rings = 1}, {.rings = 0xab}};
+  const std::string page = Page({.title = "t"}, {{.result = result, .section_digests = digests}});
+  const json sections = json::parse(Numbers(page).at(0)).at("sections");
+  ASSERT_EQ(sections.size(), 2u);
+  EXPECT_EQ(sections[1].at("area"), 36.0);
+  EXPECT_EQ(sections[1].at("rings_digest"), "00000000000000ab");
+  EXPECT_EQ(sections[1].at("measures").size(), 1u);
 }
 
 TEST(ReportGeometry, ColoursAreSharesOfTheRange) {
@@ -351,11 +374,29 @@ TEST(ReportGeometry, ColoursAreSharesOfTheRange) {
   const auto colors = [&](const std::string& name, std::size_t max_triangles = 1000) {
     return DecodeFrame({.result = result}, 1000, max_triangles, name).colors;
   };
-  EXPECT_THAT(colors("p"), ElementsAre(0, 0, 0, 255, 128, 0, 0, 0, 0, 0, 0));
-  EXPECT_EQ(colors("v")[0], 255) << "length of a vector";
+  EXPECT_THAT(colors("p"), ElementsAre(ElementsAre(0, 0, 0, 255, 128, 0, 0, 0, 0, 0, 0)));
+  ASSERT_EQ(colors("v").size(), 3u) << "length, x, y";
+  EXPECT_EQ(colors("v")[0][0], 255) << "length of a vector";
+  EXPECT_EQ(colors("v")[1][0], 128) << "the x component is constant";
+  EXPECT_EQ(colors("v")[2][0], 0) << "-5 is the least y component";
+  EXPECT_EQ(colors("v")[2][1], 255);
   EXPECT_THAT(colors("q"), IsEmpty());
   EXPECT_THAT(colors(""), IsEmpty());
-  EXPECT_EQ(colors("p", 8).size(), result.rings.PointCount()) << "outline only, without a mesh";
+  EXPECT_EQ(colors("p", 8)[0].size(), result.rings.PointCount()) << "outline only, without a mesh";
+}
+
+TEST(ReportGeometry, ColoursParticlesInTheRangeOfBoth) {
+  Result result = SquareWithHoleAndIsland();
+  result.attributes = {{.name = "p", .values = std::vector<float>(11, 1.0f)}};
+  const std::vector<double> particles = {3.1, 3.2, 0.1, 0.3};
+  const AttributeValues values = {.name = "p", .values = {3, 2}};
+  const FrameRecord frame = {.result = result, .particles = particles, .particle_color = &values};
+  const Decoded decoded = DecodeFrame(frame, 1000, 1000, "p");
+  EXPECT_EQ(decoded.colors[0][0], 0) << "1 in the range 1 to 3";
+  EXPECT_THAT(decoded.particle_colors[0], ElementsAre(128, 255)) << "in the order of the particles";
+  const AttributeValues other = {.name = "q", .values = {3, 2}};
+  const FrameRecord unknown = {.result = result, .particles = particles, .particle_color = &other};
+  EXPECT_THAT(DecodeFrame(unknown, 1000, 1000, "p").particle_colors[0], IsEmpty());
 }
 
 TEST(ReportGeometry, NormalsHave256Directions) {

@@ -1,3 +1,6 @@
+import type { Frame, Isoline } from '../protocol/frame';
+import type { MapName } from './ramp';
+
 /** Parts of a frame to draw, and their style. */
 export interface Look {
   outline: boolean;
@@ -7,9 +10,19 @@ export interface Look {
   edges: boolean;
   particles: boolean;
   normals: boolean;
-  isolines: boolean;
-  /** One colour for all, one for each identity, or the name of an attribute. */
+  /** Sections and isolines, as lines. */
+  sections: boolean;
+  /** Outlines without a line: 0 is the stream's own, k is section k - 1. */
+  hidden: readonly number[];
+  /** The outline to show as the picture. */
+  outlineShown: number;
+  /** One colour for all, one for each identity, or a channel of an attribute (protocol/channels.ts). */
   colour: 'plain' | 'identity' | string;
+  /** Colours of an attribute. */
+  map: MapName;
+  /** Numbers with the first and the last colour of the map. Null: of all frames so far. */
+  from: number | null;
+  to: number | null;
   dark: boolean;
   /** Width of the outline, in CSS pixels. */
   lineWidth: number;
@@ -21,11 +34,21 @@ export const DEFAULT_LOOK: Readonly<Look> = {
   edges: false,
   particles: false,
   normals: false,
-  isolines: true,
+  sections: true,
+  hidden: [],
+  outlineShown: 0,
   colour: 'plain',
+  map: 'violet-yellow',
+  from: null,
+  to: null,
   dark: false,
   lineWidth: 2,
 };
+
+/** The isolines that the look draws. */
+export function shownIsolines(frame: Frame, look: Look): Isoline[] {
+  return look.sections ? frame.isolines.filter(({ index }) => !look.hidden.includes(index)) : [];
+}
 
 /** The attribute that the look colours by, or null. */
 export function attributeOf(look: Look): string | null {

@@ -1,12 +1,23 @@
 import { NO_RING, type Rings } from '../protocol/frame';
-import { identityColour, packed, type Rgb, theme } from './colours';
+import { identityColour, oklch, packed, type Rgb, theme } from './colours';
 import { attributeOf, type Look } from './look';
+
+/** Successive sections differ by a golden angle, beginning at the hue of the first one. */
+const GOLDEN_TURN = (3 - Math.sqrt(5)) / 2;
+const ISOLINE_HUE = 0.13;
 
 /** Colours of triangles without a colour of their own. */
 export function fillTones(look: Look): { band: Rgb; interior: Rgb } {
   const { band, interior, neutralBand, neutralInterior } = theme(look.dark);
   return attributeOf(look) === null
     ? { band, interior } : { band: neutralBand, interior: neutralInterior };
+}
+
+/** The colour of an outline drawn as lines: 0 is the stream's own, k is section k - 1. */
+export function isolineColour(index: number, dark: boolean): Rgb {
+  if (index === 0) return theme(dark).outline;
+  if (index === 1) return theme(dark).isoline;
+  return oklch(dark ? 0.78 : 0.55, 0.15, (index - 1) * GOLDEN_TURN + ISOLINE_HUE);
 }
 
 /** Returns a function from ring to colour, packed for the shaders. */

@@ -4,26 +4,43 @@ import { hex, oklch, type Rgb } from './colours';
 const STOPS = 9;
 
 /**
- * The colour of a number from 0 to 1: violet, teal, yellow, with lightness in equal steps. The dark
- * theme uses lighter colours, so that both ends contrast with the background.
+ * Colour maps: lightness, chroma and hue in degrees of a number from 0 to 1. The dark theme uses
+ * lighter colours, so that all colours contrast with the background.
  */
-export function rampColour(share: number, dark: boolean): Rgb {
-  const t = Math.min(Math.max(share, 0), 1);
-  const lightness = dark ? 0.52 + 0.4 * t : 0.3 + 0.36 * t;
-  const hue = (300 - 200 * t) / 360;
-  return oklch(lightness, 0.16 - 0.02 * t, hue);
+const MAPS = {
+  // Lightness in equal steps.
+  'violet-yellow': (t: number, dark: boolean) =>
+    [dark ? 0.52 + 0.4 * t : 0.3 + 0.36 * t, 0.16 - 0.02 * t, 300 - 200 * t],
+  // For numbers on both sides of zero: the middle is grey.
+  'blue-red': (t: number, dark: boolean) => {
+    const away = Math.abs(2 * t - 1);
+    return [dark ? 0.9 - 0.26 * away : 0.64 - 0.22 * away, 0.19 * away, t < 0.5 ? 255 : 27];
+  },
+  grey: (t: number, dark: boolean) => [dark ? 0.5 + 0.45 * t : 0.22 + 0.42 * t, 0, 0],
+} as const;
+
+export type MapName = keyof typeof MAPS;
+export const MAP_NAMES = Object.keys(MAPS) as MapName[];
+
+/** A colour map in one theme. */
+export interface Ramp { dark: boolean; map: MapName }
+
+/** The colour of a number from 0 to 1. */
+export function rampColour(share: number, { dark, map }: Ramp): Rgb {
+  const [lightness, chroma, hue] = MAPS[map](Math.min(Math.max(share, 0), 1), dark);
+  return oklch(lightness, chroma, hue / 360);
 }
 
 /** Colours of a legend, as `#rrggbb`. */
-export function rampStops(dark: boolean): string[] {
-  return Array.from({ length: STOPS }, (_, k) => hex(rampColour(k / (STOPS - 1), dark)));
+export function rampStops(ramp: Ramp): string[] {
+  return Array.from({ length: STOPS }, (_, k) => hex(rampColour(k / (STOPS - 1), ramp)));
 }
 
 /** Colours as RGBA bytes, from the smallest to the largest number. */
-export function rampTexels(count: number, dark: boolean): Uint8Array {
+export function rampTexels(count: number, ramp: Ramp): Uint8Array {
   const texels = new Uint8Array(4 * count);
   for (let k = 0; k < count; ++k) {
-    const colour = rampColour(k / (count - 1), dark);
+    const colour = rampColour(k / (count - 1), ramp);
     for (let part = 0; part < 3; ++part) {
       texels[4 * k + part] = Math.round(255 * Math.min(Math.max(colour[part], 0), 1));
     }

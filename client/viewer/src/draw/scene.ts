@@ -1,3 +1,4 @@
+import { channelLabel } from '../protocol/channels';
 import type { Frame } from '../protocol/frame';
 import { attributeOf, DEFAULT_LOOK, type Look } from './look';
 import { RingIndex } from './pick';
@@ -20,6 +21,8 @@ export interface Picked {
 
 /** Range and colours of the attribute that the look colours by. */
 export interface Legend {
+  /** Name of the channel for the user. */
+  name: string;
   min: number;
   max: number;
   /** Colours from the smallest to the largest number, in equal steps. */
@@ -34,7 +37,9 @@ export class Scene {
   view: View = { x: 0, y: 0, scale: 1 };
   /** Ring under the pointer. */
   hovered: number | null = null;
-  /** Range of the attribute's colours. Null: the range of all frames so far. */
+  /** Called after each drawing, in the same task. */
+  drawn: (() => void) | null = null;
+  /** Range of the attribute's colours if the look has none. Null: the range of all frames so far. */
   fixedRange: Range | null = null;
   /** Main-thread time of the last `show`, milliseconds. */
   lastUploadMs = 0;
@@ -58,6 +63,8 @@ export class Scene {
   get size(): Size {
     return { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
   }
+
+  get hasWebgl(): boolean { return !(this.drawing instanceof SvgDrawing); }
 
   /** The selected rings of the frame: several after a split. */
   get selectedRings(): readonly number[] {
@@ -117,10 +124,11 @@ export class Scene {
       look: this.look,
       view: this.view,
       ratio: this.canvas.width / Math.max(this.size.width, 1),
-      range: this.attribute() && this.colourRange,
+      range: this.attributes().length > 0 ? this.colourRange : null,
       selected: this.selected,
       hovered: this.hovered,
     });
+    this.drawn?.();
   }
 
   /** Selects the ring of this identity and follows it through splits and merges; null for none. */
@@ -142,7 +150,16 @@ export class Scene {
   /** Legend of the attribute that the look colours by; null without one. */
   legend(): Legend | null {
     const range = this.colourRange;
-    return range && { ...range, stops: rampStops(this.look.dark) };
+    const name = attributeOf(this.look);
+    if (!range || name === null) return null;
+    return { ...range, name: channelLabel(name, this.channels), stops: rampStops(this.look) };
+  }
+
+  /** Names of the numbers that the frame can be coloured by. */
+  get channels(): string[] {
+    if (!this.frame) return [];
+    const { rings, particleAttributes } = this.frame;
+    return [...new Set([...rings.attributes.keys(), ...particleAttributes?.keys() ?? []])];
   }
 
   destroy(): void {
@@ -165,25 +182,30 @@ export class Scene {
   }
 
   private get colourRange(): Range | null {
-    return this.range && (this.fixedRange ?? this.range);
+    if (!this.range) return null;
+    const { min, max } = this.fixedRange ?? this.range;
+    return { min: this.look.from ?? min, max: this.look.to ?? max };
   }
 
-  /** Numbers of the mesh, which include those of the rings, or of the rings alone. */
-  private attribute(): Float32Array | null {
+  /** Numbers of the mesh, which include those of the rings, or of the rings alone, and of the particles. */
+  private attributes(): Float32Array[] {
     const name = attributeOf(this.look);
-    if (name === null || !this.frame) return null;
-    return this.frame.mesh?.attribute(name) ?? this.frame.rings.attributes.get(name) ?? null;
+    if (name === null || !this.frame) return [];
+    const { mesh, rings, particleAttributes } = this.frame;
+    return [mesh?.attribute(name) ?? rings.attributes.get(name), particleAttributes?.get(name)]
+      .filter((values) => values !== undefined);
   }
 
   /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
   private widenRange(restart: boolean): void {
     if (restart) this.range = null;
-    const values = this.attribute();
-    const range = values && rangeOf(values);
-    if (!range) return;
-    this.range = this.range
-      ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) }
-      : range;
+    for (const values of this.attributes()) {
+      const range = rangeOf(values);
+      if (!range) continue;
+      this.range = this.range
+        ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) }
+        : range;
+    }
   }
 
   private readonly onLost = (event: Event): void => {

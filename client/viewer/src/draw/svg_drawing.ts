@@ -1,6 +1,8 @@
 import { svg } from '../export/svg';
 import type { Drawing, Picture } from './webgl/renderer';
 
+export const NO_WEBGL = 'This browser has no WebGL2, so pictures are drawn slowly as SVG.';
+
 /** Draws by SVG, for browsers without WebGL2. Slower, with the same colours. */
 export class SvgDrawing implements Drawing {
   private readonly element = document.createElement('div');

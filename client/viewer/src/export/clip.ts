@@ -1,3 +1,6 @@
+import { CanvasCopy, type Drawn } from './canvas_copy';
+import type { Mark } from './marks';
+
 /** Formats that browsers record, the best first. */
 const FORMATS = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm'];
 
@@ -5,7 +8,7 @@ const FORMATS = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm']
 const BITS_PER_PIXEL = 6;
 const FEWEST_BITS = 2_500_000;
 
-/** Records a canvas as a video. */
+/** Records a scene as a video. */
 export interface Clip {
   /** Throws if the browser cannot record WebM, or a recording is running. */
   start(): void;
@@ -13,7 +16,10 @@ export interface Clip {
   stop(): Promise<Blob>;
 }
 
-export function clip(canvas: HTMLCanvasElement): Clip {
+/** `marks`: on each picture, as of then. Throws without WebGL. */
+export function clip(scene: Drawn, marks: () => readonly Mark[]): Clip {
+  const copy = new CanvasCopy(scene, marks);
+  const { canvas } = copy;
   let recorder: MediaRecorder | null = null;
   let parts: Blob[] = [];
   return {
@@ -23,6 +29,9 @@ export function clip(canvas: HTMLCanvasElement): Clip {
         ? undefined : FORMATS.find((one) => MediaRecorder.isTypeSupported(one));
       if (!format) throw new Error('This browser cannot record WebM. Save pictures instead.');
       parts = [];
+      scene.draw();
+      copy.update();
+      scene.drawn = () => copy.update();
       recorder = new MediaRecorder(canvas.captureStream(), {
         mimeType: format,
         videoBitsPerSecond: Math.max(FEWEST_BITS, BITS_PER_PIXEL * canvas.width * canvas.height),
@@ -33,6 +42,7 @@ export function clip(canvas: HTMLCanvasElement): Clip {
     stop() {
       const running = recorder;
       recorder = null;
+      scene.drawn = null;
       if (!running) return Promise.reject(new Error('No clip is being recorded.'));
       return new Promise((resolve, reject) => {
         running.onstop = () => resolve(new Blob(parts, { type: 'video/webm' }));

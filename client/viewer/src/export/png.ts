@@ -1,13 +1,13 @@
-import type { Scene } from '../draw/scene';
+import { CanvasCopy, type Drawn } from './canvas_copy';
+import type { Mark } from './marks';
 
-/**
- * The canvas as PNG, in device pixels. Draws and reads in one task, because the browser clears the
- * drawing after the task.
- */
-export function png(scene: Pick<Scene, 'draw' | 'canvas'>): Promise<Blob> {
+/** The scene with its marks as PNG, in device pixels. */
+export function png(scene: Drawn, marks: readonly Mark[]): Promise<Blob> {
   return new Promise((resolve, reject) => {
+    const copy = new CanvasCopy(scene, () => marks);
     scene.draw();
-    scene.canvas.toBlob((blob) => {
+    copy.update();
+    copy.canvas.toBlob((blob) => {
       if (blob) resolve(blob);
       else reject(new Error('The browser could not save the canvas. Try a smaller window.'));
     }, 'image/png');

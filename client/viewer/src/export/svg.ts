@@ -1,8 +1,9 @@
 import { hex, mix, type Rgb, theme, unpacked } from '../draw/colours';
-import { attributeOf, type Look } from '../draw/look';
+import { attributeOf, type Look, shownIsolines } from '../draw/look';
+import { type Mark, marksSvg } from './marks';
 import { pieceTints } from '../draw/pieces';
 import { type Range, rampColour, rangeOf, shareOf } from '../draw/ramp';
-import { fillTones, ringColours } from '../draw/look_colours';
+import { fillTones, isolineColour, ringColours } from '../draw/look_colours';
 import {
   BAND_TINT, dotDiameter, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT, ISOLINE_WIDTH,
   NORMAL_WIDTH, normalLength, normalStride, PARTICLE_ALPHA,
@@ -18,11 +19,11 @@ const RAMP_STEPS = 64;
 
 /**
  * The frame as an SVG picture, in CSS pixels. `range`: of the attribute that the look colours by;
- * null: the frame's own. `selected`: rings to highlight.
+ * null: the frame's own. `selected`: rings to highlight. `marks`: caption, scale and legend.
  */
 export function svg(
   frame: Frame, look: Look, view: View, size: Size, range: Range | null = null,
-  selected: readonly number[] = [],
+  selected: readonly number[] = [], marks: readonly Mark[] = [],
 ): string {
   const at = new Projection(view, size, frame.origin);
   const colours = theme(look.dark);
@@ -33,13 +34,12 @@ export function svg(
     '<g stroke-linecap="round" stroke-linejoin="round">',
     `<rect width="100%" height="100%" fill="${hex(colours.background)}"/>`,
   ];
-  const { rings, isolines, mesh, statistics } = frame;
+  const { rings, mesh, statistics } = frame;
   const ringColour = ringColours(rings, look);
   if (look.fill) parts.push(...areas(frame, look, ringColour, range, at));
   if (look.edges && mesh) parts.push(...edges(mesh, rings, look, ringColour, at));
   if (look.particles && frame.particles) {
-    parts.push(line(dotPath(frame.particles, at), colours.particle,
-      dotDiameter(statistics.spacing * view.scale), PARTICLE_ALPHA));
+    parts.push(...dots(frame, frame.particles, look, range, dotDiameter(statistics.spacing * view.scale), at));
   }
   if (look.normals && rings.normals) {
     const count = rings.points.length / 2;
@@ -49,11 +49,13 @@ export function svg(
       colours.normal, NORMAL_WIDTH));
   }
   if (look.outline) parts.push(...outline(rings, look, ringColour, range, at));
-  if (look.isolines && isolines) {
-    parts.push(line(ringPath(isolines, isolines.outerOf.keys(), at), colours.isoline, ISOLINE_WIDTH));
+  for (const isoline of shownIsolines(frame, look)) {
+    const path = ringPath(isoline.rings, isoline.rings.outerOf.keys(), new Projection(view, size, isoline.origin));
+    parts.push(line(path, isolineColour(isoline.index, look.dark), ISOLINE_WIDTH));
   }
   parts.push(line(ringPath(rings, selected, at), colours.accent, Math.max(look.lineWidth, 1) + 0.5));
-  return [...parts.filter((part) => part !== ''), '</g></svg>', ''].join('\n');
+  const drawn = parts.filter((part) => part !== '');
+  return [...drawn, '</g>', ...marksSvg(marks), '</svg>', ''].join('\n');
 }
 
 /**
@@ -98,7 +100,7 @@ function colouredMesh(
   const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
   const paths = bandPaths(mesh, (point) => shareOf(extent, values[point]), RAMP_STEPS, at);
   return paths.map((path, band) => {
-    const colour = hex(rampColour((band + 0.5) / RAMP_STEPS, look.dark));
+    const colour = hex(rampColour((band + 0.5) / RAMP_STEPS, look));
     return path && `<path fill="${colour}" stroke="${colour}" stroke-width="0.7" d="${path}"/>`;
   });
 }
@@ -125,13 +127,36 @@ function outline(
       line(ringPath(rings, group, at), unpacked(colour), look.lineWidth));
   }
   const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
-  const colourOf = (point: number, next: number): string => {
-    const share = shareOf(extent, (values[point] + values[next]) / 2);
-    if (!Number.isFinite(share)) return hex(theme(look.dark).missing);
-    return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look.dark));
-  };
+  const colourOf = (point: number, next: number): string =>
+    colourAt(extent, (values[point] + values[next]) / 2, look);
   return Array.from(segmentPaths(rings, colourOf, at), ([colour, path]) =>
     stroke(path, colour, look.lineWidth, 1));
+}
+
+/** The particles, in one colour or in those of an attribute. */
+function dots(
+  { particleAttributes }: Frame, particles: Float32Array, look: Look, range: Range | null,
+  diameter: number, at: Projection,
+): string[] {
+  const name = attributeOf(look);
+  const values = name === null ? undefined : particleAttributes?.get(name);
+  if (!values) return [line(dotPath(particles, at), theme(look.dark).particle, diameter, PARTICLE_ALPHA)];
+  const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
+  const paths = new Map<string, string>();
+  for (let k = 0; k < particles.length / 2; ++k) {
+    const colour = colourAt(extent, values[k], look);
+    paths.set(colour, (paths.get(colour) ?? '') + dotPath(particles.subarray(2 * k, 2 * k + 2), at));
+  }
+  const rim = line(dotPath(particles, at), theme(look.dark).background, diameter, PARTICLE_ALPHA);
+  const dot = diameter > 4 ? diameter - 1.5 : diameter;
+  return [rim, ...Array.from(paths, ([colour, path]) => stroke(path, colour, dot, PARTICLE_ALPHA))];
+}
+
+/** Colour of a number, in steps. */
+function colourAt(extent: Range, value: number, look: Look): string {
+  const share = shareOf(extent, value);
+  if (!Number.isFinite(share)) return hex(theme(look.dark).missing);
+  return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look));
 }
 
 /** Groups rings by colour. */

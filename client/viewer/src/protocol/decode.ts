@@ -1,8 +1,9 @@
 import {
-  CoordinateFormat, type Mesh as MeshMessage, type NamedAttribute, Plane, type ReconstructedFrame,
+  CoordinateFormat, type Mesh as MeshMessage, Plane, PositionFormat, type ReconstructedFrame,
   type Rings as RingsMessage,
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
+import { AttributeChannels, type Channels } from './channels';
 import type { Frame, Mesh, Rings, Statistics } from './frame';
 import { relativePositions } from './positions';
 
@@ -40,14 +41,6 @@ class Relative {
   }
 }
 
-/** One number per point: the length of a vector. */
-function magnitudesOf({ values, components }: NamedAttribute): Float32Array {
-  const numbers = arrayOf(Float32Array, values);
-  if (components <= 1) return numbers;
-  return Float32Array.from({ length: numbers.length / components }, (_, k) =>
-    Math.hypot(...numbers.subarray(k * components, (k + 1) * components)));
-}
-
 /**
  * The mesh of a message. Arrays of a message are rarely aligned, and a copy takes longer than an
  * upload. They are therefore copied when they are first read as numbers.
@@ -57,10 +50,11 @@ class MessageMesh implements Mesh {
   readonly bytes: Mesh['bytes'];
   private numbers: Float32Array | null = null;
   private indices: Uint32Array | null = null;
-  private readonly attributes = new Map<string, Float32Array>();
+  private readonly channels: Channels;
 
   constructor(private readonly message: MeshMessage, private readonly relative: Relative) {
     this.classes = message.classes;
+    this.channels = new AttributeChannels(message.attributes);
     this.bytes = {
       points: relative.isRelative() ? message.points : bytesOf(this.points),
       triangles: message.triangles,
@@ -76,15 +70,12 @@ class MessageMesh implements Mesh {
   }
 
   attribute(name: string): Float32Array | undefined {
-    const message = this.message.attributes.find((one) => one.name === name);
-    if (message && !this.attributes.has(name)) this.attributes.set(name, magnitudesOf(message));
-    return this.attributes.get(name);
+    return this.channels.get(name);
   }
 }
 
 function decodeRings(message: RingsMessage | undefined, points: Float32Array): Rings {
   const measures = message?.measures ?? [];
-  const attributes = message?.attributes ?? [];
   return {
     points,
     offsets: message ? arrayOf(Uint32Array, message.offsets) : new Uint32Array(1),
@@ -95,7 +86,7 @@ function decodeRings(message: RingsMessage | undefined, points: Float32Array): R
     particles: Float64Array.from(measures, ({ particleCount }) => Number(particleCount)),
     parents: measures.map((measure) => measure.parentIdentities),
     normals: message && message.normals.length > 0 ? arrayOf(Float32Array, message.normals) : null,
-    attributes: new Map(attributes.map((attribute) => [attribute.name, magnitudesOf(attribute)])),
+    attributes: new AttributeChannels(message?.attributes ?? []),
   };
 }
 
@@ -118,6 +109,20 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
   };
 }
 
+/** A section sets neither sequence nor time. */
+function decodeSection(section: ReconstructedFrame, { sequence, time }: ReconstructedFrame): Frame {
+  return { ...decodeFrame(section, Plane.UNSPECIFIED), sequence, time };
+}
+
+/** The server echoes velocities, and no other attributes of the particles. */
+function echoedVelocities({ particleFormat, particleVelocities }: ReconstructedFrame): Channels | null {
+  if (particleVelocities.length === 0) return null;
+  const inSpace = particleFormat === PositionFormat.FLOAT32_3 || particleFormat === PositionFormat.FLOAT64_3;
+  return new AttributeChannels([
+    { name: 'velocity', values: particleVelocities, components: inSpace ? 3 : 2 },
+  ]);
+}
+
 /** Decodes a result. `plane`: the plane of echoed particles with three components. */
 export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
   const relative = new Relative(message);
@@ -126,11 +131,13 @@ export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
     time: message.time,
     origin: relative.origin,
     rings: decodeRings(message.rings, relative.points(message.rings?.points ?? EMPTY)),
-    isolines: null,
+    sections: message.sections.map((section) => decodeSection(section, message)),
+    isolines: [],
     mesh: message.mesh ? new MessageMesh(message.mesh, relative) : null,
     particles: message.particles.length > 0
       ? relativePositions(message.particleFormat, message.particles, plane, relative.origin)
       : null,
+    particleAttributes: echoedVelocities(message),
     statistics: decodeStatistics(message),
     ringsDigest: message.ringsDigest,
     meshDigest: message.meshDigest,

@@ -1,3 +1,5 @@
+import { AttributeChannels, type Channels } from './channels';
+
 /** Class of a mesh triangle. */
 export const TRIANGLE_CLASS = { band: 0, interior: 1 } as const;
 
@@ -15,8 +17,8 @@ export interface Rings {
   /** Identities, in the previous frame, of the rings that each ring continues. */
   parents: bigint[][];
   normals: Float32Array | null;
-  /** One number per vertex, by the attribute's name; the length of a vector. */
-  attributes: Map<string, Float32Array>;
+  /** Numbers per vertex. */
+  attributes: Channels;
 }
 
 export interface Mesh {
@@ -27,7 +29,7 @@ export interface Mesh {
   readonly classes: Uint8Array;
   /** `points` and `triangles` as bytes of any alignment, for an upload without a copy. */
   readonly bytes: { readonly points: Uint8Array; readonly triangles: Uint8Array };
-  /** One number per point; undefined if the mesh lacks the attribute. */
+  /** One number per point; undefined if the mesh lacks the channel. */
   attribute(name: string): Float32Array | undefined;
 }
 
@@ -56,14 +58,28 @@ export interface Frame {
   /** World coordinates of the point that all positions are relative to. */
   origin: [number, number];
   rings: Rings;
-  /** Rings of further isovalues in the same plane; null if there are none. */
-  isolines: Rings | null;
+  /** Sections of the frame, in the order of the stream's parameters. */
+  sections: readonly Frame[];
+  /** Other outlines in parallel planes, to draw as lines (`pictureOf`). */
+  isolines: readonly Isoline[];
   mesh: Mesh | null;
   /** x, y of every particle, relative to the origin. */
   particles: Float32Array | null;
+  /** Numbers per particle; null if none are known. */
+  particleAttributes: Channels | null;
   statistics: Statistics;
   ringsDigest: bigint;
-  meshDigest: bigint;
+  /** Null: not known. */
+  meshDigest: bigint | null;
+}
+
+/** Another outline of the frame, drawn as lines. */
+export interface Isoline {
+  /** 0: the stream's own outline; k: section k - 1. */
+  index: number;
+  rings: Rings;
+  /** As Frame.origin, in the coordinates of the picture. */
+  origin: [number, number];
 }
 
 /** In Rings.outerOf: an outer ring. */
@@ -82,6 +98,6 @@ export function bareRings(points: Float32Array, offsets: Uint32Array): Rings {
     particles: new Float64Array(count),
     parents: Array.from({ length: count }, () => []),
     normals: null,
-    attributes: new Map(),
+    attributes: new AttributeChannels([]),
   };
 }

@@ -1,13 +1,16 @@
 import { bytesOf } from '../protocol/arrays';
+import { channelsOf, type Channels } from '../protocol/channels';
 import { bareRings, type Mesh, NO_RING, type Rings } from '../protocol/frame';
 
 /** Geometry of a frame in a report. The format is described in client/output/report_geometry.h. */
 export interface Geometry {
   origin: [number, number];
   rings: Rings;
-  isolines: Rings | null;
+  /** Rings of each section, without measures. */
+  sections: Rings[];
   mesh: Mesh | null;
   particles: Float32Array;
+  particleAttributes: Channels;
 }
 
 /** Reads varints and quantised points from the bytes of a frame. */
@@ -66,27 +69,39 @@ class Reader {
   }
 }
 
-/** Decodes the geometry of a frame. `color`: name and range of the attribute, if there is one. */
-export function decodeGeometry(
-  base64: string, color: { name: string; range: readonly [number, number] } | null,
-): Geometry {
+/** Name of the attribute, and the range of each of its channels. */
+export interface Colors { name: string; ranges: readonly (readonly [number, number])[] }
+
+/** Decodes the geometry of a frame. */
+export function decodeGeometry(base64: string, colors: Colors | null): Geometry {
   const reader = new Reader(base64);
   const origin = reader.origin();
   const rings = decodeRings(reader);
   const mesh = decodeMesh(reader, rings.points);
   const particles = reader.points(reader.count());
-  const isolines = decodeIsolines(reader);
-  const shares = reader.byteArray();
-  if (color && shares.length > 0) {
-    const [low, high] = color.range;
-    const values = Float32Array.from(shares, (byte) => low + (byte / 255) * (high - low));
-    rings.attributes.set(color.name, values.subarray(0, rings.points.length / 2));
-    if (mesh && values.length === mesh.points.length / 2) mesh.attributes.set(color.name, values);
+  const sections = Array.from({ length: reader.count() }, () => decodeSection(reader));
+  const attributes = new Map<string, Float32Array>();
+  const particleAttributes = new Map<string, Float32Array>();
+  const components = colors && colors.ranges.length > 1 ? colors.ranges.length - 1 : 1;
+  const channels = channelsOf(colors?.name ?? '', components);
+  for (let channel = 0, count = reader.count(); channel < count; ++channel) {
+    const numbers = (shares: Uint8Array) => numbersOf(shares, colors?.ranges[channel] ?? [0, 0]);
+    const values = numbers(reader.byteArray());
+    const ofParticles = numbers(reader.byteArray());
+    attributes.set(channels[channel], values.subarray(0, rings.points.length / 2));
+    if (mesh && values.length === mesh.points.length / 2) mesh.attributes.set(channels[channel], values);
+    if (ofParticles.length > 0) particleAttributes.set(channels[channel], ofParticles);
   }
-  return { origin, rings, isolines, mesh, particles };
+  return { origin, rings: { ...rings, attributes }, sections, mesh, particles, particleAttributes };
 }
 
-function decodeRings(reader: Reader): Rings {
+/** Numbers from bytes, which are positions in a range from 0 to 255. */
+function numbersOf(shares: Uint8Array, [low, high]: readonly [number, number]): Float32Array {
+  return Float32Array.from(shares, (byte) => low + (byte / 255) * (high - low));
+}
+
+/** Sizes and nesting of rings. */
+function decodeSizes(reader: Reader): { offsets: Uint32Array<ArrayBuffer>; outerOf: Uint32Array<ArrayBuffer> } {
   const count = reader.count();
   const offsets = new Uint32Array(count + 1);
   const outerOf = new Uint32Array(count);
@@ -95,7 +110,12 @@ function decodeRings(reader: Reader): Rings {
     const outer = reader.count();
     outerOf[ring] = outer === 0 ? NO_RING : outer - 1;
   }
-  const rings = bareRings(reader.points(offsets[count]), offsets);
+  return { offsets, outerOf };
+}
+
+function decodeRings(reader: Reader): Rings {
+  const { offsets, outerOf } = decodeSizes(reader);
+  const rings = bareRings(reader.points(offsets[outerOf.length]), offsets);
   const turns = reader.byteArray();
   const normals = new Float32Array(2 * turns.length);
   turns.forEach((turn, k) => {
@@ -139,10 +159,7 @@ function decodeMesh(reader: Reader, ringPoints: Float32Array): ReportMesh | null
   return count > 0 ? new ReportMesh(points, triangles, classes) : null;
 }
 
-function decodeIsolines(reader: Reader): Rings | null {
-  const count = reader.count();
-  const offsets = new Uint32Array(count + 1);
-  for (let ring = 0; ring < count; ++ring) offsets[ring + 1] = offsets[ring] + reader.count();
-  const points = reader.points(offsets[count]);
-  return count > 0 ? bareRings(points, offsets) : null;
+function decodeSection(reader: Reader): Rings {
+  const { offsets, outerOf } = decodeSizes(reader);
+  return { ...bareRings(reader.points(offsets[outerOf.length]), offsets), outerOf };
 }

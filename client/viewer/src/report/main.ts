@@ -6,20 +6,23 @@ import { AS_STREAMED } from '../stream/settings';
 import { addressText, parseAddress } from '../ui/address';
 import { CurvesPanel, RESULT_CURVES } from '../ui/curves_panel';
 import { button, byId, setText } from '../ui/dom';
+import { releaseFocusAfterClicks, usesKey } from '../ui/keys';
 import { LookPanel, type Switch } from '../ui/look_panel';
+import { downloadCurves } from '../ui/export_panel';
 import { Pane } from '../ui/pane';
 import { StatusLine } from '../ui/status_line';
 import { Theme } from '../ui/theme';
 import { TimePanel } from '../ui/time_panel';
+import { reportOutlines } from './outlines';
 import { ReportTrack } from './track';
 
 /** Keys that switch a part of the picture. */
 const LAYER_KEYS: Record<string, Switch> = {
-  o: 'outline', m: 'edges', p: 'particles', n: 'normals', i: 'isolines',
+  o: 'outline', m: 'edges', p: 'particles', n: 'normals', i: 'sections',
 };
 
 /** Names in links to reports of earlier versions: `#layers=outline,mesh`. */
-const FORMER_LAYERS: Record<string, string> = { mesh: 'edges', colors: '' };
+const FORMER_LAYERS: Record<string, string> = { mesh: 'edges', colors: '', isolines: 'sections' };
 
 /** Reads the frames that client/output/report.cc has written into the document. */
 function trackOfDocument(): ReportTrack {
@@ -32,6 +35,7 @@ function trackOfDocument(): ReportTrack {
     document.querySelector('h1')?.textContent ?? '',
     { placement: parameter('placement'), fill: parameter('fill') },
     document.body.dataset.color ?? '',
+    reportOutlines(rows.map(({ cells: [name, value] }) => [name.textContent ?? '', value.textContent ?? ''])),
     scripts('frame-numbers').map((script) => JSON.parse(script.textContent ?? '')),
     (index) => geometries[index].textContent ?? '');
 }
@@ -52,7 +56,6 @@ class Report {
       chosen: () => {}, closed: () => {}, moved: () => this.writeAddress(),
     }, null);
     this.pane.setIndex(0, 1, true);
-    this.pane.scene.fixedRange = this.track.colorRange;
     byId('stage', HTMLElement).append(this.pane.element);
     this.time = new TimePanel(() => this.track, () => this.writeAddress());
     this.curves = new CurvesPanel(RESULT_CURVES, true, (sequence) => {
@@ -63,9 +66,9 @@ class Report {
       this.look.setDark(dark);
       this.curves.setDark(dark);
     });
-    if (this.track.hasIsolines) this.look.offerIsolines();
-    this.look.setAttributes(this.track.colorRange ? [this.track.color] : []);
-    this.look.setColour(this.track.colorRange ? this.track.color : 'plain');
+    const { color, colorRanges } = this.track;
+    this.look.setAttributes([...colorRanges.keys()]);
+    this.look.setColour(colorRanges.has(color) ? color : 'plain');
     this.look.toggle('edges');
     this.listen();
     this.readAddress();
@@ -84,6 +87,7 @@ class Report {
     };
     button('zoom-in').addEventListener('click', () => zoom('+'));
     button('zoom-out').addEventListener('click', () => zoom('-'));
+    button('export-csv').addEventListener('click', () => downloadCurves(this.track));
     button('fit').addEventListener('click', () => this.pane.fit());
     addEventListener('beforeprint', () => this.pane.scene.draw());
     const actions: Record<string, () => void> = {
@@ -96,13 +100,11 @@ class Report {
       c: () => this.toggleColour(),
       ...Object.fromEntries(Object.entries(LAYER_KEYS).map(([key, name]) => [key, () => this.look.toggle(name)])),
     };
+    releaseFocusAfterClicks();
     // Captures the event, so that arrows step instead of panning the focused picture.
     addEventListener('keydown', (event) => {
-      const isControl = /^(INPUT|SELECT|BUTTON|SUMMARY)$/.test((event.target as HTMLElement).tagName);
-      const isTyped = isControl && (event.key === ' ' || event.key.startsWith('Arrow'));
-      if (isTyped || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey) return;
       const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      if (!action) return;
+      if (!action || event.shiftKey || usesKey(event.target, event)) return;
       event.preventDefault();
       event.stopPropagation();
       action();
@@ -110,12 +112,14 @@ class Report {
   }
 
   private toggleColour(): void {
-    const { color, colorRange } = this.track;
-    if (colorRange) this.look.setColour(this.look.look.colour === color ? 'plain' : color);
+    const { color, colorRanges } = this.track;
+    if (colorRanges.has(color)) this.look.setColour(this.look.look.colour === color ? 'plain' : color);
   }
 
   private lookChanged(): void {
-    this.pane?.setLook(this.look.look);
+    if (!this.pane) return;
+    this.pane.scene.fixedRange = this.track.colorRanges.get(this.look.look.colour) ?? null;
+    this.pane.setLook(this.look.look);
     this.writeAddress();
   }
 
@@ -150,9 +154,11 @@ class Report {
     player.tick(now);
     this.pane.refresh(now);
     this.time.refresh();
-    this.curves.refresh(this.track, now);
+    this.curves.refresh(this.track, this.pane.summary, this.pane.isStreamed, now);
+    this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl);
+    this.look.setOutlines(this.track.outlines);
     this.look.setLegend(this.pane.scene.legend());
-    this.status.refresh(this.track, this.pane.problem, now);
+    this.status.refresh([this.pane.state], 0, this.track, now);
     setText(byId('omissions', HTMLElement), this.track.omissions(player.sequence ?? 0));
     document.body.dataset.frame = this.track.labelOf(player.sequence ?? 0);
     requestAnimationFrame((next) => this.refresh(next));

@@ -1,10 +1,12 @@
 import type { Range as ValueRange } from '../draw/ramp';
 import { type Bounds, union } from '../draw/view';
+import { channelsOf } from '../protocol/channels';
 import type { Frame, Rings, Statistics } from '../protocol/frame';
+import type { Outline } from '../protocol/sections';
 import { type Entry, History, type Summary } from '../stream/history';
 import { Player, type Range } from '../stream/player';
 import { sentence } from '../stream/status';
-import { STAGES } from '../stream/summary';
+import { ringCounts, STAGES } from '../stream/summary';
 import type { Method, Track } from '../stream/track';
 import { count } from '../ui/format';
 import { decodeGeometry } from './geometry';
@@ -34,10 +36,20 @@ export interface FrameNumbers {
   rings_digest: string;
   mesh_digest: string;
   box: [number, number, number, number] | null;
-  colors?: [number, number];
-  /** Area, perimeter, particles, identity, parents of each ring. */
-  measures: [number | null, number | null, number, string, string[]][];
+  /** Range of each channel of the attribute: a scalar, or the magnitude and the components. */
+  colors?: [number, number][];
+  measures: Measures;
+  sections: {
+    area: number | null;
+    perimeter: number | null;
+    particles: number;
+    rings_digest: string;
+    measures: Measures;
+  }[];
 }
+
+/** Area, perimeter, particles, identity, parents of each ring. */
+type Measures = [number | null, number | null, number, string, string[]][];
 
 /** Frames per second at speed 1. */
 const RATE = 12;
@@ -56,21 +68,19 @@ export class ReportTrack implements Track {
   readonly state = { kind: 'well', text: '' } as const;
   readonly parameters = null;
   readonly bounds: Bounds | null;
-  /** Range of the attribute `color` in all frames. */
-  readonly colorRange: ValueRange | null;
-  readonly hasIsolines: boolean;
+  /** Range of each channel of the attribute `color` in all frames. */
+  readonly colorRanges: ReadonlyMap<string, ValueRange>;
   /** Distinct texts of doubts. A doubt is an index. */
   private readonly doubts: string[];
   private latest: { sequence: number; frame: Frame } | null = null;
 
   constructor(readonly title: string, readonly method: Method, readonly color: string,
-              private readonly numbers: FrameNumbers[],
+              readonly outlines: readonly Outline[], private readonly numbers: FrameNumbers[],
               private readonly geometryOf: (index: number) => string) {
     this.bounds = boundsOfAll(numbers);
-    this.colorRange = rangeOfAll(numbers);
+    this.colorRanges = rangesOfAll(color, numbers);
     this.doubts = [...new Set(numbers.flatMap(({ doubts }) => doubts))];
     numbers.forEach((one, k) => this.history.insert(this.entry(one, k + 1), Infinity));
-    this.hasIsolines = numbers.length > 0 && this.frame(1).isolines !== null;
     this.player = new Player(this, false);
     this.player.loop = true;
     this.player.seek(1);
@@ -104,7 +114,8 @@ export class ReportTrack implements Track {
 
   private entry(numbers: FrameNumbers, sequence: number): Entry {
     const summary: Summary = {
-      area: orNaN(numbers.area), rings: numbers.measures.length, triangles: numbers.triangles,
+      area: orNaN(numbers.area), triangles: numbers.triangles,
+      ...ringCounts(numbers.measures.map(([area]) => area ?? 0)),
       trianglesGrid: numbers.triangles_grid, milliseconds: orNaN(numbers.milliseconds),
       stages: STAGES.map((name) => numbers.stages[name] ?? 0),
       received: NaN, drawn: NaN, dropped: NaN, latency: 0,
@@ -124,12 +135,27 @@ export class ReportTrack implements Track {
 
   private decode(sequence: number): Frame {
     const numbers = this.numbers[sequence - 1];
-    const color = numbers.colors ? { name: this.color, range: numbers.colors } : null;
-    const { origin, rings, isolines, mesh, particles } = decodeGeometry(this.geometryOf(sequence - 1), color);
-    return {
-      sequence: BigInt(sequence), time: orNaN(numbers.time), origin, rings: measured(rings, numbers),
-      isolines, mesh, particles, statistics: this.statistics(numbers),
+    const colors = numbers.colors ? { name: this.color, ranges: numbers.colors } : null;
+    const { sections, ...geometry } = decodeGeometry(this.geometryOf(sequence - 1), colors);
+    const frame: Frame = {
+      ...geometry, particles: geometry.particles.length > 0 ? geometry.particles : null, sequence: BigInt(sequence), time: orNaN(numbers.time),
+      rings: measured(geometry.rings, numbers.measures), sections: [], isolines: [],
+      statistics: this.statistics(numbers),
       ringsDigest: BigInt(`0x${numbers.rings_digest}`), meshDigest: BigInt(`0x${numbers.mesh_digest}`),
+    };
+    return { ...frame, sections: sections.map((rings, k) => this.section(frame, rings, numbers.sections[k])) };
+  }
+
+  /** A section of a frame. The report has no mesh of it. */
+  private section(frame: Frame, rings: Rings, numbers: FrameNumbers['sections'][0]): Frame {
+    const { spacing } = frame.statistics;
+    return {
+      ...frame, rings: measured(rings, numbers.measures), mesh: null, particles: null,
+      particleAttributes: null, ringsDigest: BigInt(`0x${numbers.rings_digest}`), meshDigest: null,
+      statistics: {
+        ...UNKNOWN, particles: numbers.particles, area: orNaN(numbers.area),
+        perimeter: orNaN(numbers.perimeter), spacing,
+      },
     };
   }
 
@@ -145,7 +171,12 @@ export class ReportTrack implements Track {
   }
 }
 
-function measured(rings: Rings, { measures }: FrameNumbers): Rings {
+const UNKNOWN: Statistics = {
+  particles: NaN, triangles: NaN, trianglesGrid: NaN, area: NaN, perimeter: NaN, spacing: NaN, milliseconds: NaN,
+  droppedHoles: 0, droppedComponents: 0, droppedSpray: 0, selfIntersections: 0, foldedTriangles: 0, doubts: [],
+};
+
+function measured(rings: Rings, measures: Measures): Rings {
   return {
     ...rings,
     area: Float64Array.from(measures, ([area]) => orNaN(area)),
@@ -167,10 +198,12 @@ function boundsOfAll(numbers: FrameNumbers[]): Bounds | null {
   return boxes.filter((box) => side(box) <= limit).reduce(union);
 }
 
-function rangeOfAll(numbers: FrameNumbers[]): ValueRange | null {
-  const ranges = numbers.map(({ colors }) => colors).filter((range) => range !== undefined);
-  if (ranges.length === 0) return null;
-  return {
-    min: Math.min(...ranges.map(([low]) => low)), max: Math.max(...ranges.map(([, high]) => high)),
-  };
+function rangesOfAll(color: string, numbers: FrameNumbers[]): Map<string, ValueRange> {
+  const frames = numbers.map(({ colors }) => colors).filter((ranges) => ranges !== undefined);
+  const count = frames[0]?.length ?? 0;
+  const channels = count === 0 ? [] : channelsOf(color, Math.max(1, count - 1));
+  return new Map(channels.map((channel, k) => [channel, {
+    min: Math.min(...frames.map((ranges) => ranges[k][0])),
+    max: Math.max(...frames.map((ranges) => ranges[k][1])),
+  }]));
 }

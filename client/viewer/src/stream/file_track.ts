@@ -7,13 +7,14 @@ import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
+import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf, outputsFor, parametersOf, type Settings } from './settings';
 import { decodeFrame } from '../protocol/decode';
-import type { Particles } from '../protocol/particles';
+import { particleChannels, type Particles } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
-import { CallError, describe, mayRetry, type CallStatus } from './status';
+import { CallError, describe, mayRetry, sentence, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
-import { HISTORY_BYTES, type Method, type Track, type TrackState } from './track';
+import { type DrawnParticles, HISTORY_BYTES, type Method, type Track, type TrackState } from './track';
 
 /** Frames per second at speed 1. */
 const RATE = 30;
@@ -35,8 +36,8 @@ export class FileTrack implements Track {
   private producer: Producer | null = null;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private wakeSender: (() => void) | null = null;
-  /** Error of a frame or a file, or empty. */
-  private problem = '';
+  /** Why frames are refused, by sequence. */
+  private readonly refusals = new Map<number, string>();
   private hasAttributes = false;
   private attempt = 0;
 
@@ -49,6 +50,7 @@ export class FileTrack implements Track {
   get title(): string { return this.source.title; }
   get method(): Method | null { return methodOf(this.parameters); }
   get bounds(): null { return null; }
+  get outlines(): Outline[] { return outlinesOf(this.parameters); }
 
   range(): Range { return { first: 1, last: this.source.count }; }
   rate(): number { return RATE; }
@@ -57,6 +59,7 @@ export class FileTrack implements Track {
   entryAt(sequence: number): Entry | null { return this.history.get(sequence); }
   labelOf(sequence: number): string { return String(sequence); }
   sequenceOf(label: number): number { return label; }
+  refusalOf(sequence: number): string { return this.refusals.get(sequence) ?? ''; }
   doubtText(doubt: number): string { return this.gateway.doubtText(doubt); }
 
   async particlesOf(sequence: number): Promise<Particles> {
@@ -65,16 +68,20 @@ export class FileTrack implements Track {
   }
 
   /** The server does not return the particles of its producer. */
-  async drawnParticles(sequence: number, origin: [number, number]): Promise<Float32Array> {
-    const { positionFormat, positions } = await this.particlesOf(sequence);
-    return relativePositions(positionFormat, positions, 0, origin);
+  async drawnParticles(sequence: number, origin: [number, number]): Promise<DrawnParticles> {
+    const particles = shareOf(await this.source.frame(sequence - 1), this.settings.share);
+    return {
+      points: relativePositions(particles.positionFormat, particles.positions, 0, origin),
+      attributes: particleChannels(particles),
+    };
   }
 
   reopen(settings: Settings): void {
     this.close();
     this.settings = settings;
     this.history.clear();
-    this.problem = '';
+    this.refusals.clear();
+    this.state = { kind: 'busy', text: 'Connecting' };
     this.connect();
   }
 
@@ -114,8 +121,8 @@ export class FileTrack implements Track {
       next: (sequence) => this.next(sequence, producer),
       frame: (frame, message) => this.frame(frame, message),
       error: (error) => {
-        this.problem = `Frame ${error.sequence} is refused: ${error.message}.`;
-        this.state = { kind: 'failed', text: this.problem };
+        this.refusals.set(Number(error.sequence), `Frame ${error.sequence} is refused: ${sentence(error.message)}`);
+        this.answered(Number(error.sequence));
       },
       ended: (status) => this.ended(status),
     });
@@ -139,7 +146,6 @@ export class FileTrack implements Track {
       return shareOf(await this.particlesOf(sequence), this.settings.share);
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      this.problem = error.message;
       this.state = { kind: 'failed', text: error.message };
       return null;
     }
@@ -163,9 +169,13 @@ export class FileTrack implements Track {
       summary: summarise(frame, this.counts),
       frame: () => decodeFrame(parseResult(message), 0),
     }, Math.max(1, (this.player.sequence ?? 1) - KEPT_BEHIND));
-    if (sequence === this.source.count && !this.problem) {
-      this.state = { kind: 'well', text: 'All frames received' };
-    }
+    this.answered(sequence);
+  }
+
+  private answered(sequence: number): void {
+    if (sequence !== this.source.count || this.state.kind !== 'well') return;
+    const { size } = this.refusals;
+    this.state = { kind: 'well', text: `All frames received${size > 0 ? `, ${size} refused` : ''}` };
   }
 
   private ended(status: CallStatus): void {

@@ -3,7 +3,9 @@ import type { Frame } from '../protocol/frame';
 /** Figures of a frame for the curves. NaN: unknown. */
 export interface Summary {
   area: number;
+  /** Outer rings. */
   rings: number;
+  holes: number;
   triangles: number;
   trianglesGrid: number;
   milliseconds: number;

@@ -115,6 +115,9 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     normalMemory: base?.normalMemory,
     attributeTolerance: base?.attributeTolerance,
     plane: base?.plane,
+    slice: base?.slice,
+    isovalue: base?.isovalue,
+    sections: base?.sections,
     minComponentArea: base?.minComponentArea,
     minComponentParticles: base?.minComponentParticles,
   });

@@ -1,4 +1,5 @@
 import type { ReconstructedFrame } from '@proto/v1/reconstruction_pb';
+import type { Frame } from '../protocol/frame';
 import type { Summary } from './history';
 
 /** Names of the stages in statistics. */
@@ -9,6 +10,21 @@ export const STAGES = [
 /** Frames since the start of a track. */
 export interface Counts { received: number; drawn: number; dropped: number }
 
+/** Rings and holes, by the sign of their areas. */
+export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
+  const holes = areas.filter((area) => area < 0).length;
+  return { rings: areas.length - holes, holes };
+}
+
+/** Figures of a frame that is no entry of a history: of other settings, or of a section. */
+export function summaryOf({ statistics, rings }: Frame): Summary {
+  const { area, triangles, trianglesGrid, milliseconds } = statistics;
+  return {
+    area, ...ringCounts([...rings.area]), triangles, trianglesGrid, milliseconds,
+    stages: STAGES.map(() => NaN), received: NaN, drawn: NaN, dropped: NaN, latency: NaN,
+  };
+}
+
 /** `counts`: null for a frame fetched from the server's history. */
 export function summarise(frame: ReconstructedFrame, counts: Counts | null): Summary {
   const statistics = frame.statistics;
@@ -16,7 +32,7 @@ export function summarise(frame: ReconstructedFrame, counts: Counts | null): Sum
     (name) => statistics?.stages.find(({ stage }) => stage === name)?.milliseconds ?? 0);
   return {
     area: statistics?.area ?? 0,
-    rings: frame.rings?.measures.length ?? 0,
+    ...ringCounts(frame.rings?.measures.map(({ area }) => area) ?? []),
     triangles: Number(statistics?.triangles ?? 0),
     trianglesGrid: Number(statistics?.trianglesGrid ?? 0),
     milliseconds: statistics?.milliseconds ?? 0,

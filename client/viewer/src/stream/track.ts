@@ -2,7 +2,9 @@ import type { ReconstructionParameters } from '@proto/v1/reconstruction_pb';
 import type { Bounds } from '../draw/view';
 import type { Entry, History } from './history';
 import type { Playable, Player } from './player';
+import type { Channels } from '../protocol/channels';
 import type { Particles } from '../protocol/particles';
+import type { Outline } from '../protocol/sections';
 import type { Settings } from './settings';
 import type { Counts } from './summary';
 
@@ -19,6 +21,9 @@ export interface TrackState {
 /** Names of placement and fill. */
 export interface Method { placement: string; fill: string }
 
+/** Particles to draw: x, y of each, and their numbers. */
+export interface DrawnParticles { points: Float32Array; attributes: Channels }
+
 /** A sequence of results: a watched stream, dropped files, or the frames of a report. */
 export interface Track extends Playable {
   readonly kind: 'watch' | 'file' | 'report';
@@ -31,6 +36,8 @@ export interface Track extends Playable {
   readonly method: Method | null;
   /** As resolved by the server; null until it has answered. */
   readonly parameters: ReconstructionParameters | null;
+  /** The outlines of each frame: its own, then its sections. */
+  readonly outlines: readonly Outline[];
   /** Bounds of all frames; null if they are unknown. */
   readonly bounds: Bounds | null;
   /** The entry to show at a sequence; null if it is not available yet. */
@@ -41,10 +48,16 @@ export interface Track extends Playable {
   sequenceOf(label: number): number;
   /** Explanation of a doubt. */
   doubtText(doubt: number): string;
+  /** Why a frame is refused; empty if it is not. */
+  refusalOf?(sequence: number): string;
+  /** Whether another stream has the name now. This track keeps showing the former one. */
+  readonly hasNewRun?: boolean;
+  /** Drops the former stream and shows the one that has the name now. */
+  switchRun?(): void;
   /** Particles of a frame, for another reconstruction; null if they are not available. */
   particlesOf(sequence: number): Promise<Particles | null>;
-  /** x, y of the particles relative to `origin`, for a frame whose result lacks them. */
-  drawnParticles?(sequence: number, origin: [number, number]): Promise<Float32Array>;
+  /** The particles relative to `origin`, for a frame whose result lacks them. */
+  drawnParticles?(sequence: number, origin: [number, number]): Promise<DrawnParticles>;
   /** Settings of all frames. Files only. */
   readonly settings?: Settings;
   /** Reconstructs all frames with other settings. Files only. */

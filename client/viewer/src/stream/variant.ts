@@ -2,6 +2,7 @@ import { ReconstructFrameRequestSchema, ReconstructFrameResponseSchema } from '@
 import { shareOf } from '../input/share';
 import { decodeFrame } from '../protocol/decode';
 import type { Frame } from '../protocol/frame';
+import { particleChannels } from '../protocol/particles';
 import type { Gateway } from './gateway';
 import { outputsFor, parametersOf, settingsText, type Settings } from './settings';
 import type { Track } from './track';
@@ -13,6 +14,8 @@ export class Variant {
   problem = '';
   private requested = '';
   private busy = false;
+  /** Counts calls of `reset`: results of requests before the last one are dropped. */
+  private epoch = 0;
 
   constructor(private readonly gateway: Gateway, private readonly changed: () => void) {}
 
@@ -22,26 +25,27 @@ export class Variant {
     if (this.busy || key === this.requested) return;
     this.requested = key;
     this.busy = true;
+    const { epoch } = this;
     this.fetch(track, sequence, settings)
-      .then((result) => {
-        this.result = result;
-        this.problem = '';
-      })
-      .catch((error: unknown) => {
-        this.result = null;
-        this.problem = error instanceof Error ? error.message : String(error);
-      })
-      .finally(() => {
-        this.busy = false;
-        this.changed();
-      });
+      .then((result) => this.finish(epoch, result, ''))
+      .catch((error: unknown) => this.finish(epoch, null, error instanceof Error ? error.message : String(error)));
   }
 
   /** Drops the result, so that the next call of `request` sends a request. */
   reset(): void {
+    ++this.epoch;
     this.result = null;
     this.problem = '';
     this.requested = '';
+  }
+
+  private finish(epoch: number, result: Frame | null, problem: string): void {
+    this.busy = false;
+    if (epoch === this.epoch) {
+      this.result = result;
+      this.problem = problem;
+    }
+    this.changed();
   }
 
   private async fetch(track: Track, sequence: number, settings: Settings): Promise<Frame> {
@@ -63,6 +67,8 @@ export class Variant {
     frame.sequence = BigInt(sequence);
     frame.particleFormat = chosen.positionFormat;
     frame.particles = chosen.positions;
-    return decodeFrame(frame, track.parameters?.plane ?? 0);
+    return {
+      ...decodeFrame(frame, track.parameters?.plane ?? 0), particleAttributes: particleChannels(chosen),
+    };
   }
 }

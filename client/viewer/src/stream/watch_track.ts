@@ -9,6 +9,7 @@ import { PlayoutClock } from './playout_clock';
 import { Player, type Range } from './player';
 import { decodeFrame } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
+import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf } from './settings';
 import { describe, mayRetry, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
@@ -48,6 +49,7 @@ export class WatchTrack implements Track {
   private serverOldest = Infinity;
   private newest = -Infinity;
   private wasOpen = false;
+  hasNewRun = false;
   private mode = WatchMode.EVERY;
   private isSuspended = false;
   private isPastMissing = false;
@@ -62,6 +64,7 @@ export class WatchTrack implements Track {
 
   get method(): Method | null { return methodOf(this.parameters); }
   get bounds(): null { return null; }
+  get outlines(): Outline[] { return outlinesOf(this.parameters); }
 
   range(): Range | null {
     const first = this.history.first;
@@ -85,10 +88,14 @@ export class WatchTrack implements Track {
   async particlesOf(sequence: number): Promise<Particles | null> {
     const frame = this.entryAt(sequence)?.message();
     if (!frame || frame.particles.length === 0) return null;
-    return { time: frame.time, positionFormat: frame.particleFormat, positions: frame.particles };
+    return {
+      time: frame.time, positionFormat: frame.particleFormat, positions: frame.particles,
+      ids: frame.particleIds, volumes: frame.particleVolumes, velocities: frame.particleVelocities,
+    };
   }
 
   refresh(): void {
+    if (this.hasNewRun) return;  // The server holds frames of the new run only.
     this.fetchPast();
     const position = this.player.sequence;
     if (position === null) return;
@@ -171,7 +178,13 @@ export class WatchTrack implements Track {
   }
 
   private opened(opened: WatchOpened): void {
-    if (this.wasOpen && opened.lineage !== this.lineage) this.forget();
+    if (this.wasOpen && opened.lineage !== this.lineage) {
+      if (this.history.size > 0) {
+        this.keepFormerRun();
+        return;
+      }
+      this.forget();
+    }
     this.wasOpen = true;
     this.lineage = opened.lineage;
     this.parameters = opened.parameters ?? null;
@@ -182,7 +195,25 @@ export class WatchTrack implements Track {
     this.isPastMissing = true;
   }
 
-  /** Another stream has the name now. */
+  switchRun(): void {
+    this.close();
+    this.hasNewRun = false;
+    this.forget();
+    this.lineage = '';
+    this.wasOpen = false;
+    this.state = { kind: 'busy', text: 'Connecting' };
+    this.connect();
+  }
+
+  /** Another stream has the name now. The frames of the former one stay until `switchRun`. */
+  private keepFormerRun(): void {
+    this.close();
+    this.call = null;
+    this.backfill = null;
+    this.hasNewRun = true;
+    this.state = { kind: 'ended', text: 'This run has ended. A new run with the same name has started.' };
+  }
+
   private forget(): void {
     this.history.clear();
     this.clock.reset();
@@ -226,9 +257,13 @@ export class WatchTrack implements Track {
       this.state = { kind: 'failed', text: describe(status) };
       return;
     }
-    this.state = end && status.code === 0
-      ? { kind: 'ended', text: 'The stream has ended. Waiting for it to start again.' }
-      : { kind: 'lost', text: `${describe(status)} Trying again.` };
+    if (status.reason === 'NO_SUCH_STREAM' || (end && status.code === 0)) {
+      this.state = this.wasOpen
+        ? { kind: 'ended', text: 'The stream has ended. Waiting for it to start again.' }
+        : { kind: 'busy', text: `${describe(status)} Waiting for it.` };
+    } else {
+      this.state = { kind: 'lost', text: `${describe(status)} Trying again.` };
+    }
     this.retry = setTimeout(() => this.connect(), this.backoff.take());
   }
 

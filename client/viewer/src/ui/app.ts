@@ -6,8 +6,9 @@ import { WatchTrack } from '../stream/watch_track';
 import { addressText, parseAddress, type Address } from './address';
 import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
 import { button } from './dom';
-import { ExportPanel } from './export_panel';
+import { ExportPanel, NO_PICTURE } from './export_panel';
 import { FilesPanel } from './files_panel';
+import { releaseFocusAfterClicks, usesKey } from './keys';
 import { LookPanel } from './look_panel';
 import type { Pane } from './pane';
 import { SettingsPanel } from './settings_panel';
@@ -29,6 +30,7 @@ export class App {
   private readonly streams: StreamsPanel;
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
+  private readonly exports: ExportPanel;
   private ownAddress = '';
   /** False while the address of the link is read, which must not be overwritten. */
   private isReady = false;
@@ -52,8 +54,8 @@ export class App {
       this.look.setDark(dark);
       this.curves.setDark(dark);
     });
-    new ExportPanel(() => this.stage.chosen, () => this.look.look,
-                    (text, isError) => this.status.report(text, isError));
+    this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
+                    (text, isError, isGone) => this.status.report(text, isError, isGone));
     new FilesPanel((source) => this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED })),
                    (text, isError) => this.status.report(text, isError));
     button('side-by-side').addEventListener('click', () => this.addBeside());
@@ -116,7 +118,7 @@ export class App {
   }
 
   private watchBeside(stream: string): void {
-    if (this.stage.isFull) this.status.report('The page shows at most four pictures. Close one of them.', true);
+    if (this.stage.isFull) this.reportFull();
     else this.stage.add(this.watchTrack(stream), { ...AS_STREAMED });
     this.writeAddress();
   }
@@ -134,10 +136,14 @@ export class App {
     this.writeAddress();
   }
 
+  private reportFull(): void {
+    this.status.report('The page shows at most four pictures. Close one of them.', true, () => !this.stage.isFull);
+  }
+
   private addBeside(): void {
     const pane = this.stage.chosen;
-    if (!pane) this.status.report('No picture yet. Choose a stream or drop files.', true);
-    else if (this.stage.isFull) this.status.report('The page shows at most four pictures. Close one of them.', true);
+    if (!pane) this.status.report(NO_PICTURE, true, () => this.stage.panes.length > 0);
+    else if (this.stage.isFull) this.reportFull();
     else this.stage.add(pane.track, { ...pane.settings });
     this.writeAddress();
   }
@@ -186,13 +192,10 @@ export class App {
       l: () => this.time.follow(),
       f: () => this.fit(),
     };
+    releaseFocusAfterClicks();
     addEventListener('keydown', (event) => {
-      const target = event.target as HTMLElement;
-      const isControl = /^(INPUT|SELECT|BUTTON|TEXTAREA|SUMMARY)$/.test(target.tagName);
-      const isScrub = target.id === 'scrub' && event.key !== ' ';
-      if ((isControl && !isScrub) || event.ctrlKey || event.metaKey || event.altKey) return;
       const action = actions[event.key];
-      if (!action) return;
+      if (!action || usesKey(event.target, event)) return;
       event.preventDefault();
       action();
     });
@@ -262,10 +265,14 @@ export class App {
 
   private refreshPanels(now: number): void {
     const pane: Pane | null = this.stage.chosen;
-    this.look.setAttributes([...pane?.frame?.rings.attributes.keys() ?? []]);
+    this.look.setAttributes(pane?.scene.channels ?? []);
+    this.look.offer(pane?.frame ?? null, this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
+    this.exports.offer(pane?.scene.hasWebgl ?? true);
+    this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.scene.legend() ?? null);
     this.time.refresh();
-    this.curves.refresh(this.track, now);
-    this.status.refresh(this.track, pane?.problem ?? '', now);
+    this.curves.refresh(this.track, pane?.summary ?? null, pane?.isStreamed ?? true, now);
+    this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,
+      this.track, now);
   }
 }

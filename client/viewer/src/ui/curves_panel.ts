@@ -2,10 +2,13 @@ import uPlot from 'uplot';
 import type { Entry, Summary } from '../stream/history';
 import { STAGES } from '../stream/summary';
 import type { Track } from '../stream/track';
+import { curvePoints } from './curve_data';
 import { byId, make } from './dom';
-import { number } from './format';
+import { count, number } from './format';
+import { tickDigits, ticks } from './ticks';
 
-interface Line { name: string; value(summary: Summary): number }
+/** `text`: the value as under the picture. */
+interface Line { name: string; value(summary: Summary): number; text(value: number): string }
 
 interface Curve {
   title: string;
@@ -15,17 +18,22 @@ interface Curve {
   total?(summary: Summary): number;
 }
 
+const milliseconds = (value: number) => number(value, 3);
+
 /** Curves of results. */
 export const RESULT_CURVES: Curve[] = [
-  { title: 'Area', lines: [{ name: 'area', value: (s) => s.area }] },
-  { title: 'Rings', lines: [{ name: 'rings', value: (s) => s.rings }] },
+  { title: 'Area', lines: [{ name: 'area', value: (s) => s.area, text: (value) => number(value, 7) }] },
+  { title: 'Rings, holes', lines: [
+    { name: 'rings', value: (s) => s.rings, text: count },
+    { name: 'holes', value: (s) => s.holes, text: count },
+  ] },
   { title: 'Triangles', lines: [
-    { name: 'merged', value: (s) => s.triangles },
-    { name: 'unmerged', value: (s) => s.trianglesGrid },
+    { name: 'merged', value: (s) => s.triangles, text: count },
+    { name: 'unmerged', value: (s) => s.trianglesGrid, text: count },
   ] },
   {
     title: 'Milliseconds',
-    lines: STAGES.map((name, k) => ({ name, value: (s: Summary) => s.stages[k] })),
+    lines: STAGES.map((name, k) => ({ name, value: (s: Summary) => s.stages[k], text: milliseconds })),
     isWide: true,
     total: (s) => s.milliseconds,
   },
@@ -34,11 +42,11 @@ export const RESULT_CURVES: Curve[] = [
 /** Curves of a stream through the server. */
 export const STREAM_CURVES: Curve[] = [
   { title: 'Frames', isWide: true, lines: [
-    { name: 'received', value: (s) => s.received },
-    { name: 'drawn', value: (s) => s.drawn },
-    { name: 'dropped', value: (s) => s.dropped },
+    { name: 'received', value: (s) => s.received, text: count },
+    { name: 'drawn', value: (s) => s.drawn, text: count },
+    { name: 'dropped', value: (s) => s.dropped, text: count },
   ] },
-  { title: 'Latency, ms', lines: [{ name: 'latency', value: (s) => s.latency }] },
+  { title: 'Latency, ms', lines: [{ name: 'latency', value: (s) => s.latency, text: milliseconds }] },
 ];
 
 /** Distinct in both themes. The first is the accent. */
@@ -46,25 +54,24 @@ const COLOURS = {
   light: ['#0b5cad', '#c2410c', '#15803d', '#7e22ce', '#a16207', '#be185d', '#0f766e', '#525b6b', '#4d7c0f'],
   dark: ['#6bb5ff', '#fb923c', '#4ade80', '#c084fc', '#facc15', '#f472b6', '#2dd4bf', '#aab4c4', '#a3e635'],
 };
-/** About one point per pixel. */
-const MOST_POINTS = 600;
 const REFRESH_MS = 300;
-
-/** At most MOST_POINTS entries, in equal steps. */
-function sample({ history }: Track): Entry[] {
-  const count = Math.min(history.size, MOST_POINTS);
-  return Array.from({ length: count }, (_, k) =>
-    history.entry(Math.round(k * (history.size - 1) / Math.max(1, count - 1))));
-}
+/** Width of a digit on an axis. */
+const LABEL_PIXELS = 6;
 
 /** Values of the lines at each entry; null for gaps. Bands are sums from the top band down. */
-function valuesOf({ lines, total }: Curve, entries: Entry[]): (number | null)[][] {
-  const values = lines.map((line) => entries.map(({ summary }) => line.value(summary)));
+function valuesOf({ lines, total }: Curve, entries: readonly (Entry | null)[]): (number | null)[][] {
+  const values = lines.map((line) => entries.map((entry) => (entry ? line.value(entry.summary) : NaN)));
   if (total) {
     for (let k = 1; k < values.length; ++k) values[k] = values[k].map((value, i) => value + values[k - 1][i]);
     values.reverse();
   }
   return values.map((row) => row.map((value) => (Number.isFinite(value) ? value : null)));
+}
+
+/** Values without a neighbour, which no line shows. */
+function isolated(values: ArrayLike<number | null | undefined>): number[] {
+  const isThere = (k: number) => values[k] !== null && values[k] !== undefined;
+  return [...Array(values.length).keys()].filter((k) => isThere(k) && !isThere(k - 1) && !isThere(k + 1));
 }
 
 /** The upper limit of bands: without the slowest 3 % if these would flatten the rest. */
@@ -80,10 +87,14 @@ export class CurvesPanel {
   private plots: uPlot[] = [];
   private readonly captions: HTMLElement[] = [];
   private readonly holders: HTMLElement[] = [];
-  private entries: Entry[] = [];
+  private entries: readonly (Entry | null)[] = [];
   private track: Track | null = null;
   private lastRefresh = -Infinity;
   private position = NaN;
+  /** Figures under the picture, and their text when the captions were written. */
+  private shown: Summary | null = null;
+  private note = '';
+  private captioned = '';
   /** Index of the entry under the pointer. */
   private hovered: number | null = null;
   private colours = COLOURS.light;
@@ -109,26 +120,33 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  refresh(track: Track | null, now: number): void {
+  /** `shown`: the figures under the picture. `isStreamed`: whether they are points of the curves. */
+  refresh(track: Track | null, shown: Summary | null, isStreamed: boolean, now: number): void {
+    const frame = JSON.stringify([shown, isStreamed]);
+    if (frame !== this.captioned && this.hovered === null) {
+      this.captioned = frame;
+      this.shown = shown;
+      this.note = isStreamed ? '' : ' (line: as streamed)';
+      this.showCaptions();
+    }
     if (now - this.lastRefresh < REFRESH_MS) return;
     this.lastRefresh = now;
     this.track = track;
     this.position = track?.player.sequence ?? NaN;
-    this.entries = track ? sample(track) : [];
-    const x = this.entries.map(({ sequence }) => Number(track?.labelOf(sequence)));
+    const { x, entries } = track ? curvePoints(track) : { x: [], entries: [] };
+    this.entries = entries;
     this.curves.forEach((curve, k) => this.plots[k]?.setData([x, ...valuesOf(curve, this.entries)]));
     this.showCaptions();
   }
 
-  /** The values at the pointer, or else at the current frame, in the colours of the lines. */
+  /** The values at the pointer, or else those under the picture, in the colours of the lines. */
   private showCaptions(): void {
-    const entry = this.hovered === null ? this.track?.entryAt(this.position) : this.entries[this.hovered];
-    const summary = entry?.summary ?? null;
+    const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     this.curves.forEach(({ title, lines, isWide, total }, k) => {
-      const parts: (Node | string)[] = [title];
-      if (total && summary) parts.push(' ', make('b', {}, number(total(summary), 3)));
+      const parts: (Node | string)[] = [title + (this.hovered === null ? this.note : '')];
+      if (total && summary) parts.push(' ', make('b', {}, milliseconds(total(summary))));
       lines.forEach((line, i) => {
-        const value = summary && (!total || this.isDetailed) ? number(line.value(summary), total ? 3 : 5) : '';
+        const value = summary && (!total || this.isDetailed) ? line.text(line.value(summary)) : '';
         const text = isWide ? `${line.name} ${value}` : value;
         parts.push(' ', make('b', { style: `color: ${this.colours[i]}`, title: line.name }, text));
       });
@@ -144,21 +162,34 @@ export class CurvesPanel {
       stroke: quiet, font: '10px system-ui', grid: { stroke: line, width: 0.5 }, ticks: { show: false },
     };
     const series = curve.lines.map(({ name }, k): uPlot.Series => ({
-      label: name, stroke: this.colours[k], width: 1.25, points: { show: false }, spanGaps: false,
+      label: name, stroke: this.colours[k], width: 1.25, spanGaps: false,
+      points: { show: true, size: 3, filter: (self, index) => isolated(self.data[index]) },
       ...curve.total && { fill: this.colours[k], width: 0 },
     }));
     const plot = new uPlot({
       width: Math.max(60, holder.clientWidth),
       height: Math.max(40, holder.clientHeight),
       legend: { show: false },
+      padding: [6, 8, 0, 0],
       cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
       scales: {
         x: { time: false },
         ...curve.total && { y: { range: (self: uPlot) => [0, topOf([...self.data[1] ?? []])] as [number, number] } },
       },
       axes: [
-        { ...axis, size: 16, gap: 1, space: 60 },
-        { ...axis, size: 42, gap: 2, space: 24, values: (_, ticks) => ticks.map((tick) => number(tick, 3)) },
+        {
+          ...axis, size: 19, gap: 4, splits: (_, __, min, max) => ticks(min, max),
+          values: (self, all) => {
+            const texts = all.map((tick) => number(tick, Math.max(5, tickDigits(all))));
+            const widest = LABEL_PIXELS * (1 + Math.max(...texts.map(({ length }) => length)));
+            const isNarrow = self.bbox.width / devicePixelRatio / all.length < widest;
+            return texts.map((text, k) => (isNarrow && k % 2 === 1 ? '' : text));
+          },
+        },
+        {
+          ...axis, size: 48, gap: 2, splits: (_, __, min, max) => ticks(min, max),
+          values: (_, all) => all.map((tick) => number(tick, tickDigits(all))),
+        },
       ],
       series: [{}, ...curve.total ? series.reverse() : series],
       hooks: { draw: [(self) => this.drawPosition(self)], setCursor: [(self) => this.hover(self.cursor.idx)] },

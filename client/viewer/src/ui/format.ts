@@ -9,7 +9,7 @@ export function number(value: number, digits = 5): string {
 
 const thousands = new Intl.NumberFormat('en', { useGrouping: true });
 
-/** A count with separators: 12,345. */
+/** A count with separators: 12,345; a dash if it is unknown. */
 export function count(value: number): string {
-  return thousands.format(value);
+  return Number.isFinite(value) ? thousands.format(value) : '–';
 }

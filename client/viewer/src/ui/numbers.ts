@@ -43,7 +43,7 @@ const ROWS: Row[] = [
   { key: 'folded', title: 'Folded triangles',
     text: ({ statistics }) => unlessZero(statistics.foldedTriangles), isAlert: true },
   { key: 'rings-digest', title: 'Rings digest', text: ({ frame }) => digestText(frame.ringsDigest), isWide: true },
-  { key: 'mesh-digest', title: 'Mesh digest', text: ({ frame }) => digestText(frame.meshDigest), isWide: true },
+  { key: 'mesh-digest', title: 'Mesh digest', text: ({ frame }) => (frame.meshDigest === null ? '–' : digestText(frame.meshDigest)), isWide: true },
 ];
 
 /** The figures of a pane's frame. */
@@ -55,6 +55,14 @@ export class Numbers {
     this.element.append(make('div', { class: kind }, make('dt', {}, row.title), value));
     return value;
   });
+
+  /** Shows dashes. */
+  clear(): void {
+    for (const value of this.values) {
+      setText(value, '–');
+      value.title = '';
+    }
+  }
 
   show(frame: Frame, label: string, method: Method | null): void {
     const shown = { frame, label, method, statistics: frame.statistics };

@@ -1,15 +1,18 @@
 import { attachNavigation, Scene, type Look, type Picked } from '../draw';
 import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
-import type { Entry } from '../stream/history';
+import { type Outline, outlineName, pictureOf } from '../protocol/sections';
+import type { Entry, Summary } from '../stream/history';
 import {
   FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
 } from '../stream/settings';
 import type { Method, Track } from '../stream/track';
+import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
 import { make, setText } from './dom';
 import { count, number } from './format';
 import { Numbers } from './numbers';
+import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
 
 export interface PaneEvents {
@@ -33,8 +36,17 @@ export class Pane {
   });
   private readonly readout = make('div', { class: 'readout' });
   private readonly name = make('span', { class: 'name' });
+  private readonly badge = make('span', { class: 'state' });
   private readonly subtitle = make('span', { class: 'quiet' });
-  private readonly closeButton = make('button', { type: 'button', class: 'icon' }, '✕');
+  private readonly noticeText = make('span');
+  private readonly switchButton = make('button', { type: 'button', title: 'Shows the stream that has this name now.' },
+    'Switch to the new run');
+  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton);
+  /** Settings and method of the frame shown. */
+  private shownText = '';
+  /** Why the frame of the track is refused, or empty. */
+  private refusal = '';
+  private readonly closeButton = make('button', { type: 'button', class: 'icon', title: 'Closes this picture.' }, '✕');
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
   private readonly variant: Variant | null;
@@ -43,6 +55,10 @@ export class Pane {
   private shown: Entry | Frame | null = null;
   /** Bounds of all frames shown since the view follows the content. */
   private extent: Bounds | null = null;
+  /** The frame with all its outlines, of which `frame` shows one. */
+  private whole: Frame | null = null;
+  /** Whether the frame shown still has the former settings. */
+  private isPending = false;
   private dirty = true;
   private look: Look | null = null;
   private pointer: [number, number] | null = null;
@@ -53,10 +69,12 @@ export class Pane {
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
               newVariant: ((changed: () => void) => Variant) | null) {
     this.element = make('section', { class: 'pane' },
-      make('header', {}, this.name, this.subtitle, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout), this.numbers.element);
+      make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
+      make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout, this.notice),
+      this.numbers.element);
     this.variant = newVariant?.(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
+    this.switchButton.addEventListener('click', () => this.track.switchRun?.());
     this.element.addEventListener('pointerdown', () => events.chosen(this));
     this.element.addEventListener('focusin', () => events.chosen(this));
     this.scene = new Scene(this.canvas);
@@ -82,9 +100,8 @@ export class Pane {
 
   showTrack(track: Track): void {
     this.track = track;
-    this.shown = null;
+    this.clear();
     this.isFree = true;
-    this.extent = null;
     this.variant?.reset();
     this.select(null);
   }
@@ -92,14 +109,18 @@ export class Pane {
   setSettings(settings: Settings): void {
     this.settings = settings;
     this.variant?.reset();
+    this.refusal = '';
+    this.isPending = true;
     this.shown = null;
   }
 
   setLook(look: Look): void {
     this.scene.setLook(look);
     const isNew = look.particles && !this.look?.particles;
+    const isOther = look.outlineShown !== this.look?.outlineShown;
     this.look = look;
     this.dirty = true;
+    if (isOther && this.whole && this.whole.sections.length > 0) this.showOutline(this.whole);
     if (isNew && this.frame) void this.addParticles(this.frame);
   }
 
@@ -117,19 +138,45 @@ export class Pane {
     this.dirty = true;
   }
 
-  /** Error or doubts of the frame; empty if there are none. */
-  get problem(): string {
-    if (this.variant?.problem) return this.variant.problem;
+  /** Figures of the frame shown; null without one. */
+  get summary(): Summary | null {
+    if (!this.frame) return null;
+    return this.entry?.summary ?? summaryOf(this.frame);
+  }
+
+  /** Whether the frame shown is one of the track, and not of other settings or a section. */
+  get isStreamed(): boolean { return this.frame === null || this.entry !== null; }
+
+  private get entry(): Entry | null {
+    const isOwn = this.frame !== null && (this.frame === this.whole || (this.look?.outlineShown ?? 0) === 0);
+    return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
+  }
+
+  /** The outlines of the frame. */
+  get outlines(): readonly Outline[] { return this.track.outlines; }
+
+  /** Name, frame, time and settings, for exports. */
+  get caption(): string {
+    if (!this.frame) return this.track.title;
+    const label = this.track.labelOf(Number(this.frame.sequence));
+    return `${this.track.title}, frame ${label}, time ${number(this.frame.time, 6)}, ${this.shownText}`;
+  }
+
+  get state(): PaneState {
     const doubts = this.frame?.statistics.doubts ?? [];
-    return doubts.map((doubt) => this.track.doubtText(doubt)).join(' ');
+    return paneState(this.track, this.refusal, doubts.map((doubt) => this.track.doubtText(doubt)).join(' '),
+      this.frame !== null && !this.isPending);
   }
 
   /** Shows the current frame, and draws if anything has changed. */
   refresh(now: number): void {
     const sequence = this.track.player.sequence;
+    // The frames of a former run or of other settings are gone.
+    if (this.frame && this.track.history.size === 0) this.clear();
     if (sequence !== null) this.update(sequence, now);
     setText(this.name, this.track.title);
-    setText(this.subtitle, this.description());
+    setText(this.subtitle, this.frame ? this.shownText : '');
+    this.showState();
     if (!this.dirty) return;
     this.dirty = false;
     this.pick();
@@ -145,6 +192,31 @@ export class Pane {
     this.element.remove();
   }
 
+  /** Shows nothing: the picture of another stream or other settings must not stay under this name. */
+  private clear(): void {
+    this.shown = null;
+    this.whole = null;
+    this.frame = null;
+    this.extent = null;
+    this.refusal = '';
+    this.isPending = false;
+    this.scene.show(null);
+    this.numbers.clear();
+    this.dirty = true;
+  }
+
+  private showState(): void {
+    const { state } = this;
+    this.badge.dataset.state = state.kind;
+    setText(this.badge, stateName(state, this.track));
+    if (this.badge.title !== state.text) this.badge.title = state.text;
+    const isNoted = this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
+      (state.kind === 'waiting' && !this.frame);
+    this.notice.hidden = !isNoted || this.track.kind === 'report';
+    this.switchButton.hidden = !this.track.hasNewRun;
+    if (isNoted) setText(this.noticeText, state.text);
+  }
+
   private get isVariant(): boolean {
     return this.track.kind === 'watch' ? !isAsStreamed(this.settings)
       : !isAsStreamed(this.settings) &&
@@ -152,8 +224,15 @@ export class Pane {
   }
 
   private update(sequence: number, now: number): void {
+    const refusal = this.isVariant ? '' : this.track.refusalOf?.(sequence) ?? '';
+    if (refusal) {
+      if (this.frame) this.clear();
+      this.refusal = refusal;
+      return;
+    }
     const entry = this.isVariant ? null : this.track.entryAt(sequence);
     if (entry) {
+      this.refusal = '';
       if (entry === this.shown) return;
       if (Number.isNaN(entry.summary.latency)) {
         entry.summary.latency = now - entry.receivedAt;
@@ -165,25 +244,39 @@ export class Pane {
     const isFailed = this.track.state.kind === 'failed';
     if (!this.variant || (!this.isVariant && (this.track.kind === 'watch' || isFailed))) return;
     this.variant.request(this.track, sequence, this.settings);
-    const result = this.variant.result;
+    const { result, problem } = this.variant;
+    if (problem && this.frame) this.clear();
+    this.refusal = problem;
     if (!result || result === this.shown) return;
     this.show(result, result);
   }
 
   private show(source: Entry | Frame, frame: Frame): void {
     this.shown = source;
+    this.isPending = false;
+    this.whole = frame;
+    frame = pictureOf(frame, this.outlines, this.look?.outlineShown ?? 0);
     this.frame = frame;
     this.scene.show(frame);
     this.keepInView();
     this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), this.method());
+    this.shownText = this.description();
     this.dirty = true;
     if (this.look?.particles) void this.addParticles(frame);
+  }
+
+  /** Shows another outline of the frame, in the coordinates of its plane. */
+  private showOutline(whole: Frame): void {
+    this.isFree = true;
+    this.extent = null;
+    this.show(this.shown ?? whole, whole);
   }
 
   /** While the view follows the content, it grows to include each frame. */
   private keepInView(): void {
     if (!this.isFree || !this.frame) return;
-    const bounds = this.track.bounds ?? boundsOf(this.frame.rings.points, this.frame.origin);
+    const isOwn = this.frame === null || (this.look?.outlineShown ?? 0) === 0;
+    const bounds = (isOwn ? this.track.bounds : null) ?? boundsOf(this.frame.rings.points, this.frame.origin);
     if (!bounds) return;
     const extent = this.extent ? union(this.extent, bounds) : bounds;
     if (this.extent && sameBounds(extent, this.extent)) return;
@@ -196,7 +289,8 @@ export class Pane {
     if (frame.particles || !this.track.drawnParticles) return;
     const particles = await this.track.drawnParticles(Number(frame.sequence), frame.origin);
     if (frame !== this.frame) return;
-    frame.particles = particles;
+    frame.particles = particles.points;
+    frame.particleAttributes = particles.attributes;
     this.scene.show(frame);
     this.dirty = true;
   }
@@ -213,7 +307,9 @@ export class Pane {
     const settings = settingsText(this.settings);
     const text = settings ? settings.replaceAll(';', ', ').replaceAll(':', ' ') : 'as streamed';
     const isAlone = this.shown !== null && this.shown === this.variant?.result;
-    return isAlone ? `${text} (this frame alone)` : text;
+    const outline = this.outlines.length > 1
+      ? `${outlineName(this.outlines[this.look?.outlineShown ?? 0] ?? this.outlines[0])}, ` : '';
+    return outline + (isAlone ? `${text} (this frame alone)` : text);
   }
 
   private resize(): void {

@@ -9,6 +9,9 @@ type NumberName = keyof typeof NUMBERS;
 
 /** Settings of the chosen pane. */
 export class SettingsPanel {
+  /** The last valid settings. */
+  private valid: Settings = AS_STREAMED;
+
   constructor(private readonly changed: (settings: Settings) => void) {
     for (const name of Object.keys(PLACEMENTS)) select('placement').add(new Option(name, name));
     for (const name of Object.keys(FILLS)) select('fill').add(new Option(name, name));
@@ -23,6 +26,7 @@ export class SettingsPanel {
   }
 
   show(settings: Settings, pane: string): void {
+    this.valid = settings;
     select('placement').value = nameOf(PLACEMENTS, settings.placement);
     select('fill').value = nameOf(FILLS, settings.fill);
     for (const name of Object.keys(NUMBERS) as NumberName[]) {
@@ -34,13 +38,15 @@ export class SettingsPanel {
   }
 
   private read(): void {
-    if (!byId('settings', HTMLFormElement).reportValidity()) return;
     this.offerOffset();
+    // An invalid field keeps its last valid value; the browser names its limits.
+    byId('settings', HTMLFormElement).reportValidity();
     const numberIn = (name: NumberName) => {
-      const value = input(NUMBERS[name]).valueAsNumber;
-      return Number.isNaN(value) ? null : value;
+      const { validity, valueAsNumber } = input(NUMBERS[name]);
+      if (!validity.valid) return this.valid[name];
+      return Number.isNaN(valueAsNumber) ? null : valueAsNumber;
     };
-    this.changed({
+    this.valid = {
       placement: PLACEMENTS[select('placement').value] ?? 0,
       fill: FILLS[select('fill').value] ?? 0,
       kernelRadius: numberIn('kernelRadius'),
@@ -48,7 +54,8 @@ export class SettingsPanel {
       cellSize: numberIn('cellSize'),
       surfaceOffset: numberIn('surfaceOffset'),
       share: Number(select('share').value),
-    });
+    };
+    this.changed({ ...this.valid });
   }
 
   /** The surface offset applies to one placement only. */

@@ -84,7 +84,8 @@ export class StreamsPanel {
     const details = make('small');
     const watch = make('button', { type: 'button', class: 'watch', 'aria-label': `Watch ${name}` }, name, details);
     const beside = make('button', { type: 'button', 'aria-label': `Watch ${name} beside` }, '+');
-    beside.title = 'Watch beside the current pictures';
+    beside.title = 'Shows this stream beside the current pictures.';
+    watch.title = 'Shows this stream in the chosen picture.';
     watch.addEventListener('click', () => this.events.watch(name));
     beside.addEventListener('click', () => this.events.beside(name));
     const item = { element: make('li', {}, watch, beside), details, watch };

@@ -189,7 +189,7 @@ test('an attribute colours the outline over its legend', () =>
       return {
         colours: bench.coloursAt([[5, 0], [5, 6], [10, 3]]),
         legend: bench.scene.legend(),
-        stops: bench.rampStops(false).map((stop) => bench.rgb(stop).map((part) => 255 * part)),
+        stops: bench.rampStops({ dark: false, map: 'violet-yellow' }).map((stop) => bench.rgb(stop).map((part) => 255 * part)),
       };
     });
     assert.equal(legend.min, -2);
@@ -197,6 +197,52 @@ test('an attribute colours the outline over its legend', () =>
     assertNear(colours[0], stops[0], 3, 'smallest');
     assertNear(colours[1], stops[stops.length - 1], 3, 'largest');
     assertNear(colours[2], stops[(stops.length - 1) / 2], 6, 'middle');
+  }));
+
+test('an attribute colours particles, in the map and range of the look', () =>
+  inPage(async (page) => {
+    const { colours, stops, ground } = await page.evaluate(() => {
+      const frame = bench.polygon([[0, 0], [10, 0], [10, 6], [0, 6]]);
+      frame.particles = Float32Array.of(3, 3, 5, 3, 7, 3);
+      frame.particleAttributes = new Map([['speed', Float32Array.of(-9, 1, 40)]]);
+      const look = { fill: false, outline: false, particles: true, colour: 'speed', map: 'blue-red', from: 0, to: 2 };
+      bench.picture(look, frame);
+      return {
+        colours: bench.coloursAt([[3, 3], [5, 3], [7, 3], [9, 3]]),
+        stops: bench.rampStops({ dark: false, map: 'blue-red' }).map((stop) => bench.rgb(stop).map((part) => 255 * part)),
+        ground: bench.theme(false).background.map((part) => 255 * part),
+      };
+    });
+    // Dots cover 85 % of the background.
+    const dot = (colour) => colour.map((part, k) => 0.85 * part + 0.15 * ground[k]);
+    assertNear(colours[0], dot(stops[0]), 6, 'below the range');
+    assertNear(colours[1], dot(stops[(stops.length - 1) / 2]), 6, 'middle');
+    assertNear(colours[2], dot(stops[stops.length - 1]), 6, 'above the range');
+    assertNear(colours[3], ground, 2, 'no particle');
+  }));
+
+test('isolines have their colours and their own origin', () =>
+  inPage(async (page) => {
+    const { colours, background } = await page.evaluate(() => {
+      const frame = bench.polygon([[0, 0], [10, 0], [10, 6], [0, 6]]);
+      const { rings } = bench.polygon([[1, 1], [3, 1], [3, 5], [1, 5]]);
+      frame.isolines = [{ index: 1, rings, origin: [0, 0] }, { index: 2, rings, origin: [5, 0] }];
+      const shown = (look) => {
+        bench.picture({ fill: false, outline: false, ...look }, frame);
+        // The darkest pixel across each line.
+        return [[1, 3], [6, 3]].map(([x, y]) => {
+          const across = bench.coloursAt([-0.02, -0.01, 0, 0.01, 0.02].map((off) => [x + off, y]));
+          return across.reduce((a, b) => (a[0] + a[1] + a[2] < b[0] + b[1] + b[2] ? a : b));
+        });
+      };
+      return {
+        colours: [shown({}), shown({ hidden: [1] }), shown({ sections: false })],
+        background: bench.theme(false).background.map((part) => 255 * part),
+      };
+    });
+    const isLine = (colour) => Math.max(...colour.map((part, k) => Math.abs(part - background[k]))) > 60;
+    assert.deepEqual(colours.map((pair) => pair.map(isLine)), [[true, true], [false, true], [false, false]]);
+    assert.notDeepEqual(colours[0][0], colours[0][1], 'colours differ');
   }));
 
 test('particles, normals and edges add to the picture', () => inPage(async (page) => {

@@ -182,7 +182,7 @@ async function head(blob: Promise<Blob>): Promise<{ type: string; size: number; 
 
 /** Records a clip of a moving view. */
 async function film(refreshes: number): Promise<Blob> {
-  const recording = clip(canvas);
+  const recording = clip(scene, () => []);
   recording.start();
   for (let k = 0; k < refreshes; ++k) {
     await new Promise(requestAnimationFrame);
@@ -211,7 +211,7 @@ async function loseContext(): Promise<void> {
 
 const bench = {
   scene, canvas, picture, pixels, coloursAt, ink, polygon, sent, times, head, film, loseContext,
-  makeFrame, theme, rgb, rampStops, png: () => png(scene),
+  makeFrame, theme, rgb, rampStops, png: () => png(scene, []),
   changes: () => changes, clicks: () => clicks,
 };
 export type Bench = typeof bench;

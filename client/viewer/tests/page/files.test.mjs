@@ -60,7 +60,7 @@ async function drop(...paths) {
 const isAll = () => until('all frames are here', async () => await viewer.status() === 'All frames received');
 
 test('a CSV folder has the numbers of the command line', async () => {
-  const truth = await world.statistics(folder);
+  const truth = await world.statistics(folder, '--attributes', 'pressure');
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
   await viewer.shows();
@@ -74,7 +74,7 @@ test('a CSV folder has the numbers of the command line', async () => {
     assert.equal(Number(numbers.time), row.time);
   }
   const { capabilities } = await world.information();
-  const colours = await viewer.page.getByLabel('Colour').locator('option').allTextContents();
+  const colours = await viewer.page.getByLabel('Colour', { exact: true }).locator('option').allTextContents();
   assert.equal(colours.includes('by pressure'), capabilities.includes('attributes'));
 });
 

@@ -182,6 +182,12 @@ test('two placements are compared side by side', async () => {
   assert.notEqual(left.triangles, right.triangles);
   assert.ok(Number(left.area) > 0 && Number(right.area) > 0);
   assert.notEqual(await viewer.picture(0), await viewer.picture(1));
+  // The captions have the numbers of the chosen picture, and name the curve's settings if they differ.
+  const caption = viewer.page.locator('#curves figcaption').first();
+  await until('the caption has the area of picture 2', async () =>
+    await caption.textContent() === `Area (line: as streamed) ${right.area}`);
+  await viewer.pane(0).locator('canvas').focus();
+  await until('the caption has the area of picture 1', async () => await caption.textContent() === `Area ${left.area}`);
   await viewer.button('Close picture 2').click();
   assert.equal(await viewer.page.locator('.pane').count(), 1);
 });
@@ -249,6 +255,20 @@ test('a click in a curve goes to that moment', async () => {
     const shown = await viewer.frame();
     return await viewer.button('Play').count() === 1 && shown === place && newest - place > 20;
   });
+});
+
+test('the curves are exported as CSV', async () => {
+  const producer = await openNew();
+  await viewer.button('Pause').click();
+  const [download] = await Promise.all([
+    viewer.page.waitForEvent('download'), viewer.button('CSV of curves').click()]);
+  const chunks = [];
+  for await (const chunk of await download.createReadStream()) chunks.push(chunk);
+  const [head, ...rows] = Buffer.concat(chunks).toString().trimEnd().split('\n').map((row) => row.split(','));
+  const area = head.indexOf('area');
+  const row = rows.find(([frame]) => frame === '40');
+  assert.ok(Math.abs(Number(row[area]) - truth[39].area) < 1e-9);
+  await producer.stop();
 });
 
 test('the picture is exported as PNG, SVG and GeoJSON', async () => {

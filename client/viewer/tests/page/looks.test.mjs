@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, violations, World } from './support.mjs';
+import { launch, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser;
 
@@ -38,7 +38,7 @@ for (const colorScheme of ['light', 'dark']) {
         await viewer.page.getByLabel('Fill', { exact: true }).selectOption('grid');
         await viewer.page.getByLabel('Mesh edges').check();
         await viewer.page.getByLabel('Particles', { exact: true }).check();
-        await viewer.page.getByLabel('Colour').selectOption('identity');
+        await viewer.page.getByLabel('Colour', { exact: true }).selectOption('identity');
         await until('the other fill', async () => await viewer.value('fill', 1) === 'grid' &&
           await viewer.value('triangles', 1) === await viewer.value('grid', 1));
         await viewer.page.mouse.move(width * 0.45, 300);
@@ -78,6 +78,7 @@ test('every control can be reached and has a name', async () => {
                              element.labels?.length))
       .map((element) => element.outerHTML));
     assert.deepEqual(unnamed, []);
+    assert.deepEqual(await withoutTooltip(viewer.page), []);
     const seen = new Set();
     for (let k = 0; k < 60; ++k) {
       await viewer.page.keyboard.press('Tab');

@@ -49,6 +49,7 @@ test('the page reports the end of a stream and its return', async () => {
     await until('the end is told', async () => /ended|No stream/.test(await viewer.status()));
     await viewer.page.getByText('No stream is open').waitFor();
     world.loop('dam');
+    await viewer.button('Switch to the new run').click();
     await until('it is live again', async () => await viewer.status() === 'Live');
     const at = await viewer.frame();
     await until('it moves', async () => await viewer.frame() !== at);

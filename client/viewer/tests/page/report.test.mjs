@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { launch, recording, replay, screenshots, until, Viewer, violations } from './support.mjs';
+import { launch, recording, replay, screenshots, until, Viewer, violations, withoutTooltip } from './support.mjs';
 
 let browser, folder, truth;
 const file = (name) => path.join(folder, name);
@@ -84,6 +84,10 @@ test('buttons, keys, slider and curves go to a frame', () => inReport('dam.html'
   await shows(report, 37);
 }));
 
+test('every control has a tooltip', () => inReport('discs.html', {}, async (report) => {
+  assert.deepEqual(await withoutTooltip(report.page), []);
+}));
+
 test('links have frame, view and layers, also former ones', () =>
   inReport('dam.html', { hash: '#frame=10&layers=outline,particles' }, async (report) => {
     const { page } = report;
@@ -114,7 +118,7 @@ for (const colorScheme of ['light', 'dark']) {
   test(`colours and isolines of an attribute (${colorScheme})`, () =>
     inReport('discs.html', { colorScheme }, async (report) => {
       const { page } = report;
-      assert.equal(await page.getByLabel('Colour').inputValue(), 'p');
+      assert.equal(await page.getByLabel('Colour', { exact: true }).inputValue(), 'p');
       assert.match(await page.locator('#legend-min').textContent(), /^-1(\.0\d+)?$/);
       assert.deepEqual(await violations(page), []);
       await page.screenshot({ path: path.join(screenshots, `report_${colorScheme}.png`), fullPage: true });

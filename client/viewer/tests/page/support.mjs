@@ -216,6 +216,14 @@ export class Viewer {
   async close() { await this.page.context().close(); }
 }
 
+/** Controls without a tooltip of one sentence, their own or their label's. A disabled one names its reason. */
+export function withoutTooltip(page) {
+  return page.evaluate(() => [...document.querySelectorAll('button, select, input')]
+    .filter((element) => !/^[A-Z]([^.]|\.\d)*\.$/.test(element.title || element.labels?.[0]?.title || '') &&
+                         !(element.disabled && element.labels?.[0]?.title))
+    .map((element) => element.outerHTML));
+}
+
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 /** Serious and critical violations, one line each. */

@@ -1,8 +1,8 @@
 import type { Frame, Rings } from '../../protocol/frame';
 import { DataTexture, TEXELS } from './data_texture';
-import { attributeOf, type Look } from '../look';
+import { attributeOf, type Look, shownIsolines } from '../look';
 import { pieceTints } from '../pieces';
-import { rampTexels } from '../ramp';
+import { rampTexels, type Ramp } from '../ramp';
 import { ringColours } from '../look_colours';
 import { RingTable } from './ring_table';
 
@@ -11,19 +11,20 @@ const RAMP_TEXELS = 256;
 /** Colours of an attribute from its smallest to its largest number, filtered linearly. */
 class RampTexture {
   private readonly texture: WebGLTexture;
-  private isDark: boolean | null = null;
+  private shown = '';
 
   constructor(private readonly gl: WebGL2RenderingContext) {
     this.texture = gl.createTexture();
   }
 
-  upload(dark: boolean): void {
-    if (this.isDark === dark) return;
-    this.isDark = dark;
+  upload({ dark, map }: Ramp): void {
+    const shown = `${map} ${dark}`;
+    if (this.shown === shown) return;
+    this.shown = shown;
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, RAMP_TEXELS, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE,
-      rampTexels(RAMP_TEXELS, dark));
+      rampTexels(RAMP_TEXELS, { dark, map }));
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
@@ -67,7 +68,8 @@ export class RingTextures {
 /** A frame on the graphics card. Uploads only the parts that the look needs, once per frame. */
 export class FrameTextures {
   readonly outline: RingTextures;
-  readonly isolines: RingTextures;
+  /** Grows to the largest number of lines so far. */
+  readonly isolines: RingTextures[] = [];
   readonly triangles: DataTexture;
   readonly classes: DataTexture;
   /** A colour per point of the mesh, filled if triangles are coloured by identity. */
@@ -76,23 +78,28 @@ export class FrameTextures {
   /** A number per vertex of the rings, or per point of the mesh if `isMeshColoured`. */
   readonly attribute: DataTexture;
   readonly particles: DataTexture;
+  /** A number per particle if `hasParticleColours`. */
+  readonly particleNumbers: DataTexture;
+  hasParticleColours = false;
   readonly ramp: RampTexture;
   isMeshColoured = false;
+  /** Whether `attribute` has the numbers of the look's channel. */
+  hasOutlineColours = false;
 
   private frame: Frame | null = null;
   /** Uploaded parts of the frame, with the part of the look that they depend on. */
   private readonly uploaded = new Map<string, unknown>();
 
-  constructor(gl: WebGL2RenderingContext) {
+  constructor(private readonly gl: WebGL2RenderingContext) {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.outline = new RingTextures(gl);
-    this.isolines = new RingTextures(gl);
     this.triangles = new DataTexture(gl, TEXELS.uint32);
     this.classes = new DataTexture(gl, TEXELS.uint8);
     this.tints = new DataTexture(gl, TEXELS.uint32);
     this.normals = new DataTexture(gl, TEXELS.float2);
     this.attribute = new DataTexture(gl, TEXELS.float);
     this.particles = new DataTexture(gl, TEXELS.float2);
+    this.particleNumbers = new DataTexture(gl, TEXELS.float);
     this.ramp = new RampTexture(gl);
   }
 
@@ -110,28 +117,30 @@ export class FrameTextures {
     this.prepareRings(frame, look, colours, isMeshed);
     if (isMeshed) this.prepareMesh(frame, look, colours);
     this.prepareAttribute(frame, look);
-    const { rings, isolines, particles } = frame;
-    if (look.isolines && isolines) {
-      this.once('isolines', true, () => {
-        this.isolines.points.upload(isolines.points);
-        this.isolines.upload(isolines);
-        this.isolines.rings.upload(this.isolines.table.styles(isolines, look));
+    const { rings, particles } = frame;
+    shownIsolines(frame, look).forEach((isoline, k) => {
+      this.isolines[k] ??= new RingTextures(this.gl);
+      this.once(`isolines ${k}`, isoline.index, () => {
+        this.isolines[k].points.upload(isoline.rings.points);
+        this.isolines[k].upload(isoline.rings);
+        this.isolines[k].rings.upload(this.isolines[k].table.styles(isoline.rings, look));
       });
-    }
+    });
     if (look.normals && rings.normals) {
       const { normals } = rings;
       this.once('normals', true, () => this.normals.upload(normals));
     }
     if (look.particles && particles) {
       this.once('particles', true, () => this.particles.upload(particles));
+      this.prepareParticleNumbers(frame, look);
     }
-    this.ramp.upload(look.dark);
+    this.ramp.upload(look);
   }
 
   destroy(): void {
     for (const texture of [
-      this.outline, this.isolines, this.triangles, this.classes, this.tints, this.normals,
-      this.attribute, this.particles, this.ramp,
+      this.outline, ...this.isolines, this.triangles, this.classes, this.tints, this.normals,
+      this.attribute, this.particles, this.particleNumbers, this.ramp,
     ]) {
       texture.destroy();
     }
@@ -168,7 +177,17 @@ export class FrameTextures {
       const ofMesh = name !== null && look.fill ? mesh?.attribute(name) : undefined;
       const values = ofMesh ?? (name === null ? undefined : rings.attributes.get(name));
       this.isMeshColoured = ofMesh !== undefined;
+      this.hasOutlineColours = values !== undefined;
       if (values) this.attribute.upload(values);
+    });
+  }
+
+  private prepareParticleNumbers({ particleAttributes }: Frame, look: Look): void {
+    const name = attributeOf(look);
+    this.once('particleNumbers', name, () => {
+      const values = name === null ? undefined : particleAttributes?.get(name);
+      this.hasParticleColours = values !== undefined;
+      if (values) this.particleNumbers.upload(values);
     });
   }
 

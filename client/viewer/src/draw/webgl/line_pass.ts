@@ -120,7 +120,8 @@ export class LinePass {
     program.texture('points', rings.points);
     program.texture('ringOf', rings.ringOf);
     program.texture('rings', rings.rings);
-    program.attribute(style.attribute, textures.attribute, textures.ramp);
+    program.attribute(
+      textures.hasOutlineColours ? style.attribute : null, textures.attribute, textures.ramp);
     program.colour('single', style.colour ?? [0, 0, 0], style.colour ? 1 : 0);
     program.number('opacity', style.opacity);
     program.number('halfWidth', style.width / 2);

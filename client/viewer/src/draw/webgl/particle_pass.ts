@@ -1,13 +1,18 @@
 import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
-import { type Camera, Program } from './program';
+import { type AttributeStyle, type Camera, Program } from './program';
 import { PARTICLE_ALPHA } from '../style';
 
 const VERTEX = `
 uniform sampler2D particles;
 uniform float diameter;  // Device pixels.
+uniform sampler2D numbers;
+uniform bool byAttribute;
+uniform vec2 range;      // Smallest number, and 1 / (largest - smallest).
+flat out float value;
 
 void main() {
+  value = byAttribute ? (texelFetch(numbers, at(gl_VertexID), 0).r - range.x) * range.y : 0.0;
   gl_Position = position(pixel(texelFetch(particles, at(gl_VertexID), 0).rg));
   gl_PointSize = diameter + 2.0;
 }
@@ -16,16 +21,23 @@ void main() {
 const FRAGMENT = `
 uniform float diameter;
 uniform vec4 ink;
+uniform vec4 ground;   // Rim of a dot that has the colour of its surroundings.
+flat in float value;
 out vec4 colour;
 
 void main() {
   float away = length(gl_PointCoord - 0.5) * (diameter + 2.0);
   float alpha = ink.a * clamp(0.5 * diameter + 0.5 - away, 0.0, 1.0);
-  colour = vec4(ink.rgb * alpha, alpha);
+  vec3 base = ink.rgb;
+  if (byAttribute) {
+    float inside = clamp(0.5 * diameter - 0.75 - away, 0.0, 1.0);
+    base = mix(ground.rgb, attributeColour(value).rgb, diameter > 4.0 ? inside : 1.0);
+  }
+  colour = vec4(base * alpha, alpha);
 }
 `;
 
-/** Particles as round dots. */
+/** Particles as round dots, in one colour or in those of an attribute. */
 export class ParticlePass {
   private readonly program: Program;
 
@@ -36,11 +48,15 @@ export class ParticlePass {
   /** `diameter` in device pixels. */
   draw(
     textures: FrameTextures, camera: Camera, count: number, diameter: number, dark: boolean,
+    attribute: AttributeStyle | null,
   ): void {
     const { program } = this;
     program.use(camera);
     program.texture('particles', textures.particles);
+    program.attribute(
+      textures.hasParticleColours ? attribute : null, textures.particleNumbers, textures.ramp);
     program.number('diameter', diameter);
+    program.colour('ground', theme(dark).background);
     program.colour('ink', theme(dark).particle, PARTICLE_ALPHA);
     this.gl.drawArrays(this.gl.POINTS, 0, count);
   }

@@ -3,8 +3,8 @@ import { theme, type Rgb } from '../colours';
 import { FillPass } from './fill_pass';
 import { FrameTextures } from './frame_textures';
 import { LinePass, type LineStyle } from './line_pass';
-import type { Look } from '../look';
-import { fillTones } from '../look_colours';
+import { type Look, shownIsolines } from '../look';
+import { fillTones, isolineColour } from '../look_colours';
 import { NormalPass } from './normal_pass';
 import { ParticlePass } from './particle_pass';
 import type { AttributeStyle, Camera } from './program';
@@ -92,15 +92,16 @@ export class Renderer implements Drawing {
     if (look.particles && frame.particles) {
       const diameter = ratio * dotDiameter(frame.statistics.spacing * view.scale);
       this.particles.draw(
-        this.textures, camera, frame.particles.length / 2, diameter, look.dark);
+        this.textures, camera, frame.particles.length / 2, diameter, look.dark, attribute);
     }
     if (look.normals && frame.rings.normals) this.drawNormals(picture, frame, camera);
     if (look.outline) this.drawOutline(picture, attribute, camera);
     else if (look.fill) this.smoothBorder(picture, attribute, camera);
-    if (look.isolines && frame.isolines) {
-      this.lines.draw(this.textures.isolines, this.textures, camera,
-        solid(theme(look.dark).isoline, 1, ISOLINE_WIDTH * ratio));
-    }
+    shownIsolines(frame, look).forEach(({ index, origin }, k) => {
+      const centre: [number, number] = [view.x - origin[0], view.y - origin[1]];
+      this.lines.draw(this.textures.isolines[k], this.textures, { ...camera, centre },
+        solid(isolineColour(index, look.dark), 1, ISOLINE_WIDTH * ratio));
+    });
     this.drawSelected(picture, frame, camera);
   }
 

@@ -1,0 +1,29 @@
+import type { Scene } from '../draw/scene';
+import { drawMarks, type Mark } from './marks';
+
+/** What an export reads of a scene. */
+export type Drawn = Pick<Scene, 'draw' | 'drawn' | 'canvas' | 'size'>;
+
+/** The last drawing of a scene with its marks, on a canvas of its own. */
+export class CanvasCopy {
+  readonly canvas = document.createElement('canvas');
+  private readonly context: CanvasRenderingContext2D;
+
+  /** Throws without WebGL, where the scene is no canvas. */
+  constructor(private readonly scene: Drawn, private readonly marks: () => readonly Mark[]) {
+    const context = this.canvas.getContext('2d');
+    if (!context || !scene.canvas.getContext('webgl2')) {
+      throw new Error('This browser draws without WebGL. Save the picture as SVG.');
+    }
+    this.context = context;
+  }
+
+  /** Copies the scene. Requires that it was drawn in this task: the browser clears the drawing afterwards. */
+  update(): void {
+    const { width, height } = this.scene.canvas;
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
+    this.context.drawImage(this.scene.canvas, 0, 0);
+    drawMarks(this.context, this.marks(), width / Math.max(1, this.scene.size.width));
+  }
+}

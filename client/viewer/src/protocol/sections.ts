@@ -1,0 +1,104 @@
+import type { ReconstructionParameters, SlicePlane } from '@proto/v1/reconstruction_pb';
+import type { Frame, Isoline } from './frame';
+
+type Vector = readonly [number, number, number];
+
+/** A plane that cuts 3D particles. */
+export interface SectionPlane { origin: Vector; normal: Vector }
+
+/** An outline of a frame: 0 is the stream's own, the others are its sections, in order. */
+export interface Outline {
+  /** Null: the particles are 2D. */
+  plane: SectionPlane | null;
+  /** Of the density; null: the outline of the body. */
+  isovalue: number | null;
+}
+
+const AXES = ['x', 'y', 'z'];
+
+/** Name of an outline for the user: `z = 0.5, isovalue 0.3`. */
+export function outlineName({ plane, isovalue }: Outline): string {
+  const parts = [plane ? planeName(plane) : '', isovalue === null ? '' : `isovalue ${isovalue}`];
+  return parts.filter(Boolean).join(', ') || 'Outline';
+}
+
+function planeName({ origin, normal }: SectionPlane): string {
+  const along = normal.flatMap((part, axis) => part === 0 ? [] : [axis]);
+  if (along.length === 1) return `${AXES[along[0]]} = ${origin[along[0]]}`;
+  return `through (${origin.join(', ')}), normal (${normal.join(', ')})`;
+}
+
+/** The outlines of a stream's frames. */
+export function outlinesOf(parameters: ReconstructionParameters | null): Outline[] {
+  const own = { plane: planeOf(parameters?.slice) ?? null, isovalue: parameters?.isovalue ?? null };
+  return [own, ...(parameters?.sections ?? []).map(({ slice, isovalue }) =>
+    ({ plane: planeOf(slice) ?? own.plane, isovalue: isovalue ?? null }))];
+}
+
+function planeOf(slice: SlicePlane | undefined): SectionPlane | undefined {
+  return slice && {
+    origin: [slice.originX, slice.originY, slice.originZ],
+    normal: [slice.normalX, slice.normalY, slice.normalZ],
+  };
+}
+
+/**
+ * The picture of outline `shown` of a frame: that outline, with all outlines in parallel planes as
+ * isolines. The frame itself if it lacks the outline.
+ */
+export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: number): Frame {
+  const { sections } = frame;
+  if (sections.length === 0) return frame;
+  const all = [frame, ...sections];
+  const base = all[shown] ? shown : 0;
+  const isolines = all.flatMap(({ rings, origin }, index): Isoline[] => {
+    const shift = index === base ? null : shiftBetween(outlines[index]?.plane, outlines[base]?.plane);
+    return shift ? [{ index, rings, origin: [origin[0] + shift[0], origin[1] + shift[1]] }] : [];
+  });
+  if (base === 0) return { ...frame, isolines };
+  // Particles lie around the plane of the stream's own outline.
+  const isOwnPlane = shiftBetween(outlines[0]?.plane, outlines[base]?.plane)?.every((part) => part === 0);
+  return { ...all[base], particles: isOwnPlane ? frame.particles : null, sections, isolines };
+}
+
+/**
+ * World coordinates in plane `to` of the point (0, 0) of plane `from`, projected along the normal.
+ * Null if the planes are not parallel, or have opposite normals.
+ */
+export function shiftBetween(
+  from: SectionPlane | null | undefined, to: SectionPlane | null | undefined,
+): [number, number] | null {
+  if (!from && !to) return [0, 0];
+  if (!from || !to) return null;
+  const [a, b] = [unit(from.normal), unit(to.normal)];
+  if (dot(a, b) < 1 - 1e-12) return null;
+  const apart: Vector = [
+    from.origin[0] - to.origin[0], from.origin[1] - to.origin[1], from.origin[2] - to.origin[2],
+  ];
+  const [first, second] = axesOf(b);
+  return [dot(apart, first), dot(apart, second)];
+}
+
+/** The axes of coordinates in a plane, as SlicePlane of the protocol defines them. */
+function axesOf(normal: Vector): [Vector, Vector] {
+  const [x, y, z] = normal.map(Math.abs);
+  const axis: Vector = x > y && x > z ? [0, 1, 0] : [1, 0, 0];
+  const along = dot(axis, normal);
+  const first = unit([
+    axis[0] - along * normal[0], axis[1] - along * normal[1], axis[2] - along * normal[2],
+  ]);
+  return [first, [
+    normal[1] * first[2] - normal[2] * first[1],
+    normal[2] * first[0] - normal[0] * first[2],
+    normal[0] * first[1] - normal[1] * first[0],
+  ]];
+}
+
+function dot(a: Vector, b: Vector): number {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+function unit([x, y, z]: Vector): Vector {
+  const length = Math.hypot(x, y, z);
+  return [x / length, y / length, z / length];
+}

@@ -1,0 +1,56 @@
+import type { Entry, Summary } from '../stream/history';
+import { STAGES } from '../stream/summary';
+import type { Track } from '../stream/track';
+
+/** About one point per pixel. */
+const MOST_POINTS = 600;
+
+/** Points of curves. A null entry is a gap: frames are missing there. */
+export interface CurvePoints { x: number[]; entries: (Entry | null)[] }
+
+/** At most MOST_POINTS entries in equal steps, and a gap wherever frames between two of them are missing. */
+export function curvePoints(track: Pick<Track, 'history' | 'labelOf'>): CurvePoints {
+  const { history } = track;
+  const count = Math.min(history.size, MOST_POINTS);
+  const chosen = Array.from({ length: count }, (_, k) => Math.round(k * (history.size - 1) / Math.max(1, count - 1)));
+  const labels = chosen.map((index) => Number(track.labelOf(history.entry(index).sequence)));
+  // Frames per entry: a stream may be watched, or a report written, with every n-th frame.
+  const steps = labels.slice(1).map((label, k) => (label - labels[k]) / (chosen[k + 1] - chosen[k]));
+  const step = Math.min(...steps);
+  const points: CurvePoints = { x: [], entries: [] };
+  labels.forEach((label, k) => {
+    if (k > 0 && steps[k - 1] > step) {
+      points.x.push((labels[k - 1] + label) / 2);
+      points.entries.push(null);
+    }
+    points.x.push(label);
+    points.entries.push(history.entry(chosen[k]));
+  });
+  return points;
+}
+
+/** Columns of the file of curves. */
+const COLUMNS: [string, (summary: Summary) => number][] = [
+  ['area', (s) => s.area],
+  ['rings', (s) => s.rings],
+  ['holes', (s) => s.holes],
+  ['triangles', (s) => s.triangles],
+  ['triangles_unmerged', (s) => s.trianglesGrid],
+  ['milliseconds', (s) => s.milliseconds],
+  ...STAGES.map((name, k): [string, (summary: Summary) => number] => [`${name}_ms`, (s) => s.stages[k]]),
+  ['received', (s) => s.received],
+  ['drawn', (s) => s.drawn],
+  ['dropped', (s) => s.dropped],
+  ['latency_ms', (s) => s.latency],
+];
+
+/** All frames of the history as CSV. A number that is unknown is empty. */
+export function curvesCsv(track: Pick<Track, 'history' | 'labelOf'>): string {
+  const { history } = track;
+  const cell = (value: number) => (Number.isFinite(value) ? String(value) : '');
+  const rows = Array.from({ length: history.size }, (_, k) => {
+    const { sequence, time, summary } = history.entry(k);
+    return [track.labelOf(sequence), cell(time), ...COLUMNS.map(([, value]) => cell(value(summary)))].join(',');
+  });
+  return `${[['frame', 'time', ...COLUMNS.map(([name]) => name)].join(','), ...rows].join('\n')}\n`;
+}
