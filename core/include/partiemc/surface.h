@@ -1,0 +1,56 @@
+// Closed surfaces of particles that fill space, and the check of their guarantees.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+
+namespace partiemc {
+
+/// The value of Surface::outer_of for a shell that is no cavity.
+inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::max();
+
+struct ShellMeasures {
+  double area = 0;    ///< World units squared.
+  double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
+  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Of the enclosed volume.
+  std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
+
+  friend bool operator==(const ShellMeasures&, const ShellMeasures&) = default;
+};
+
+/// Closed surfaces. A shell is one connected surface: the outside of a body, or a cavity in one.
+/// Guarantees (core/SURFACES.md):
+///   S1 every edge has exactly two triangles, which run along it in opposite directions;
+///   S2 the triangles around each point form one cycle; each point has triangles of one shell;
+///   S3 triangles intersect only in their common points and edges; none is degenerate;
+///   S4 triangles are counter-clockwise seen from outside the body; outer shells lie in nothing or
+///      in a cavity, and each cavity lies directly in the shell that `outer_of` gives;
+///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
+///      centroids are those of the triangles.
+struct Surface {
+  std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
+  std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.
+  std::vector<float> normals;            ///< Per point: outward unit normal, interleaved.
+  std::vector<std::uint32_t> point_offsets = {0};     ///< Shell k has [offsets[k], offsets[k + 1]).
+  std::vector<std::uint32_t> triangle_offsets = {0};  ///< Likewise.
+  std::vector<std::uint32_t> outer_of;                ///< Per shell: its outer shell, or kNoShell.
+  std::vector<ShellMeasures> measures;                ///< Per shell.
+
+  std::size_t ShellCount() const { return outer_of.size(); }
+  std::size_t PointCount() const { return points.size() / 3; }
+  std::size_t TriangleCount() const { return triangles.size() / 3; }
+  void Clear();
+  friend bool operator==(const Surface&, const Surface&) = default;
+};
+
+/// Checks S1 to S5 with exact arithmetic, independent of the construction. Measures are compared
+/// to 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
+/// values. Cost: n log n in the triangles if they are of similar size.
+absl::Status Validate(const Surface& surface);
+
+}  // namespace partiemc
