@@ -178,7 +178,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
       {{"core/src/",
         "core/src/",
         {"base", "frame", "state", "bins", "field", "crossings", "rings", "sampler", "normals",
-         "vertices", "identities", "mesh", "attributes", "check"},
+         "vertices", "identities", "mesh", "attributes", "space", "check"},
         {"frame_lengths", "reconstructor", "workspace", "workspace_bytes"}},
        {"server/",
         "",

@@ -1,13 +1,17 @@
-// Closed surfaces of particles that fill space, and the check of their guarantees.
+// Turns frames of particles that fill space into closed surfaces, and checks their guarantees.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <span>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
 
 namespace partiemc {
 
@@ -52,5 +56,61 @@ struct Surface {
 /// to 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
 /// values. Cost: n log n in the triangles if they are of similar size.
 absl::Status Validate(const Surface& surface);
+
+/// How the vertices of a surface are placed (core/SURFACES.md).
+enum class SurfacePlacement : std::uint8_t {
+  kMarchingCubes,  ///< Linear interpolation of the level set on lattice edges.
+  kVirtualPlane,   ///< The default: vertices on smoothed planes.
+};
+
+struct SurfaceParameters {
+  SurfacePlacement placement = SurfacePlacement::kVirtualPlane;
+
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of it.
+  double spacing = 1;
+  /// As in ReconstructionParameters, with their ranges.
+  double kernel_radius = 3, cell_size = 1;
+  /// Absent: calibrated for the placement.
+  std::optional<double> reference_radius = std::nullopt;
+
+  friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
+};
+
+/// Reusable buffers, one set for each thread that calls Reconstruct. Its history never changes a
+/// result.
+class SurfaceWorkspace {
+ public:
+  SurfaceWorkspace();
+  ~SurfaceWorkspace();
+  SurfaceWorkspace(SurfaceWorkspace&&) noexcept;
+  SurfaceWorkspace& operator=(SurfaceWorkspace&&) noexcept;
+
+  struct Buffers;
+  Buffers& buffers() { return *buffers_; }
+
+ private:
+  std::unique_ptr<Buffers> buffers_;
+};
+
+/// Reconstructs surfaces. Immutable; may be shared between threads.
+class SurfaceReconstructor {
+ public:
+  /// Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
+  static absl::StatusOr<SurfaceReconstructor> Create(const SurfaceParameters& parameters,
+                                                     const FrameLimits& limits = {});
+
+  /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
+  /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
+  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
+  /// Errors with a Violation: those of Reconstructor. `surface` is then empty.
+  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
+
+ private:
+  SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
+
+  SurfaceParameters parameters_;
+  ReconstructionParameters in_space_;  // Resolved, as the stages take them.
+  FrameLimits limits_;
+};
 
 }  // namespace partiemc

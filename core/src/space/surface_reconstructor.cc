@@ -1,0 +1,110 @@
+// Runs the stages of a surface in order.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "base/cancellation.h"
+#include "base/vec3.h"
+#include "frame/calibration.h"
+#include "frame/distinct_ids.h"
+#include "frame/frame_view.h"
+#include "frame/scale.h"
+#include "partiemc/surface.h"
+#include "space/bins.h"
+#include "space/bodies.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/mesh.h"
+#include "space/vertices.h"
+
+namespace partiemc {
+
+struct SurfaceWorkspace::Buffers {
+  DistinctIdsScratch distinct_ids;
+  space::SpaceBins bins;
+  space::SpaceField field;
+  space::SpaceCrossings crossings;
+  space::Bodies bodies;
+  std::vector<Vec3> positions, normals;
+  space::MeshScratch mesh;
+};
+
+namespace {
+
+// Factors of the reference radius (core/SURFACES.md, "Calibration").
+constexpr double kVirtualPlaneFactor = .985, kMarchingCubesFactor = 1.065;
+
+/// The parameters as the stages of a slice take them: lengths and weights in space.
+ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
+  ReconstructionParameters in_space;
+  in_space.spacing = parameters.spacing;
+  in_space.kernel_radius = parameters.kernel_radius;
+  in_space.cell_size = parameters.cell_size;
+  in_space.reference_radius = parameters.reference_radius;
+  in_space.slice = SlicePlane{};
+  return in_space;
+}
+
+ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
+  ReconstructionParameters in_space = InSpace(parameters);
+  if (!in_space.reference_radius) {
+    const double factor = parameters.placement == SurfacePlacement::kMarchingCubes
+                              ? kMarchingCubesFactor
+                              : kVirtualPlaneFactor;
+    in_space.reference_radius = factor * CalibratedSliceRadius(parameters.kernel_radius);
+  }
+  return in_space;
+}
+
+double LightestVolume(const Frame& frame, double spacing) {
+  if (frame.volumes.empty()) return spacing * spacing * spacing;
+  float lightest = frame.volumes[0];
+  for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
+  return lightest;
+}
+
+}  // namespace
+
+SurfaceWorkspace::SurfaceWorkspace() : buffers_(std::make_unique<Buffers>()) {}
+SurfaceWorkspace::~SurfaceWorkspace() = default;
+SurfaceWorkspace::SurfaceWorkspace(SurfaceWorkspace&&) noexcept = default;
+SurfaceWorkspace& SurfaceWorkspace::operator=(SurfaceWorkspace&&) noexcept = default;
+
+SurfaceReconstructor::SurfaceReconstructor(const SurfaceParameters& parameters,
+                                           const FrameLimits& limits)
+    : parameters_(parameters), in_space_(Resolved(parameters)), limits_(limits) {}
+
+absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
+    const SurfaceParameters& parameters, const FrameLimits& limits) {
+  if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
+  if (absl::Status status = Validate(limits); !status.ok()) return status;
+  return SurfaceReconstructor(parameters, limits);
+}
+
+absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorkspace& workspace,
+                                               Surface& surface) const {
+  surface.Clear();
+  SurfaceWorkspace::Buffers& b = workspace.buffers();
+  absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
+  if (!status.ok() || frame.ParticleCount() == 0) return status;
+  const double cell_size = parameters_.cell_size * parameters_.spacing;
+  const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
+                                LightestVolume(frame, parameters_.spacing));
+  status = space::BinParticles(frame, scale, limits_, b.bins);
+  if (!status.ok()) return status;
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::SampleField(b.bins, scale, b.field);
+  space::FindCrossings(bricks, b.field, b.crossings);
+  space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
+  space::FindBodies(frame, b.bins, b.field, parameters_.spacing, b.bodies);
+  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
+  space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  for (Vec3& position : b.positions) position = cell_size * position;
+  space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
+  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
+                         surface);
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,29 @@
+// Places the vertices of the crossings.
+#pragma once
+
+#include <vector>
+
+#include "base/vec3.h"
+#include "frame/scale.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/mesh.h"
+
+namespace partiemc::space {
+
+/// Distance of a crossing from the ends of its edge, in cells. Rounding to world coordinates cannot
+/// move it to a node.
+inline constexpr double kEdgeMargin = 1.0 / 4096;
+/// The same for anchors of vertices that move: tetrahedra at a node keep a size.
+inline constexpr double kAnchorMargin = .02;
+
+/// Sets the vertices on edges to the linear crossings of F, at least `margin` from the nodes, and
+/// those in cells to the mean of the crossings of their loop. In cells.
+void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
+                      const SpaceCrossings& crossings, double margin, std::vector<Vec3>& positions);
+
+/// Per vertex: the normalised sum of the area normals of its triangles.
+void AverageNormals(const std::vector<Vec3>& positions,
+                    const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals);
+
+}  // namespace partiemc::space
