@@ -60,11 +60,10 @@ absl::Status Validate(const Surface& surface);
 /// How the vertices of a surface are placed (core/SURFACES.md).
 enum class SurfacePlacement : std::uint8_t {
   kMarchingCubes,  ///< Linear interpolation of the level set on lattice edges.
-  kVirtualPlane,   ///< The default: vertices on smoothed planes.
 };
 
 struct SurfaceParameters {
-  SurfacePlacement placement = SurfacePlacement::kVirtualPlane;
+  SurfacePlacement placement = SurfacePlacement::kMarchingCubes;
 
   /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of it.
   double spacing = 1;

@@ -1,6 +1,6 @@
 // Runs the stages of a surface in order.
+#include <algorithm>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -32,8 +32,8 @@ struct SurfaceWorkspace::Buffers {
 
 namespace {
 
-// Factors of the reference radius (core/SURFACES.md, "Calibration").
-constexpr double kVirtualPlaneFactor = .985, kMarchingCubesFactor = 1.065;
+// Factor of the reference radius (core/SURFACES.md, "Calibration").
+constexpr double kMarchingCubesFactor = 1.065;
 
 /// The parameters as the stages of a slice take them: lengths and weights in space.
 ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
@@ -49,10 +49,8 @@ ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
 ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space = InSpace(parameters);
   if (!in_space.reference_radius) {
-    const double factor = parameters.placement == SurfacePlacement::kMarchingCubes
-                              ? kMarchingCubesFactor
-                              : kVirtualPlaneFactor;
-    in_space.reference_radius = factor * CalibratedSliceRadius(parameters.kernel_radius);
+    in_space.reference_radius =
+        kMarchingCubesFactor * CalibratedSliceRadius(parameters.kernel_radius);
   }
   return in_space;
 }

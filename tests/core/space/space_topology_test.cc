@@ -1,14 +1,16 @@
 // Surfaces of random signs and of random particles keep S1 to S5.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "partiemc/arena.h"
 #include "partiemc/surface.h"
 #include "space/bodies.h"
 #include "space/cell_loops.h"
+#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/mesh.h"
 #include "space/space_particles.h"
@@ -128,6 +130,62 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
     const absl::Status status = Validate(surface);
     ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
   }
+}
+
+struct Moved {
+  absl::Status status;         // Of Validate.
+  std::uint32_t returned = 0;  // Vertices that were moved back.
+};
+
+/// Moves vertices at random, certifies, and checks the surface. Without the certificate all quads
+/// are cut along faces.
+Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random& random,
+                   bool is_certified = true) {
+  std::vector<Vec3> anchors, normals;
+  const space::BrickDirectory& bricks = signs.bins.bricks;
+  space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
+  std::vector<std::uint8_t> is_fixed;
+  space::MarkFixedVertices(bricks, signs.crossings, is_fixed);
+  std::vector<Vec3> positions = anchors;
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (is_fixed[v] != 0 || !random.Chance(share)) continue;
+    const auto along = [&] { return random.Uniform(-amount, amount); };
+    const double x = along(), y = along();
+    positions[v] = positions[v] + Vec3{x, y, along()};
+  }
+  space::Certificate certificate;
+  certificate.modes.resize(signs.crossings.cells.size());
+  if (is_certified) {
+    EXPECT_TRUE(space::Certify(bricks, signs.crossings, 1, anchors, positions, certificate));
+  }
+  space::MeshScratch scratch;
+  space::EmitQuads(bricks, signs.crossings, certificate, scratch.triangles);
+  space::AverageNormals(positions, scratch.triangles, normals);
+  Surface surface;
+  space::AssembleSurface({bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
+                         scratch, surface);
+  return {Validate(surface), certificate.returned};
+}
+
+TEST(Certificate, KeepsMovedVerticesApart) {
+  const std::uint64_t frames = Frames(60);
+  int intersections = 0;
+  for (std::uint64_t seed = 0; seed < frames; ++seed) {
+    const RandomSigns signs(seed);
+    Random random(seed);
+    // No face is refused at the anchors.
+    const Moved anchored = MoveVertices(signs, 0, 1, random);
+    ASSERT_TRUE(anchored.status.ok()) << anchored.status.message() << ", seed " << seed;
+    ASSERT_EQ(anchored.returned, 0u);
+    for (const auto& [amount, share] : {std::pair(.3, 1.0), {1.5, .2}, {3.0, .05}}) {
+      Random same = random;
+      const Moved moved = MoveVertices(signs, amount, share, random);
+      ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
+      intersections += !MoveVertices(signs, amount, share, same, false).status.ok();
+    }
+  }
+  // The same vertices do intersect without the certificate.
+  EXPECT_GT(intersections, static_cast<int>(frames));
 }
 
 class SpaceFrames : public ::testing::TestWithParam<SurfacePlacement> {};
