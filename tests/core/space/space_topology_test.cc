@@ -227,7 +227,9 @@ TEST_P(SpaceFrames, HaveTheSameBitsForAnyOrderThreadsAndHistory) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, SpaceFrames, ::testing::Values(SurfacePlacement::kMarchingCubes));
+INSTANTIATE_TEST_SUITE_P(All, SpaceFrames,
+                         ::testing::Values(SurfacePlacement::kMarchingCubes,
+                                           SurfacePlacement::kVirtualPlane));
 
 TEST(SurfaceReconstructor, RefusesBadInput) {
   EXPECT_FALSE(SurfaceReconstructor::Create({.spacing = 0}).ok());

@@ -13,10 +13,12 @@
 #include "partiemc/surface.h"
 #include "space/bins.h"
 #include "space/bodies.h"
+#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/vertices.h"
+#include "space_vertices/virtual_plane.h"
 
 namespace partiemc {
 
@@ -26,14 +28,25 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceField field;
   space::SpaceCrossings crossings;
   space::Bodies bodies;
-  std::vector<Vec3> positions, normals;
+  std::vector<Vec3> anchors, positions, normals;
+  std::vector<std::uint8_t> is_fixed;
+  space::VirtualPlaneScratch virtual_plane;
+  space::Certificate certificate;
   space::MeshScratch mesh;
 };
 
 namespace {
 
-// Factor of the reference radius (core/SURFACES.md, "Calibration").
-constexpr double kMarchingCubesFactor = 1.065;
+/// The factor of the reference radius (core/SURFACES.md, "Calibration").
+double CalibrationOf(SurfacePlacement placement) {
+  switch (placement) {
+    case SurfacePlacement::kMarchingCubes:
+      return 1.065;
+    case SurfacePlacement::kVirtualPlane:
+      return .985;
+  }
+  return 1;
+}
 
 /// The parameters as the stages of a slice take them: lengths and weights in space.
 ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
@@ -50,7 +63,7 @@ ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space = InSpace(parameters);
   if (!in_space.reference_radius) {
     in_space.reference_radius =
-        kMarchingCubesFactor * CalibratedSliceRadius(parameters.kernel_radius);
+        CalibrationOf(parameters.placement) * CalibratedSliceRadius(parameters.kernel_radius);
   }
   return in_space;
 }
@@ -60,6 +73,33 @@ double LightestVolume(const Frame& frame, double spacing) {
   float lightest = frame.volumes[0];
   for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
   return lightest;
+}
+
+/// Triangles between the crossings of the edges. Leaves positions in world units.
+void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
+  space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  for (Vec3& position : b.positions) position = cell_size * position;
+  space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
+}
+
+/// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
+/// positions in world units.
+absl::Status PlaceMovedVertices(const Scale& scale, SurfaceWorkspace::Buffers& b) {
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
+  space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
+  space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors, b.is_fixed,
+                       b.virtual_plane, b.positions, b.normals);
+  for (Vec3& position : b.positions) position = scale.cell_size * position;
+  for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
+  if (!space::Certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions,
+                      b.certificate)) {
+    return absl::InternalError("a face is refused although its vertices are at their anchors");
+  }
+  space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -96,10 +136,11 @@ absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorksp
   space::FindCrossings(bricks, b.field, b.crossings);
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
   space::FindBodies(frame, b.bins, b.field, parameters_.spacing, b.bodies);
-  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
-  space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
-  for (Vec3& position : b.positions) position = cell_size * position;
-  space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
+  if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
+    PlaceByMarchingCubes(cell_size, b);
+  } else if (status = PlaceMovedVertices(scale, b); !status.ok()) {
+    return status;
+  }
   space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
                          surface);
   return absl::OkStatus();

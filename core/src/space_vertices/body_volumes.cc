@@ -1,0 +1,142 @@
+#include "space_vertices/body_volumes.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/parallel.h"
+
+namespace partiemc::space {
+namespace {
+
+// Spray grows at most by this factor along each axis.
+constexpr double kMostGrowth = 4;
+
+/// The cube root, by Newton's method. Requires: 1 / 64 <= value <= 64.
+double CubeRoot(double value) {
+  double root = value > 1 ? value : 1;  // From above, it falls.
+  for (int round = 0; round < 24; ++round) root = (2 * root + value / (root * root)) / 3;
+  return root;
+}
+
+/// Calls visit(from, to) for the crossings of a loop: each curve from one to the next.
+template <typename Visit>
+void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                  const ActiveCell& cell, int loop, Visit visit) {
+  const CellLoops& loops = LoopsOf(cell.corners);
+  for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
+    visit(EdgeVertexOf(bricks, crossings, cell, loops.edge[step]),
+          EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)]));
+  }
+}
+
+/// Calls visit(cell, loop of the cell, loop).
+template <typename Visit>
+void ForEachLoopOfCells(const SpaceCrossings& crossings, const Visit& visit) {
+  ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
+    const ActiveCell& cell = crossings.cells[index];
+    for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
+      visit(cell, loop, cell.first_loop - crossings.edge_count + loop);
+    }
+  });
+}
+
+}  // namespace
+
+void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
+                        const SpaceCrossings& crossings, const Bodies& bodies,
+                        BodyVolumes& volumes) {
+  volumes.body_of.resize(crossings.VertexCount());
+  ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
+    ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
+      BrickPlace node{brick, i, j, k};
+      if (!field.IsInside(node)) {
+        node = Normalise(bricks, brick, i + (axis == 0), j + (axis == 1), k + (axis == 2));
+      }
+      volumes.body_of[v] = bodies.BodyOf(node);
+    });
+  });
+  ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
+    const CellLoops& loops = LoopsOf(cell.corners);
+    volumes.body_of[crossings.edge_count + index] =
+        volumes.body_of[EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.first[loop]])];
+  });
+}
+
+void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                   const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {
+  // Relative to the lowest node of the body, far from the origin, too.
+  const auto origin_of = [&](std::uint32_t body) {
+    const BrickPlace& lowest = bodies.bodies[body].lowest;
+    return OriginOf(bricks[lowest.brick]) + Vec3{1.0 * lowest.i, 1.0 * lowest.j, 1.0 * lowest.k};
+  };
+  volumes.areas.resize(crossings.loop_count);
+  volumes.parts.resize(crossings.loop_count);
+  ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
+    const std::uint32_t vertex = crossings.edge_count + index;
+    const Vec3 origin = origin_of(volumes.body_of[vertex]);
+    const Vec3 a = positions[vertex] - origin;
+    double area = 0;
+    BodyVolumes::Part part;
+    ForEachCurve(bricks, crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
+      const Vec3 b = positions[from] - origin, c = positions[to] - origin;
+      const double volume = Dot(a, Cross(b, c)) / 6;
+      area += Length(Cross(b - a, c - a)) / 2;
+      part.volume += volume;
+      part.moment = part.moment + (volume / 4) * (a + b + c);
+    });
+    volumes.areas[index] = area;
+    volumes.parts[index] = part;
+  });
+  volumes.measures.assign(bodies.bodies.size(), {});
+  for (std::uint32_t loop = 0; loop < crossings.loop_count; ++loop) {
+    BodyMeasure& measure = volumes.measures[volumes.body_of[crossings.edge_count + loop]];
+    measure.area += volumes.areas[loop];
+    measure.volume += volumes.parts[loop].volume;
+    measure.centroid = measure.centroid + volumes.parts[loop].moment;
+  }
+  for (std::uint32_t body = 0; body < volumes.measures.size(); ++body) {
+    BodyMeasure& measure = volumes.measures[body];
+    const double inverse = measure.volume > 0 ? 1 / measure.volume : 0;
+    measure.centroid = origin_of(body) + inverse * measure.centroid;
+  }
+}
+
+void FindSpray(const Bodies& bodies, double cell_size, double least_area, BodyVolumes& volumes) {
+  const double per_cell = 1 / (cell_size * cell_size * cell_size);
+  constexpr double kMost = kMostGrowth * kMostGrowth * kMostGrowth;
+  volumes.spray.assign(bodies.bodies.size(), {});
+  for (std::size_t body = 0; body < volumes.spray.size(); ++body) {
+    const BodyMeasure& measure = volumes.measures[body];
+    if (measure.area >= least_area) continue;
+    const double wanted = bodies.bodies[body].volume * per_cell;
+    const bool is_known = wanted > 0 && measure.volume > 0;
+    const double ratio = is_known ? std::clamp(wanted / measure.volume, 1 / kMost, kMost) : 1;
+    volumes.spray[body] = {measure.centroid, CubeRoot(ratio)};
+  }
+}
+
+void MatchVolumes(const Bodies& bodies, double cell_size, double limit, const BodyVolumes& volumes,
+                  const std::vector<Vec3>& normals, std::vector<Vec3>& positions) {
+  const double per_cell = 1 / (cell_size * cell_size * cell_size);
+  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
+    const std::uint32_t body = volumes.body_of[v];
+    const BodyMeasure& measure = volumes.measures[body];
+    const double wanted = bodies.bodies[body].volume * per_cell;
+    // No particle: volumes of a body are unknown.
+    if (volumes.spray[body].scale > 0 || !(wanted > 0) || !(measure.area > 0)) return;
+    const double offset = (wanted - measure.volume) / measure.area;
+    positions[v] = positions[v] + std::clamp(offset, -limit, limit) * normals[v];
+  });
+}
+
+void PlaceSpray(const BodyVolumes& volumes, const std::vector<Vec3>& anchors,
+                std::vector<Vec3>& positions) {
+  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
+    const SprayScale& spray = volumes.spray[volumes.body_of[v]];
+    if (spray.scale > 0) {
+      positions[v] = spray.centroid + spray.scale * (anchors[v] - spray.centroid);
+    }
+  });
+}
+
+}  // namespace partiemc::space
