@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <span>
 
 #include "base/parallel.h"
@@ -10,9 +11,6 @@
 
 namespace partiemc::space {
 namespace {
-
-// Setbacks after which a vertex returns to its anchor.
-constexpr int kMostSetbacks = 5;
 
 /// All triangulations of a polygon with n corners, three indices for each triangle.
 using Triangulations = std::vector<std::vector<std::array<std::uint8_t, 3>>>;
@@ -44,13 +42,21 @@ const Triangulations& TriangulationsOf(int corners) {
   return all[corners];
 }
 
-/// A face between two cells, or between an active and an inactive one, with its split sides.
+/// A cell beside a face.
+struct Side {
+  std::array<int, 3> at{};          ///< Relative to the brick of the face.
+  std::uint32_t active = kNoIndex;  ///< Its index, if it is active.
+};
+
+/// A face between two cells, with its split sides.
 struct Face {
+  std::uint32_t brick = 0;
   int axis = 0;
-  std::uint32_t low = kNoIndex, high = kNoIndex;  ///< Active cells below and above, or kNoIndex.
+  Side low, high;
   /// Corners and vertices on crossed sides, counter-clockwise as seen from above.
   std::array<Vec3, 8> around;
-  std::array<std::uint32_t, 8> vertex;  ///< kNoIndex: a corner, which is fixed.
+  std::array<std::uint32_t, 8> item;  ///< Vertex, or vertices + moved node; kNoIndex: stays.
+  std::array<bool, 8> is_vertex;
   int count = 0;
   int crossed = 0;
 };
@@ -58,39 +64,55 @@ struct Face {
 class Checker {
  public:
   Checker(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
-          const std::vector<Vec3>& positions)
-      : bricks_(bricks), crossings_(crossings), cell_size_(cell_size), positions_(positions) {}
+          const std::vector<Vec3>& positions, const MovedNodes& nodes)
+      : bricks_(bricks),
+        crossings_(crossings),
+        cell_size_(cell_size),
+        positions_(positions),
+        nodes_(nodes) {}
 
-  /// The face of an active cell.
-  Face FaceOf(std::uint32_t index, int face) const;
+  /// A face of the cell (i, j, k) of a brick.
+  Face FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, int face) const;
 
   /// Whether a mode is valid; sets it.
   bool FindMode(const Face& face, QuadMode& mode) const;
 
-  /// Calls visit(vertex) for the vertices of a face that may move: those on its sides, and those of
-  /// its cells with one loop.
+  /// Calls visit(item) for the vertices and nodes of a face that may move.
   template <typename Visit>
-  void ForEachVertex(const Face& face, Visit visit) const {
+  void ForEachItem(const Face& face, Visit visit) const {
     for (int k = 0; k < face.count; ++k) {
-      if (face.vertex[k] != kNoIndex) visit(face.vertex[k]);
+      if (face.item[k] != kNoIndex) visit(face.item[k]);
     }
-    for (const std::uint32_t cell : {face.low, face.high}) {
-      if (cell != kNoIndex && !IsFixed(cell)) visit(crossings_.cells[cell].first_loop);
+    for (const Side& side : {face.low, face.high}) {
+      if (side.active == kNoIndex) {
+        for (int corner = 0; corner < 8; ++corner) {
+          const std::uint32_t node = nodes_.IndexOf(NodeOf(face.brick, side.at, corner));
+          if (node != kNoIndex) visit(crossings_.VertexCount() + node);
+        }
+      } else if (!IsFixed(side)) {
+        visit(crossings_.cells[side.active].first_loop);
+      }
     }
   }
 
  private:
-  bool IsFixed(std::uint32_t cell) const {
-    return LoopsOf(crossings_.cells[cell].corners).loops > 1;
+  bool IsFixed(const Side& side) const {
+    return side.active != kNoIndex && LoopsOf(crossings_.cells[side.active].corners).loops > 1;
   }
-  Vec3 NodeAt(const ActiveCell& cell, int corner) const {
-    const Vec3 origin = OriginOf(bricks_[cell.brick]);
-    return {cell_size_ * (origin.x + (cell.i + (corner & 1))),
-            cell_size_ * (origin.y + (cell.j + (corner >> 1 & 1))),
-            cell_size_ * (origin.z + (cell.k + (corner >> 2)))};
+  BrickPlace NodeOf(std::uint32_t brick, const std::array<int, 3>& cell, int corner) const {
+    return Normalise(bricks_, brick, cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1),
+                     cell[2] + (corner >> 2));
   }
-  /// The vertex of a cell with one loop; of an inactive cell its centre, seen from the other cell.
-  Vec3 ApexOf(std::uint32_t cell, std::uint32_t other, int axis, int step) const;
+  Vec3 NodeAt(std::uint32_t brick, const std::array<int, 3>& cell, int corner) const {
+    const Vec3 origin = OriginOf(bricks_[brick]);
+    const Vec3 rest{cell_size_ * (origin.x + (cell[0] + (corner & 1))),
+                    cell_size_ * (origin.y + (cell[1] + (corner >> 1 & 1))),
+                    cell_size_ * (origin.z + (cell[2] + (corner >> 2)))};
+    const std::uint32_t node = nodes_.IndexOf(NodeOf(brick, cell, corner));
+    return node == kNoIndex ? rest : rest + nodes_.moves[node];
+  }
+  /// The vertex of a cell with one loop; without a vertex, the mean of the corners.
+  Vec3 ApexOf(std::uint32_t brick, const Side& side) const;
   bool IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const;
   bool IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const;
   bool CanTriangulate(const Face& face, std::span<const std::uint8_t> polygon, const Vec3& below,
@@ -100,48 +122,49 @@ class Checker {
   const SpaceCrossings& crossings_;
   const double cell_size_;
   const std::vector<Vec3>& positions_;
+  const MovedNodes& nodes_;
 };
 
 double Along(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
-Face Checker::FaceOf(std::uint32_t index, int face) const {
-  const ActiveCell& cell = crossings_.cells[index];
+Face Checker::FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, int face) const {
   Face of;
+  of.brick = brick;
   of.axis = face / 2;
-  std::array<int, 3> at{cell.i, cell.j, cell.k};
-  at[of.axis] += (face & 1) != 0 ? 1 : -1;
-  const BrickPlace place = Normalise(bricks_, cell.brick, at[0], at[1], at[2]);
-  const bool is_active = place.brick != kNoIndex &&
-                         (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
-  const std::uint32_t other = is_active ? crossings_.CellAt(place) : kNoIndex;
-  of.low = (face & 1) != 0 ? index : other;
-  of.high = (face & 1) != 0 ? other : index;
-  // Seen from above: the order of the upper face, moved to this one.
+  of.low.at = of.high.at = cell;
+  ((face & 1) != 0 ? of.high : of.low).at[of.axis] += (face & 1) != 0 ? 1 : -1;
+  for (Side* side : {&of.low, &of.high}) {
+    const BrickPlace place = Normalise(bricks_, brick, side->at[0], side->at[1], side->at[2]);
+    const bool is_active = place.brick != kNoIndex &&
+                           (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
+    if (is_active) side->active = crossings_.CellAt(place);
+  }
+  // Seen from above: the corners of the upper face of the cell below.
   const std::array<int, 4> corners = CornersOfFace(2 * of.axis + 1);
-  const auto corner_at = [&](int k) {
-    return (face & 1) != 0 ? corners[k & 3] : corners[k & 3] ^ 1 << of.axis;
-  };
+  const bool has_crossings = of.low.active != kNoIndex && of.high.active != kNoIndex;
   for (int k = 0; k < 4; ++k) {
-    const int a = corner_at(k), b = corner_at(k + 1);
-    of.around[of.count] = NodeAt(cell, a);
-    of.vertex[of.count++] = kNoIndex;
-    if (((cell.corners >> a ^ cell.corners >> b) & 1) == 0) continue;
-    const std::uint32_t v = EdgeVertexOf(bricks_, crossings_, cell, EdgeBetween(a, b));
+    const int a = corners[k], b = corners[(k + 1) & 3];
+    const std::uint32_t node = nodes_.IndexOf(NodeOf(brick, of.low.at, a));
+    of.around[of.count] = NodeAt(brick, of.low.at, a);
+    of.is_vertex[of.count] = false;
+    of.item[of.count++] = node == kNoIndex ? kNoIndex : crossings_.VertexCount() + node;
+    if (!has_crossings) continue;
+    const ActiveCell& low = crossings_.cells[of.low.active];
+    if (((low.corners >> a ^ low.corners >> b) & 1) == 0) continue;
+    const std::uint32_t v = EdgeVertexOf(bricks_, crossings_, low, EdgeBetween(a, b));
     of.around[of.count] = positions_[v];
-    of.vertex[of.count++] = v;
+    of.is_vertex[of.count] = true;
+    of.item[of.count++] = v;
     ++of.crossed;
   }
   return of;
 }
 
-Vec3 Checker::ApexOf(std::uint32_t cell, std::uint32_t other, int axis, int step) const {
-  if (cell != kNoIndex) return positions_[crossings_.cells[cell].first_loop];
-  const ActiveCell& at = crossings_.cells[other];
-  const Vec3 origin = OriginOf(bricks_[at.brick]);
-  const auto middle = [&](int of_axis, double low) {
-    return cell_size_ * (low + (of_axis == axis ? step : 0) + .5);
-  };
-  return {middle(0, origin.x + at.i), middle(1, origin.y + at.j), middle(2, origin.z + at.k)};
+Vec3 Checker::ApexOf(std::uint32_t brick, const Side& side) const {
+  if (side.active != kNoIndex) return positions_[crossings_.cells[side.active].first_loop];
+  Vec3 sum;
+  for (int corner = 0; corner < 8; ++corner) sum = sum + NodeAt(brick, side.at, corner);
+  return .125 * sum;
 }
 
 bool Checker::IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const {
@@ -184,14 +207,12 @@ bool Checker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& abov
   std::array<int, 4> vertices{};
   int count = 0;
   for (int k = 0; k < face.count; ++k) {
-    if (face.vertex[k] != kNoIndex) vertices[count++] = k;
+    if (face.is_vertex[k]) vertices[count++] = k;
   }
   if (count == 2) return check(vertices[0], vertices[1]) && check(vertices[1], vertices[0]);
   // Ambiguous: vertices are at 1, 3, 5, 7. Each of two opposite corners, those inside, is cut off.
-  const std::uint32_t known = face.low != kNoIndex ? face.low : face.high;
-  const std::array<int, 4> corners = CornersOfFace(2 * face.axis + 1);
-  const int first = face.low != kNoIndex ? corners[0] : corners[0] ^ 1 << face.axis;
-  const bool is_inside = (crossings_.cells[known].corners >> first & 1) != 0;
+  const int first = CornersOfFace(2 * face.axis + 1)[0];
+  const bool is_inside = (crossings_.cells[face.low.active].corners >> first & 1) != 0;
   // Between the curves remain the four vertices and the two other corners.
   constexpr std::array<std::uint8_t, 6> kEven{0, 1, 3, 4, 5, 7}, kOdd{1, 2, 3, 5, 6, 7};
   return is_inside ? check(7, 1) && check(3, 5) && CanTriangulate(face, kOdd, below, above)
@@ -200,18 +221,16 @@ bool Checker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& abov
 
 bool Checker::FindMode(const Face& face, QuadMode& mode) const {
   mode = QuadMode::kAlongFace;
-  const bool is_low_fixed = face.low != kNoIndex && IsFixed(face.low);
-  const bool is_high_fixed = face.high != kNoIndex && IsFixed(face.high);
+  const bool is_low_fixed = IsFixed(face.low), is_high_fixed = IsFixed(face.high);
   if (is_low_fixed && is_high_fixed) return true;
+  const Vec3 below = is_low_fixed ? Vec3{} : ApexOf(face.brick, face.low);
+  const Vec3 above = is_high_fixed ? Vec3{} : ApexOf(face.brick, face.high);
   // The face of a fixed cell is flat: the other vertex must be on its own side.
   const double level = Along(face.around[0], face.axis);
-  if (is_low_fixed) return Along(ApexOf(face.high, face.low, face.axis, 1), face.axis) > level;
-  if (is_high_fixed) return Along(ApexOf(face.low, face.high, face.axis, -1), face.axis) < level;
-  const Vec3 below = ApexOf(face.low, face.high, face.axis, -1);
-  const Vec3 above = ApexOf(face.high, face.low, face.axis, 1);
+  if (is_low_fixed) return Along(above, face.axis) > level;
+  if (is_high_fixed) return Along(below, face.axis) < level;
   if (face.crossed == 0) {
-    return (Along(below, face.axis) < level && Along(above, face.axis) > level) ||
-           IsValidAcross(face, below, above);
+    return IsValidAlong(face, below, above) || IsValidAcross(face, below, above);
   }
   if (face.crossed == 2 && IsValidAcross(face, below, above)) {
     mode = QuadMode::kAcrossCells;
@@ -220,42 +239,80 @@ bool Checker::FindMode(const Face& face, QuadMode& mode) const {
   return IsValidAlong(face, below, above);
 }
 
-/// Calls visit(cell, face) for each face of an active cell once.
+/// Calls visit(cell, side) for each face of the near cells of a brick once.
 template <typename Visit>
-void ForEachFace(const BrickDirectory& bricks, const SpaceCrossings& crossings, std::uint32_t index,
+void ForEachFace(const BrickDirectory& bricks, const MovedNodes& nodes, std::uint32_t brick,
                  Visit visit) {
-  const ActiveCell& cell = crossings.cells[index];
-  for (int face = 0; face < 6; ++face) {
-    if ((face & 1) == 0) {
-      // The cell below has this face, if it is active.
-      std::array<int, 3> at{cell.i, cell.j, cell.k};
-      --at[face / 2];
-      const BrickPlace place = Normalise(bricks, cell.brick, at[0], at[1], at[2]);
-      if (place.brick != kNoIndex &&
-          (crossings.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0) {
-        continue;
+  for (int k = 0; k < kBrickSize; ++k) {
+    for (std::uint64_t bits = nodes.bricks[brick].near[k]; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      const std::array<int, 3> cell{bit % kBrickSize, bit / kBrickSize, k};
+      for (int side = 0; side < 6; ++side) {
+        if ((side & 1) == 0) {
+          // The cell below has this face, if it is near.
+          std::array<int, 3> at = cell;
+          --at[side / 2];
+          const BrickPlace place = Normalise(bricks, brick, at[0], at[1], at[2]);
+          if (place.brick != kNoIndex &&
+              (nodes.bricks[place.brick].near[place.k] >> place.Bit() & 1) != 0) {
+            continue;
+          }
+        }
+        visit(cell, side);
       }
     }
-    visit(face);
   }
 }
 
-/// Moves the vertices of refused faces back. Returns their number.
-std::uint32_t MoveBack(const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
-                       Certificate& certificate) {
-  std::uint32_t moved = 0;
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    certificate.is_checked[v] = 0;
-    if (certificate.is_bad[v] == 0) continue;
-    certificate.is_bad[v] = 0;
-    if (positions[v] == anchors[v]) continue;
-    const int setbacks = ++certificate.setbacks[v];
-    certificate.returned += setbacks == 1;
-    positions[v] = setbacks < kMostSetbacks ? .5 * (positions[v] + anchors[v]) : anchors[v];
-    certificate.is_checked[v] = 1;
-    ++moved;
-  }
-  return moved;
+/// Whether something in a brick or around it has moved.
+bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
+                    const std::vector<std::uint8_t>& has_moved) {
+  if (has_moved[brick] != 0) return true;
+  const BrickNeighbours& around = bricks.neighbours(brick);
+  return std::any_of(around.begin(), around.end(), [&](std::uint32_t other) {
+    return other != kNoIndex && has_moved[other] != 0;
+  });
+}
+
+/// Moves the vertices and nodes of refused faces back. Returns whether there are any that can.
+bool MoveBack(const SpaceCrossings& crossings, const std::vector<Vec3>& anchors,
+              std::vector<Vec3>& positions, Certificate& certificate) {
+  std::atomic<std::uint32_t> returned = 0;
+  std::atomic<bool> has_any = false;
+  ParallelFor(static_cast<std::uint32_t>(crossings.bricks.size()), [&](std::uint32_t brick) {
+    bool has_moved = false;
+    const auto move_vertex = [&](std::uint32_t v) {
+      if (certificate.is_bad[v] == 0) return;
+      certificate.is_bad[v] = 0;
+      if (positions[v] == anchors[v]) return;
+      const int setbacks = ++certificate.setbacks[v];
+      if (setbacks == 1) returned.fetch_add(1, std::memory_order_relaxed);
+      positions[v] = setbacks < kMostSetbacks ? .5 * (positions[v] + anchors[v]) : anchors[v];
+      has_moved = true;
+    };
+    ForEachCrossedEdge(crossings, brick,
+                       [&](std::uint32_t v, int, int, int, int) { move_vertex(v); });
+    const SpaceCrossings::Brick& at = crossings.bricks[brick];
+    const std::uint32_t end = brick + 1 < crossings.bricks.size()
+                                  ? crossings.bricks[brick + 1].first_cell
+                                  : static_cast<std::uint32_t>(crossings.cells.size());
+    for (std::uint32_t cell = at.first_cell; cell < end; ++cell) {
+      move_vertex(crossings.cells[cell].first_loop);
+    }
+    MovedNodes& nodes = certificate.nodes;
+    ForEachMovedNode(nodes, brick, [&](std::uint32_t node, int, int, int) {
+      std::uint8_t& is_bad = certificate.is_bad[positions.size() + node];
+      if (is_bad != 0 && nodes.setbacks[node] < kMostSetbacks) {
+        ++nodes.setbacks[node];
+        has_moved = true;
+      }
+      is_bad = 0;
+    });
+    certificate.has_moved[brick] = has_moved;
+    if (has_moved) has_any.store(true, std::memory_order_relaxed);
+  });
+  certificate.returned += returned;
+  return has_any;
 }
 
 }  // namespace
@@ -276,35 +333,38 @@ void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& cross
 bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate) {
-  const auto cells = static_cast<std::uint32_t>(crossings.cells.size());
-  certificate.modes.assign(cells, {});
+  const auto count = static_cast<std::uint32_t>(bricks.size());
+  MovedNodes& nodes = certificate.nodes;
+  FindMovedNodes(bricks, crossings, nodes);
+  certificate.modes.assign(crossings.cells.size(), {});
   certificate.rounds = certificate.returned = 0;
   certificate.setbacks.assign(positions.size(), 0);
-  certificate.is_checked.assign(positions.size(), 1);
-  certificate.is_bad.assign(positions.size(), 0);
-  const Checker checker(bricks, crossings, cell_size, positions);
+  certificate.is_bad.assign(positions.size() + nodes.count, 0);
+  certificate.has_moved.assign(count, 1);
+  const Checker checker(bricks, crossings, cell_size, positions, nodes);
   for (;;) {
+    ParallelFor(count, [&](std::uint32_t brick) {
+      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
+      MoveNodesOf(brick, bricks, crossings, anchors, positions, nodes);
+    });
     std::atomic<bool> is_refused = false;
-    ParallelFor(cells, [&](std::uint32_t index) {
-      ForEachFace(bricks, crossings, index, [&](int side) {
-        const Face face = checker.FaceOf(index, side);
-        bool is_checked = false;
-        checker.ForEachVertex(
-            face, [&](std::uint32_t v) { is_checked |= certificate.is_checked[v] != 0; });
-        if (!is_checked) return;
+    ParallelFor(count, [&](std::uint32_t brick) {
+      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
+      ForEachFace(bricks, nodes, brick, [&](const std::array<int, 3>& cell, int side) {
+        const Face face = checker.FaceOf(brick, cell, side);
         QuadMode mode;
         const bool is_valid = checker.FindMode(face, mode);
-        if ((side & 1) != 0) certificate.modes[index][side / 2] = mode;
+        if (face.crossed > 0) certificate.modes[face.low.active][face.axis] = mode;
         if (is_valid) return;
         is_refused.store(true, std::memory_order_relaxed);
-        checker.ForEachVertex(face, [&](std::uint32_t v) {
-          std::atomic_ref(certificate.is_bad[v]).store(1, std::memory_order_relaxed);
+        checker.ForEachItem(face, [&](std::uint32_t item) {
+          std::atomic_ref(certificate.is_bad[item]).store(1, std::memory_order_relaxed);
         });
       });
     });
     if (!is_refused) return true;
     ++certificate.rounds;
-    if (MoveBack(anchors, positions, certificate) == 0) return false;
+    if (!MoveBack(crossings, anchors, positions, certificate)) return false;
   }
 }
 

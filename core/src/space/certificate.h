@@ -5,14 +5,16 @@
 // space while all vertices are at their anchors. If each has a decomposition into tetrahedra that
 // are positively oriented with the moved vertices, the piecewise linear map from the anchors is
 // injective (Lipman, arXiv 1310.0955), so triangles that are faces of these tetrahedra intersect
-// nowhere. Vertices may leave their cells.
+// nowhere. Vertices may leave their cells. Lattice nodes are auxiliary points that follow them
+// (moved_nodes.h).
 //
 // A curve on a face joins E and E'; its quad (C_i, E, C_j, E') is cut in one of two modes:
 //   kAcrossCells  along C_i C_j: valid if the tetrahedra (A, B, C_i, C_j) over the sides A B of the
 //                 split face are positive;
 //   kAlongFace    along E E': valid if a triangulation of the split face with the edge E E' has
 //                 positive tetrahedra with C_i and with C_j. Always so at the anchors.
-// The vertices of cells with several loops stay at their anchors, and their faces stay flat.
+// The vertices of cells with several loops stay at their anchors, and their faces stay flat. A cell
+// without a vertex has a virtual one, the mean of its corners.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +24,7 @@
 #include "space/crossings.h"
 #include "space/lattice.h"
 #include "space/mesh.h"
+#include "space/moved_nodes.h"
 
 namespace partiemc::space {
 
@@ -32,19 +35,20 @@ struct Certificate {
   std::uint32_t rounds = 0;                    ///< Rounds of repair.
   std::uint32_t returned = 0;                  ///< Vertices that were moved back at least once.
 
-  std::vector<std::uint8_t> setbacks;            ///< Scratch, by vertex.
-  std::vector<std::uint8_t> is_checked, is_bad;  ///< Scratch, by vertex: in this round.
+  MovedNodes nodes;
+  std::vector<std::uint8_t> setbacks;   ///< By vertex.
+  std::vector<std::uint8_t> is_bad;     ///< By vertex, then by node: refused in this round.
+  std::vector<std::uint8_t> has_moved;  ///< By brick: since the last round.
 };
 
 /// Marks the vertices of cells with several loops, which have to stay at their anchors.
 void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        std::vector<std::uint8_t>& is_fixed);
 
-/// Finds a mode for each face. Where none is valid, the vertices of the face move half way back to
-/// their anchors, from the fifth time all the way. `positions` and `anchors` in world units, as the
-/// surface will have them. Returns false if a face is refused although its vertices are at their
-/// anchors: a bug.
-/// Requires: fixed vertices are at their anchors.
+/// Finds a mode for each face. Where none is valid, the vertices and nodes of the face move half
+/// way back to their anchors, from the fifth time all the way. `positions` and `anchors` in world
+/// units, as the surface will have them. Returns false if a face is refused although its vertices
+/// are at their anchors: a bug. Requires: fixed vertices are at their anchors.
 bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);

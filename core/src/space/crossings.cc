@@ -3,49 +3,16 @@
 #include <algorithm>
 
 #include "base/parallel.h"
+#include "space/brick_layers.h"
 
 namespace partiemc::space {
 namespace {
-
-constexpr std::uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
-
-/// The inside nodes of a brick and around it.
-class NodeLayers {
- public:
-  NodeLayers(const BrickDirectory& bricks, const SpaceField& field, std::uint32_t brick)
-      : bricks_(bricks), field_(field), brick_(brick) {}
-
-  /// Layer k, -1 <= k <= 8, shifted: bit 8 j + i is node (i + dx, j + dy), -1 <= dx, dy <= 1.
-  std::uint64_t operator()(int k, int dx, int dy) const {
-    if (dx == 0) return Rows(k, 0, dy);
-    const std::uint64_t here = Rows(k, 0, dy), beside = Rows(k, dx, dy);
-    return dx > 0 ? (here >> 1 & ~kLastColumn) | (beside << 7 & kLastColumn)
-                  : (here << 1 & ~kFirstColumn) | (beside >> 7 & kFirstColumn);
-  }
-
- private:
-  /// The bricks in column `bx`, rows shifted by dy.
-  std::uint64_t Rows(int k, int bx, int dy) const {
-    const std::uint64_t here = Word(bx, 0, k);
-    if (dy == 0) return here;
-    const std::uint64_t beside = Word(bx, dy, k);
-    return dy > 0 ? here >> 8 | beside << 56 : here << 8 | beside >> 56;
-  }
-  std::uint64_t Word(int bx, int by, int k) const {
-    const std::uint32_t owner = bricks_.At(brick_, bx, by, k >> kBrickShift);
-    return owner == kNoIndex ? 0 : field_.inside[owner][k & (kBrickSize - 1)];
-  }
-
-  const BrickDirectory& bricks_;
-  const SpaceField& field_;
-  const std::uint32_t brick_;
-};
 
 /// Marks crossed edges, the nodes at their ends, and active cells.
 void MarkBrick(const BrickDirectory& bricks, const SpaceField& field, std::uint32_t brick,
                SpaceCrossings& crossings) {
   SpaceCrossings::Brick& at = crossings.bricks[brick];
-  const NodeLayers nodes(bricks, field, brick);
+  const BrickLayers nodes(bricks, field.inside, brick);
   std::uint16_t cells = 0;
   for (int k = 0; k < kBrickSize; ++k) {
     const std::uint64_t here = nodes(k, 0, 0);
@@ -94,7 +61,7 @@ void FillCells(const BrickDirectory& bricks, const SpaceField& field, std::uint3
   const SpaceCrossings::Brick& at = crossings.bricks[brick];
   std::uint32_t next = at.first_cell;
   loops = 0;
-  const NodeLayers nodes(bricks, field, brick);
+  const BrickLayers nodes(bricks, field.inside, brick);
   for (int k = 0; k < kBrickSize; ++k) {
     if (at.active[k] == 0) continue;
     std::array<std::uint64_t, 8> words;
