@@ -345,7 +345,7 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
   for (;;) {
     ParallelFor(count, [&](std::uint32_t brick) {
       if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
-      MoveNodesOf(brick, bricks, crossings, anchors, positions, nodes);
+      MoveNodesOf(brick, bricks, crossings, cell_size, anchors, positions, nodes);
     });
     std::atomic<bool> is_refused = false;
     ParallelFor(count, [&](std::uint32_t brick) {

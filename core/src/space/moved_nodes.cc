@@ -27,6 +27,9 @@ std::uint64_t AtTheEnd(const BrickDirectory& bricks, std::uint32_t brick, int k)
   return nodes;
 }
 
+// In squared cells. Keeps the weight of a vertex at the node finite.
+constexpr double kLeastSquare = 1e-3;
+
 bool HasOneLoop(const ActiveCell& cell) { return LoopsOf(cell.corners).loops == 1; }
 
 }  // namespace
@@ -78,14 +81,19 @@ void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossing
 }
 
 void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
-                 MovedNodes& nodes) {
+                 double cell_size, const std::vector<Vec3>& anchors,
+                 const std::vector<Vec3>& positions, MovedNodes& nodes) {
+  const Vec3 origin = OriginOf(bricks[brick]);
+  const double least = kLeastSquare * cell_size * cell_size;
   ForEachMovedNode(nodes, brick, [&](std::uint32_t index, int i, int j, int k) {
     Vec3 sum;
-    int vertices = 0;
+    double total = 0;
+    const Vec3 node = cell_size * (origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k});
     const auto add = [&](std::uint32_t v) {
-      sum = sum + (positions[v] - anchors[v]);
-      ++vertices;
+      const Vec3 to = anchors[v] - node;
+      const double weight = 1 / (Dot(to, to) + least);
+      sum = sum + weight * (positions[v] - anchors[v]);
+      total += weight;
     };
     for (int side = 0; side < 8; ++side) {
       const BrickPlace place =
@@ -104,7 +112,7 @@ void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceC
     }
     const int setbacks = nodes.setbacks[index];
     const double share = setbacks < kMostSetbacks ? 1.0 / (1 << setbacks) : 0;
-    nodes.moves[index] = vertices > 0 ? (share / vertices) * sum : Vec3{};
+    nodes.moves[index] = total > 0 ? (share / total) * sum : Vec3{};
   });
 }
 

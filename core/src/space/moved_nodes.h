@@ -1,8 +1,9 @@
 // Lattice nodes that follow the vertices around them: auxiliary points of the certificate.
 //
-// A node of a cell with a vertex moves by the mean displacement of the vertices in the cells around
-// it and on its edges. Smooth displacements then keep the cells in shape. Nodes of cells with
-// several loops stay, as do nodes next to bricks that do not exist.
+// A node of a cell with a vertex moves by the weighted mean displacement of the vertices in the
+// cells around it and on its edges, with weights 1 / distance^2. Smooth displacements then keep the
+// cells in shape. Nodes of cells with several loops stay, as do nodes next to bricks that do not
+// exist.
 #pragma once
 
 #include <array>
@@ -47,10 +48,10 @@ inline constexpr int kMostSetbacks = 5;
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                     MovedNodes& nodes);
 
-/// Sets the moves of the nodes of a brick.
+/// Sets the moves of the nodes of a brick. Anchors and positions in world units.
 void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
-                 MovedNodes& nodes);
+                 double cell_size, const std::vector<Vec3>& anchors,
+                 const std::vector<Vec3>& positions, MovedNodes& nodes);
 
 /// Calls visit(index, i, j, k) for each node of a brick that may move.
 template <typename Visit>
