@@ -1,5 +1,7 @@
 // Runs the stages of a surface in order.
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -18,6 +20,7 @@
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/vertices.h"
+#include "space_vertices/qef.h"
 #include "space_vertices/virtual_plane.h"
 
 namespace partiemc {
@@ -41,6 +44,7 @@ namespace {
 double CalibrationOf(SurfacePlacement placement) {
   switch (placement) {
     case SurfacePlacement::kMarchingCubes:
+    case SurfacePlacement::kQef:
       return 1.065;
     case SurfacePlacement::kVirtualPlane:
       return .985;
@@ -86,12 +90,21 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
 
 /// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
 /// positions in world units.
-absl::Status PlaceMovedVertices(const Scale& scale, SurfaceWorkspace::Buffers& b) {
+absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
+                                SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
   space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
-  space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors, b.is_fixed,
-                       b.virtual_plane, b.positions, b.normals);
+  if (placement == SurfacePlacement::kQef) {
+    space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
+    space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);
+  } else {
+    space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors,
+                         b.virtual_plane, b.positions, b.normals);
+  }
+  for (std::size_t v = 0; v < b.positions.size(); ++v) {
+    if (b.is_fixed[v] != 0) b.positions[v] = b.anchors[v];
+  }
   for (Vec3& position : b.positions) position = scale.cell_size * position;
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
   if (!space::Certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions,
@@ -138,7 +151,7 @@ absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorksp
   space::FindBodies(frame, b.bins, b.field, parameters_.spacing, b.bodies);
   if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
     PlaceByMarchingCubes(cell_size, b);
-  } else if (status = PlaceMovedVertices(scale, b); !status.ok()) {
+  } else if (status = PlaceMovedVertices(parameters_.placement, scale, b); !status.ok()) {
     return status;
   }
   space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,

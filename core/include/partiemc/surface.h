@@ -60,6 +60,7 @@ absl::Status Validate(const Surface& surface);
 /// How the vertices of a surface are placed (core/SURFACES.md).
 enum class SurfacePlacement : std::uint8_t {
   kMarchingCubes,  ///< Linear interpolation of the level set on lattice edges.
+  kQef,            ///< Vertices in cells by dual contouring (least squares), for comparison.
   kVirtualPlane,   ///< Vertices on smoothed planes, with the volume of the particles.
 };
 

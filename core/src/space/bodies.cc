@@ -85,7 +85,8 @@ void JoinParts(const BrickDirectory& bricks, Bodies& bodies) {
 void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   const auto parts = static_cast<std::uint32_t>(bodies.parts.size());
   for (std::uint32_t part = 0; part < parts; ++part) RootOf(bodies.parts, part);
-  std::vector<std::int64_t> lowest_z;
+  std::vector<std::int64_t>& lowest_z = bodies.lowest_z;
+  lowest_z.clear();
   // Roots come before their other parts.
   for (std::uint32_t index = 0; index < parts; ++index) {
     Bodies::Part& part = bodies.parts[index];

@@ -30,8 +30,9 @@ struct Bodies {
     std::uint32_t brick;
     std::uint32_t body;  // While parts are joined: another part of it.
   };
-  std::vector<Part> parts;           ///< By brick.
-  std::vector<std::uint32_t> first;  ///< Per brick: its first part, and the number of all parts.
+  std::vector<Part> parts;             ///< By brick.
+  std::vector<std::uint32_t> first;    ///< Per brick: its first part, and the number of all parts.
+  std::vector<std::int64_t> lowest_z;  ///< Scratch: by body.
 
   /// The body of an inside node.
   std::uint32_t BodyOf(const BrickPlace& node) const {

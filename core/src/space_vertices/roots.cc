@@ -1,6 +1,5 @@
 #include "space_vertices/roots.h"
 
-#include <algorithm>
 #include <cstddef>
 
 #include "base/parallel.h"
@@ -14,13 +13,6 @@ namespace {
 constexpr double kWeakGradient = 1e-3;
 // Cells per task: hides the cost of a sampler.
 constexpr std::size_t kCellsAtOnce = 64;
-
-Vec3 Clamped(const Vec3& point, const Vec3& low) {
-  const auto clamp = [](double value, double from) {
-    return std::clamp(value, from + kAnchorMargin, from + 1 - kAnchorMargin);
-  };
-  return {clamp(point.x, low.x), clamp(point.y, low.y), clamp(point.z, low.z)};
-}
 
 class RootFinder {
  public:
@@ -43,7 +35,7 @@ class RootFinder {
     Vec3 step = (-sample.value / square) * sample.gradient;
     const double length = Length(step);
     if (length > constants_.newton_step) step = (constants_.newton_step / length) * step;
-    const Vec3 moved = Clamped(position + step, low_);
+    const Vec3 moved = ClampedToCell(position + step, low_);
     Vec3 gradient = sample.gradient;
     if (Length(moved - position) > constants_.long_step) {
       const PointSample again = sampler_.Sample(moved - origin_);

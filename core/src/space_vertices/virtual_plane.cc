@@ -33,9 +33,8 @@ void SmoothLoops(const PlacementInput& input, const VirtualPlaneConstants& const
 }  // namespace
 
 void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& constants,
-                   const std::vector<Vec3>& anchors, const std::vector<std::uint8_t>& is_fixed,
-                   VirtualPlaneScratch& scratch, std::vector<Vec3>& positions,
-                   std::vector<Vec3>& normals) {
+                   const std::vector<Vec3>& anchors, VirtualPlaneScratch& scratch,
+                   std::vector<Vec3>& positions, std::vector<Vec3>& normals) {
   const BrickDirectory& bricks = input.bins.bricks;
   const SpaceCrossings& crossings = input.crossings;
   const double h = input.scale.spacing, cell_size = input.scale.cell_size;
@@ -56,9 +55,6 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   MatchVolumes(input.bodies, cell_size, constants.volume_limit * h, scratch.volumes, normals,
                positions);
   PlaceSpray(scratch.volumes, anchors, positions);
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (is_fixed[v] != 0) positions[v] = anchors[v];
-  }
 }
 
 }  // namespace partiemc::space

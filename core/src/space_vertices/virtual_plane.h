@@ -1,7 +1,6 @@
 // The default placement: vertices on smoothed planes (core/SURFACES.md, "Placements").
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "base/vec3.h"
@@ -44,10 +43,8 @@ struct VirtualPlaneScratch {
 };
 
 /// Moves the vertices from their anchors to smoothed planes and sets their normals. In cells.
-/// `is_fixed` vertices stay at their anchors.
 void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& constants,
-                   const std::vector<Vec3>& anchors, const std::vector<std::uint8_t>& is_fixed,
-                   VirtualPlaneScratch& scratch, std::vector<Vec3>& positions,
-                   std::vector<Vec3>& normals);
+                   const std::vector<Vec3>& anchors, VirtualPlaneScratch& scratch,
+                   std::vector<Vec3>& positions, std::vector<Vec3>& normals);
 
 }  // namespace partiemc::space

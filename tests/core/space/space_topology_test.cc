@@ -228,7 +228,7 @@ TEST_P(SpaceFrames, HaveTheSameBitsForAnyOrderThreadsAndHistory) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SpaceFrames,
-                         ::testing::Values(SurfacePlacement::kMarchingCubes,
+                         ::testing::Values(SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
                                            SurfacePlacement::kVirtualPlane));
 
 TEST(SurfaceReconstructor, RefusesBadInput) {

@@ -1,0 +1,246 @@
+// The steps of the placements in space.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "frame/calibration.h"
+#include "frame/scale.h"
+#include "partiemc/surface.h"
+#include "space/bins.h"
+#include "space/bodies.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/point_sampler.h"
+#include "space/space_particles.h"
+#include "space/vertices.h"
+#include "space_vertices/body_volumes.h"
+#include "space_vertices/edge_vertices.h"
+#include "space_vertices/loop_filters.h"
+#include "space_vertices/loop_windows.h"
+#include "space_vertices/qef.h"
+#include "space_vertices/roots.h"
+
+namespace partiemc::space {
+namespace {
+
+using support::Random;
+using testing::Ball;
+using testing::SpaceParticles;
+
+/// All stages up to the anchors, for particles of spacing 1 and cells of size 1.
+struct Anchored {
+  Scale scale;
+  SpaceBins bins;
+  SpaceField field;
+  SpaceCrossings crossings;
+  Bodies bodies;
+  std::vector<Vec3> anchors;
+
+  explicit Anchored(const SpaceParticles& particles) {
+    ReconstructionParameters parameters;
+    parameters.reference_radius = CalibratedSliceRadius(3);
+    parameters.slice = SlicePlane{};
+    scale = MakeScale(parameters, 1, 1, 1);
+    EXPECT_TRUE(BinParticles(particles.AsFrame(), scale, {}, bins).ok());
+    SampleField(bins, scale, field);
+    FindCrossings(bins.bricks, field, crossings);
+    EvaluateNodes(bins, scale, crossings.near, field);
+    FindBodies(particles.AsFrame(), bins, field, 1, bodies);
+    PlaceOnCrossings(bins.bricks, field, crossings, kAnchorMargin, anchors);
+  }
+
+  std::vector<Vec3> Loops(const std::vector<Vec3>& by_vertex) const {
+    return {by_vertex.begin() + crossings.edge_count, by_vertex.end()};
+  }
+};
+
+constexpr double kRadius = 6;
+
+/// The loops of a ball, moved to the sphere.
+struct OnSphere : Anchored {
+  std::vector<Vec3> centres, normals;
+  std::vector<double> areas;
+  LoopWindows windows;
+
+  explicit OnSphere(double reach) : Anchored(MakeBall()) {
+    for (const Vec3& at : Loops(anchors)) {
+      normals.push_back(Normalised(at));
+      centres.push_back(kRadius * normals.back());
+      areas.push_back(1);
+    }
+    FindWindows(bins.bricks, crossings, centres, reach, windows);
+  }
+
+  static SpaceParticles MakeBall() {
+    Random random(1);
+    return Ball({0, 0, 0}, kRadius, .2, random);
+  }
+};
+
+TEST(LoopWindows, ContainTheLoopsWithinReach) {
+  constexpr double kReach = 2.5;
+  const OnSphere ball(kReach);
+  ASSERT_GT(ball.centres.size(), 300u);
+  for (std::uint32_t i = 0; i < ball.centres.size(); ++i) {
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t j = 0; j < ball.centres.size(); ++j) {
+      const Vec3 to = ball.centres[j] - ball.centres[i];
+      if (Dot(to, to) < kReach * kReach) expected.push_back(j);
+    }
+    const auto window = ball.windows.Of(i);
+    EXPECT_EQ(window[0], i);
+    std::vector<std::uint32_t> found(window.begin(), window.end());
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, expected);
+  }
+}
+
+TEST(LoopWindows, KeepBodiesApart) {
+  Random random(2);
+  SpaceParticles particles = Ball({0, 0, 0}, 3, 0, random);
+  particles.Add(Ball({0, 0, 8}, 3, 0, random));
+  const Anchored two(particles);
+  ASSERT_EQ(two.bodies.bodies.size(), 2u);
+  LoopWindows windows;
+  const std::vector<Vec3> centres = two.Loops(two.anchors);
+  FindWindows(two.bins.bricks, two.crossings, centres, 6, windows);
+  for (std::uint32_t i = 0; i < centres.size(); ++i) {
+    for (const std::uint32_t j : windows.Of(i)) {
+      EXPECT_EQ(centres[i].z < 4, centres[j].z < 4);
+    }
+  }
+}
+
+TEST(LoopFilters, LeaveASphereUnchanged) {
+  const OnSphere ball(4);
+  const LoopSurface surface{ball.windows, ball.centres, ball.areas};
+  std::vector<double> bends(ball.centres.size());
+  FindBends(surface, ball.normals, 2.5, 2, bends);
+  for (const double bend : bends) EXPECT_NEAR(bend, 2 / kRadius, 1e-9);
+  std::vector<Vec3> smooth(ball.centres.size());
+  const std::vector<double> no_bases(ball.centres.size());
+  SmoothOnPlanes(surface, ball.normals, no_bases, 4, smooth);
+  for (std::size_t i = 0; i < smooth.size(); ++i) {
+    EXPECT_LT(Length(smooth[i] - ball.centres[i]), 1e-12);
+  }
+}
+
+TEST(LoopFilters, ReduceNoiseOfNormalsAndHeights) {
+  OnSphere ball(4);
+  Random random(3);
+  const std::vector<Vec3> truth = ball.normals;
+  double noise = 0, rest = 0, height = 0, rest_of_height = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double x = random.Uniform(-.2, .2), y = random.Uniform(-.2, .2);
+    ball.normals[i] = Normalised(truth[i] + Vec3{x, y, random.Uniform(-.2, .2)});
+    noise += Length(ball.normals[i] - truth[i]);
+    const double by = random.Uniform(-.1, .1);
+    ball.centres[i] = ball.centres[i] + by * truth[i];
+    height += std::abs(by);
+  }
+  const LoopSurface surface{ball.windows, ball.centres, ball.areas};
+  std::vector<Vec3> once(truth.size()), twice(truth.size());
+  SmoothNormals(surface, ball.normals, 2.5, Stop::kNowhere, once);
+  SmoothNormals(surface, once, 4, Stop::kAtEdges, twice);
+  for (std::size_t i = 0; i < truth.size(); ++i) rest += Length(twice[i] - truth[i]);
+  EXPECT_LT(rest, .3 * noise);
+  std::vector<Vec3> smooth(truth.size());
+  SmoothOnPlanes(surface, twice, std::vector<double>(truth.size()), 4, smooth);
+  for (const Vec3& at : smooth) rest_of_height += std::abs(Length(at) - kRadius);
+  EXPECT_LT(rest_of_height, .4 * height);
+}
+
+TEST(EdgeVertices, LieOnTheSphereOfTheirLoops) {
+  const OnSphere ball(1);
+  std::vector<Vec3> positions = ball.anchors, normals(ball.anchors.size());
+  const std::uint32_t first = ball.crossings.edge_count;
+  std::copy(ball.centres.begin(), ball.centres.end(), positions.begin() + first);
+  std::copy(ball.normals.begin(), ball.normals.end(), normals.begin() + first);
+  PlaceEdgesByLoops(ball.bins.bricks, ball.crossings, ball.anchors, positions, normals);
+  for (std::uint32_t v = 0; v < first; ++v) {
+    EXPECT_NEAR(Length(positions[v]), kRadius, .02);
+    EXPECT_NEAR(Length(normals[v]), 1, 1e-12);
+  }
+}
+
+TEST(Roots, LieOnTheLevelSet) {
+  const Anchored ball(OnSphere::MakeBall());
+  std::vector<Vec3> positions = ball.anchors, normals;
+  FindRoots(ball.bins, ball.scale, ball.crossings, {}, positions, normals);
+  PointSampler sampler(ball.bins, ball.scale);
+  double before = 0, after = 0;
+  for (const ActiveCell& cell : ball.crossings.cells) {
+    const auto x = static_cast<float>(cell.i), y = static_cast<float>(cell.j),
+               z = static_cast<float>(cell.k);
+    sampler.MoveTo(cell.brick, {{x, y, z}, {x + 1, y + 1, z + 1}});
+    const Vec3 origin = OriginOf(ball.bins.bricks[cell.brick]);
+    before += std::abs(sampler.Value(ball.anchors[cell.first_loop] - origin));
+    after += std::abs(sampler.Value(positions[cell.first_loop] - origin));
+    EXPECT_GT(Dot(normals[cell.first_loop], Normalised(positions[cell.first_loop])), .7);
+  }
+  EXPECT_LT(after, .2 * before);
+}
+
+TEST(Qef, FindsTheCornerOfThreePlanes) {
+  Random random(4);
+  const Anchored box(testing::Box({0, 0, 0}, {9, 9, 9}, 0, random));
+  std::vector<Vec3> positions = box.anchors, normals;
+  PlaceByQef(box.bins, box.scale, box.crossings, positions, normals);
+  // On the faces, far from edges, the normals are those of the box.
+  int checked = 0;
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    EXPECT_NEAR(Length(normals[v]), 1, 1e-12);
+    if (std::abs(positions[v].x - 4.5) > 1 || std::abs(positions[v].y - 4.5) > 1) continue;
+    EXPECT_GT(std::abs(normals[v].z), .999);
+    EXPECT_NEAR(std::abs(positions[v].z - 4.5), 5, .15);
+    ++checked;
+  }
+  EXPECT_GT(checked, 4);
+}
+
+SpaceParticles Drop(int count, Random& random) {
+  // The lattice points nearest to a random centre, shaken.
+  const double x = random.Unit(), y = random.Unit();
+  const Vec3 centre{x, y, random.Unit()};
+  double radius = 0;
+  SpaceParticles drop;
+  while (drop.size() < static_cast<std::size_t>(count)) {
+    radius += .05;
+    Random same(7);
+    drop = Ball(centre, radius, .1, same);
+  }
+  return drop;
+}
+
+double VolumeOf(const Surface& surface) {
+  double volume = 0;
+  for (const ShellMeasures& shell : surface.measures) volume += shell.volume;
+  return volume;
+}
+
+TEST(VirtualPlane, GivesDropsAndBallsTheVolumeOfTheirParticles) {
+  const auto reconstructor =
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  Random random(5);
+  for (const int count : {1, 2, 4, 8, 12, 20, 30, 60, 100, 300, 1000}) {
+    double worst = 1;
+    for (int trial = 0; trial < 5; ++trial) {
+      const SpaceParticles drop = Drop(count, random);
+      ASSERT_TRUE(reconstructor->Reconstruct(drop.AsFrame(), workspace, surface).ok());
+      ASSERT_TRUE(Validate(surface).ok());
+      const double ratio = VolumeOf(surface) / static_cast<double>(drop.size());
+      if (std::abs(ratio - 1) > std::abs(worst - 1)) worst = ratio;
+    }
+    std::printf("%d particles: volume %.3f\n", count, worst);
+    if (count >= 20) {
+      EXPECT_NEAR(worst, 1, .1) << count;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::space
