@@ -108,30 +108,33 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   }
 }
 
-/// The nearest inside corner of the cell of a particle; brick kNoIndex if there is none.
+// Layers of nodes around the cell of a particle that may have its body: of a small drop, most
+// particles lie outside of the cells with inside nodes.
+constexpr int kMostLayers = 2;
+
+/// The nearest inside node among the corners of the cell of a particle and `layers` layers around
+/// them; brick kNoIndex if there is none.
 BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::uint32_t brick,
-                         std::uint32_t particle) {
+                         std::uint32_t particle, int layers) {
   const std::array<float, 3> at{bins.x[particle], bins.y[particle], bins.z[particle]};
-  std::array<int, 3> cell;
-  std::array<float, 3> fraction;
-  for (int axis = 0; axis < 3; ++axis) {
-    cell[axis] = static_cast<int>(at[axis]);
-    fraction[axis] = at[axis] - static_cast<float>(cell[axis]);
-  }
+  const std::array<int, 3> cell{static_cast<int>(at[0]), static_cast<int>(at[1]),
+                                static_cast<int>(at[2])};
   BrickPlace nearest{kNoIndex, 0, 0, 0};
   float least = std::numeric_limits<float>::infinity();
-  for (int corner = 0; corner < 8; ++corner) {
-    float square = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float along = (corner >> axis & 1) != 0 ? 1 - fraction[axis] : fraction[axis];
-      square += along * along;
+  const auto square = [](float value) { return value * value; };
+  for (int k = cell[2] - layers; k <= cell[2] + 1 + layers; ++k) {
+    for (int j = cell[1] - layers; j <= cell[1] + 1 + layers; ++j) {
+      for (int i = cell[0] - layers; i <= cell[0] + 1 + layers; ++i) {
+        const float distance = square(at[0] - static_cast<float>(i)) +
+                               square(at[1] - static_cast<float>(j)) +
+                               square(at[2] - static_cast<float>(k));
+        if (distance >= least) continue;
+        const BrickPlace node = Normalise(bins.bricks, brick, i, j, k);
+        if (!field.IsInside(node)) continue;
+        nearest = node;
+        least = distance;
+      }
     }
-    if (square >= least) continue;
-    const BrickPlace node = Normalise(bins.bricks, brick, cell[0] + (corner & 1),
-                                      cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2));
-    if (!field.IsInside(node)) continue;
-    nearest = node;
-    least = square;
   }
   return nearest;
 }
@@ -141,7 +144,10 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
   const double usual = spacing * spacing * spacing;
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
     for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
-      const BrickPlace node = NearestInside(bins, field, brick, p);
+      BrickPlace node{kNoIndex, 0, 0, 0};
+      for (int layers = 0; node.brick == kNoIndex && layers <= kMostLayers; ++layers) {
+        node = NearestInside(bins, field, brick, p, layers);
+      }
       if (node.brick == kNoIndex) continue;
       Body& body = bodies.bodies[bodies.BodyOf(node)];
       ++body.particles;

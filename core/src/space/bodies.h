@@ -17,7 +17,7 @@ namespace partiemc::space {
 
 struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
-  std::uint64_t particles = 0;  ///< Particles whose nearest inside corner is in the body.
+  std::uint64_t particles = 0;  ///< Particles whose nearest inside node is in the body.
   double volume = 0;            ///< Their volume, world units cubed.
 };
 

@@ -287,7 +287,9 @@ bool MoveBack(const SpaceCrossings& crossings, const std::vector<Vec3>& anchors,
       if (positions[v] == anchors[v]) return;
       const int setbacks = ++certificate.setbacks[v];
       if (setbacks == 1) returned.fetch_add(1, std::memory_order_relaxed);
-      positions[v] = setbacks < kMostSetbacks ? .5 * (positions[v] + anchors[v]) : anchors[v];
+      positions[v] = setbacks < kMostSetbacks
+                         ? anchors[v] + kKeptOfMove * (positions[v] - anchors[v])
+                         : anchors[v];
       has_moved = true;
     };
     ForEachCrossedEdge(crossings, brick,

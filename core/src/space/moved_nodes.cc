@@ -110,8 +110,8 @@ void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceC
         add(crossings.EdgeVertex(low, axis));
       }
     }
-    const int setbacks = nodes.setbacks[index];
-    const double share = setbacks < kMostSetbacks ? 1.0 / (1 << setbacks) : 0;
+    double share = nodes.setbacks[index] < kMostSetbacks ? 1 : 0;
+    for (int k = 0; k < nodes.setbacks[index]; ++k) share *= kKeptOfMove;
     nodes.moves[index] = total > 0 ? (share / total) * sum : Vec3{};
   });
 }

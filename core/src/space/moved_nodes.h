@@ -27,7 +27,7 @@ struct MovedNodes {
   std::vector<Brick> bricks;
   std::uint32_t count = 0;
   std::vector<Vec3> moves;                        ///< By node, in the unit of the positions.
-  std::vector<std::uint8_t> setbacks;             ///< By node: each halves its move.
+  std::vector<std::uint8_t> setbacks;             ///< By node.
   std::vector<BrickBits> active, fixed, movable;  ///< Scratch: by brick.
 
   /// The index of a node, or kNoIndex if it stays.
@@ -41,8 +41,10 @@ struct MovedNodes {
   }
 };
 
-/// Setbacks after which vertices and nodes are where they started.
-inline constexpr int kMostSetbacks = 5;
+/// Setbacks after which vertices and nodes are where they started. Each but the last keeps
+/// kKeptOfMove of a displacement: with a half, drops kept less of their volume.
+inline constexpr int kMostSetbacks = 8;
+inline constexpr double kKeptOfMove = .7;
 
 /// Finds the nodes that may move, without setbacks. Parallel over bricks.
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
