@@ -275,31 +275,48 @@ bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
 }
 
 /// Moves the vertices and nodes of refused faces back. Returns whether there are any that can.
-bool MoveBack(const SpaceCrossings& crossings, const std::vector<Vec3>& anchors,
-              std::vector<Vec3>& positions, Certificate& certificate) {
+bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
+              Certificate& certificate) {
   std::atomic<std::uint32_t> returned = 0;
   std::atomic<bool> has_any = false;
   ParallelFor(static_cast<std::uint32_t>(crossings.bricks.size()), [&](std::uint32_t brick) {
     bool has_moved = false;
-    const auto move_vertex = [&](std::uint32_t v) {
-      if (certificate.is_bad[v] == 0) return;
+    const auto move_vertex = [&](std::uint32_t v, const Vec3& mean_move) {
       certificate.is_bad[v] = 0;
       if (positions[v] == anchors[v]) return;
       const int setbacks = ++certificate.setbacks[v];
       if (setbacks == 1) returned.fetch_add(1, std::memory_order_relaxed);
-      positions[v] = setbacks < kMostSetbacks
-                         ? anchors[v] + kKeptOfMove * (positions[v] - anchors[v])
-                         : anchors[v];
+      if (setbacks <= kSmoothings) {
+        positions[v] = anchors[v] + mean_move;
+      } else if (setbacks < kMostSetbacks) {
+        positions[v] = anchors[v] + kKeptOfMove * (positions[v] - anchors[v]);
+      } else {
+        positions[v] = anchors[v];
+      }
       has_moved = true;
     };
-    ForEachCrossedEdge(crossings, brick,
-                       [&](std::uint32_t v, int, int, int, int) { move_vertex(v); });
+    const auto move_at = [&](int i, int j, int k) {
+      const std::uint32_t node = certificate.nodes.IndexOf(Normalise(bricks, brick, i, j, k));
+      return node == kNoIndex ? Vec3{} : certificate.nodes.moves[node];
+    };
+    ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
+      if (certificate.is_bad[v] == 0) return;
+      move_vertex(
+          v, .5 * (move_at(i, j, k) + move_at(i + (axis == 0), j + (axis == 1), k + (axis == 2))));
+    });
     const SpaceCrossings::Brick& at = crossings.bricks[brick];
     const std::uint32_t end = brick + 1 < crossings.bricks.size()
                                   ? crossings.bricks[brick + 1].first_cell
                                   : static_cast<std::uint32_t>(crossings.cells.size());
     for (std::uint32_t cell = at.first_cell; cell < end; ++cell) {
-      move_vertex(crossings.cells[cell].first_loop);
+      const ActiveCell& of = crossings.cells[cell];
+      if (certificate.is_bad[of.first_loop] == 0) continue;
+      Vec3 sum;
+      for (int corner = 0; corner < 8; ++corner) {
+        sum = sum + move_at(of.i + (corner & 1), of.j + (corner >> 1 & 1), of.k + (corner >> 2));
+      }
+      move_vertex(of.first_loop, .125 * sum);
     }
     MovedNodes& nodes = certificate.nodes;
     ForEachMovedNode(nodes, brick, [&](std::uint32_t node, int, int, int) {
@@ -366,7 +383,7 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
     });
     if (!is_refused) return true;
     ++certificate.rounds;
-    if (!MoveBack(crossings, anchors, positions, certificate)) return false;
+    if (!MoveBack(bricks, crossings, anchors, positions, certificate)) return false;
   }
 }
 

@@ -41,9 +41,11 @@ struct MovedNodes {
   }
 };
 
-/// Setbacks after which vertices and nodes are where they started. Each but the last keeps
-/// kKeptOfMove of a displacement: with a half, drops kept less of their volume.
-inline constexpr int kMostSetbacks = 8;
+/// Setbacks of a vertex. The first ones replace its displacement by the mean move of the nodes
+/// around it: what is refused is uneven, and a common displacement need not be lost. Each of the
+/// next ones keeps kKeptOfMove of it, the last one nothing. Nodes skip the first ones.
+inline constexpr int kSmoothings = 4;
+inline constexpr int kMostSetbacks = 12;
 inline constexpr double kKeptOfMove = .7;
 
 /// Finds the nodes that may move, without setbacks. Parallel over bricks.
