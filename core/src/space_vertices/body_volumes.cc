@@ -8,16 +8,6 @@
 namespace partiemc::space {
 namespace {
 
-// Spray grows at most by this factor along each axis.
-constexpr double kMostGrowth = 4;
-
-/// The cube root, by Newton's method. Requires: 1 / 64 <= value <= 64.
-double CubeRoot(double value) {
-  double root = value > 1 ? value : 1;  // From above, it falls.
-  for (int round = 0; round < 24; ++round) root = (2 * root + value / (root * root)) / 3;
-  return root;
-}
-
 /// Calls visit(from, to) for the crossings of a loop: each curve from one to the next.
 template <typename Visit>
 void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
@@ -101,20 +91,6 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
   }
 }
 
-void FindSpray(const Bodies& bodies, double cell_size, double least_area, BodyVolumes& volumes) {
-  const double per_cell = 1 / (cell_size * cell_size * cell_size);
-  constexpr double kMost = kMostGrowth * kMostGrowth * kMostGrowth;
-  volumes.spray.assign(bodies.bodies.size(), {});
-  for (std::size_t body = 0; body < volumes.spray.size(); ++body) {
-    const BodyMeasure& measure = volumes.measures[body];
-    if (measure.area >= least_area) continue;
-    const double wanted = bodies.bodies[body].volume * per_cell;
-    const bool is_known = wanted > 0 && measure.volume > 0;
-    const double ratio = is_known ? std::clamp(wanted / measure.volume, 1 / kMost, kMost) : 1;
-    volumes.spray[body] = {measure.centroid, CubeRoot(ratio)};
-  }
-}
-
 void MatchVolumes(const Bodies& bodies, double cell_size, double limit, const BodyVolumes& volumes,
                   const std::vector<Vec3>& normals, std::vector<Vec3>& positions) {
   const double per_cell = 1 / (cell_size * cell_size * cell_size);
@@ -123,19 +99,9 @@ void MatchVolumes(const Bodies& bodies, double cell_size, double limit, const Bo
     const BodyMeasure& measure = volumes.measures[body];
     const double wanted = bodies.bodies[body].volume * per_cell;
     // No particle: volumes of a body are unknown.
-    if (volumes.spray[body].scale > 0 || !(wanted > 0) || !(measure.area > 0)) return;
+    if (!(wanted > 0) || !(measure.area > 0)) return;
     const double offset = (wanted - measure.volume) / measure.area;
     positions[v] = positions[v] + std::clamp(offset, -limit, limit) * normals[v];
-  });
-}
-
-void PlaceSpray(const BodyVolumes& volumes, const std::vector<Vec3>& anchors,
-                std::vector<Vec3>& positions) {
-  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
-    const SprayScale& spray = volumes.spray[volumes.body_of[v]];
-    if (spray.scale > 0) {
-      positions[v] = spray.centroid + spray.scale * (anchors[v] - spray.centroid);
-    }
   });
 }
 

@@ -40,7 +40,6 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   const double h = input.scale.spacing, cell_size = input.scale.cell_size;
   FindBodyOfVertices(bricks, input.field, crossings, input.bodies, scratch.volumes);
   MeasureBodies(bricks, crossings, input.bodies, anchors, scratch.volumes);
-  FindSpray(input.bodies, cell_size, constants.spray_area * h * h, scratch.volumes);
 
   positions = anchors;
   FindRoots(input.bins, input.scale, crossings, constants.root, positions, normals);
@@ -51,10 +50,12 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   SmoothLoops(input, constants, scratch, centres, std::span(normals).subspan(crossings.edge_count));
   PlaceEdgesByLoops(bricks, crossings, anchors, positions, normals);
 
-  MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
-  MatchVolumes(input.bodies, cell_size, constants.volume_limit * h, scratch.volumes, normals,
-               positions);
-  PlaceSpray(scratch.volumes, anchors, positions);
+  // The second round corrects what the first one misses on small bodies, which bend.
+  for (int round = 0; round < 2; ++round) {
+    MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
+    MatchVolumes(input.bodies, cell_size, constants.volume_limit * h, scratch.volumes, normals,
+                 positions);
+  }
 }
 
 }  // namespace partiemc::space

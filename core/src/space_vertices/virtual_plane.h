@@ -24,7 +24,6 @@ struct VirtualPlaneConstants {
   double rounding = 1.0 / 20;  ///< Times R^2 (kappa_1 + kappa_2): the kernel's rounding of bends.
   double smoothing_reach = 4;
   double volume_limit = .4;
-  double spray_area = 45;  ///< Bodies with a smaller surface are spray, in squared spacings.
 };
 
 struct PlacementInput {
