@@ -95,12 +95,10 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
 bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();
   bins.homes.assign(bins.bricks.bricks().begin(), bins.bricks.bricks().end());
-  struct Box {
-    std::array<float, 3> low{8, 8, 8}, high{0, 0, 0};
-  };
-  std::vector<Box> boxes(homes);
+  std::vector<SpaceBins::Box>& boxes = bins.boxes;
+  boxes.assign(homes, {});
   for (std::size_t p = 0; p < bins.keys.size(); ++p) {
-    Box& box = boxes[bins.home[p]];
+    SpaceBins::Box& box = boxes[bins.home[p]];
     for (int axis = 0; axis < 3; ++axis) {
       const float value = Coordinate(bins.keys[p], axis);
       box.low[axis] = std::min(box.low[axis], value);
@@ -150,7 +148,8 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   const std::size_t bricks = bins.bricks.size();
   std::vector<std::uint32_t>& next = bins.next;
   // From insertion order to sorted order.
-  std::vector<std::uint32_t> brick_of(bins.homes.size());
+  std::vector<std::uint32_t>& brick_of = bins.brick_of;
+  brick_of.resize(bins.homes.size());
   for (std::size_t home = 0; home < brick_of.size(); ++home) {
     brick_of[home] = bins.bricks.Find(bins.homes[home]);
   }

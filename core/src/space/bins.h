@@ -30,6 +30,12 @@ struct SpaceBins {
     std::uint64_t key;  // Cell and fractions: the whole position.
     std::uint32_t source;
   };
+  /// The particles of a home brick lie in it.
+  struct Box {
+    std::array<float, 3> low{8, 8, 8}, high{0, 0, 0};
+  };
+  std::vector<Box> boxes;                 ///< Scratch: by home brick.
+  std::vector<std::uint32_t> brick_of;    ///< Scratch: by home brick.
   std::vector<std::uint32_t> home, next;  ///< Scratch: by particle, by brick.
   std::vector<std::uint64_t> keys;        ///< Scratch, by particle.
   std::vector<Keyed> sorted;              ///< Scratch.

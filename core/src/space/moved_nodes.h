@@ -42,7 +42,7 @@ struct MovedNodes {
 };
 
 /// Setbacks of a vertex. The first ones replace its displacement by the mean move of the nodes
-/// around it: what is refused is uneven, and a common displacement need not be lost. Each of the
+/// around it: a refused face is uneven, but its common displacement need not be lost. Each of the
 /// next ones keeps kKeptOfMove of it, the last one nothing. Nodes skip the first ones.
 inline constexpr int kSmoothings = 4;
 inline constexpr int kMostSetbacks = 12;

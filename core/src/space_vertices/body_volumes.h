@@ -11,7 +11,7 @@
 
 namespace partiemc::space {
 
-/// Of a body with its cavities, in cells.
+/// Size of a body with its cavities, in cells.
 struct BodyMeasure {
   double area = 0, volume = 0;
   Vec3 centroid;

@@ -1,7 +1,8 @@
 // Weighted means over windows of loops: normals, bends and planes.
 //
-// The weight of loop j in the window of loop i is area_j B(d, reach), d = |c_j - c_i|, B(d, r) =
-// max(0, 1 - d^2 / r^2)^2; with `kStopAtEdges` times max(0, n_i . n_j)^32. Lengths in cells.
+// Loop j has in the window of loop i the weight area_j B(d, reach), where d = |c_j - c_i| and
+// B(d, r) = max(0, 1 - d^2 / r^2)^2. `kAtEdges` multiplies it by max(0, n_i . n_j)^32. Lengths are
+// in cells.
 #pragma once
 
 #include <span>
@@ -15,7 +16,7 @@ namespace partiemc::space {
 struct LoopSurface {
   const LoopWindows& windows;
   std::span<const Vec3> centres;  ///< c.
-  std::span<const double> areas;  ///< Of the triangles around the centres.
+  std::span<const double> areas;  ///< Areas of the triangles around the centres.
 };
 
 enum class Stop { kNowhere, kAtEdges };

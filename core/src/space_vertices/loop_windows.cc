@@ -8,7 +8,7 @@
 namespace partiemc::space {
 namespace {
 
-/// Links the loops of each cell with those of its neighbours.
+/// Links the loops of each cell with the loops of its neighbours.
 void LinkLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                LoopWindows& windows) {
   windows.link_first.resize(windows.loop_count + 1);

@@ -10,7 +10,7 @@
 namespace partiemc::space {
 namespace {
 
-/// Replaces positions and normals of the vertices in cells by those of smoothed planes.
+/// Moves the vertices in cells to smoothed planes and replaces their normals.
 void SmoothLoops(const PlacementInput& input, const VirtualPlaneConstants& constants,
                  VirtualPlaneScratch& scratch, std::span<Vec3> centres, std::span<Vec3> normals) {
   const double h = input.scale.spacing;
@@ -50,7 +50,7 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   SmoothLoops(input, constants, scratch, centres, std::span(normals).subspan(crossings.edge_count));
   PlaceEdgesByLoops(bricks, crossings, anchors, positions, normals);
 
-  // The second round corrects what the first one misses on small bodies, which bend.
+  // The first round misses the volume of small bodies, which bend.
   for (int round = 0; round < 2; ++round) {
     MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
     MatchVolumes(input.bodies, cell_size, constants.volume_limit * h, scratch.volumes, normals,
