@@ -88,6 +88,29 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
 }
 
+// The certificate and the cuts of the quads change the volumes of small bodies. In spacings.
+constexpr int kVolumeRounds = 4;
+constexpr double kVolumeTolerance = .01;
+constexpr double kVolumeLimit = .4;
+
+void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
+  for (std::size_t v = 0; v < b.positions.size(); ++v) {
+    if (b.is_fixed[v] != 0) b.positions[v] = b.anchors[v];
+  }
+}
+
+/// Moves the vertices of bodies whose triangles miss the volume of their particles. World units.
+bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
+  space::BodyVolumes& volumes = b.virtual_plane.volumes;
+  space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
+                          volumes);
+  const double limit = kVolumeLimit * scale.spacing * scale.cell_size;
+  const bool has_moved = space::MatchVolumes(
+      b.bodies, {.limit = limit, .tolerance = kVolumeTolerance}, b.normals, volumes, b.positions);
+  if (has_moved) KeepFixedVertices(b);
+  return has_moved;
+}
+
 /// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
 /// positions in world units.
 absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
@@ -102,16 +125,18 @@ absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
     space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors,
                          b.virtual_plane, b.positions, b.normals);
   }
-  for (std::size_t v = 0; v < b.positions.size(); ++v) {
-    if (b.is_fixed[v] != 0) b.positions[v] = b.anchors[v];
-  }
+  KeepFixedVertices(b);
   for (Vec3& position : b.positions) position = scale.cell_size * position;
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
-  if (!space::Certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions,
-                      b.certificate)) {
-    return absl::InternalError("a face is refused although its vertices are at their anchors");
+  const int rounds = placement == SurfacePlacement::kVirtualPlane ? kVolumeRounds : 0;
+  for (int round = 0;; ++round) {
+    const auto certify = round == 0 ? space::Certify : space::CertifyAgain;
+    if (!certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions, b.certificate)) {
+      return absl::InternalError("a face is refused although its vertices are at their anchors");
+    }
+    space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
+    if (round == rounds || !CorrectVolumes(scale, b)) break;
   }
-  space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
   return absl::OkStatus();
 }
 

@@ -334,6 +334,41 @@ bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return has_any;
 }
 
+/// Certifies the bricks that have moved and those around them.
+bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
+                  const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
+                  Certificate& certificate) {
+  const auto count = static_cast<std::uint32_t>(bricks.size());
+  MovedNodes& nodes = certificate.nodes;
+  const Checker checker(bricks, crossings, cell_size, positions, nodes);
+  for (;;) {
+    ParallelFor(count, [&](std::uint32_t brick) {
+      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
+      MoveNodesOf(brick, bricks, crossings, cell_size, anchors, positions, nodes);
+    });
+    std::atomic<bool> is_refused = false;
+    ParallelFor(count, [&](std::uint32_t brick) {
+      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
+      ForEachFace(bricks, nodes, brick, [&](const std::array<int, 3>& cell, int side) {
+        const Face face = checker.FaceOf(brick, cell, side);
+        QuadMode mode;
+        const bool is_valid = checker.FindMode(face, mode);
+        if (face.crossed > 0) certificate.modes[face.low.active][face.axis] = mode;
+        if (is_valid) return;
+        is_refused.store(true, std::memory_order_relaxed);
+        checker.ForEachItem(face, [&](std::uint32_t item) {
+          std::atomic_ref(certificate.is_bad[item]).store(1, std::memory_order_relaxed);
+        });
+      });
+    });
+    if (!is_refused) break;
+    ++certificate.rounds;
+    if (!MoveBack(bricks, crossings, anchors, positions, certificate)) return false;
+  }
+  certificate.certified = positions;
+  return true;
+}
+
 }  // namespace
 
 void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
@@ -360,31 +395,24 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
   certificate.setbacks.assign(positions.size(), 0);
   certificate.is_bad.assign(positions.size() + nodes.count, 0);
   certificate.has_moved.assign(count, 1);
-  const Checker checker(bricks, crossings, cell_size, positions, nodes);
-  for (;;) {
-    ParallelFor(count, [&](std::uint32_t brick) {
-      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
-      MoveNodesOf(brick, bricks, crossings, cell_size, anchors, positions, nodes);
+  return CertifyMoved(bricks, crossings, cell_size, anchors, positions, certificate);
+}
+
+bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
+                  const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
+                  Certificate& certificate) {
+  const std::vector<Vec3>& certified = certificate.certified;
+  certificate.has_moved.assign(bricks.size(), 0);
+  ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
+    ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int, int, int, int) {
+      if (positions[v] != certified[v]) certificate.has_moved[brick] = 1;
     });
-    std::atomic<bool> is_refused = false;
-    ParallelFor(count, [&](std::uint32_t brick) {
-      if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
-      ForEachFace(bricks, nodes, brick, [&](const std::array<int, 3>& cell, int side) {
-        const Face face = checker.FaceOf(brick, cell, side);
-        QuadMode mode;
-        const bool is_valid = checker.FindMode(face, mode);
-        if (face.crossed > 0) certificate.modes[face.low.active][face.axis] = mode;
-        if (is_valid) return;
-        is_refused.store(true, std::memory_order_relaxed);
-        checker.ForEachItem(face, [&](std::uint32_t item) {
-          std::atomic_ref(certificate.is_bad[item]).store(1, std::memory_order_relaxed);
-        });
-      });
-    });
-    if (!is_refused) return true;
-    ++certificate.rounds;
-    if (!MoveBack(bricks, crossings, anchors, positions, certificate)) return false;
+  });
+  for (const ActiveCell& cell : crossings.cells) {
+    const std::uint32_t v = cell.first_loop;
+    if (positions[v] != certified[v]) certificate.has_moved[cell.brick] = 1;
   }
+  return CertifyMoved(bricks, crossings, cell_size, anchors, positions, certificate);
 }
 
 void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,

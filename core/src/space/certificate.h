@@ -39,19 +39,26 @@ struct Certificate {
   std::vector<std::uint8_t> setbacks;   ///< By vertex.
   std::vector<std::uint8_t> is_bad;     ///< By vertex, then by node: refused in this round.
   std::vector<std::uint8_t> has_moved;  ///< By brick: since the last round.
+  std::vector<Vec3> certified;          ///< Positions of the vertices, once certified.
 };
 
 /// Marks the vertices of cells with several loops, which have to stay at their anchors.
 void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        std::vector<std::uint8_t>& is_fixed);
 
-/// Finds a mode for each face. Where none is valid, the vertices and nodes of the face move half
-/// way back to their anchors, from the fifth time all the way. `positions` and `anchors` in world
-/// units, as the surface will have them. Returns false if a face is refused although its vertices
-/// are at their anchors: a bug. Requires: fixed vertices are at their anchors.
+/// Finds a mode for each face. Where none is valid, the vertices and nodes of the face move back
+/// towards their anchors (setbacks, moved_nodes.h). `positions` and `anchors` in world units, as
+/// the surface will have them. Returns false if a face is refused although its vertices are at
+/// their anchors: a bug. Requires: fixed vertices are at their anchors.
 bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
+
+/// The same after vertices have moved from their certified positions. Vertices keep the number of
+/// their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
+bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
+                  const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
+                  Certificate& certificate);
 
 /// The triangles of all quads in their modes.
 void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,

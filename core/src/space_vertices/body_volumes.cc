@@ -1,6 +1,7 @@
 #include "space_vertices/body_volumes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "base/parallel.h"
@@ -17,6 +18,12 @@ void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
     visit(EdgeVertexOf(bricks, crossings, cell, loops.edge[step]),
           EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)]));
   }
+}
+
+/// The origin of the sums of a body: keeps them exact far from the origin of the world. In cells.
+Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
+  const BrickPlace& at = body.lowest;
+  return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};
 }
 
 /// Calls visit(cell, loop of the cell, loop).
@@ -54,10 +61,8 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
 
 void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {
-  // Relative to the lowest node of the body, far from the origin, too.
   const auto origin_of = [&](std::uint32_t body) {
-    const BrickPlace& lowest = bodies.bodies[body].lowest;
-    return OriginOf(bricks[lowest.brick]) + Vec3{1.0 * lowest.i, 1.0 * lowest.j, 1.0 * lowest.k};
+    return LowestNodeOf(bricks, bodies.bodies[body]);
   };
   volumes.areas.resize(crossings.loop_count);
   volumes.parts.resize(crossings.loop_count);
@@ -91,18 +96,39 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
   }
 }
 
-void MatchVolumes(const Bodies& bodies, double cell_size, double limit, const BodyVolumes& volumes,
-                  const std::vector<Vec3>& normals, std::vector<Vec3>& positions) {
-  const double per_cell = 1 / (cell_size * cell_size * cell_size);
-  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
-    const std::uint32_t body = volumes.body_of[v];
+void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
+                      std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
+                      BodyVolumes& volumes) {
+  volumes.measures.assign(bodies.bodies.size(), {});
+  for (const VertexTriangle& triangle : triangles) {
+    const std::uint32_t body = volumes.body_of[triangle[0]];
+    const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
+    const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
+               c = positions[triangle[2]] - origin;
+    volumes.measures[body].area += Length(Cross(b - a, c - a)) / 2;
+    volumes.measures[body].volume += Dot(a, Cross(b, c)) / 6;
+  }
+}
+
+bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                  BodyVolumes& volumes, std::vector<Vec3>& positions) {
+  const double per_unit = 1 / (step.unit * step.unit * step.unit);
+  volumes.offsets.assign(bodies.bodies.size(), 0);
+  bool has_moved = false;
+  for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
     const BodyMeasure& measure = volumes.measures[body];
-    const double wanted = bodies.bodies[body].volume * per_cell;
-    // No particle: volumes of a body are unknown.
-    if (!(wanted > 0) || !(measure.area > 0)) return;
-    const double offset = (wanted - measure.volume) / measure.area;
-    positions[v] = positions[v] + std::clamp(offset, -limit, limit) * normals[v];
+    const double wanted = bodies.bodies[body].volume * per_unit;
+    // No particle: the volume of the body is unknown.
+    if (!(wanted > 0) || !(measure.area > 0)) continue;
+    const double missing = wanted - measure.volume;
+    if (std::abs(missing) <= step.tolerance * wanted) continue;
+    volumes.offsets[body] = std::clamp(missing / measure.area, -step.limit, step.limit);
+    has_moved = true;
+  }
+  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
+    positions[v] = positions[v] + volumes.offsets[volumes.body_of[v]] * normals[v];
   });
+  return has_moved;
 }
 
 }  // namespace partiemc::space

@@ -2,16 +2,18 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/vec3.h"
 #include "space/bodies.h"
 #include "space/crossings.h"
 #include "space/field.h"
+#include "space/mesh.h"
 
 namespace partiemc::space {
 
-/// Size of a body with its cavities, in cells.
+/// Size of a body with its cavities.
 struct BodyMeasure {
   double area = 0, volume = 0;
   Vec3 centroid;
@@ -26,7 +28,8 @@ struct BodyVolumes {
     double volume = 0;
     Vec3 moment;
   };
-  std::vector<Part> parts;  ///< Scratch: by loop.
+  std::vector<Part> parts;      ///< Scratch: by loop.
+  std::vector<double> offsets;  ///< Scratch: by body.
 };
 
 /// Finds the body of each vertex.
@@ -39,11 +42,22 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
 void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
-/// Moves the vertices of each body along their normals by one offset: (volume of its
-/// particles
-/// - its volume) / area, limited to +-`limit` cells.
-/// Requires: MeasureBodies of `positions`.
-void MatchVolumes(const Bodies& bodies, double cell_size, double limit, const BodyVolumes& volumes,
-                  const std::vector<Vec3>& normals, std::vector<Vec3>& positions);
+/// Measures the bodies as the triangles bound them. Positions are in world units, as are area and
+/// volume. Requires: FindBodyOfVertices. Linear in triangles.
+void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
+                      std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
+                      BodyVolumes& volumes);
+
+struct VolumeStep {
+  double unit = 1;       ///< Length of the unit of positions, in world units.
+  double limit = 0;      ///< Longest offset, in units.
+  double tolerance = 0;  ///< Bodies whose relative error is not larger stay.
+};
+
+/// Moves the vertices of each body along their normals by one offset: (volume of its particles -
+/// its volume) / area, limited. Returns whether a body has moved.
+/// Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
+bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                  BodyVolumes& volumes, std::vector<Vec3>& positions);
 
 }  // namespace partiemc::space

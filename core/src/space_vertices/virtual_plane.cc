@@ -53,8 +53,8 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   // The first round misses the volume of small bodies, which bend.
   for (int round = 0; round < 2; ++round) {
     MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
-    MatchVolumes(input.bodies, cell_size, constants.volume_limit * h, scratch.volumes, normals,
-                 positions);
+    MatchVolumes(input.bodies, {.unit = cell_size, .limit = constants.volume_limit * h}, normals,
+                 scratch.volumes, positions);
   }
 }
 
