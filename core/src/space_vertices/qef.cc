@@ -1,6 +1,7 @@
 #include "space_vertices/qef.h"
 
-#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "base/parallel.h"
@@ -41,7 +42,26 @@ void FindEdgeNormals(const SpaceBins& bins, const Scale& scale, const SpaceCross
   });
 }
 
+void AddSquare(const Vec3& n, Symmetric& a) {
+  a.xx += n.x * n.x;
+  a.xy += n.x * n.y;
+  a.xz += n.x * n.z;
+  a.yy += n.y * n.y;
+  a.yz += n.y * n.z;
+  a.zz += n.z * n.z;
+}
+
 }  // namespace
+
+Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean) {
+  Symmetric a{kRegularisation, 0, 0, kRegularisation, 0, kRegularisation};
+  Vec3 b;
+  for (const TangentPlane& plane : planes) {
+    AddSquare(plane.normal, a);
+    b = b + Dot(plane.normal, plane.point - mean) * plane.normal;
+  }
+  return mean + Solve(a, b);
+}
 
 void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                 std::vector<Vec3>& positions, std::vector<Vec3>& normals) {
@@ -55,21 +75,16 @@ void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings&
     for (int loop = 0; loop < loops.loops; ++loop) {
       const std::uint32_t vertex = cell.first_loop + loop;
       const Vec3 mean = positions[vertex];
-      Symmetric a{kRegularisation, 0, 0, kRegularisation, 0, kRegularisation};
-      Vec3 b, sum;
+      std::array<TangentPlane, kMostCrossings> planes;
+      std::size_t count = 0;
+      Vec3 sum;
       for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
         const std::uint32_t v = EdgeVertexOf(bricks, crossings, cell, loops.edge[step]);
-        const Vec3& n = normals[v];
-        a.xx += n.x * n.x;
-        a.xy += n.x * n.y;
-        a.xz += n.x * n.z;
-        a.yy += n.y * n.y;
-        a.yz += n.y * n.z;
-        a.zz += n.z * n.z;
-        b = b + Dot(n, positions[v] - mean) * n;
-        sum = sum + n;
+        planes[count++] = {positions[v], normals[v]};
+        sum = sum + normals[v];
       }
-      positions[vertex] = ClampedToCell(mean + Solve(a, b), low);
+      positions[vertex] =
+          ClampedToCell(LeastSquarePoint(std::span(planes).first(count), mean), low);
       const Vec3 normal = Normalised(sum);
       normals[vertex] = normal == Vec3{} ? Vec3{0, 0, 1} : normal;
     }
