@@ -1,8 +1,10 @@
 // Runs the stages of a surface in order.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -12,10 +14,12 @@
 #include "frame/distinct_ids.h"
 #include "frame/frame_view.h"
 #include "frame/scale.h"
+#include "partiemc/status.h"
 #include "partiemc/surface.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/certificate.h"
+#include "space/cleaning.h"
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
@@ -31,6 +35,7 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceField field;
   space::SpaceCrossings crossings;
   space::Bodies bodies;
+  space::CleaningScratch cleaning;
   std::vector<Vec3> anchors, positions, normals;
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
@@ -77,6 +82,34 @@ double LightestVolume(const Frame& frame, double spacing) {
   float lightest = frame.volumes[0];
   for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
   return lightest;
+}
+
+// Smaller cavities are dents of the level set, not voids of the fluid (core/METHOD.md, "Cleaning").
+constexpr double kMinCavityParticles = 2;
+
+/// Finds the bodies. Drops what parameters ask for.
+SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& parameters,
+                                  SurfaceWorkspace::Buffers& b) {
+  SurfaceStatistics statistics;
+  const bool is_cleaned =
+      parameters.clean.value_or(parameters.placement == SurfacePlacement::kVirtualPlane);
+  if (is_cleaned) {
+    const double cell = parameters.cell_size;
+    const double limit = kMinCavityParticles / (cell * cell * cell);
+    const auto most_nodes = static_cast<std::size_t>(std::ceil(limit)) - 1;
+    statistics.dropped_cavities =
+        space::FillCavities(b.bins.bricks, most_nodes, b.cleaning, b.field);
+  }
+  const double h = parameters.spacing;
+  space::FindBodies(frame, b.bins, b.field, h, b.bodies);
+  const space::DroppedBodies dropped =
+      space::DropBodies({.drops_empty = is_cleaned,
+                         .least_volume = parameters.min_component_volume * h * h * h,
+                         .least_particles = parameters.min_component_particles},
+                        b.cleaning, b.bodies, b.field);
+  statistics.dropped_components = dropped.empty;
+  statistics.dropped_spray = dropped.spray;
+  return statistics;
 }
 
 /// Triangles between the crossings of the edges. Leaves positions in world units.
@@ -155,6 +188,12 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
+  const double volume = parameters.min_component_volume;
+  if (!(volume >= 0 && std::isfinite(volume))) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(kReasonOutOfRange), "parameters.min_component_volume",
+                           ShortestNumber(volume), "must be 0 or more cubed spacings, and finite"});
+  }
   return SurfaceReconstructor(parameters, limits);
 }
 
@@ -171,9 +210,9 @@ absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorksp
   if (!status.ok()) return status;
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::SampleField(b.bins, scale, b.field);
+  const SurfaceStatistics statistics = FindCleanBodies(frame, parameters_, b);
   space::FindCrossings(bricks, b.field, b.crossings);
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
-  space::FindBodies(frame, b.bins, b.field, parameters_.spacing, b.bodies);
   if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
     PlaceByMarchingCubes(cell_size, b);
   } else if (status = PlaceMovedVertices(parameters_.placement, scale, b); !status.ok()) {
@@ -181,6 +220,7 @@ absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorksp
   }
   space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
                          surface);
+  surface.statistics = statistics;
   return absl::OkStatus();
 }
 

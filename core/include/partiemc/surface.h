@@ -27,6 +27,14 @@ struct ShellMeasures {
   friend bool operator==(const ShellMeasures&, const ShellMeasures&) = default;
 };
 
+struct SurfaceStatistics {
+  std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
+  std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
+  std::uint64_t dropped_spray = 0;       ///< Bodies below the size that parameters set.
+
+  friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
+};
+
 /// Closed surfaces. A shell is one connected surface: the outside of a body, or a cavity in one.
 /// Guarantees (core/SURFACES.md):
 ///   S1 every edge has exactly two triangles, which run along it in opposite directions;
@@ -44,6 +52,7 @@ struct Surface {
   std::vector<std::uint32_t> triangle_offsets = {0};  ///< Likewise.
   std::vector<std::uint32_t> outer_of;                ///< Per shell: its outer shell, or kNoShell.
   std::vector<ShellMeasures> measures;                ///< Per shell.
+  SurfaceStatistics statistics;
 
   std::size_t ShellCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 3; }
@@ -73,6 +82,15 @@ struct SurfaceParameters {
   double kernel_radius = 3, cell_size = 1;
   /// Absent: calibrated for the placement.
   std::optional<double> reference_radius = std::nullopt;
+
+  /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for
+  /// `kVirtualPlane`, off for the other placements.
+  std::optional<bool> clean = std::nullopt;
+
+  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings, or are
+  /// fewer than this. At least 0; 0 keeps all.
+  double min_component_volume = 0;
+  std::uint64_t min_component_particles = 0;
 
   friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
 };

@@ -36,6 +36,7 @@ void Surface::Clear() {
   triangle_offsets.assign(1, 0);
   outer_of.clear();
   measures.clear();
+  statistics = {};
 }
 
 }  // namespace partiemc
