@@ -415,6 +415,24 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return CertifyMoved(bricks, crossings, cell_size, anchors, positions, certificate);
 }
 
+std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                                double cell_size, const std::vector<Vec3>& positions,
+                                const Certificate& certificate) {
+  const Checker checker(bricks, crossings, cell_size, positions, certificate.nodes);
+  std::uint32_t refused = 0;
+  for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
+    ForEachFace(bricks, certificate.nodes, brick, [&](const std::array<int, 3>& cell, int side) {
+      const Face face = checker.FaceOf(brick, cell, side);
+      QuadMode mode;
+      const bool is_valid = checker.FindMode(face, mode);
+      const bool is_as_cut =
+          face.crossed == 0 || certificate.modes[face.low.active][face.axis] == mode;
+      refused += !is_valid || !is_as_cut;
+    });
+  }
+  return refused;
+}
+
 void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                const Certificate& certificate, std::vector<VertexTriangle>& triangles) {
   triangles.clear();

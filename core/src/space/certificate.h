@@ -60,6 +60,11 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
+/// The number of faces for which the certificate does not hold: 0 once certified. For tests.
+std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                                double cell_size, const std::vector<Vec3>& positions,
+                                const Certificate& certificate);
+
 /// The triangles of all quads in their modes.
 void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                const Certificate& certificate, std::vector<VertexTriangle>& triangles);

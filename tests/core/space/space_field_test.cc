@@ -137,6 +137,19 @@ TEST(SpaceField, HasTheSameBitsForAnyOrderAndThreads) {
   }
 }
 
+TEST(SpaceBins, SortWeightsAtOnePosition) {
+  Random random(6);
+  SpaceParticles particles;
+  for (int k = 0; k < 300; ++k) {
+    particles.Add({1.5 * (k % 6), .5, .25});
+    particles.volumes.push_back(static_cast<float>(random.Uniform(.3, 2)));
+  }
+  const Stages stages(particles, ScaleFor(3, 1, .3));
+  const Stages other(Shuffled(particles, random), ScaleFor(3, 1, .3));
+  EXPECT_EQ(other.bins.weight, stages.bins.weight);
+  EXPECT_EQ(other.field.values, stages.field.values);
+}
+
 TEST(SpaceBins, RefusesTooManyBricksAndFarPositions) {
   SpaceParticles particles;
   particles.Add({0, 0, 0});
