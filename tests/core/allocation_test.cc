@@ -12,11 +12,13 @@
 #include <ostream>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
+#include "partiemc/surface.h"
 #include "support/particles.h"
 
 namespace {
@@ -171,6 +173,55 @@ TEST(WarmSlice, AllocatesNothing) {
   EXPECT_EQ(allocations - before, 0u);
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
+
+class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int>> {};
+
+TEST_P(WarmSurface, AllocatesNothing) {
+  const auto [placement, threads] = GetParam();
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+  tbb::task_arena arena(threads);
+  const auto reconstructor = SurfaceReconstructor::Create(
+      {.placement = placement, .clean = true, .min_component_particles = 2});
+  ASSERT_TRUE(reconstructor.ok());
+  // Balls that meet, with spray; then a few particles, then none.
+  std::vector<std::vector<double>> frames;
+  support::Random random(1);
+  for (int k = 0; k < 3; ++k) {
+    std::vector<double>& xyz = frames.emplace_back();
+    for (int p = 0; p < 24 * 12 * 12; ++p) {
+      const double x = p % 24 - 6, y = p / 24 % 12 - 6, z = p / 288 - 6;
+      const double shifted = x - 9 - k;
+      if (x * x + y * y + z * z > 25 && shifted * shifted + y * y + z * z > 20) continue;
+      xyz.insert(xyz.end(), {x + random.Uniform(0, .2), y, z});
+    }
+    for (int p = 0; p < 90; ++p) xyz.push_back(random.Uniform(-20, 20));
+  }
+  frames.push_back({0, 0, 0, 1, 0, 0});
+  frames.emplace_back();
+  SurfaceWorkspace workspace;
+  Surface surface;
+  std::size_t before = 0;
+  for (int round = 0; round < 3; ++round) {
+    before = allocations;
+    for (const std::vector<double>& xyz : frames) {
+      arena.execute([&] {
+        const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
+        ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
+        ASSERT_EQ(surface.TriangleCount() > 0, !xyz.empty());
+      });
+    }
+    if (round == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+}
+
+INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
+                         testing::Combine(testing::Values(SurfacePlacement::kMarchingCubes,
+                                                          SurfacePlacement::kQef,
+                                                          SurfacePlacement::kVirtualPlane),
+                                          testing::Values(1, 2)));
 
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;

@@ -28,7 +28,7 @@ LIST = pathlib.Path(__file__).resolve().parent / "mutations.toml"
 
 # Quick test programs of each room, those with the fewest dependencies first.
 ROOMS = {
-    "core": ["core_test", "core_threads_test", "core_allocation_test"],
+    "core": ["core_test", "core_threads_test", "core_allocation_test", "space_test"],
     "server": [
         "session_test", "checkpoint_test", "stream_registry_test", "busy_streams_test",
         "compute_pool_test", "watch_state_machine_test", "stream_state_machine_test",

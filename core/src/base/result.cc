@@ -1,5 +1,7 @@
 #include "partiemc/result.h"
 
+#include "partiemc/surface.h"
+
 namespace partiemc {
 
 void Rings::Clear() {
@@ -24,6 +26,17 @@ void Result::Clear() {
   for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
   for (Result& section : sections) section.Clear();
+}
+
+void Surface::Clear() {
+  points.clear();
+  triangles.clear();
+  normals.clear();
+  point_offsets.assign(1, 0);
+  triangle_offsets.assign(1, 0);
+  outer_of.clear();
+  measures.clear();
+  statistics = {};
 }
 
 }  // namespace partiemc

@@ -1,0 +1,135 @@
+// Turns frames of particles that fill space into closed surfaces, and checks their guarantees.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// The value of Surface::outer_of for a shell that is no cavity.
+inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::max();
+
+struct ShellMeasures {
+  double area = 0;    ///< World units squared.
+  double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
+  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Of the enclosed volume.
+  std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
+
+  friend bool operator==(const ShellMeasures&, const ShellMeasures&) = default;
+};
+
+struct SurfaceStatistics {
+  std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
+  std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
+  std::uint64_t dropped_spray = 0;       ///< Bodies below the size that parameters set.
+
+  friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
+};
+
+/// Closed surfaces. A shell is one connected surface: the outside of a body, or a cavity in one.
+/// Guarantees (core/SURFACES.md):
+///   S1 every edge has exactly two triangles, which run along it in opposite directions;
+///   S2 the triangles around each point form one cycle; each point has triangles of one shell;
+///   S3 triangles intersect only in their common points and edges; none is degenerate;
+///   S4 triangles are counter-clockwise seen from outside the body; outer shells lie in nothing or
+///      in a cavity, and each cavity lies directly in the shell that `outer_of` gives;
+///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
+///      centroids are those of the triangles.
+struct Surface {
+  std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
+  std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.
+  std::vector<float> normals;            ///< Per point: outward unit normal, interleaved.
+  std::vector<std::uint32_t> point_offsets = {0};     ///< Shell k has [offsets[k], offsets[k + 1]).
+  std::vector<std::uint32_t> triangle_offsets = {0};  ///< Likewise.
+  std::vector<std::uint32_t> outer_of;                ///< Per shell: its outer shell, or kNoShell.
+  std::vector<ShellMeasures> measures;                ///< Per shell.
+  SurfaceStatistics statistics;
+
+  std::size_t ShellCount() const { return outer_of.size(); }
+  std::size_t PointCount() const { return points.size() / 3; }
+  std::size_t TriangleCount() const { return triangles.size() / 3; }
+  void Clear();
+  friend bool operator==(const Surface&, const Surface&) = default;
+};
+
+/// Checks S1 to S5 with exact arithmetic, independent of the construction. Measures are compared
+/// to 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
+/// values. Cost: n log n in the triangles if they are of similar size.
+absl::Status Validate(const Surface& surface);
+
+/// How the vertices of a surface are placed (core/SURFACES.md).
+enum class SurfacePlacement : std::uint8_t {
+  kMarchingCubes,  ///< Linear interpolation of the level set on lattice edges.
+  kQef,            ///< Vertices in cells by dual contouring (least squares), for comparison.
+  kVirtualPlane,   ///< Vertices on smoothed planes, with the volume of the particles.
+};
+
+struct SurfaceParameters {
+  SurfacePlacement placement = SurfacePlacement::kMarchingCubes;
+
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of it.
+  double spacing = 1;
+  /// As in ReconstructionParameters, with their ranges.
+  double kernel_radius = 3, cell_size = 1;
+  /// Absent: calibrated for the placement.
+  std::optional<double> reference_radius = std::nullopt;
+
+  /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for
+  /// `kVirtualPlane`, off for the other placements.
+  std::optional<bool> clean = std::nullopt;
+
+  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings, or are
+  /// fewer than this. At least 0; 0 keeps all.
+  double min_component_volume = 0;
+  std::uint64_t min_component_particles = 0;
+
+  friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
+};
+
+/// Reusable buffers, one set for each thread that calls Reconstruct. Its history never changes a
+/// result.
+class SurfaceWorkspace {
+ public:
+  SurfaceWorkspace();
+  ~SurfaceWorkspace();
+  SurfaceWorkspace(SurfaceWorkspace&&) noexcept;
+  SurfaceWorkspace& operator=(SurfaceWorkspace&&) noexcept;
+
+  struct Buffers;
+  Buffers& buffers() { return *buffers_; }
+
+ private:
+  std::unique_ptr<Buffers> buffers_;
+};
+
+/// Reconstructs surfaces. Immutable; may be shared between threads.
+class SurfaceReconstructor {
+ public:
+  /// Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
+  static absl::StatusOr<SurfaceReconstructor> Create(const SurfaceParameters& parameters,
+                                                     const FrameLimits& limits = {});
+
+  /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
+  /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
+  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
+  /// Errors with a Violation: those of Reconstructor. `surface` is then empty.
+  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
+
+ private:
+  SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
+
+  SurfaceParameters parameters_;
+  ReconstructionParameters in_space_;  // Resolved, as the stages take them.
+  FrameLimits limits_;
+};
+
+}  // namespace partiemc

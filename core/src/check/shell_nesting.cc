@@ -1,0 +1,216 @@
+#include "check/shell_nesting.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <map>
+
+#include "base/expansion.h"
+#include "base/point.h"
+#include "base/predicates.h"
+#include "base/predicates_in_space.h"
+#include "base/vec3.h"
+
+namespace partiemc {
+namespace {
+
+// --- Orientation --------------------------------------------------------------------------------
+
+/// An exact sum of any number of doubles (Shewchuk's Grow-Expansion).
+class LongSum {
+ public:
+  void Add(double term) {
+    double carry = term;
+    std::size_t kept = 0;
+    for (const double component : components_) {
+      const Rounded sum = TwoSum(carry, component);
+      carry = sum.value;
+      if (sum.error != 0) components_[kept++] = sum.error;
+    }
+    components_.resize(kept);
+    if (carry != 0) components_.push_back(carry);
+  }
+  void AddProduct(double a, double b, double c) {
+    const Rounded product = TwoProduct(a, b);
+    for (const double factor : {product.error, product.value}) {
+      const Rounded term = TwoProduct(factor, c);
+      Add(term.error);
+      Add(term.value);
+    }
+  }
+  int Sign() const { return components_.empty() ? 0 : SignOf(components_.back()); }
+
+ private:
+  std::vector<double> components_;
+};
+
+int OrientationExactly(const Surface& surface, std::size_t shell) {
+  LongSum volume;
+  for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
+       ++t) {
+    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
+    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
+    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
+    volume.AddProduct(a.x, b.y, c.z);
+    volume.AddProduct(-a.x, b.z, c.y);
+    volume.AddProduct(a.y, b.z, c.x);
+    volume.AddProduct(-a.y, b.x, c.z);
+    volume.AddProduct(a.z, b.x, c.y);
+    volume.AddProduct(-a.z, b.y, c.x);
+  }
+  return volume.Sign();
+}
+
+int OrientationOf(const Surface& surface, std::size_t shell) {
+  const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
+  double volume = 0, magnitude = 0;
+  const std::size_t first = surface.triangle_offsets[shell];
+  const std::size_t last = surface.triangle_offsets[shell + 1];
+  for (std::size_t t = first; t < last; ++t) {
+    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]) - origin;
+    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]) - origin;
+    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]) - origin;
+    volume += Dot(a, Cross(b, c));
+    magnitude += (std::abs(a.x) + std::abs(a.y) + std::abs(a.z)) *
+                 (std::abs(b.x) + std::abs(b.y) + std::abs(b.z)) *
+                 (std::abs(c.x) + std::abs(c.y) + std::abs(c.z));
+  }
+  // Each term has fewer than 16 roundings, the sum one for each triangle.
+  const double bound = 0x1p-52 * (16 + static_cast<double>(last - first)) * magnitude;
+  if (std::abs(volume) > bound) return SignOf(volume);
+  return OrientationExactly(surface, shell);
+}
+
+// --- Nesting ------------------------------------------------------------------------------------
+
+// A vertical line through a point p passes a triangle if it passes its shadow. If it would run
+// through a corner or side of a shadow, p is moved by (e, e^2) with an infinitely small e > 0.
+
+/// The side of p of the line from a to b: +1 left. Requires: a != b.
+int SideOfMoved(const Point& a, const Point& b, const Point& p) {
+  if (const int side = Orientation(a, b, p); side != 0) return side;
+  // Moved by e along x, p gets on the left of a line that runs down.
+  if (a.y != b.y) return a.y > b.y ? 1 : -1;
+  return b.x > a.x ? 1 : -1;
+}
+
+/// +1 or -1 if the line through p passes the triangle, by the turn of its shadow; else 0.
+int PassesShadow(const std::array<Point, 3>& shadow, const Point& p) {
+  const int turn = Orientation(shadow[0], shadow[1], shadow[2]);
+  if (turn == 0) return 0;
+  for (int k = 0; k < 3; ++k) {
+    if (SideOfMoved(shadow[k], shadow[(k + 1) % 3], p) != turn) return 0;
+  }
+  return turn;
+}
+
+/// Triangles by the columns of a grid over x and y.
+class Columns {
+ public:
+  explicit Columns(const Surface& surface) {
+    const std::size_t count = surface.TriangleCount();
+    double right = 0, top = 0;
+    left_ = right = surface.points[0];
+    bottom_ = top = surface.points[1];
+    for (std::size_t k = 0; k < surface.PointCount(); ++k) {
+      left_ = std::min(left_, surface.points[3 * k]);
+      right = std::max(right, surface.points[3 * k]);
+      bottom_ = std::min(bottom_, surface.points[3 * k + 1]);
+      top = std::max(top, surface.points[3 * k + 1]);
+    }
+    side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(count))), 1, 1024);
+    width_ = (right - left_) / side_;
+    height_ = (top - bottom_) / side_;
+    triangles_.resize(static_cast<std::size_t>(side_) * side_);
+    for (std::uint32_t t = 0; t < count; ++t) AddTriangle(surface, t);
+  }
+
+  const std::vector<std::uint32_t>& At(const Vec3& p) const {
+    return triangles_[static_cast<std::size_t>(Row(p.y)) * side_ + Column(p.x)];
+  }
+
+ private:
+  int Column(double x) const {
+    return width_ > 0 ? std::clamp(static_cast<int>((x - left_) / width_), 0, side_ - 1) : 0;
+  }
+  int Row(double y) const {
+    return height_ > 0 ? std::clamp(static_cast<int>((y - bottom_) / height_), 0, side_ - 1) : 0;
+  }
+  void AddTriangle(const Surface& surface, std::uint32_t t) {
+    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
+    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
+    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
+    for (int row = Row(std::min({a.y, b.y, c.y})); row <= Row(std::max({a.y, b.y, c.y})); ++row) {
+      for (int column = Column(std::min({a.x, b.x, c.x}));
+           column <= Column(std::max({a.x, b.x, c.x})); ++column) {
+        triangles_[static_cast<std::size_t>(row) * side_ + column].push_back(t);
+      }
+    }
+  }
+
+  double left_ = 0, bottom_ = 0, width_ = 0, height_ = 0;
+  int side_ = 1;
+  std::vector<std::vector<std::uint32_t>> triangles_;
+};
+
+/// The shells with a winding number other than 0 around the first point of `shell`, except itself.
+std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& columns,
+                                      const std::vector<std::uint32_t>& shell_of,
+                                      std::uint32_t shell) {
+  const Vec3 p = Vec3At(surface.points, surface.point_offsets[shell]);
+  std::map<std::uint32_t, int> winding;
+  for (const std::uint32_t t : columns.At(p)) {
+    if (shell_of[t] == shell) continue;
+    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
+    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
+    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
+    const int turn = PassesShadow({Point{a.x, a.y}, Point{b.x, b.y}, Point{c.x, c.y}}, {p.x, p.y});
+    // Above p: p is on the lower side. On the plane but outside the triangle, the line passes it
+    // nowhere near p.
+    if (turn == 0 || SideOfPlane(a, b, c, p) != -turn) continue;
+    winding[shell_of[t]] += turn;
+  }
+  std::vector<std::uint32_t> containing;
+  for (const auto& [other, turns] : winding) {
+    if (turns != 0) containing.push_back(other);
+  }
+  return containing;
+}
+
+}  // namespace
+
+std::vector<int> OrientationsOf(const Surface& surface) {
+  std::vector<int> orientations;
+  for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    orientations.push_back(OrientationOf(surface, shell));
+  }
+  return orientations;
+}
+
+std::vector<std::uint32_t> ShellsAround(const Surface& surface) {
+  std::vector<std::uint32_t> around(surface.ShellCount(), kNoShell);
+  if (around.size() < 2) return around;
+  std::vector<std::uint32_t> shell_of(surface.TriangleCount());
+  for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
+    std::fill(shell_of.begin() + surface.triangle_offsets[shell],
+              shell_of.begin() + surface.triangle_offsets[shell + 1], shell);
+  }
+  const Columns columns(surface);
+  std::vector<std::vector<std::uint32_t>> containing;
+  for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
+    containing.push_back(Containing(surface, columns, shell_of, shell));
+  }
+  for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
+    // The innermost of the shells around it lies in all the others.
+    for (const std::uint32_t other : containing[shell]) {
+      if (around[shell] == kNoShell ||
+          containing[other].size() > containing[around[shell]].size()) {
+        around[shell] = other;
+      }
+    }
+  }
+  return around;
+}
+
+}  // namespace partiemc

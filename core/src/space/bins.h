@@ -1,0 +1,54 @@
+// Stage 1: sorts the particles of a frame in space into cells.
+//
+// The order of the particles is a function of their positions and weights only, so that results
+// have the same bits for any order of the frame.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "frame/scale.h"
+#include "partiemc/frame.h"
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+/// Particles by brick, cell (layer, row, column), position and weight. Positions are in cells
+/// relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
+struct SpaceBins {
+  BrickDirectory bricks;
+  /// Per brick: the first particle of each cell, and the end of the last one.
+  std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
+  std::vector<float> x, y, z;
+  std::vector<float> weight;          ///< Empty if uniform.
+  std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
+
+  struct Keyed {
+    std::uint64_t key;  // Cell and fractions: the whole position.
+    std::uint32_t source;
+  };
+  /// The particles of a home brick lie in it.
+  struct Box {
+    std::array<float, 3> low{8, 8, 8}, high{0, 0, 0};
+  };
+  std::vector<Box> boxes;                 ///< Scratch: by home brick.
+  std::vector<std::uint32_t> brick_of;    ///< Scratch: by home brick.
+  std::vector<std::uint32_t> home, next;  ///< Scratch: by particle, by brick.
+  std::vector<std::uint64_t> keys;        ///< Scratch, by particle.
+  std::vector<Keyed> sorted;              ///< Scratch.
+  std::vector<BrickCoordinate> homes;     ///< Scratch.
+
+  void Clear();
+};
+
+/// Sorts particles; bricks exist wherever a node lies within the kernel radius and one cell of a
+/// particle. Requires: CheckFrame has passed the frame for a slice, three components.
+/// Errors with a Violation: OUT_OF_RANGE positions beyond 2^30 cells from the origin;
+/// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
+absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                          SpaceBins& bins);
+
+}  // namespace partiemc::space

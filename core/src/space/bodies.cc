@@ -1,0 +1,176 @@
+#include "space/bodies.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+
+namespace partiemc::space {
+namespace {
+
+constexpr std::uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
+
+/// The nodes of `inside` that are connected to `seed`.
+BrickBits Connected(const BrickBits& inside, const BrickBits& seed) {
+  BrickBits found = seed;
+  for (bool has_grown = true; has_grown;) {
+    has_grown = false;
+    for (int k = 0; k < kBrickSize; ++k) {
+      const std::uint64_t here = found[k];
+      std::uint64_t word =
+          here | (here << 1 & ~kFirstColumn) | (here >> 1 & ~kLastColumn) | here << 8 | here >> 8;
+      if (k > 0) word |= found[k - 1];
+      if (k + 1 < kBrickSize) word |= found[k + 1];
+      word &= inside[k];
+      if (word == found[k]) continue;
+      found[k] = word;
+      has_grown = true;
+    }
+  }
+  return found;
+}
+
+/// Appends the parts of a brick.
+void SplitBrick(const BrickBits& inside, std::uint32_t brick, std::vector<Bodies::Part>& parts) {
+  BrickBits rest = inside;
+  for (int k = 0; k < kBrickSize;) {
+    if (rest[k] == 0) {
+      ++k;
+      continue;
+    }
+    BrickBits seed{};
+    seed[k] = rest[k] & (~rest[k] + 1);
+    const BrickBits found = Connected(rest, seed);
+    for (int layer = 0; layer < kBrickSize; ++layer) rest[layer] &= ~found[layer];
+    const auto index = static_cast<std::uint32_t>(parts.size());
+    parts.push_back({found, brick, index});
+  }
+}
+
+/// Whether parts of a brick and of its next brick along an axis are connected.
+bool AreJoined(const BrickBits& low, const BrickBits& high, int axis) {
+  if (axis == 2) return (low[kBrickSize - 1] & high[0]) != 0;
+  for (int k = 0; k < kBrickSize; ++k) {
+    const std::uint64_t shifted = axis == 0 ? low[k] >> 7 & kFirstColumn : low[k] >> 56;
+    if ((shifted & high[k]) != 0) return true;
+  }
+  return false;
+}
+
+std::uint32_t RootOf(std::vector<Bodies::Part>& parts, std::uint32_t part) {
+  while (parts[part].body != part) {
+    part = parts[part].body = parts[parts[part].body].body;
+  }
+  return part;
+}
+
+void JoinParts(const BrickDirectory& bricks, Bodies& bodies) {
+  constexpr std::array<int, 3> kNext = {14, 16, 22};  // Neighbours along x, y, z.
+  for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::uint32_t other = bricks.neighbours(brick)[kNext[axis]];
+      if (other == kNoIndex) continue;
+      for (std::uint32_t a = bodies.first[brick]; a < bodies.first[brick + 1]; ++a) {
+        for (std::uint32_t b = bodies.first[other]; b < bodies.first[other + 1]; ++b) {
+          if (!AreJoined(bodies.parts[a].nodes, bodies.parts[b].nodes, axis)) continue;
+          const std::uint32_t p = RootOf(bodies.parts, a), q = RootOf(bodies.parts, b);
+          bodies.parts[std::max(p, q)].body = std::min(p, q);
+        }
+      }
+    }
+  }
+}
+
+/// Numbers the bodies and finds their lowest nodes.
+void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
+  const auto parts = static_cast<std::uint32_t>(bodies.parts.size());
+  for (std::uint32_t part = 0; part < parts; ++part) RootOf(bodies.parts, part);
+  std::vector<std::int64_t>& lowest_z = bodies.lowest_z;
+  lowest_z.clear();
+  // Roots come before their other parts.
+  for (std::uint32_t index = 0; index < parts; ++index) {
+    Bodies::Part& part = bodies.parts[index];
+    std::uint32_t parent = part.body;
+    if (parent == index) {
+      part.body = static_cast<std::uint32_t>(bodies.bodies.size());
+      bodies.bodies.push_back({});
+      lowest_z.push_back(std::numeric_limits<std::int64_t>::max());
+    } else {
+      part.body = bodies.parts[parent].body;
+    }
+    int k = 0;
+    while (part.nodes[k] == 0) ++k;
+    const std::int64_t z = std::int64_t{bricks[part.brick].z} * kBrickSize + k;
+    if (z >= lowest_z[part.body]) continue;
+    lowest_z[part.body] = z;
+    const int bit = std::countr_zero(part.nodes[k]);
+    bodies.bodies[part.body].lowest = {part.brick, bit % kBrickSize, bit / kBrickSize, k};
+  }
+}
+
+// Layers of nodes around the cell of a particle that may have its body: of a small drop, most
+// particles lie outside of the cells with inside nodes.
+constexpr int kMostLayers = 2;
+
+/// The nearest inside node among the corners of the cell of a particle and `layers` layers around
+/// them; brick kNoIndex if there is none.
+BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::uint32_t brick,
+                         std::uint32_t particle, int layers) {
+  const std::array<float, 3> at{bins.x[particle], bins.y[particle], bins.z[particle]};
+  const std::array<int, 3> cell{static_cast<int>(at[0]), static_cast<int>(at[1]),
+                                static_cast<int>(at[2])};
+  BrickPlace nearest{kNoIndex, 0, 0, 0};
+  float least = std::numeric_limits<float>::infinity();
+  const auto square = [](float value) { return value * value; };
+  for (int k = cell[2] - layers; k <= cell[2] + 1 + layers; ++k) {
+    for (int j = cell[1] - layers; j <= cell[1] + 1 + layers; ++j) {
+      for (int i = cell[0] - layers; i <= cell[0] + 1 + layers; ++i) {
+        const float distance = square(at[0] - static_cast<float>(i)) +
+                               square(at[1] - static_cast<float>(j)) +
+                               square(at[2] - static_cast<float>(k));
+        if (distance >= least) continue;
+        const BrickPlace node = Normalise(bins.bricks, brick, i, j, k);
+        if (!field.IsInside(node)) continue;
+        nearest = node;
+        least = distance;
+      }
+    }
+  }
+  return nearest;
+}
+
+void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField& field,
+                    double spacing, Bodies& bodies) {
+  const double usual = spacing * spacing * spacing;
+  for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
+    for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
+      BrickPlace node{kNoIndex, 0, 0, 0};
+      for (int layers = 0; node.brick == kNoIndex && layers <= kMostLayers; ++layers) {
+        node = NearestInside(bins, field, brick, p, layers);
+      }
+      if (node.brick == kNoIndex) continue;
+      Body& body = bodies.bodies[bodies.BodyOf(node)];
+      ++body.particles;
+      body.volume += frame.volumes.empty() ? usual : frame.volumes[bins.source[p]];
+    }
+  }
+}
+
+}  // namespace
+
+void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
+                Bodies& bodies) {
+  bodies.bodies.clear();
+  bodies.parts.clear();
+  bodies.first.clear();
+  for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
+    bodies.first.push_back(static_cast<std::uint32_t>(bodies.parts.size()));
+    SplitBrick(field.inside[brick], brick, bodies.parts);
+  }
+  bodies.first.push_back(static_cast<std::uint32_t>(bodies.parts.size()));
+  JoinParts(bins.bricks, bodies);
+  NumberBodies(bins.bricks, bodies);
+  CountParticles(frame, bins, field, spacing, bodies);
+}
+
+}  // namespace partiemc::space

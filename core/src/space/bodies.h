@@ -1,0 +1,50 @@
+// The bodies of a frame: connected sets of inside nodes.
+//
+// Inside nodes are connected along lattice edges only, as the surface separates inside corners that
+// are not neighbours (cell_loops.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "frame/scale.h"
+#include "partiemc/frame.h"
+#include "space/bins.h"
+#include "space/field.h"
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+struct Body {
+  BrickPlace lowest{};          ///< One of its nodes with the smallest z.
+  std::uint64_t particles = 0;  ///< Particles whose nearest inside node is in the body.
+  double volume = 0;            ///< Their volume, world units cubed.
+};
+
+struct Bodies {
+  std::vector<Body> bodies;
+
+  /// A part of a body in one brick.
+  struct Part {
+    BrickBits nodes;
+    std::uint32_t brick;
+    std::uint32_t body;  // While parts are joined: another part of it.
+  };
+  std::vector<Part> parts;             ///< By brick.
+  std::vector<std::uint32_t> first;    ///< Per brick: its first part, and the number of all parts.
+  std::vector<std::int64_t> lowest_z;  ///< Scratch: by body.
+
+  /// The body of an inside node.
+  std::uint32_t BodyOf(const BrickPlace& node) const {
+    std::uint32_t part = first[node.brick];
+    while ((parts[part].nodes[node.k] >> node.Bit() & 1) == 0) ++part;
+    return parts[part].body;
+  }
+};
+
+/// Finds the bodies, in the order of their first parts, and counts their particles.
+/// `spacing` in world units: a particle without a volume has its cube.
+void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
+                Bodies& bodies);
+
+}  // namespace partiemc::space

@@ -1,0 +1,101 @@
+// Stage 3: finds the crossed edges and the active cells, and the loops of crossings in them.
+//
+// Vertices: one on each crossed edge, numbered by brick, axis, layer, row, column; after them one
+// for each loop of a cell, by cell and loop.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "base/vec3.h"
+#include "space/cell_loops.h"
+#include "space/field.h"
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+struct ActiveCell {
+  std::uint32_t brick = 0;
+  std::uint8_t i = 0, j = 0, k = 0;
+  std::uint8_t corners = 0;      ///< The case.
+  std::uint32_t first_loop = 0;  ///< The vertex of its first loop.
+};
+
+struct SpaceCrossings {
+  /// A brick's crossed edges by axis and layer, each at its lower node, and active cells.
+  struct Brick {
+    std::array<BrickBits, 3> crossed{};
+    BrickBits active{};
+    std::uint32_t first_edge = 0, first_cell = 0;
+    std::array<std::array<std::uint16_t, kBrickSize>, 3> edges_before{};
+    std::array<std::uint16_t, kBrickSize> cells_before{};
+  };
+  std::vector<Brick> bricks;
+  std::vector<ActiveCell> cells;
+  std::uint32_t edge_count = 0, loop_count = 0;
+
+  std::vector<BrickBits> near;            ///< Nodes of crossed edges.
+  std::vector<std::uint32_t> loop_first;  ///< Scratch: by brick.
+
+  std::uint32_t VertexCount() const { return edge_count + loop_count; }
+
+  /// The vertex on the edge from a node along an axis. Requires: it is crossed.
+  std::uint32_t EdgeVertex(const BrickPlace& node, int axis) const {
+    const Brick& at = bricks[node.brick];
+    const std::uint64_t below = (std::uint64_t{1} << node.Bit()) - 1;
+    return at.first_edge + at.edges_before[axis][node.k] +
+           static_cast<std::uint32_t>(CountBits(at.crossed[axis][node.k] & below));
+  }
+  /// Index of an active cell. Requires: it is active.
+  std::uint32_t CellAt(const BrickPlace& place) const {
+    const Brick& at = bricks[place.brick];
+    const std::uint64_t below = (std::uint64_t{1} << place.Bit()) - 1;
+    return at.first_cell + at.cells_before[place.k] +
+           static_cast<std::uint32_t>(CountBits(at.active[place.k] & below));
+  }
+};
+
+/// Deterministic, parallel over bricks: count, sum, fill. Cost: linear in nodes.
+void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
+                   SpaceCrossings& crossings);
+
+/// The vertex on an edge of a cell.
+inline std::uint32_t EdgeVertexOf(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                                  const ActiveCell& cell, int edge) {
+  const int corner = LowCornerOfEdge(edge);
+  return crossings.EdgeVertex(Normalise(bricks, cell.brick, cell.i + (corner & 1),
+                                        cell.j + (corner >> 1 & 1), cell.k + (corner >> 2)),
+                              AxisOfEdge(edge));
+}
+
+/// The cell on the other side of a face. Requires: it is active.
+inline std::uint32_t CellAcross(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                                const ActiveCell& cell, int face) {
+  std::array<int, 3> at{cell.i, cell.j, cell.k};
+  at[face / 2] += (face & 1) != 0 ? 1 : -1;
+  return crossings.CellAt(Normalise(bricks, cell.brick, at[0], at[1], at[2]));
+}
+
+/// The lowest node of a brick, in cells.
+inline Vec3 OriginOf(const BrickCoordinate& brick) {
+  return {8.0 * brick.x, 8.0 * brick.y, 8.0 * brick.z};
+}
+
+/// Calls visit(vertex, i, j, k, axis) for each crossed edge of a brick.
+template <typename Visit>
+void ForEachCrossedEdge(const SpaceCrossings& crossings, std::uint32_t brick, Visit visit) {
+  std::uint32_t vertex = crossings.bricks[brick].first_edge;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int k = 0; k < kBrickSize; ++k) {
+      for (std::uint64_t bits = crossings.bricks[brick].crossed[axis][k]; bits != 0;
+           bits &= bits - 1) {
+        const int bit = std::countr_zero(bits);
+        visit(vertex++, bit % kBrickSize, bit / kBrickSize, k, axis);
+      }
+    }
+  }
+}
+
+}  // namespace partiemc::space

@@ -1,0 +1,130 @@
+#include "space/field.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "base/parallel.h"
+#include "space/near_particles.h"
+#include "space/point_sampler.h"
+#include "space/point_sums.h"
+
+namespace partiemc::space {
+namespace {
+
+/// Calls visit(i, j, k) for each marked node of a brick, in blocks of 2 x 2 x 2 nodes, and before
+/// each block move_to(i, j, k) with its lowest node.
+template <typename MoveTo, typename Visit>
+void ForEachInBlocks(const BrickBits& nodes, MoveTo move_to, Visit visit) {
+  for (int k = 0; k < kBrickSize; k += 2) {
+    for (int j = 0; j < kBrickSize; j += 2) {
+      for (int i = 0; i < kBrickSize; i += 2) {
+        constexpr std::uint64_t kSquare = 0x303;
+        const std::uint64_t square = kSquare << (j * kBrickSize + i);
+        if (((nodes[k] | nodes[k + 1]) & square) == 0) continue;
+        move_to(i, j, k);
+        for (int layer = k; layer < k + 2; ++layer) {
+          for (std::uint64_t bits = nodes[layer] & square; bits != 0; bits &= bits - 1) {
+            const int bit = std::countr_zero(bits);
+            visit(bit % kBrickSize, bit / kBrickSize, layer);
+          }
+        }
+      }
+    }
+  }
+}
+
+NearBox BoxOfBlock(int i, int j, int k) {
+  const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
+  return {{x, y, z}, {x + 1, y + 1, z + 1}};
+}
+
+void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
+                   const BrickBits& nodes, SpaceField& field) {
+  PointSampler sampler(bins, scale);
+  ForEachInBlocks(
+      nodes, [&](int i, int j, int k) { sampler.MoveTo(brick, BoxOfBlock(i, j, k)); },
+      [&](int i, int j, int k) {
+        field.values[brick][BrickPlace{brick, i, j, k}.Index()] =
+            static_cast<float>(sampler.Value(Vec3{1.0 * i, 1.0 * j, 1.0 * k}));
+        field.exact[brick][k] |= std::uint64_t{1} << (j * kBrickSize + i);
+      });
+}
+
+void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
+                 SpaceField& field) {
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  alignas(64) std::array<float, kBrickNodes> density{};
+  const NearBox all{{0, 0, 0}, {7, 7, 7}};
+  ForEachNearRun(bins, brick, all, radius,
+                 [&](const NearRun& run) { AddDensity(bins, run, radius, density.data()); });
+  const float weight = bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
+  const auto guard = static_cast<float>(scale.guard);
+  const auto saturation = static_cast<float>(scale.saturation);
+  const auto slope = static_cast<float>(scale.guard_slope);
+  BrickBits& inside = field.inside[brick] = {};
+  BrickBits open{};
+  auto& values = field.values[brick];
+  for (int node = 0; node < kBrickNodes; ++node) {
+    const float f = weight * density[node];
+    const std::uint64_t bit = std::uint64_t{1} << node % (kBrickSize * kBrickSize);
+    const int layer = node / (kBrickSize * kBrickSize);
+    // Above f_1 saturation decides, up to f_0 the guard.
+    if (f > saturation) {
+      inside[layer] |= bit;
+      values[node] = (saturation - f) * slope;
+    } else if (f > guard) {
+      open[layer] |= bit;
+    } else {
+      values[node] = (guard - f) * slope;
+    }
+  }
+  field.exact[brick] = {};
+  EvaluateBrick(bins, scale, brick, open, field);
+  for (int layer = 0; layer < kBrickSize; ++layer) {
+    for (std::uint64_t bits = open[layer]; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      const bool is_inside = values[layer * kBrickSize * kBrickSize + bit] < 0;
+      inside[layer] |= std::uint64_t{is_inside} << bit;
+    }
+  }
+}
+
+}  // namespace
+
+void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field) {
+  const std::size_t bricks = bins.bricks.size();
+  field.values.resize(bricks);
+  field.inside.resize(bricks);
+  field.exact.resize(bricks);
+  ParallelFor(static_cast<std::uint32_t>(bricks),
+              [&](std::uint32_t brick) { SampleBrick(bins, scale, brick, field); });
+}
+
+void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
+                   SpaceField& field) {
+  ParallelFor(static_cast<std::uint32_t>(nodes.size()), [&](std::uint32_t brick) {
+    BrickBits missing;
+    std::uint64_t any = 0;
+    for (int layer = 0; layer < kBrickSize; ++layer) {
+      missing[layer] = nodes[brick][layer] & ~field.exact[brick][layer];
+      any |= missing[layer];
+    }
+    if (any == 0) return;
+    EvaluateBrick(bins, scale, brick, missing, field);
+    // The density of the other sum decided the side. Both may differ by rounding at f_0 and f_1.
+    for (int layer = 0; layer < kBrickSize; ++layer) {
+      for (std::uint64_t bits = missing[layer]; bits != 0; bits &= bits - 1) {
+        const int bit = std::countr_zero(bits);
+        float& value = field.values[brick][layer * kBrickSize * kBrickSize + bit];
+        const bool is_inside = (field.inside[brick][layer] >> bit & 1) != 0;
+        if (is_inside != (value < 0)) {
+          value = is_inside ? -std::numeric_limits<float>::min() : 0.0f;
+        }
+      }
+    }
+  });
+}
+
+}  // namespace partiemc::space

@@ -1,0 +1,42 @@
+// Last stage: triangles and vertices -> surface, by shell.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vec3.h"
+#include "partiemc/surface.h"
+#include "space/bodies.h"
+#include "space/crossings.h"
+#include "space/field.h"
+
+namespace partiemc::space {
+
+/// What the assembly of a surface needs.
+struct MeshInput {
+  const BrickDirectory& bricks;
+  const SpaceField& field;
+  const SpaceCrossings& crossings;
+  const Bodies& bodies;
+  std::span<const Vec3> positions;  ///< By vertex, world units.
+  std::span<const Vec3> normals;    ///< By vertex, unit length.
+};
+
+using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertices of SpaceCrossings.
+
+struct MeshScratch {
+  std::vector<VertexTriangle> triangles;
+  std::vector<std::uint32_t> parent, shell_of, point_of, next;
+};
+
+/// The triangles of marching cubes, by cell: only vertices on edges, except in long loops.
+void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                       std::vector<VertexTriangle>& triangles);
+
+/// Sorts `scratch.triangles` and their vertices by shell and measures the shells. Shells are
+/// ordered by their first vertex. The outer shell of a body is the one below its lowest node.
+void AssembleSurface(const MeshInput& input, MeshScratch& scratch, Surface& surface);
+
+}  // namespace partiemc::space

@@ -1,0 +1,72 @@
+// Lattice nodes that follow the vertices around them: auxiliary points of the certificate.
+//
+// A node of a cell with a vertex moves by the weighted mean displacement of the vertices in the
+// cells around it and on its edges, with weights 1 / distance^2. Smooth displacements then keep the
+// cells in shape. Nodes of cells with several loops stay, as do nodes next to bricks that do not
+// exist.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "base/vec3.h"
+#include "space/crossings.h"
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+struct MovedNodes {
+  struct Brick {
+    BrickBits nodes{};  ///< Nodes that may move.
+    BrickBits near{};   ///< Active cells, and cells with such a node.
+    std::uint32_t first = 0;
+    std::array<std::uint16_t, kBrickSize> before{};
+  };
+  std::vector<Brick> bricks;
+  std::uint32_t count = 0;
+  std::vector<Vec3> moves;                        ///< By node, in the unit of the positions.
+  std::vector<std::uint8_t> setbacks;             ///< By node.
+  std::vector<BrickBits> active, fixed, movable;  ///< Scratch: by brick.
+
+  /// The index of a node, or kNoIndex if it stays.
+  std::uint32_t IndexOf(const BrickPlace& node) const {
+    if (node.brick == kNoIndex) return kNoIndex;
+    const Brick& at = bricks[node.brick];
+    if ((at.nodes[node.k] >> node.Bit() & 1) == 0) return kNoIndex;
+    const std::uint64_t below = (std::uint64_t{1} << node.Bit()) - 1;
+    return at.first + at.before[node.k] +
+           static_cast<std::uint32_t>(CountBits(at.nodes[node.k] & below));
+  }
+};
+
+/// Setbacks of a vertex. The first ones replace its displacement by the mean move of the nodes
+/// around it: a refused face is uneven, but its common displacement need not be lost. Each of the
+/// next ones keeps kKeptOfMove of it, the last one nothing. Nodes skip the first ones.
+inline constexpr int kSmoothings = 4;
+inline constexpr int kMostSetbacks = 12;
+inline constexpr double kKeptOfMove = .7;
+
+/// Finds the nodes that may move, without setbacks. Parallel over bricks.
+void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                    MovedNodes& nodes);
+
+/// Sets the moves of the nodes of a brick. Anchors and positions in world units.
+void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                 double cell_size, const std::vector<Vec3>& anchors,
+                 const std::vector<Vec3>& positions, MovedNodes& nodes);
+
+/// Calls visit(index, i, j, k) for each node of a brick that may move.
+template <typename Visit>
+void ForEachMovedNode(const MovedNodes& nodes, std::uint32_t brick, Visit visit) {
+  std::uint32_t index = nodes.bricks[brick].first;
+  for (int k = 0; k < kBrickSize; ++k) {
+    for (std::uint64_t bits = nodes.bricks[brick].nodes[k]; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      visit(index++, bit % kBrickSize, bit / kBrickSize, k);
+    }
+  }
+}
+
+}  // namespace partiemc::space

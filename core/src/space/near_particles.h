@@ -1,0 +1,121 @@
+// Walks over the particles near a box.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "space/bins.h"
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+/// A box in cells relative to a brick.
+struct NearBox {
+  std::array<float, 3> low, high;
+};
+
+/// A block of particles, in cells relative to a brick. Filled up to a multiple of the lanes with
+/// particles that are too far away to count.
+struct NearBlock {
+  static constexpr int kCapacity = 512;
+  static constexpr int kLanes = 8;
+  template <typename Value>
+  using PerParticle = std::array<Value, kCapacity + kLanes>;
+
+  alignas(64) PerParticle<float> x, y, z;
+  alignas(64) PerParticle<float> weight;  ///< 1 if uniform.
+  PerParticle<std::uint32_t> particle;    ///< Index into SpaceBins.
+  int count = 0;
+
+  void Pad() {
+    for (int k = count; k % kLanes != 0; ++k) {
+      x[k] = y[k] = z[k] = 1e6f;
+      weight[k] = 0;
+    }
+  }
+};
+
+/// The particles that lie in a row of cells: indices [first, last) of the bins, and what to add to
+/// their coordinates.
+struct NearRun {
+  std::uint32_t first, last;
+  float shift_x, shift_y, shift_z;
+};
+
+/// Calls visit(NearRun) for runs that contain all particles within `radius` of the box, in the
+/// order of the bins: brick by brick, row by row. May contain others.
+template <typename Visit>
+void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
+                    Visit visit) {
+  std::array<int, 3> low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    low[axis] = static_cast<int>(std::floor(box.low[axis] - radius));
+    high[axis] = static_cast<int>(std::floor(box.high[axis] + radius));
+  }
+  // The distance of the cells [at, at + 1] from the box along an axis.
+  const auto distance = [&](int at, int axis) {
+    return std::max({0.0f, static_cast<float>(at) - box.high[axis],
+                     box.low[axis] - static_cast<float>(at + 1)});
+  };
+  const float square = radius * radius;
+  for (int bz = low[2] >> kBrickShift; bz <= high[2] >> kBrickShift; ++bz) {
+    for (int by = low[1] >> kBrickShift; by <= high[1] >> kBrickShift; ++by) {
+      for (int bx = low[0] >> kBrickShift; bx <= high[0] >> kBrickShift; ++bx) {
+        const std::uint32_t owner = bins.bricks.At(brick, bx, by, bz);
+        if (owner == kNoIndex) continue;
+        const auto& cells = bins.cells[owner];
+        if (cells.front() == cells.back()) continue;
+        const int base[3] = {bx * kBrickSize, by * kBrickSize, bz * kBrickSize};
+        for (int z = std::max(low[2], base[2]); z <= std::min(high[2], base[2] + 7); ++z) {
+          const float dz = distance(z, 2);
+          for (int y = std::max(low[1], base[1]); y <= std::min(high[1], base[1] + 7); ++y) {
+            const float dy = distance(y, 1);
+            const float rest = square - dy * dy - dz * dz;
+            if (rest <= 0) continue;
+            const float half = std::sqrt(rest);
+            // Truncation rounds down: coordinates are more than -64 cells.
+            const int first =
+                std::max(static_cast<int>(box.low[0] - half + 64) - 64, base[0]) - base[0];
+            const int last =
+                std::min(static_cast<int>(box.high[0] + half + 64) - 64, base[0] + 7) - base[0];
+            if (first > last) continue;
+            const int row = ((z - base[2]) * kBrickSize + y - base[1]) * kBrickSize;
+            const NearRun run{cells[row + first], cells[row + last + 1],
+                              static_cast<float>(base[0]), static_cast<float>(base[1]),
+                              static_cast<float>(base[2])};
+            if (run.first < run.last) visit(run);
+          }
+        }
+      }
+    }
+  }
+}
+
+/// Calls visit(const NearBlock&) for blocks with all particles within `radius` of the box.
+template <typename Visit>
+void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
+                      NearBlock& block, Visit visit) {
+  block.count = 0;
+  const bool is_uniform = bins.weight.empty();
+  ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
+    for (std::uint32_t p = run.first; p < run.last; ++p) {
+      if (block.count == NearBlock::kCapacity) {
+        visit(block);
+        block.count = 0;
+      }
+      const int k = block.count++;
+      block.x[k] = bins.x[p] + run.shift_x;
+      block.y[k] = bins.y[p] + run.shift_y;
+      block.z[k] = bins.z[p] + run.shift_z;
+      block.weight[k] = is_uniform ? 1.0f : bins.weight[p];
+      block.particle[k] = p;
+    }
+  });
+  if (block.count == 0) return;
+  block.Pad();
+  visit(block);
+}
+
+}  // namespace partiemc::space

@@ -1,0 +1,89 @@
+#include "space/point_sampler.h"
+
+namespace partiemc::space {
+namespace {
+
+QueryPoint QueryAt(const Vec3& point) {
+  return {static_cast<float>(point.x), static_cast<float>(point.y), static_cast<float>(point.z)};
+}
+
+float InverseSquare(const Scale& scale) {
+  return static_cast<float>(1 / (scale.kernel_radius * scale.kernel_radius));
+}
+
+double WeightOf(const SpaceBins& bins, const Scale& scale) {
+  return bins.weight.empty() ? scale.uniform_weight : 1;
+}
+
+}  // namespace
+
+void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
+  brick_ = brick;
+  box_ = box;
+  int blocks = 0;
+  ForEachNearBlock(bins_, brick_, box_, static_cast<float>(scale_.kernel_radius), block_,
+                   [&](const NearBlock&) { ++blocks; });
+  is_whole_ = blocks <= 1;
+}
+
+template <typename Visit>
+void PointSampler::ForEachBlock(Visit visit) {
+  if (is_whole_) {
+    visit(block_);
+  } else {
+    ForEachNearBlock(bins_, brick_, box_, static_cast<float>(scale_.kernel_radius), block_, visit);
+  }
+}
+
+double PointSampler::Value(const Vec3& point) {
+  PartialMoments moments;
+  const QueryPoint at = QueryAt(point);
+  ForEachBlock(
+      [&](const NearBlock& block) { AddMoments(block, at, InverseSquare(scale_), moments); });
+  return LevelSetOf(TotalOf(moments, WeightOf(bins_, scale_)), scale_).value;
+}
+
+PointSample PointSampler::Sample(const Vec3& point) {
+  PartialMoments moments;
+  PartialSlopes partial;
+  const QueryPoint at = QueryAt(point);
+  ForEachBlock([&](const NearBlock& block) {
+    AddMoments(block, at, InverseSquare(scale_), moments);
+    AddSlopes(block, at, InverseSquare(scale_), partial);
+  });
+  const double weight = WeightOf(bins_, scale_);
+  const Sums sums = TotalOf(moments, weight);
+  const Slopes slopes = TotalOf(partial, weight);
+  const LevelSetAt level = LevelSetOf(sums, scale_);
+  if (!(sums.kernel > 0)) return {level.value, {}};
+  switch (level.term) {
+    case Term::kPhi:
+      return {level.value, GradientOfPhi(sums, slopes, scale_)};
+    case Term::kGap:
+      return {level.value, GradientOfGap(sums, slopes, at)};
+    case Term::kGuard:
+    case Term::kSaturation:
+      break;
+  }
+  const double six = 6 / (scale_.kernel_radius * scale_.kernel_radius);
+  return {level.value, (-six * scale_.guard_slope) * slopes.density};
+}
+
+// With the unit eigenvector v of M = sum k D D^T and its eigenvalue m:
+//   grad m = 6 / R^2 sum t^2 D (v . D)^2 - 2 (v . sum k D) v,
+//   sigma = m / (R^2 sum k).
+Vec3 PointSampler::GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point) {
+  const Vec3 v = Eigenvector(sums.second, LargestEigenvalue(sums.second));
+  PartialThirds partial;
+  ForEachBlock(
+      [&](const NearBlock& block) { AddThirds(block, point, InverseSquare(scale_), v, partial); });
+  const Vec3 third{partial.Total(0), partial.Total(1), partial.Total(2)};
+  const double square = scale_.kernel_radius * scale_.kernel_radius;
+  const double six = 6 / square;
+  const Vec3 of_moment = six * third - (2 * Dot(v, sums.first)) * v;
+  const double spread = SpreadOf(sums, scale_);
+  return (scale_.gap_slope / sums.kernel) *
+         ((1 / square) * of_moment - (spread * six) * slopes.first);
+}
+
+}  // namespace partiemc::space

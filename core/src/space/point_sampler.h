@@ -1,0 +1,46 @@
+// Evaluates the level set and its gradient at any point.
+#pragma once
+
+#include "frame/scale.h"
+#include "space/bins.h"
+#include "space/level_set.h"
+#include "space/near_particles.h"
+#include "space/point_sums.h"
+
+namespace partiemc::space {
+
+/// F at a point with its gradient, per cell.
+struct PointSample {
+  double value = 0;
+  Vec3 gradient;
+};
+
+/// Collects the particles around a box once for all points in it. Not thread-safe; about 12 kB.
+class PointSampler {
+ public:
+  PointSampler(const SpaceBins& bins, const Scale& scale) : bins_(bins), scale_(scale) {}
+
+  /// Sets the box of the points to come, in cells relative to `brick`.
+  void MoveTo(std::uint32_t brick, const NearBox& box);
+
+  /// F at a point of the box, relative to the brick.
+  double Value(const Vec3& point);
+
+  /// F and the gradient of the term that determines it: analytic, of the gap by the derivative of
+  /// its eigenvalue.
+  PointSample Sample(const Vec3& point);
+
+ private:
+  template <typename Visit>
+  void ForEachBlock(Visit visit);
+  Vec3 GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point);
+
+  const SpaceBins& bins_;
+  const Scale& scale_;
+  std::uint32_t brick_ = 0;
+  NearBox box_;
+  NearBlock block_;
+  bool is_whole_ = false;  // All particles around the box are in block_.
+};
+
+}  // namespace partiemc::space

@@ -1,0 +1,209 @@
+#include "space/point_sums.h"
+
+#include <algorithm>
+
+// Highway compiles the rest of this file once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "space/point_sums.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc::space {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lanes = hn::CappedTag<float, NearBlock::kLanes>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+
+// The offsets of some particles of a block from a point, and t = max(0, 1 - |D|^2 / R^2).
+struct Offsets {
+  Vector x, y, z, t;
+
+  HWY_INLINE Offsets(const NearBlock& block, int k, Vector px, Vector py, Vector pz,
+                     Vector inverse_square) {
+    const Lanes d;
+    x = hn::Sub(hn::LoadU(d, block.x.data() + k), px);
+    y = hn::Sub(hn::LoadU(d, block.y.data() + k), py);
+    z = hn::Sub(hn::LoadU(d, block.z.data() + k), pz);
+    const Vector square = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
+    t = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0f), hn::Mul(square, inverse_square)));
+  }
+};
+
+// Calls add(first lane, offsets, index of the first particle) for all particles of a block. Lanes
+// [0, 8) of the partial sums are served in turn.
+template <class Add>
+HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                              int lane, Add add) {
+  const Lanes d;
+  const Vector px = hn::Set(d, point.x), py = hn::Set(d, point.y), pz = hn::Set(d, point.z);
+  const Vector inverse = hn::Set(d, inverse_square);
+  for (int k = lane; k < block.count; k += NearBlock::kLanes) {
+    add(Offsets(block, k, px, py, pz, inverse), k);
+  }
+}
+
+void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                PartialMoments& sums) {
+  const Lanes d;
+  for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
+    const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
+    Vector k0 = load(0), kw = load(1), kx = load(2), ky = load(3), kz = load(4);
+    Vector xx = load(5), xy = load(6), xz = load(7), yy = load(8), yz = load(9), zz = load(10);
+    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int p) HWY_ATTR {
+      const Vector k = hn::Mul(hn::Mul(to.t, to.t), to.t);
+      k0 = hn::Add(k0, k);
+      kw = hn::Add(kw, hn::Mul(k, hn::LoadU(d, block.weight.data() + p)));
+      const Vector x = hn::Mul(k, to.x), y = hn::Mul(k, to.y), z = hn::Mul(k, to.z);
+      kx = hn::Add(kx, x);
+      ky = hn::Add(ky, y);
+      kz = hn::Add(kz, z);
+      xx = hn::Add(xx, hn::Mul(x, to.x));
+      xy = hn::Add(xy, hn::Mul(x, to.y));
+      xz = hn::Add(xz, hn::Mul(x, to.z));
+      yy = hn::Add(yy, hn::Mul(y, to.y));
+      yz = hn::Add(yz, hn::Mul(y, to.z));
+      zz = hn::Add(zz, hn::Mul(z, to.z));
+    });
+    const Vector all[] = {k0, kw, kx, ky, kz, xx, xy, xz, yy, yz, zz};
+    for (int q = 0; q < 11; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
+  }
+}
+
+void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+               PartialSlopes& sums) {
+  const Lanes d;
+  for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
+    const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
+    Vector sx = load(0), sy = load(1), sz = load(2);
+    Vector xx = load(3), xy = load(4), xz = load(5), yy = load(6), yz = load(7), zz = load(8);
+    Vector wx = load(9), wy = load(10), wz = load(11);
+    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int p) HWY_ATTR {
+      const Vector square = hn::Mul(to.t, to.t);
+      const Vector x = hn::Mul(square, to.x), y = hn::Mul(square, to.y), z = hn::Mul(square, to.z);
+      sx = hn::Add(sx, x);
+      sy = hn::Add(sy, y);
+      sz = hn::Add(sz, z);
+      xx = hn::Add(xx, hn::Mul(x, to.x));
+      xy = hn::Add(xy, hn::Mul(x, to.y));
+      xz = hn::Add(xz, hn::Mul(x, to.z));
+      yy = hn::Add(yy, hn::Mul(y, to.y));
+      yz = hn::Add(yz, hn::Mul(y, to.z));
+      zz = hn::Add(zz, hn::Mul(z, to.z));
+      const Vector w = hn::LoadU(d, block.weight.data() + p);
+      wx = hn::Add(wx, hn::Mul(w, x));
+      wy = hn::Add(wy, hn::Mul(w, y));
+      wz = hn::Add(wz, hn::Mul(w, z));
+    });
+    const Vector all[] = {sx, sy, sz, xx, xy, xz, yy, yz, zz, wx, wy, wz};
+    for (int q = 0; q < 12; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
+  }
+}
+
+void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
+               PartialThirds& sums) {
+  const Lanes d;
+  const Vector vx = hn::Set(d, static_cast<float>(v.x)), vy = hn::Set(d, static_cast<float>(v.y)),
+               vz = hn::Set(d, static_cast<float>(v.z));
+  for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
+    const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
+    Vector sx = load(0), sy = load(1), sz = load(2);
+    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int) HWY_ATTR {
+      const Vector along =
+          hn::Mul(to.t, hn::Add(hn::Add(hn::Mul(vx, to.x), hn::Mul(vy, to.y)), hn::Mul(vz, to.z)));
+      const Vector square = hn::Mul(along, along);
+      sx = hn::Add(sx, hn::Mul(square, to.x));
+      sy = hn::Add(sy, hn::Mul(square, to.y));
+      sz = hn::Add(sz, hn::Mul(square, to.z));
+    });
+    hn::Store(sx, d, sums.lanes[0].data() + lane);
+    hn::Store(sy, d, sums.lanes[1].data() + lane);
+    hn::Store(sz, d, sums.lanes[2].data() + lane);
+  }
+}
+
+// The nodes [first, last] of a brick within the radius of a coordinate.
+struct NodeRange {
+  int first, last;
+
+  HWY_INLINE NodeRange(float coordinate, float radius) {
+    constexpr int kOffset = 128;  // Truncation then rounds down.
+    first = std::max(static_cast<int>(coordinate - radius + kOffset) - kOffset + 1, 0);
+    last = std::min(static_cast<int>(coordinate + radius + kOffset) - kOffset, kBrickSize - 1);
+  }
+};
+
+void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
+  const Lanes d;
+  const float inverse = 1 / (radius * radius);
+  const Vector inverse_square = hn::Set(d, inverse);
+  for (std::uint32_t p = run.first; p < run.last; ++p) {
+    const float x = bins.x[p] + run.shift_x;
+    const float y = bins.y[p] + run.shift_y;
+    const float z = bins.z[p] + run.shift_z;
+    const NodeRange rows(y, radius), layers(z, radius);
+    const Vector weight = hn::Set(d, bins.weight.empty() ? 1.0f : bins.weight[p]);
+    for (int lane = 0; lane < kBrickSize; lane += kLanes) {
+      const Vector dx = hn::Sub(hn::Set(d, x), hn::Iota(d, static_cast<float>(lane)));
+      const Vector column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse_square));
+      for (int k = layers.first; k <= layers.last; ++k) {
+        const float dz = z - static_cast<float>(k);
+        for (int j = rows.first; j <= rows.last; ++j) {
+          const float dy = y - static_cast<float>(j);
+          const Vector t =
+              hn::Max(hn::Zero(d), hn::Sub(column, hn::Set(d, (dy * dy + dz * dz) * inverse)));
+          float* const at = nodes + (k * kBrickSize + j) * kBrickSize + lane;
+          const Vector kernel = hn::Mul(hn::Mul(t, t), t);
+          hn::Store(hn::Add(hn::Load(d, at), hn::Mul(kernel, weight)), d, at);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc::space
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc::space {
+
+HWY_EXPORT(AddMoments);
+HWY_EXPORT(AddSlopes);
+HWY_EXPORT(AddThirds);
+HWY_EXPORT(AddDensity);
+
+void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                PartialMoments& sums) {
+  HWY_DYNAMIC_DISPATCH(AddMoments)(block, point, inverse_square, sums);
+}
+void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+               PartialSlopes& sums) {
+  HWY_DYNAMIC_DISPATCH(AddSlopes)(block, point, inverse_square, sums);
+}
+void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
+               PartialThirds& sums) {
+  HWY_DYNAMIC_DISPATCH(AddThirds)(block, point, inverse_square, v, sums);
+}
+void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
+  HWY_DYNAMIC_DISPATCH(AddDensity)(bins, run, radius, nodes);
+}
+
+Sums TotalOf(const PartialMoments& sums, double weight) {
+  const auto at = [&](int q) { return sums.Total(q); };
+  return {
+      at(0), weight * at(1), {at(2), at(3), at(4)}, {at(5), at(6), at(7), at(8), at(9), at(10)}};
+}
+
+Slopes TotalOf(const PartialSlopes& sums, double weight) {
+  const auto at = [&](int q) { return sums.Total(q); };
+  return {{at(0), at(1), at(2)},
+          {at(3), at(4), at(5), at(6), at(7), at(8)},
+          weight * Vec3{at(9), at(10), at(11)}};
+}
+
+}  // namespace partiemc::space
+#endif  // HWY_ONCE

@@ -1,0 +1,50 @@
+// Kernel sums at nodes and points, in vectors. Every instruction set gives the same bits: terms go
+// to eight partial sums by their index, which are added by halves.
+#pragma once
+
+#include <array>
+
+#include "base/vec3.h"
+#include "space/level_set.h"
+#include "space/near_particles.h"
+
+namespace partiemc::space {
+
+/// Partial sums of floats: by quantity, by lane.
+template <int kQuantities>
+struct PartialSums {
+  alignas(32) std::array<std::array<float, NearBlock::kLanes>, kQuantities> lanes{};
+
+  double Total(int quantity) const {
+    const auto& part = lanes[quantity];
+    return ((double{part[0]} + double{part[4]}) + (double{part[2]} + double{part[6]})) +
+           ((double{part[1]} + double{part[5]}) + (double{part[3]} + double{part[7]}));
+  }
+};
+
+using PartialMoments = PartialSums<11>;  ///< k, w k, k D, k D D^T.
+using PartialSlopes = PartialSums<12>;   ///< t^2 D, t^2 D D^T, w t^2 D.
+using PartialThirds = PartialSums<3>;    ///< t^2 D (v . D)^2.
+
+/// A point in cells relative to the brick of a block.
+struct QueryPoint {
+  float x, y, z;
+};
+
+/// Each adds the particles of a block.
+void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                PartialMoments& sums);
+void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+               PartialSlopes& sums);
+void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
+               PartialThirds& sums);
+
+/// The sums of all blocks. `weight`: of every particle if the bins have none.
+Sums TotalOf(const PartialMoments& sums, double weight);
+Slopes TotalOf(const PartialSlopes& sums, double weight);
+
+/// Adds the kernels of a run of particles, times their weights, to the nodes of a brick, by layer,
+/// row, column.
+void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes);
+
+}  // namespace partiemc::space

@@ -1,0 +1,134 @@
+#include "space_vertices/body_volumes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "base/parallel.h"
+
+namespace partiemc::space {
+namespace {
+
+/// Calls visit(from, to) for the crossings of a loop: each curve from one to the next.
+template <typename Visit>
+void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                  const ActiveCell& cell, int loop, Visit visit) {
+  const CellLoops& loops = LoopsOf(cell.corners);
+  for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
+    visit(EdgeVertexOf(bricks, crossings, cell, loops.edge[step]),
+          EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)]));
+  }
+}
+
+/// The origin of the sums of a body: keeps them exact far from the origin of the world. In cells.
+Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
+  const BrickPlace& at = body.lowest;
+  return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};
+}
+
+/// Calls visit(cell, loop of the cell, loop).
+template <typename Visit>
+void ForEachLoopOfCells(const SpaceCrossings& crossings, const Visit& visit) {
+  ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
+    const ActiveCell& cell = crossings.cells[index];
+    for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
+      visit(cell, loop, cell.first_loop - crossings.edge_count + loop);
+    }
+  });
+}
+
+}  // namespace
+
+void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
+                        const SpaceCrossings& crossings, const Bodies& bodies,
+                        BodyVolumes& volumes) {
+  volumes.body_of.resize(crossings.VertexCount());
+  ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
+    ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
+      BrickPlace node{brick, i, j, k};
+      if (!field.IsInside(node)) {
+        node = Normalise(bricks, brick, i + (axis == 0), j + (axis == 1), k + (axis == 2));
+      }
+      volumes.body_of[v] = bodies.BodyOf(node);
+    });
+  });
+  ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
+    const CellLoops& loops = LoopsOf(cell.corners);
+    volumes.body_of[crossings.edge_count + index] =
+        volumes.body_of[EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.first[loop]])];
+  });
+}
+
+void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                   const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {
+  const auto origin_of = [&](std::uint32_t body) {
+    return LowestNodeOf(bricks, bodies.bodies[body]);
+  };
+  volumes.areas.resize(crossings.loop_count);
+  volumes.parts.resize(crossings.loop_count);
+  ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
+    const std::uint32_t vertex = crossings.edge_count + index;
+    const Vec3 origin = origin_of(volumes.body_of[vertex]);
+    const Vec3 a = positions[vertex] - origin;
+    double area = 0;
+    BodyVolumes::Part part;
+    ForEachCurve(bricks, crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
+      const Vec3 b = positions[from] - origin, c = positions[to] - origin;
+      const double volume = Dot(a, Cross(b, c)) / 6;
+      area += Length(Cross(b - a, c - a)) / 2;
+      part.volume += volume;
+      part.moment = part.moment + (volume / 4) * (a + b + c);
+    });
+    volumes.areas[index] = area;
+    volumes.parts[index] = part;
+  });
+  volumes.measures.assign(bodies.bodies.size(), {});
+  for (std::uint32_t loop = 0; loop < crossings.loop_count; ++loop) {
+    BodyMeasure& measure = volumes.measures[volumes.body_of[crossings.edge_count + loop]];
+    measure.area += volumes.areas[loop];
+    measure.volume += volumes.parts[loop].volume;
+    measure.centroid = measure.centroid + volumes.parts[loop].moment;
+  }
+  for (std::uint32_t body = 0; body < volumes.measures.size(); ++body) {
+    BodyMeasure& measure = volumes.measures[body];
+    const double inverse = measure.volume > 0 ? 1 / measure.volume : 0;
+    measure.centroid = origin_of(body) + inverse * measure.centroid;
+  }
+}
+
+void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
+                      std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
+                      BodyVolumes& volumes) {
+  volumes.measures.assign(bodies.bodies.size(), {});
+  for (const VertexTriangle& triangle : triangles) {
+    const std::uint32_t body = volumes.body_of[triangle[0]];
+    const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
+    const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
+               c = positions[triangle[2]] - origin;
+    volumes.measures[body].area += Length(Cross(b - a, c - a)) / 2;
+    volumes.measures[body].volume += Dot(a, Cross(b, c)) / 6;
+  }
+}
+
+bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                  BodyVolumes& volumes, std::vector<Vec3>& positions) {
+  const double per_unit = 1 / (step.unit * step.unit * step.unit);
+  volumes.offsets.assign(bodies.bodies.size(), 0);
+  bool has_moved = false;
+  for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
+    const BodyMeasure& measure = volumes.measures[body];
+    const double wanted = bodies.bodies[body].volume * per_unit;
+    // No particle: the volume of the body is unknown.
+    if (!(wanted > 0) || !(measure.area > 0)) continue;
+    const double missing = wanted - measure.volume;
+    if (std::abs(missing) <= step.tolerance * wanted) continue;
+    volumes.offsets[body] = std::clamp(missing / measure.area, -step.limit, step.limit);
+    has_moved = true;
+  }
+  ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
+    positions[v] = positions[v] + volumes.offsets[volumes.body_of[v]] * normals[v];
+  });
+  return has_moved;
+}
+
+}  // namespace partiemc::space

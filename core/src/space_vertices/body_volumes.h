@@ -1,0 +1,63 @@
+// Volumes of bodies: measures them, and matches them to the volume of their particles.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vec3.h"
+#include "space/bodies.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/mesh.h"
+
+namespace partiemc::space {
+
+/// Size of a body with its cavities.
+struct BodyMeasure {
+  double area = 0, volume = 0;
+  Vec3 centroid;
+};
+
+struct BodyVolumes {
+  std::vector<std::uint32_t> body_of;  ///< By vertex.
+  std::vector<BodyMeasure> measures;   ///< By body.
+  std::vector<double> areas;           ///< By loop: of the triangles around its vertex.
+
+  struct Part {
+    double volume = 0;
+    Vec3 moment;
+  };
+  std::vector<Part> parts;      ///< Scratch: by loop.
+  std::vector<double> offsets;  ///< Scratch: by body.
+};
+
+/// Finds the body of each vertex.
+void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
+                        const SpaceCrossings& crossings, const Bodies& bodies,
+                        BodyVolumes& volumes);
+
+/// Measures the bodies, with all quads cut along their faces.
+/// Requires: FindBodyOfVertices. Parallel over cells, then linear in loops.
+void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                   const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
+
+/// Measures the bodies as the triangles bound them. Positions are in world units, as are area and
+/// volume. Requires: FindBodyOfVertices. Linear in triangles.
+void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
+                      std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
+                      BodyVolumes& volumes);
+
+struct VolumeStep {
+  double unit = 1;       ///< Length of the unit of positions, in world units.
+  double limit = 0;      ///< Longest offset, in units.
+  double tolerance = 0;  ///< Bodies whose relative error is not larger stay.
+};
+
+/// Moves the vertices of each body along their normals by one offset: (volume of its particles -
+/// its volume) / area, limited. Returns whether a body has moved.
+/// Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
+bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                  BodyVolumes& volumes, std::vector<Vec3>& positions);
+
+}  // namespace partiemc::space

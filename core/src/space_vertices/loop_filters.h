@@ -1,0 +1,40 @@
+// Weighted means over windows of loops: normals, bends and planes.
+//
+// Loop j has in the window of loop i the weight area_j B(d, reach), where d = |c_j - c_i| and
+// B(d, r) = max(0, 1 - d^2 / r^2)^2. `kAtEdges` multiplies it by max(0, n_i . n_j)^32. Lengths are
+// in cells.
+#pragma once
+
+#include <span>
+
+#include "base/vec3.h"
+#include "space_vertices/loop_windows.h"
+
+namespace partiemc::space {
+
+/// The surface by loop.
+struct LoopSurface {
+  const LoopWindows& windows;
+  std::span<const Vec3> centres;  ///< c.
+  std::span<const double> areas;  ///< Areas of the triangles around the centres.
+};
+
+enum class Stop { kNowhere, kAtEdges };
+
+/// The normalised weighted mean of the normals. `smooth` does not overlap `normals`. Keeps a normal
+/// whose mean is 0.
+void SmoothNormals(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
+                   Stop stop, std::span<Vec3> smooth);
+
+/// The sum of the principal curvatures, positive where the surface is convex, from the turn of the
+/// normals. Limited to +-`limit`.
+void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
+               double limit, std::span<double> bends);
+
+/// Moves each centre along its normal by the weighted mean of (n_i + n_j) / 2 . (c_j - c_i) +
+/// base_j: to the mean of the near planes. A sphere with base 0 stays unchanged, as the mean normal
+/// of two of its points is perpendicular to their chord.
+void SmoothOnPlanes(const LoopSurface& surface, std::span<const Vec3> normals,
+                    std::span<const double> bases, double reach, std::span<Vec3> smooth);
+
+}  // namespace partiemc::space

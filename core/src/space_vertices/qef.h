@@ -1,0 +1,32 @@
+// The placement `qef`: vertices in cells at the least square of the distances from tangent planes.
+//
+// Ju, Losasso, Schaefer, Warren: Dual Contouring of Hermite Data, 2002; with the regularisation
+// towards the mean of the crossings instead of a truncated inverse.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/vec3.h"
+#include "frame/scale.h"
+#include "space/bins.h"
+#include "space/crossings.h"
+
+namespace partiemc::space {
+
+struct TangentPlane {
+  Vec3 point, normal;  ///< The normal has length 1.
+};
+
+/// The point x that minimises sum (n . (x - e))^2 + .05 |x - mean|^2 over planes through e with
+/// normals n.
+Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean);
+
+/// Samples the level set at the crossings of the edges for their normals. Moves each vertex in a
+/// cell to the LeastSquarePoint of the crossings of its loop, not out of the cell. Its normal is
+/// the normalised mean of theirs. In cells. Parallel over bricks and cells. Requires: vertices at
+/// their crossings. Sets all normals.
+void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
+                std::vector<Vec3>& positions, std::vector<Vec3>& normals);
+
+}  // namespace partiemc::space

@@ -1,0 +1,61 @@
+#include "space_vertices/virtual_plane.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "space_vertices/edge_vertices.h"
+#include "space_vertices/loop_filters.h"
+
+namespace partiemc::space {
+namespace {
+
+/// Moves the vertices in cells to smoothed planes and replaces their normals.
+void SmoothLoops(const PlacementInput& input, const VirtualPlaneConstants& constants,
+                 VirtualPlaneScratch& scratch, std::span<Vec3> centres, std::span<Vec3> normals) {
+  const double h = input.scale.spacing;
+  const LoopSurface surface{scratch.windows, centres, scratch.volumes.areas};
+  scratch.smooth.resize(centres.size());
+  scratch.smooth2.resize(centres.size());
+  scratch.bases.resize(centres.size());
+  SmoothNormals(surface, normals, constants.normal_reach * h, Stop::kNowhere, scratch.smooth);
+  SmoothNormals(surface, scratch.smooth, constants.bilateral_reach * h, Stop::kAtEdges,
+                scratch.smooth2);
+  SmoothNormals(surface, scratch.smooth2, constants.bilateral_reach * h, Stop::kAtEdges, normals);
+
+  FindBends(surface, normals, constants.bend_reach * h, 2 / h, scratch.bases);
+  const double radius = input.scale.kernel_radius;
+  for (double& base : scratch.bases) base *= constants.rounding * radius * radius;
+  SmoothOnPlanes(surface, normals, scratch.bases, constants.smoothing_reach * h, scratch.smooth);
+  std::copy(scratch.smooth.begin(), scratch.smooth.end(), centres.begin());
+}
+
+}  // namespace
+
+void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& constants,
+                   const std::vector<Vec3>& anchors, VirtualPlaneScratch& scratch,
+                   std::vector<Vec3>& positions, std::vector<Vec3>& normals) {
+  const BrickDirectory& bricks = input.bins.bricks;
+  const SpaceCrossings& crossings = input.crossings;
+  const double h = input.scale.spacing, cell_size = input.scale.cell_size;
+  FindBodyOfVertices(bricks, input.field, crossings, input.bodies, scratch.volumes);
+  MeasureBodies(bricks, crossings, input.bodies, anchors, scratch.volumes);
+
+  positions = anchors;
+  FindRoots(input.bins, input.scale, crossings, constants.root, positions, normals);
+  const auto centres = std::span(positions).subspan(crossings.edge_count);
+  const double reach = std::max({constants.normal_reach, constants.bilateral_reach,
+                                 constants.bend_reach, constants.smoothing_reach});
+  FindWindows(bricks, crossings, centres, reach * h, scratch.windows);
+  SmoothLoops(input, constants, scratch, centres, std::span(normals).subspan(crossings.edge_count));
+  PlaceEdgesByLoops(bricks, crossings, anchors, positions, normals);
+
+  // The first round misses the volume of small bodies, which bend.
+  for (int round = 0; round < 2; ++round) {
+    MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
+    MatchVolumes(input.bodies, {.unit = cell_size, .limit = constants.volume_limit * h}, normals,
+                 scratch.volumes, positions);
+  }
+}
+
+}  // namespace partiemc::space

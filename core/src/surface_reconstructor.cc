@@ -1,0 +1,227 @@
+// Runs the stages of a surface in order.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "base/cancellation.h"
+#include "base/vec3.h"
+#include "frame/calibration.h"
+#include "frame/distinct_ids.h"
+#include "frame/frame_view.h"
+#include "frame/scale.h"
+#include "partiemc/status.h"
+#include "partiemc/surface.h"
+#include "space/bins.h"
+#include "space/bodies.h"
+#include "space/certificate.h"
+#include "space/cleaning.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/mesh.h"
+#include "space/vertices.h"
+#include "space_vertices/qef.h"
+#include "space_vertices/virtual_plane.h"
+
+namespace partiemc {
+
+struct SurfaceWorkspace::Buffers {
+  DistinctIdsScratch distinct_ids;
+  space::SpaceBins bins;
+  space::SpaceField field;
+  space::SpaceCrossings crossings;
+  space::Bodies bodies;
+  space::CleaningScratch cleaning;
+  std::vector<Vec3> anchors, positions, normals;
+  std::vector<std::uint8_t> is_fixed;
+  space::VirtualPlaneScratch virtual_plane;
+  space::Certificate certificate;
+  space::MeshScratch mesh;
+};
+
+namespace {
+
+/// The factor of the reference radius (core/SURFACES.md, "Calibration").
+double CalibrationOf(SurfacePlacement placement) {
+  switch (placement) {
+    case SurfacePlacement::kMarchingCubes:
+    case SurfacePlacement::kQef:
+      return 1.065;
+    case SurfacePlacement::kVirtualPlane:
+      return .985;
+  }
+  return 1;
+}
+
+/// The parameters as the stages of a slice take them: lengths and weights in space.
+ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
+  ReconstructionParameters in_space;
+  in_space.spacing = parameters.spacing;
+  in_space.kernel_radius = parameters.kernel_radius;
+  in_space.cell_size = parameters.cell_size;
+  in_space.reference_radius = parameters.reference_radius;
+  in_space.slice = SlicePlane{};
+  return in_space;
+}
+
+ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
+  ReconstructionParameters in_space = InSpace(parameters);
+  if (!in_space.reference_radius) {
+    in_space.reference_radius =
+        CalibrationOf(parameters.placement) * CalibratedSliceRadius(parameters.kernel_radius);
+  }
+  return in_space;
+}
+
+double LightestVolume(const Frame& frame, double spacing) {
+  if (frame.volumes.empty()) return spacing * spacing * spacing;
+  float lightest = frame.volumes[0];
+  for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
+  return lightest;
+}
+
+// Smaller cavities are dents of the level set, not voids of the fluid (core/METHOD.md, "Cleaning").
+constexpr double kMinCavityParticles = 2;
+
+/// Finds the bodies. Drops what parameters ask for.
+SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& parameters,
+                                  SurfaceWorkspace::Buffers& b) {
+  SurfaceStatistics statistics;
+  const bool is_cleaned =
+      parameters.clean.value_or(parameters.placement == SurfacePlacement::kVirtualPlane);
+  if (is_cleaned) {
+    const double cell = parameters.cell_size;
+    const double limit = kMinCavityParticles / (cell * cell * cell);
+    const auto most_nodes = static_cast<std::size_t>(std::ceil(limit)) - 1;
+    statistics.dropped_cavities =
+        space::FillCavities(b.bins.bricks, most_nodes, b.cleaning, b.field);
+  }
+  const double h = parameters.spacing;
+  space::FindBodies(frame, b.bins, b.field, h, b.bodies);
+  const space::DroppedBodies dropped =
+      space::DropBodies({.drops_empty = is_cleaned,
+                         .least_volume = parameters.min_component_volume * h * h * h,
+                         .least_particles = parameters.min_component_particles},
+                        b.cleaning, b.bodies, b.field);
+  statistics.dropped_components = dropped.empty;
+  statistics.dropped_spray = dropped.spray;
+  return statistics;
+}
+
+/// Triangles between the crossings of the edges. Leaves positions in world units.
+void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
+  space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  for (Vec3& position : b.positions) position = cell_size * position;
+  space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
+}
+
+// The certificate and the cuts of the quads change the volumes of small bodies. In spacings.
+constexpr int kVolumeRounds = 4;
+constexpr double kVolumeTolerance = .01;
+constexpr double kVolumeLimit = .4;
+
+void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
+  for (std::size_t v = 0; v < b.positions.size(); ++v) {
+    if (b.is_fixed[v] != 0) b.positions[v] = b.anchors[v];
+  }
+}
+
+/// Moves the vertices of bodies whose triangles miss the volume of their particles. World units.
+bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
+  space::BodyVolumes& volumes = b.virtual_plane.volumes;
+  space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
+                          volumes);
+  const double limit = kVolumeLimit * scale.spacing * scale.cell_size;
+  const bool has_moved = space::MatchVolumes(
+      b.bodies, {.limit = limit, .tolerance = kVolumeTolerance}, b.normals, volumes, b.positions);
+  if (has_moved) KeepFixedVertices(b);
+  return has_moved;
+}
+
+/// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
+/// positions in world units.
+absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
+                                SurfaceWorkspace::Buffers& b) {
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
+  space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
+  if (placement == SurfacePlacement::kQef) {
+    space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
+    space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);
+  } else {
+    space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors,
+                         b.virtual_plane, b.positions, b.normals);
+  }
+  KeepFixedVertices(b);
+  for (Vec3& position : b.positions) position = scale.cell_size * position;
+  for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
+  const int rounds = placement == SurfacePlacement::kVirtualPlane ? kVolumeRounds : 0;
+  for (int round = 0;; ++round) {
+    const auto certify = round == 0 ? space::Certify : space::CertifyAgain;
+    if (!certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions, b.certificate)) {
+      return absl::InternalError("a face is refused although its vertices are at their anchors");
+    }
+    space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
+    if (round == rounds || !CorrectVolumes(scale, b)) break;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+SurfaceWorkspace::SurfaceWorkspace() : buffers_(std::make_unique<Buffers>()) {}
+SurfaceWorkspace::~SurfaceWorkspace() = default;
+SurfaceWorkspace::SurfaceWorkspace(SurfaceWorkspace&&) noexcept = default;
+SurfaceWorkspace& SurfaceWorkspace::operator=(SurfaceWorkspace&&) noexcept = default;
+
+SurfaceReconstructor::SurfaceReconstructor(const SurfaceParameters& parameters,
+                                           const FrameLimits& limits)
+    : parameters_(parameters), in_space_(Resolved(parameters)), limits_(limits) {}
+
+absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
+    const SurfaceParameters& parameters, const FrameLimits& limits) {
+  if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
+  if (absl::Status status = Validate(limits); !status.ok()) return status;
+  const double volume = parameters.min_component_volume;
+  if (!(volume >= 0 && std::isfinite(volume))) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(kReasonOutOfRange), "parameters.min_component_volume",
+                           ShortestNumber(volume), "must be 0 or more cubed spacings, and finite"});
+  }
+  return SurfaceReconstructor(parameters, limits);
+}
+
+absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorkspace& workspace,
+                                               Surface& surface) const {
+  surface.Clear();
+  SurfaceWorkspace::Buffers& b = workspace.buffers();
+  absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
+  if (!status.ok() || frame.ParticleCount() == 0) return status;
+  const double cell_size = parameters_.cell_size * parameters_.spacing;
+  const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
+                                LightestVolume(frame, parameters_.spacing));
+  status = space::BinParticles(frame, scale, limits_, b.bins);
+  if (!status.ok()) return status;
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::SampleField(b.bins, scale, b.field);
+  const SurfaceStatistics statistics = FindCleanBodies(frame, parameters_, b);
+  space::FindCrossings(bricks, b.field, b.crossings);
+  space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
+  if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
+    PlaceByMarchingCubes(cell_size, b);
+  } else if (status = PlaceMovedVertices(parameters_.placement, scale, b); !status.ok()) {
+    return status;
+  }
+  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
+                         surface);
+  surface.statistics = statistics;
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,270 @@
+// Surfaces of random signs and of random particles keep S1 to S5.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "partiemc/surface.h"
+#include "space/bodies.h"
+#include "space/cell_loops.h"
+#include "space/certificate.h"
+#include "space/crossings.h"
+#include "space/mesh.h"
+#include "space/space_particles.h"
+#include "space/vertices.h"
+
+namespace partiemc {
+namespace {
+
+using support::Random;
+using testing::RandomSpaceScene;
+using testing::Shuffled;
+using testing::SpaceParticles;
+
+/// More frames than usual, for a longer run: PARTIEMC_SPACE_FRAMES.
+std::uint64_t Frames(std::uint64_t usual) {
+  const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
+  return wanted == nullptr ? usual : std::strtoull(wanted, nullptr, 10);
+}
+
+TEST(CellLoops, CoverEveryCrossingOnce) {
+  for (unsigned corners = 0; corners < 256; ++corners) {
+    const space::CellLoops& loops = space::LoopsOf(corners);
+    unsigned crossed = 0;
+    for (int edge = 0; edge < 12; ++edge) {
+      const int low = space::LowCornerOfEdge(edge);
+      const int high = low | 1 << space::AxisOfEdge(edge);
+      crossed |= ((corners >> low ^ corners >> high) & 1) << edge;
+    }
+    unsigned visited = 0;
+    for (int step = 0; step < loops.Steps(); ++step) {
+      EXPECT_EQ(visited >> loops.edge[step] & 1, 0u);
+      visited |= 1u << loops.edge[step];
+    }
+    EXPECT_EQ(visited, crossed);
+    for (int loop = 0; loop < loops.loops; ++loop) {
+      const int size = loops.first[loop + 1] - loops.first[loop];
+      EXPECT_GE(size, 3);
+      EXPECT_EQ(space::TrianglesOf(corners, loop).count, size - 2) << corners;
+    }
+  }
+}
+
+TEST(CellLoops, MatchAcrossFaces) {
+  for (unsigned corners = 0; corners < 256; ++corners) {
+    const space::CellLoops& loops = space::LoopsOf(corners);
+    for (int step = 0; step < loops.Steps(); ++step) {
+      const int face = loops.face[step];
+      // The mirrored cell has the same corners on the common face.
+      unsigned other = 0;
+      for (int corner = 0; corner < 8; ++corner) {
+        other |= (corners >> (corner ^ 1 << face / 2) & 1) << corner;
+      }
+      const space::CellLoops& across = space::LoopsOf(other);
+      const int from = space::EdgeAcross(loops.edge[loops.Next(step)], face);
+      const int to = space::EdgeAcross(loops.edge[step], face);
+      int found = 0;
+      for (int k = 0; k < across.Steps(); ++k) {
+        found += across.edge[k] == from && across.edge[across.Next(k)] == to &&
+                 across.face[k] == (face ^ 1);
+      }
+      EXPECT_EQ(found, 1);
+    }
+  }
+}
+
+/// Bricks with random values at their inner nodes.
+struct RandomSigns {
+  space::SpaceBins bins;
+  space::SpaceField field;
+  space::SpaceCrossings crossings;
+  space::Bodies bodies;
+
+  explicit RandomSigns(std::uint64_t seed) {
+    Random random(seed);
+    for (int z = 0; z < 2; ++z) {
+      for (int y = 0; y < 2; ++y) {
+        for (int x = 0; x < 2; ++x) bins.bricks.Insert({z, y, x});
+      }
+    }
+    bins.bricks.Seal();
+    bins.cells.assign(8, {});
+    field.values.resize(8);
+    field.inside.resize(8);
+    const double density = random.Uniform(.05, .95);
+    const bool is_even = random.Chance(.2);
+    for (std::uint32_t brick = 0; brick < 8; ++brick) {
+      const auto [bz, by, bx] = bins.bricks[brick];
+      for (int node = 0; node < space::kBrickNodes; ++node) {
+        const space::BrickPlace at{brick, node % 8, node / 8 % 8, node / 64};
+        const int x = 8 * bx + at.i, y = 8 * by + at.j, z = 8 * bz + at.k;
+        const bool is_inner = x > 3 && x < 12 && y > 3 && y < 12 && z > 3 && z < 12;
+        const bool is_inside = is_inner && random.Chance(density);
+        const double size = is_even ? 1 : random.Chance(.1) ? 0 : random.Unit();
+        field.values[brick][node] = static_cast<float>(is_inside ? -size - 1e-3 : size);
+        field.inside[brick][at.k] |= std::uint64_t{is_inside} << at.Bit();
+      }
+    }
+    FindCrossings(bins.bricks, field, crossings);
+    FindBodies({}, bins, field, 1, bodies);
+  }
+};
+
+TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
+  const std::uint64_t frames = Frames(300);
+  for (std::uint64_t seed = 0; seed < frames; ++seed) {
+    const RandomSigns signs(seed);
+    std::vector<Vec3> positions, normals;
+    space::PlaceOnCrossings(signs.bins.bricks, signs.field, signs.crossings, space::kEdgeMargin,
+                            positions);
+    space::MeshScratch scratch;
+    space::EmitMarchingCubes(signs.bins.bricks, signs.crossings, scratch.triangles);
+    space::AverageNormals(positions, scratch.triangles, normals);
+    Surface surface;
+    space::AssembleSurface(
+        {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
+        scratch, surface);
+    const absl::Status status = Validate(surface);
+    ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
+  }
+}
+
+struct Moved {
+  absl::Status status;         // Of Validate.
+  std::uint32_t returned = 0;  // Vertices that were moved back.
+};
+
+/// Moves vertices at random, certifies, and checks the surface. Without the certificate all quads
+/// are cut along faces.
+Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random& random,
+                   bool is_certified = true) {
+  std::vector<Vec3> anchors, normals;
+  const space::BrickDirectory& bricks = signs.bins.bricks;
+  space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
+  std::vector<std::uint8_t> is_fixed;
+  space::MarkFixedVertices(bricks, signs.crossings, is_fixed);
+  std::vector<Vec3> positions = anchors;
+  const auto move = [&](double part) {
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+      if (is_fixed[v] != 0 || !random.Chance(part)) continue;
+      const auto along = [&] { return random.Uniform(-amount, amount); };
+      const double x = along(), y = along();
+      positions[v] = positions[v] + Vec3{x, y, along()};
+    }
+  };
+  move(share);
+  space::Certificate certificate;
+  certificate.modes.resize(signs.crossings.cells.size());
+  if (is_certified) {
+    EXPECT_TRUE(space::Certify(bricks, signs.crossings, 1, anchors, positions, certificate));
+    // Rounds look at bricks around moved vertices only: no face has been missed.
+    const auto refused = [&] {
+      return space::CountRefusedFaces(bricks, signs.crossings, 1, positions, certificate);
+    };
+    EXPECT_EQ(refused(), 0u);
+    move(.02);
+    if (amount > 0) {
+      EXPECT_GT(refused(), 0u);
+    }
+    EXPECT_TRUE(space::CertifyAgain(bricks, signs.crossings, 1, anchors, positions, certificate));
+    EXPECT_EQ(refused(), 0u);
+  }
+  space::MeshScratch scratch;
+  space::EmitQuads(bricks, signs.crossings, certificate, scratch.triangles);
+  space::AverageNormals(positions, scratch.triangles, normals);
+  Surface surface;
+  space::AssembleSurface({bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
+                         scratch, surface);
+  return {Validate(surface), certificate.returned};
+}
+
+TEST(Certificate, KeepsMovedVerticesApart) {
+  const std::uint64_t frames = Frames(60);
+  int intersections = 0;
+  for (std::uint64_t seed = 0; seed < frames; ++seed) {
+    const RandomSigns signs(seed);
+    Random random(seed);
+    // No face is refused at the anchors.
+    const Moved anchored = MoveVertices(signs, 0, 1, random);
+    ASSERT_TRUE(anchored.status.ok()) << anchored.status.message() << ", seed " << seed;
+    ASSERT_EQ(anchored.returned, 0u);
+    for (const auto& [amount, share] : {std::pair(.3, 1.0), {1.5, .2}, {3.0, .05}}) {
+      Random same = random;
+      const Moved moved = MoveVertices(signs, amount, share, random);
+      ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
+      intersections += !MoveVertices(signs, amount, share, same, false).status.ok();
+    }
+  }
+  // The same vertices do intersect without the certificate.
+  EXPECT_GT(intersections, static_cast<int>(frames));
+}
+
+class SpaceFrames : public ::testing::TestWithParam<SurfacePlacement> {};
+
+TEST_P(SpaceFrames, KeepS1ToS5) {
+  const auto plain = SurfaceReconstructor::Create({.placement = GetParam(), .clean = false});
+  const auto cleaned = SurfaceReconstructor::Create(
+      {.placement = GetParam(), .clean = true, .min_component_particles = 3});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  const std::uint64_t frames = Frames(300);
+  std::size_t triangles = 0;
+  for (std::uint64_t seed = 0; seed < frames; ++seed) {
+    const SpaceParticles particles = RandomSpaceScene(seed);
+    Frame frame = particles.AsFrame();
+    const std::vector<float> floats(particles.xyz.begin(), particles.xyz.end());
+    if (seed % 4 == 1) frame.positions = std::span<const float>(floats);
+    const auto& reconstructor = seed % 3 == 0 ? cleaned : plain;
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
+    const absl::Status status = Validate(surface);
+    ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
+    triangles += surface.TriangleCount();
+  }
+  EXPECT_GT(triangles, 500 * frames);
+}
+
+TEST_P(SpaceFrames, HaveTheSameBitsForAnyOrderAndHistory) {
+  const auto reconstructor = SurfaceReconstructor::Create({.placement = GetParam()});
+  Random random(9);
+  SurfaceWorkspace warm;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    const SpaceParticles particles = RandomSpaceScene(seed);
+    SurfaceWorkspace cold;
+    Surface expected;
+    ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), cold, expected).ok());
+    const SpaceParticles shuffled = Shuffled(particles, random);
+    Surface surface;
+    ASSERT_TRUE(reconstructor->Reconstruct(shuffled.AsFrame(), warm, surface).ok());
+    EXPECT_EQ(surface, expected) << seed;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SpaceFrames,
+                         ::testing::Values(SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                                           SurfacePlacement::kVirtualPlane));
+
+TEST(SurfaceReconstructor, RefusesBadInput) {
+  EXPECT_FALSE(SurfaceReconstructor::Create({.spacing = 0}).ok());
+  EXPECT_FALSE(SurfaceReconstructor::Create({.kernel_radius = 9}).ok());
+  EXPECT_FALSE(SurfaceReconstructor::Create({.cell_size = .1}).ok());
+  const auto reconstructor = SurfaceReconstructor::Create({});
+  ASSERT_TRUE(reconstructor.ok());
+  SurfaceWorkspace workspace;
+  Surface surface;
+  SpaceParticles particles;
+  EXPECT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
+  EXPECT_EQ(surface, Surface{});
+  particles.Add({0, 0, std::nan("")});
+  EXPECT_EQ(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).code(),
+            absl::StatusCode::kInvalidArgument);
+  Frame flat = particles.AsFrame();
+  flat.components = 2;
+  EXPECT_EQ(reconstructor->Reconstruct(flat, workspace, surface).code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace partiemc
