@@ -142,18 +142,25 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
                         .deadline = ToMilliseconds(flags.deadline_seconds)});
 }
 
-// Opens the watch; with --wait as soon as the stream exists. While waiting, a server may restart.
-// Errors: those of Watcher::Open; CANCELLED after Ctrl-C.
-absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags) {
+Progress::Options ProgressOptions(const WatchFlags& flags) {
   Progress::Options options = Progress::ForStandardError();
   options.quiet = flags.quiet;
-  Progress progress(std::move(options));
+  if (flags.frames > 0) options.total = flags.frames;
+  return options;
+}
+
+// Opens the watch; with --wait as soon as the stream exists. While waiting, a server may restart.
+// Shows `progress` as soon as there is something to wait for. Errors: those of Watcher::Open;
+// CANCELLED after Ctrl-C.
+absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
+                                                    std::optional<Progress>& progress) {
   for (bool waited = false;; waited = true) {
     auto watcher = OpenWatcher(flags);
     const bool absent =
         absl::IsNotFound(watcher.status()) || (waited && absl::IsUnavailable(watcher.status()));
     if (!flags.wait || !absent) return watcher;
-    progress.Wait(Concat("waiting for the stream to start: ", OneLine(watcher.status())));
+    if (!progress) progress.emplace(ProgressOptions(flags));
+    progress->Wait(Concat("waiting for the stream to start: ", OneLine(watcher.status())));
     for (int k = 0; k < kSearchPause; ++k) {
       if (Interrupted()) return absl::CancelledError("interrupted");
       std::this_thread::sleep_for(kPollInterval);
@@ -274,7 +281,8 @@ int Watch(const WatchFlags& flags) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
-  const auto watcher = OpenOrWait(flags);
+  std::optional<Progress> progress;
+  const auto watcher = OpenOrWait(flags, progress);
   if (absl::IsCancelled(watcher.status())) return Complain(kInterrupted, watcher.status());
   if (!watcher.ok()) return ComplainOfServer(watcher.status());
   std::optional<StreamRecorder> recorder;
@@ -284,20 +292,17 @@ int Watch(const WatchFlags& flags) {
     recorder = *std::move(created);
   }
 
-  Progress::Options progress_options = Progress::ForStandardError();
-  progress_options.quiet = flags.quiet;
-  if (flags.frames > 0) progress_options.total = flags.frames;
-  Progress progress(std::move(progress_options));
+  if (!progress) progress.emplace(ProgressOptions(flags));
   const auto from = ParseFrom(flags.from);
   const auto& held = (*watcher)->stream().held;
   if (from && held && held->oldest_sequence > *from) {
-    progress.Note(Concat("partiemc: frames before ", held->oldest_sequence,
-                         " are no longer in the history; begins there"));
+    progress->Note(Concat("partiemc: frames before ", held->oldest_sequence,
+                          " are no longer in the history; begins there"));
   }
   const Clock::time_point start = Clock::now();
-  const Ended ended = ReceiveAll(flags, **watcher, *outputs, recorder, progress);
+  const Ended ended = ReceiveAll(flags, **watcher, *outputs, recorder, *progress);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  progress.Finish();
+  progress->Finish();
 
   absl::Status finished = outputs->Finish();
   if (finished.ok() && recorder) finished = recorder->Finish();
