@@ -283,8 +283,11 @@ int Watch(const WatchFlags& flags) {
   }
   std::optional<Progress> progress;
   const auto watcher = OpenOrWait(flags, progress);
-  if (absl::IsCancelled(watcher.status())) return Complain(kInterrupted, watcher.status());
-  if (!watcher.ok()) return ComplainOfServer(watcher.status());
+  if (!watcher.ok()) {
+    progress.reset();  // Ends its line.
+    if (absl::IsCancelled(watcher.status())) return Complain(kInterrupted, watcher.status());
+    return ComplainOfServer(watcher.status());
+  }
   std::optional<StreamRecorder> recorder;
   if (!flags.record.empty()) {
     auto created = StreamRecorder::Create(flags.record, flags.stream, (*watcher)->stream());

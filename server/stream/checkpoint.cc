@@ -71,6 +71,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Absent and default values add no bytes, so that checkpoints from before these parameters
   // existed stay valid.
   if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
+    put_small('t');  // Distinguishes it from an isovalue.
     PutNumber(attribute_tolerance, bytes);
   }
   if (isovalue) PutNumber(*isovalue, bytes);

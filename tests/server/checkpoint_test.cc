@@ -174,6 +174,15 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   EXPECT_TRUE(ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr).ok());
 }
 
+TEST(Checkpoint, DistinguishesParametersWithTheSameValue) {
+  ReconstructionParameters tolerant = BlobParameters(), isoline = BlobParameters();
+  tolerant.attribute_tolerance = 0.3;
+  isoline.isovalue = 0.3;
+  const std::string checkpoint = Serialize(1, State{}, tolerant, Terms(), nullptr);
+  EXPECT_EQ(ReasonOf(ParseCheckpoint(checkpoint, isoline, Terms(), nullptr).status()),
+            kReasonCheckpointMismatch);
+}
+
 TEST(Checkpoint, KeepsItsFingerprintOfParameters) {
   constexpr std::size_t kFingerprintAt = 4 * 4 + 32;
   const std::string bytes = Serialize(1, State{}, {.spacing = 1.0}, Terms(), nullptr);

@@ -19,6 +19,15 @@ class PartRefused : public ErrorTable {
     Serve();
   }
 
+  // Waits until parts of at least these bytes have arrived.
+  void WaitUntilHeld(std::uint64_t bytes) {
+    ASSERT_TRUE(Eventually([&] {
+      grpc::ClientContext context;
+      SetDeadline(context);
+      v1::GetServerInfoResponse info;
+      return stub_->GetServerInfo(&context, {}, &info).ok() && info.load().memory_held() >= bytes;
+    }));
+  }
   static void ExpectError(const v1::ReconstructResponse& answer, const std::string& reason,
                           const std::string& message) {
     ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);
@@ -140,13 +149,7 @@ TEST_F(PartRefused, PART_DUPLICATE) {
   ranks.Send(1, 1);
   ranks.Send(1, 1);
   // Part 0 comes after both.
-  const std::uint64_t both = 2 * PartRequest(1, 2, 1, 1, 0, true).ByteSizeLong();
-  EXPECT_TRUE(Eventually([&] {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::GetServerInfoResponse info;
-    return stub_->GetServerInfo(&context, {}, &info).ok() && info.load().memory_held() >= both;
-  }));
+  WaitUntilHeld(2 * PartRequest(1, 2, 1, 1, 0, true).ByteSizeLong());
   ranks.Send(0, 1);
   ranks.ExpectTaken(1, 1);
   ExpectError(ranks[1].Receive(), "PART_DUPLICATE",
@@ -165,11 +168,9 @@ TEST_F(PartRefused, FRAME_BYTES) {
   auto large = PartRequest(1, 3, 1, 1, 0, false);
   large.mutable_frame()->set_positions(std::string(700'000, 'x'));
   ranks[1].Send(large);
-  EXPECT_TRUE(Eventually([&] {
-    ranks[2].Send(large);
-    const auto answer = ranks[2].Receive();
-    return answer.error().reason() == "FRAME_BYTES";
-  }));
+  WaitUntilHeld(700'000);
+  ranks[2].Send(large);
+  EXPECT_EQ(ranks[2].Receive().error().reason(), "FRAME_BYTES");
 }
 
 TEST_F(PartRefused, MALFORMED) {

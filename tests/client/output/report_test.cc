@@ -145,9 +145,9 @@ Decoded Decode(const std::string& bytes) {
     points(section_points, out.section_points);
   }
   const auto shares = [&reader] {
-    std::vector<std::uint8_t> bytes;
-    for (std::uint64_t count = reader.Count(); count > 0; --count) bytes.push_back(reader.Byte());
-    return bytes;
+    std::vector<std::uint8_t> all;
+    for (std::uint64_t count = reader.Count(); count > 0; --count) all.push_back(reader.Byte());
+    return all;
   };
   for (std::uint64_t channels = reader.Count(); channels > 0; --channels) {
     out.colors.push_back(shares());
@@ -211,7 +211,7 @@ TEST(Report, RefersToNoOtherResource) {
   const std::string name = "http://www.w3.org/2000/svg";
   for (std::size_t at; (at = page.find(name)) != std::string::npos;) page.erase(at, name.size());
   for (const char* reference :
-       {"http://", "https://", " src=", "href=", "@import", "url(", "//cdn"}) {
+       {"http://", "https://", " src=", " href=", "@import", "url(", "//cdn"}) {
     EXPECT_THAT(page, Not(HasSubstr(reference)));
   }
   EXPECT_THAT(page, HasSubstr("default-src 'none'"));
