@@ -88,7 +88,7 @@ struct ServerOptions {
   /// Limits of the connections of `address`.
   ConnectionLimits connections;
   /// Maximum received bytes of a connection that belong to no call and no message. A connection
-  /// that exceeds it is cut. 0: no limit, also none for its streams and headers.
+  /// that exceeds it is cut. 0 disables this limit and those for its streams and headers.
   std::uint64_t unaccounted_bytes = ConnectionRules{}.unaccounted_bytes;
   Keepalive keepalive;
 };

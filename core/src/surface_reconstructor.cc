@@ -87,7 +87,7 @@ double LightestVolume(const Frame& frame, double spacing) {
 // Smaller cavities are dents of the level set, not voids of the fluid (core/METHOD.md, "Cleaning").
 constexpr double kMinCavityParticles = 2;
 
-/// Finds the bodies. Drops what parameters ask for.
+/// Finds the bodies. Drops the cavities and bodies that `parameters` exclude.
 SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& parameters,
                                   SurfaceWorkspace::Buffers& b) {
   SurfaceStatistics statistics;

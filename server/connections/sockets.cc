@@ -105,7 +105,10 @@ absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
     SocketAddress one;
     std::memcpy(&one.storage, next->ai_addr, next->ai_addrlen);
     one.size = next->ai_addrlen;
-    all.push_back(one);
+    const bool is_known = std::ranges::any_of(all, [&](const SocketAddress& known) {
+      return std::memcmp(&known.storage, &one.storage, sizeof(one.storage)) == 0;
+    });
+    if (!is_known) all.push_back(one);
   }
   return all;
 }
@@ -148,7 +151,8 @@ absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::millisec
     if (listeners.port != 0) candidate.set_port(listeners.port);
     auto socket = Listen(candidate, dead_after);
     if (!socket.ok()) {
-      if (absl::IsAlreadyExists(socket.status())) return socket.status();
+      // With port 0, another program may have the port on the second address.
+      if (address.port != 0 && absl::IsAlreadyExists(socket.status())) return socket.status();
       error.Update(socket.status());
       continue;
     }

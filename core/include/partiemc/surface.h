@@ -40,8 +40,9 @@ struct SurfaceStatistics {
 ///   S1 every edge has exactly two triangles, which run along it in opposite directions;
 ///   S2 the triangles around each point form one cycle; each point has triangles of one shell;
 ///   S3 triangles intersect only in their common points and edges; none is degenerate;
-///   S4 triangles are counter-clockwise seen from outside the body; outer shells lie in nothing or
-///      in a cavity, and each cavity lies directly in the shell that `outer_of` gives;
+///   S4 triangles are counter-clockwise seen from outside the body; no shell encloses
+///      an outer shell, or a cavity does directly, and each cavity lies directly in the shell that
+///      `outer_of` gives;
 ///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
 ///      centroids are those of the triangles.
 struct Surface {
@@ -121,7 +122,9 @@ class SurfaceReconstructor {
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
   /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// Errors with a Violation: those of Reconstructor. `surface` is then empty.
+  /// Errors with a Violation: those of Reconstructor, without memory guard and cancellation.
+  /// `surface` is then empty. After an exception (std::bad_alloc) surface and workspace must be
+  /// replaced.
   absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
 
  private:

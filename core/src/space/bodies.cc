@@ -108,8 +108,8 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   }
 }
 
-// Layers of nodes around the cell of a particle that may have its body: of a small drop, most
-// particles lie outside of the cells with inside nodes.
+// Search distance from a particle to its body, in layers of nodes. Most particles of a small drop
+// lie in cells without inside nodes.
 constexpr int kMostLayers = 2;
 
 /// The nearest inside node among the corners of the cell of a particle and `layers` layers around

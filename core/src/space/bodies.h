@@ -28,7 +28,7 @@ struct Bodies {
   struct Part {
     BrickBits nodes;
     std::uint32_t brick;
-    std::uint32_t body;  // While parts are joined: another part of it.
+    std::uint32_t body;  // Index of the body; in JoinParts: the parent part.
   };
   std::vector<Part> parts;             ///< By brick.
   std::vector<std::uint32_t> first;    ///< Per brick: its first part, and the number of all parts.

@@ -51,7 +51,7 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
 struct VolumeStep {
   double unit = 1;       ///< Length of the unit of positions, in world units.
   double limit = 0;      ///< Longest offset, in units.
-  double tolerance = 0;  ///< Bodies whose relative error is not larger stay.
+  double tolerance = 0;  ///< Relative error up to which a body is not moved.
 };
 
 /// Moves the vertices of each body along their normals by one offset: (volume of its particles -

@@ -1,4 +1,4 @@
-// Windows on the surface: the loops near a loop that near loops connect to it.
+// Windows: for each loop, the loops within a distance that are connected to it through such loops.
 //
 // A loop is the index of a vertex in a cell, minus `edge_count`. Two loops are linked if a curve on
 // a face belongs to both.
@@ -27,7 +27,7 @@ struct LoopWindows {
     std::vector<std::uint32_t> first, loops;
     std::vector<std::uint32_t> slots;  ///< Scratch: open addressing.
   };
-  std::vector<Chunk> chunks;  ///< May have more than there are; keeps their memory.
+  std::vector<Chunk> chunks;  ///< The first ones are in use; later ones keep their memory.
   std::size_t loop_count = 0;
 
   std::vector<std::uint32_t> link_first, links;  ///< By loop: loops across its faces.

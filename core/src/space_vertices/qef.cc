@@ -23,7 +23,7 @@ Vec3 Solve(const Symmetric& a, const Vec3& b) {
   return inverse * (b.x * yz + b.y * zx + b.z * xy);
 }
 
-/// The direction of the gradient at each crossing; along the edge if there is none.
+/// The direction of the gradient at each crossing. Without a gradient: along the edge, outward.
 void FindEdgeNormals(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                      const std::vector<Vec3>& positions, std::vector<Vec3>& normals) {
   ParallelFor(static_cast<std::uint32_t>(bins.bricks.size()), [&](std::uint32_t brick) {
@@ -34,10 +34,12 @@ void FindEdgeNormals(const SpaceBins& bins, const Scale& scale, const SpaceCross
       sampler.MoveTo(brick, {{x, y, z},
                              {x + static_cast<float>(axis == 0), y + static_cast<float>(axis == 1),
                               z + static_cast<float>(axis == 2)}});
-      const Vec3 normal = Normalised(sampler.Sample(positions[v] - origin).gradient);
-      normals[v] = normal == Vec3{}
-                       ? Vec3{axis == 0 ? 1.0 : 0, axis == 1 ? 1.0 : 0, axis == 2 ? 1.0 : 0}
-                       : normal;
+      normals[v] = Normalised(sampler.Sample(positions[v] - origin).gradient);
+      if (normals[v] != Vec3{}) return;
+      const Vec3 lower{x, y, z};
+      const Vec3 along{axis == 0 ? 1.0 : 0, axis == 1 ? 1.0 : 0, axis == 2 ? 1.0 : 0};
+      const bool rises = sampler.Sample(lower).value <= sampler.Sample(lower + along).value;
+      normals[v] = (rises ? 1.0 : -1.0) * along;
     });
   });
 }

@@ -1,4 +1,4 @@
-// The default placement: vertices on smoothed planes (core/SURFACES.md, "Placements").
+// The most accurate placement: vertices on smoothed planes (core/SURFACES.md, "Placements").
 #pragma once
 
 #include <vector>

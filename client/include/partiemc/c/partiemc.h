@@ -116,7 +116,8 @@ typedef struct partiemc_options {
                                        (partiemc_event_section). Each costs like a frame. */
   size_t section_count;
   double attribute_tolerance; /* Largest error of attributes across triangles of "greedy", a
-                                 fraction of their range, at most 1; 0: the default, .01. */
+                                 fraction of their range, at most 1. 0: the default, .01; for
+                                 the finest mesh set a tiny number, such as 1e-9. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
