@@ -273,6 +273,14 @@ TEST(AttributeMeshes, OfAConstantHaveAFewLargeBlocks) {
   EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus());
 }
 
+// The square root of 2 is no float, so sums of lengths round.
+TEST(AttributeMeshes, OfAConstantVectorAreThoseOfAConstant) {
+  Body body([](double, double) { return 1.0; });
+  const Result scalar = MeshOf(body);
+  body.values.insert(body.values.end(), body.values.begin(), body.values.end());
+  EXPECT_EQ(MeshOf(body).mesh, scalar.mesh);
+}
+
 TEST(AttributeMeshes, WithToleranceOneAreThoseWithoutAttributes) {
   const Body body([](double x, double y) { return std::sin(x / 7) + y; });
   const Result with = MeshOf(body, {.attribute_tolerance = 1});

@@ -176,6 +176,46 @@ TEST(GaugesTest, ContactAnglesAreWithinFiveDegrees) {
   }
 }
 
+// Liquid between two vertical walls. The surface rises to both by an arc with a radius of 20.
+TEST(GaugesTest, ContactAnglesOfAMeniscusAreWithinFiveDegrees) {
+  for (const double degrees : {40, 60, 75}) {
+    const double angle = degrees * std::numbers::pi / 180;
+    const double half_width = 20 * std::cos(angle), centre = 20 + 20 * std::sin(angle);
+    Random random(4);
+    Particles liquid;
+    for (int j = 0; j < 60; ++j) {
+      for (int i = 0; i < static_cast<int>(2 * half_width); ++i) {
+        const double x = i + 0.5 - half_width + random.Uniform(-0.05, 0.05);
+        const double y = j + 0.5 + random.Uniform(-0.05, 0.05);
+        if (y < centre && std::hypot(x, y - centre) > 20) liquid.Add(x, y);
+      }
+    }
+    // The wall on the left runs down, so that the liquid is on its left; its start is the surface.
+    const Gauge gauge{
+        .name = "c", .kind = GaugeKind::kContact, .numbers = {-half_width, 0, 0, -1, half_width}};
+    const std::vector<double> values = Measure(gauge, ResultOf(liquid, 1));
+    EXPECT_NEAR(values[0], degrees, 5);
+    EXPECT_NEAR(values[2], -20, 1);
+  }
+}
+
+TEST(GaugesTest, ABoxInAHoleIsEmpty) {
+  Result ring;
+  std::vector<double> outer, hole;
+  for (int k = 0; k < 64; ++k) {
+    const double angle = k * std::numbers::pi / 32;
+    for (auto* const points : {&outer, &hole}) {
+      const double radius = points == &outer ? 1 : 0.5, turn = points == &outer ? 1 : -1;
+      points->push_back(0.0137 + radius * std::cos(turn * angle));
+      points->push_back(0.0291 + radius * std::sin(turn * angle));
+    }
+  }
+  AddRing(ring, outer, kNoRing, std::numbers::pi);
+  AddRing(ring, hole, 0, -std::numbers::pi / 4);
+  EXPECT_THAT(Reading("b=box:.1,.1,.3,.3", ring), ElementsAre(0, IsNan(), IsNan()));
+  EXPECT_THAT(Reading("b=box:-.07,-.13,.11,.17", ring), ElementsAre(0, IsNan(), IsNan()));
+}
+
 TEST(GaugesTest, AnglesOfReposeAreWithinTwoDegrees) {
   for (const double degrees : {15, 25, 35}) {
     const double slope = std::tan(degrees * std::numbers::pi / 180);

@@ -19,7 +19,9 @@ constexpr double kRoundedSpacings = 1;
 constexpr int kSurfaceSamples = 200;
 constexpr double kFlankFrom = 0.2, kFlankTo = 0.8;
 
-double Degrees(double radians) { return radians * (180 / 3.141592653589793); }
+constexpr double kPi = 3.141592653589793;
+
+double Degrees(double radians) { return radians * (180 / kPi); }
 
 // The outer ring with the largest area.
 std::optional<std::size_t> LargestRing(const Rings& rings) {
@@ -43,22 +45,24 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
     if (p.y >= rounded) arc.push_back(p);
   }
   if (arc.empty()) return {};
-  const Point foot = *std::ranges::min_element(
-      arc, {}, [&](const Point& p) { return std::pair(p.y, first * p.x); });
-  // The lowest point on the searched side of the body.
-  Point side = foot;
-  const Point top = *std::ranges::max_element(arc, {}, &Point::y);
+  // The outermost of the points next to the wall.
+  const double lowest = std::ranges::min(arc, {}, &Point::y).y;
+  Point side{first * INFINITY, 0};
   for (const Point& p : arc) {
-    if (first * (p.x - top.x) < 0 && (first * (side.x - top.x) >= 0 || p.y < side.y)) side = p;
+    if (p.y <= lowest + rounded && first * p.x < first * side.x) side = p;
   }
   std::erase_if(arc,
                 [&](const Point& p) { return std::hypot(p.x - side.x, p.y - side.y) > reach; });
   const std::optional<Circle> circle = FitCircle(arc);
   if (!circle || std::abs(circle->centre.y) > circle->radius) return {};
-  // cos(angle) = -height of the centre / radius; the wall cuts the circle at +-radius sin(angle).
-  const double cosine = -circle->centre.y / circle->radius;
-  return {.place = circle->centre.x - first * circle->radius * std::sqrt(1 - cosine * cosine),
-          .angle = Degrees(std::acos(cosine))};
+  // The wall cuts the circle at +-radius sin(angle). For a drop, the centre is on the body's side
+  // of the contact, and cos(angle) = -height of the centre / radius. For a meniscus, it is on the
+  // other side, and the angle is the supplement.
+  const double angle = std::acos(-circle->centre.y / circle->radius);
+  const bool is_meniscus = first * (circle->centre.x - side.x) < 0;
+  const int toward_contact = is_meniscus ? first : -first;
+  return {.place = circle->centre.x + toward_contact * circle->radius * std::sin(angle),
+          .angle = Degrees(is_meniscus ? kPi - angle : angle)};
 }
 
 }  // namespace

@@ -33,6 +33,7 @@ BoxArea AreaInBox(const Rings& rings, const Point& min, const Point& max) {
   // Sums relative to the middle of the box, which loses no digits far from the origin.
   const Point middle{min.x + (max.x - min.x) / 2, min.y + (max.y - min.y) / 2};
   double twice_area = 0, moment_x = 0, moment_y = 0;
+  double magnitude = 0;  // Of the terms of twice_area.
   std::vector<Point> polygon, clipped;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::span<const double> points = rings.RingPoints(ring);
@@ -48,11 +49,14 @@ BoxArea AreaInBox(const Rings& rings, const Point& min, const Point& max) {
       const Point a{from.x - middle.x, from.y - middle.y}, b{to.x - middle.x, to.y - middle.y};
       const double cross = a.x * b.y - b.x * a.y;
       twice_area += cross;
+      magnitude += std::abs(cross);
       moment_x += (a.x + b.x) * cross;
       moment_y += (a.y + b.y) * cross;
     }
   }
-  if (twice_area == 0) return {.area = 0, .centroid = {NAN, NAN}};
+  // A box in a hole has parts that cancel, except for rounding.
+  constexpr double kRounding = 1e-14;
+  if (std::abs(twice_area) <= kRounding * magnitude) return {.area = 0, .centroid = {NAN, NAN}};
   return {
       .area = twice_area / 2,
       .centroid = {middle.x + moment_x / (3 * twice_area), middle.y + moment_y / (3 * twice_area)}};

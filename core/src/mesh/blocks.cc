@@ -242,7 +242,7 @@ void SumWindows(const AttributeSource& attributes, Blocks& blocks) {
 void FindTolerances(const AttributeSource& attributes, std::vector<double>& tolerances) {
   tolerances.clear();
   for (const Attribute& attribute : attributes.frame.attributes) {
-    double range = 0;
+    double range = 0, largest = 0;
     for (int c = 0; c < attribute.components; ++c) {
       double least = INFINITY, most = -INFINITY;
       for (std::size_t k = c; k < attribute.values.size(); k += attribute.components) {
@@ -250,9 +250,12 @@ void FindTolerances(const AttributeSource& attributes, std::vector<double>& tole
         most = std::max<double>(most, attribute.values[k]);
       }
       range = std::max(range, most - least);
+      largest = std::max({largest, std::abs(least), std::abs(most)});
     }
-    tolerances.insert(tolerances.end(), PartsOf(attribute.components),
-                      attributes.tolerance * range);
+    // Sums round, and values are floats: a constant must not look rough.
+    constexpr double kRounding = 0x1p-22;
+    const double tolerance = std::max(attributes.tolerance * range, kRounding * largest);
+    tolerances.insert(tolerances.end(), PartsOf(attribute.components), tolerance);
   }
 }
 
