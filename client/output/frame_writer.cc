@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <span>
 #include <system_error>
 #include <utility>
 
@@ -24,6 +26,12 @@ constexpr std::array kFormats = {
 #endif
     FrameFormat::kCsv,     FrameFormat::kPly, FrameFormat::kStl, FrameFormat::kGlb,
 };
+
+// Whether coordinates, and their differences, are finite as 32-bit floats.
+bool AreFloats(std::span<const double> points) {
+  return std::ranges::all_of(
+      points, [](double x) { return std::abs(x) < std::numeric_limits<float>::max() / 2; });
+}
 
 bool AllFinite(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(),
@@ -91,6 +99,11 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
     return absl::DataLossError(Concat("frame ", frame.index,
                                       ": a coordinate of the result is not finite; "
                                       "reconstruct it again with --check"));
+  }
+  const bool has_floats = format == FrameFormat::kStl || format == FrameFormat::kGlb;
+  if (has_floats && !AreFloats(frame.result.rings.points)) {
+    return absl::OutOfRangeError(Concat("frame ", frame.index, ": coordinates above 3.4e38; ",
+                                        Name(format), " has 32-bit floats"));
   }
   switch (format) {
     case FrameFormat::kGeoJson:

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "absl/strings/ascii.h"
 #include "client/output/formats.h"
@@ -146,13 +147,15 @@ std::string EncodePly(const FrameRecord& frame) {
                            "\ncomment time ", frame.time, "\nelement vertex ", vertices.Count(),
                            "\nproperty double x\nproperty double y\nproperty double z\n");
   std::vector<const AttributeValues*> attributes;
+  std::set<std::string> used = {"x", "y", "z"};
   for (const AttributeValues& one : frame.result.attributes) {
     if (!vertices.have_attributes) break;
     attributes.push_back(&one);
     for (int c = 0; c < one.components; ++c) {
-      AppendAll(out, "property float ", PlyName(one.name));
-      if (one.components > 1) AppendAll(out, "_", c);
-      out += '\n';
+      std::string name = PlyName(one.name);
+      if (one.components > 1) AppendAll(name, "_", c);
+      while (!used.insert(name).second) name += '_';
+      AppendAll(out, "property float ", name, "\n");
     }
   }
   const std::vector<std::uint32_t> sides =

@@ -41,6 +41,9 @@ class BgeoReader final : public OneFrameReader {
     if (points > kMaxParticles) {
       return Error(Concat("declares ", points, " points; at most ", kMaxParticles));
     }
+    if (attributes > kMaxBgeoWords) {
+      return Error(Concat("declares ", attributes, " attributes; at most ", kMaxBgeoWords));
+    }
     std::vector<Attribute> layout = {{"position", 3, 0, false}};
     std::size_t words = 4;  // x, y, z, w.
     for (std::uint64_t k = 0; k < attributes; ++k) {

@@ -18,6 +18,7 @@ namespace {
 constexpr std::size_t kMaxListed = 12;  // Datasets in a message.
 constexpr std::size_t kMaxVtkArrays = std::size_t{1} << 20;
 constexpr std::size_t kMaxVisited = 10000;  // Objects that are searched for them.
+constexpr std::ptrdiff_t kMostLevels = 8;   // Groups in groups.
 
 std::string JoinPath(std::string_view group, std::string_view name) {
   return group.empty() ? std::string(name) : Concat(group, "/", name);
@@ -294,6 +295,8 @@ class Hdf5Survey {
   std::string Listed() const {
     std::vector<std::string> found, queue = {""};
     for (std::size_t k = 0; k < queue.size() && queue.size() < kMaxVisited; ++k) {
+      // Hard links can form cycles.
+      if (std::ranges::count(queue[k], '/') > kMostLevels) continue;
       if (!queue[k].empty() && file_.Describe(queue[k])) found.push_back(queue[k]);
       if (found.size() == kMaxListed) return Concat(absl::StrJoin(found, ", "), ", ...");
       for (const std::string& name : file_.Members(queue[k])) {

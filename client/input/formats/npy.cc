@@ -109,12 +109,12 @@ class TypeParser {
     }
     const char kind = type[digits - 1];
     const auto known = ElementTypeOf(kind, *size);
-    if (known) {
+    if (known && (count <= kMaxArrayComponents || !header.structured)) {
       const bool big = type.front() == '>';
       const bool native = type.front() == '|' || type.front() == '=';
       const bool swapped = !native && big != (std::endian::native == std::endian::big);
       header.fields.push_back({field_name, *known, swapped, count, header.element_bytes});
-    } else if (!header.structured) {
+    } else if (!known && !header.structured) {
       return NotPlain(name_, Concat("has elements of type '", shown, "'"),
                       "save float32, float64 or integers");
     }

@@ -11,6 +11,8 @@
 namespace partiemc::client::input {
 namespace {
 
+constexpr std::size_t kMaxColumns = 65'536;
+
 struct NamedArray {
   ZipEntry entry;
   std::string name;
@@ -51,6 +53,9 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
     const std::vector<std::string> names = NpyTable(array.header, array.name, {}).names;
     array.column_count = names.size();
     table.column_names.insert(table.column_names.end(), names.begin(), names.end());
+    if (table.column_names.size() > kMaxColumns) {
+      return absl::DataLossError(Concat(path, ": has more than ", kMaxColumns, " columns"));
+    }
     table.arrays.push_back(std::move(array));
   }
   return table;

@@ -15,6 +15,7 @@ namespace {
 
 // More values are no description of arrays. Bounds the memory of a small hostile file.
 constexpr std::size_t kMaxPickleValues = std::size_t{1} << 20;
+constexpr std::size_t kMaxNameBytes = 1 << 16;
 
 using Kind = PickleValue::Kind;
 
@@ -44,7 +45,7 @@ class PickleMachine {
 
   absl::Status Run() {
     while (true) {
-      if (pickle_.values_.size() > kMaxPickleValues || stack_.size() > kMaxPickleValues) {
+      if (std::max({pickle_.values_.size(), stack_.size(), memo_.size()}) > kMaxPickleValues) {
         return Damaged("has more than a million values");
       }
       const std::size_t at = pickle_.bytes_.size() - rest_.size();
@@ -70,6 +71,13 @@ class PickleMachine {
 
   absl::Status Damaged(std::string_view what) const {
     return absl::DataLossError(Concat(name_, ": its pickle ", what));
+  }
+
+  // Counts bytes that operations make from other values, which may be named any number of times.
+  // False if they are more than the pickle itself has, and a few names.
+  bool MayMake(std::size_t bytes) {
+    made_bytes_ += bytes;
+    return made_bytes_ <= pickle_.bytes_.size() + kMaxNameBytes;
   }
 
   std::optional<std::string_view> Bytes(std::uint64_t count) {
@@ -114,7 +122,7 @@ class PickleMachine {
   }
 
   Outcome PushGlobal(std::optional<std::string_view> module, std::optional<std::string_view> name) {
-    if (!module || !name) return Outcome::kBroken;
+    if (!module || !name || !MayMake(module->size() + name->size() + 1)) return Outcome::kBroken;
     pickle_.texts_.push_back(Concat(*module, ".", *name));
     return Push({.kind = Kind::kGlobal, .text = pickle_.texts_.back()});
   }
@@ -216,6 +224,7 @@ class PickleMachine {
 
   // Bytes that protocol 2 stores as the text of their Latin-1 characters, in UTF-8.
   Outcome PushLatin1(std::string_view text) {
+    if (!MayMake(text.size())) return Outcome::kBroken;
     std::string bytes;
     for (std::size_t k = 0; k < text.size(); ++k) {
       const auto lead = static_cast<unsigned char>(text[k]);
@@ -251,6 +260,7 @@ class PickleMachine {
       target.big_endian = items[1]->text == ">" || (items[1]->text != "<" && kBigEndianMachine);
     }
     if (target.kind == Kind::kArray && items.size() == 5) {
+      if (!MayMake(items[1]->items.size() * sizeof(std::uint64_t))) return Outcome::kBroken;
       target.shape.clear();
       for (const PickleValue* const extent : items[1]->items) {
         const auto count = IdOfNumber(extent->number);
@@ -383,6 +393,7 @@ class PickleMachine {
   const std::string& name_;
   std::vector<PickleValue*> stack_;  // A mark is null.
   std::map<std::uint64_t, PickleValue*> memo_;
+  std::size_t made_bytes_ = 0;
 };
 
 const PickleValue* PickleValue::Find(std::string_view key) const {

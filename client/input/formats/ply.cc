@@ -199,6 +199,8 @@ class PlyReader final : public OneFrameReader {
           const auto skipped = Skip(ElementBytes(*property.length));
           if (!skipped.ok()) return skipped.status();
         }
+        constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 60;  // Products do not overflow.
+        if (length > kMostBytes) return EndsEarly(element, k);
         const auto skipped = Skip(length * ElementBytes(property.type));
         if (!skipped.ok()) return skipped.status();
         if (!*skipped) return EndsEarly(element, k);

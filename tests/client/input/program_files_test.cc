@@ -144,6 +144,24 @@ TEST(Pickle, BrokenOnesAreRefused) {
                 {"a million values"});
 }
 
+// Small pickles that name the same values again and again.
+TEST(Pickle, MemoryIsBoundedByTheFile) {
+  using namespace std::string_literals;
+  std::string doubling = "X\x01\0\0\0A\x94"s;
+  for (char k = 0; k < 40; ++k) doubling += "h"s + k + "h"s + k + "\x93\x94"s;
+  std::string copies = "X\0\0\x10\0"s + std::string(1 << 20, 'a') +
+                       "\x94\x85\x94"
+                       "c_codecs\nencode\n\x94"s;
+  for (int k = 0; k < 1000; ++k) copies += "h\x02h\x01R0"s;
+  std::string extents = "(cnumpy.core.multiarray\n_reconstruct\n)R\x94("s;
+  for (int k = 0; k < 1000; ++k) extents += "K\x01";
+  extents += "t\x94"s;
+  for (int k = 0; k < 1000; ++k) extents += "h\x00(Nh\x01NNNtb0"s;
+  for (const std::string& bytes : {doubling, copies, extents}) {
+    EXPECT_EQ(Parse(bytes).status().code(), absl::StatusCode::kDataLoss);
+  }
+}
+
 TEST(Collection, FilesAreOrderedByTimeAndRelativeToTheCollection) {
   const support::TemporaryFolder directory;
   directory.Write("b.csv", "x,y\n1,2\n");
