@@ -166,7 +166,7 @@ TEST(Collection, FilesAreOrderedByTimeAndRelativeToTheCollection) {
   const support::TemporaryFolder directory;
   directory.Write("b.csv", "x,y\n1,2\n");
   directory.Write("a & c.csv", "x,y\n3,4\n");
-  for (const std::string path :
+  for (const std::string& path :
        {directory.Write("all.pvd",
                         "<VTKFile type=\"Collection\"><Collection>\n"
                         "<!-- <DataSet timestep=\"9\" file=\"gone.csv\"/> -->\n"

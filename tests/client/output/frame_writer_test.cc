@@ -507,6 +507,26 @@ TEST(Ply, WithoutAMeshTheRingsAreEdges) {
   EXPECT_EQ(ply.size(), ply.find("end_header\n") + 11 + 11 * 24 + 11 * 8);
 }
 
+TEST(Ply, NamesOfPropertiesAreUnique) {
+  Result result = SquareWithHoleAndIsland();
+  const std::vector<float> values(result.mesh.PointCount(), 1);
+  result.attributes = {{"y", 1, values}, {"a.b", 1, values}, {"a_b", 1, values}};
+  const std::string ply = Encode(FrameFormat::kPly, {.result = result});
+  for (const char* name : {"float y_\n", "float a_b\n", "float a_b_\n"}) {
+    EXPECT_THAT(ply, HasSubstr(name));
+  }
+}
+
+TEST(Glb, CoordinatesBeyondFloatsAreRefused) {
+  Result result = SquareWithHoleAndIsland();
+  for (double& coordinate : result.rings.points) coordinate *= 1e40;
+  result.mesh = {};
+  for (const FrameFormat format : {FrameFormat::kGlb, FrameFormat::kStl}) {
+    EXPECT_EQ(EncodeFrame(format, {.result = result}, {}).status().code(),
+              absl::StatusCode::kOutOfRange);
+  }
+}
+
 TEST(Stl, HasOneRecordForEachTriangle) {
   const Result result = SquareWithHoleAndIsland();
   const std::string stl = Encode(FrameFormat::kStl, {.result = result});
