@@ -83,5 +83,13 @@ test('isolines of 2D particles are drawn together', () => {
   const outlines = outlinesOf(create(ReconstructionParametersSchema, { sections: [{ isovalue: 0.3 }, { isovalue: 0.7 }] }));
   assert.deepEqual(outlines.map(outlineName), ['Outline', 'isovalue 0.3', 'isovalue 0.7']);
   assert.deepEqual(pictureOf(frame, outlines, 0).isolines.map(({ index }) => index), [1, 2]);
-  assert.notEqual(pictureOf(frame, outlines, 1).particles, null);
+  const [x, y] = frame.origin;
+  for (const shown of [1, 2]) {
+    const picture = pictureOf(frame, outlines, shown);
+    assert.notDeepEqual(picture.origin, frame.origin, 'each outline has an origin of its own');
+    assert.deepEqual(
+      [...picture.particles ?? []].map((part, k) => part + picture.origin[k % 2]),
+      [...frame.particles ?? []].map((part, k) => part + [x, y][k % 2]), 'the particles stay in place');
+    assert.equal(picture.particleAttributes, frame.particleAttributes);
+  }
 });

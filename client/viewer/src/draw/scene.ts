@@ -184,10 +184,11 @@ export class Scene {
   private get colourRange(): Range | null {
     if (!this.range) return null;
     const { min, max } = this.fixedRange ?? this.range;
-    return { min: this.look.from ?? min, max: this.look.to ?? max };
+    const chosen = { min: this.look.from ?? min, max: this.look.to ?? max };
+    return chosen.min < chosen.max ? chosen : { min, max };
   }
 
-  /** Numbers of the mesh, which include those of the rings, or of the rings alone, and of the particles. */
+  /** The attribute's values: of the mesh (or of the rings, without a mesh), and of the particles. */
   private attributes(): Float32Array[] {
     const name = attributeOf(this.look);
     if (name === null || !this.frame) return [];

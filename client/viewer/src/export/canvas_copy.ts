@@ -1,7 +1,7 @@
 import type { Scene } from '../draw/scene';
 import { drawMarks, type Mark } from './marks';
 
-/** What an export reads of a scene. */
+/** The members of a scene that exports use. */
 export type Drawn = Pick<Scene, 'draw' | 'drawn' | 'canvas' | 'size'>;
 
 /** The last drawing of a scene with its marks, on a canvas of its own. */

@@ -16,7 +16,7 @@ export interface Clip {
   stop(): Promise<Blob>;
 }
 
-/** `marks`: on each picture, as of then. Throws without WebGL. */
+/** `marks`: returns the marks of the current picture; called for every picture. Throws without WebGL. */
 export function clip(scene: Drawn, marks: () => readonly Mark[]): Clip {
   const copy = new CanvasCopy(scene, marks);
   const { canvas } = copy;
@@ -31,13 +31,14 @@ export function clip(scene: Drawn, marks: () => readonly Mark[]): Clip {
       parts = [];
       scene.draw();
       copy.update();
-      scene.drawn = () => copy.update();
-      recorder = new MediaRecorder(canvas.captureStream(), {
+      const begun = new MediaRecorder(canvas.captureStream(), {
         mimeType: format,
         videoBitsPerSecond: Math.max(FEWEST_BITS, BITS_PER_PIXEL * canvas.width * canvas.height),
       });
-      recorder.ondataavailable = (event) => parts.push(event.data);
-      recorder.start();
+      begun.ondataavailable = (event) => parts.push(event.data);
+      begun.start();
+      recorder = begun;
+      scene.drawn = () => copy.update();
     },
     stop() {
       const running = recorder;

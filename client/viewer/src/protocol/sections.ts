@@ -58,7 +58,17 @@ export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: num
   if (base === 0) return { ...frame, isolines };
   // Particles lie around the plane of the stream's own outline.
   const isOwnPlane = shiftBetween(outlines[0]?.plane, outlines[base]?.plane)?.every((part) => part === 0);
-  return { ...all[base], particles: isOwnPlane ? frame.particles : null, sections, isolines };
+  return {
+    ...all[base], sections, isolines,
+    particles: isOwnPlane ? moved(frame.particles, frame.origin, all[base].origin) : null,
+    particleAttributes: isOwnPlane ? frame.particleAttributes : null,
+  };
+}
+
+/** Points relative to the origin `from`, relative to the origin `to`. */
+function moved(points: Float32Array | null, from: [number, number], to: [number, number]): Float32Array | null {
+  const shift = [from[0] - to[0], from[1] - to[1]];
+  return points && points.map((value, k) => value + shift[k % 2]);
 }
 
 /**

@@ -67,7 +67,7 @@ class Report {
       this.curves.setDark(dark);
     });
     const { color, colorRanges } = this.track;
-    this.look.setAttributes([...colorRanges.keys()]);
+    this.look.setAttributes([...colorRanges.keys()], null);
     this.look.setColour(colorRanges.has(color) ? color : 'plain');
     this.look.toggle('edges');
     this.listen();

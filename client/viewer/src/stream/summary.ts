@@ -16,7 +16,7 @@ export function ringCounts(areas: readonly number[]): { rings: number; holes: nu
   return { rings: areas.length - holes, holes };
 }
 
-/** Figures of a frame that is no entry of a history: of other settings, or of a section. */
+/** Computes the figures of a frame outside the history: a frame with other settings, or a section. */
 export function summaryOf({ statistics, rings }: Frame): Summary {
   const { area, triangles, trianglesGrid, milliseconds } = statistics;
   return {

@@ -265,7 +265,7 @@ export class App {
 
   private refreshPanels(now: number): void {
     const pane: Pane | null = this.stage.chosen;
-    this.look.setAttributes(pane?.scene.channels ?? []);
+    this.look.setAttributes(pane?.scene.channels ?? [], this.track);
     this.look.offer(pane?.frame ?? null, this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
     this.exports.offer(pane?.scene.hasWebgl ?? true);
     this.look.setOutlines(pane?.outlines ?? []);

@@ -15,7 +15,7 @@ export const NO_PICTURE = 'No picture yet. Choose a stream or drop files.';
 
 /** Exports the picture of the chosen pane, and a link to it. */
 export class ExportPanel {
-  private recording: ReturnType<typeof clip> | null = null;
+  private recording: { clip: ReturnType<typeof clip>; pane: Pane } | null = null;
 
   constructor(private readonly pane: () => Pane | null, private readonly look: () => Look,
               private readonly report: (text: string, isError: boolean, isGone?: () => boolean) => void) {
@@ -78,17 +78,23 @@ export class ExportPanel {
   }
 
   private async toggleClip(pane: Pane): Promise<void> {
-    const isOn = this.recording !== null;
-    if (this.recording) {
-      const blob = await this.recording.stop();
+    const running = this.recording;
+    if (running) {
       this.recording = null;
-      download(this.name(pane, 'webm'), blob);
+      this.showRecording();
+      download(this.name(running.pane, 'webm'), await running.clip.stop());
     } else {
-      this.recording = clip(pane.scene, () => this.marks(pane));
-      this.recording.start();
+      const started = clip(pane.scene, () => this.marks(pane));
+      started.start();
+      this.recording = { clip: started, pane };
+      this.showRecording();
     }
-    button('export-clip').setAttribute('aria-pressed', String(!isOn));
-    setText(button('export-clip'), isOn ? 'Record clip' : 'Stop and save');
+  }
+
+  private showRecording(): void {
+    const isOn = this.recording !== null;
+    button('export-clip').setAttribute('aria-pressed', String(isOn));
+    setText(button('export-clip'), isOn ? 'Stop and save' : 'Record clip');
   }
 
   /** Caption, scale and legend of the picture. */

@@ -27,6 +27,9 @@ export class LookPanel {
   private chosen: Look = { ...DEFAULT_LOOK };
   /** State of the list of outlines. */
   private outlineState = '';
+  /** Names of attributes of a track. */
+  private readonly offered = new Set<string>();
+  private offeredOf: object | null = null;
 
   constructor(private readonly changed: () => void) {
     for (const name of NAMES) {
@@ -55,15 +58,23 @@ export class LookPanel {
 
   setDark(dark: boolean): void { this.set({ dark }); }
 
-  /** Sets the names of the frame's attributes. */
-  setAttributes(names: string[]): void {
+  /**
+   * Offers the attributes of a frame, and of earlier frames of its track: a frame can be without its
+   * attributes for a moment. The chosen one remains; a frame without it has one colour.
+   */
+  setAttributes(ofFrame: readonly string[], track: object | null): void {
+    if (track !== this.offeredOf) this.offered.clear();
+    this.offeredOf = track;
+    for (const name of ofFrame) this.offered.add(name);
+    const { colour: chosen } = this.chosen;
+    const names = [...this.offered];
+    if (!['plain', 'identity', ...names].includes(chosen)) names.push(chosen);
     const colour = select('colour');
     const values = ['plain', 'identity', ...names];
     const current = [...colour.options].map((option) => option.value);
     if (values.join('\n') === current.join('\n')) return;
     while (colour.options.length > 2) colour.remove(2);
     for (const name of names) colour.add(new Option(`by ${channelLabel(name, names)}`, name));
-    if (!values.includes(this.chosen.colour)) this.setColour('plain');
     colour.value = this.chosen.colour;
   }
 
@@ -125,7 +136,7 @@ export class LookPanel {
 
   toggle(name: Switch): void { this.set({ [name]: !this.chosen[name] }); }
 
-  /** A range belongs to one attribute, so another colour has none. */
+  /** Resets the range, because it belongs to the previous attribute. */
   setColour(colour: string): void {
     if (colour !== this.chosen.colour) this.set({ colour, from: null, to: null });
   }
@@ -174,6 +185,7 @@ export class LookPanel {
     const from = name === 'from' ? value : this.chosen.from;
     const to = name === 'to' ? value : this.chosen.to;
     const isEmpty = from !== null && to !== null && from >= to;
+    for (const end of ['from', 'to']) input(end).setCustomValidity('');
     control.setCustomValidity(isEmpty ? 'The range must begin below its end.' : '');
     if (control.reportValidity()) this.set({ [name]: value });
   }

@@ -172,7 +172,8 @@ export class Pane {
   refresh(now: number): void {
     const sequence = this.track.player.sequence;
     // The frames of a former run or of other settings are gone.
-    if (this.frame && this.track.history.size === 0) this.clear();
+    const isStreamed = this.shown !== null && 'summary' in this.shown;
+    if (this.frame && isStreamed && this.track.history.size === 0) this.clear();
     if (sequence !== null) this.update(sequence, now);
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');

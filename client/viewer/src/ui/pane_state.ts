@@ -1,6 +1,6 @@
 import type { Track } from '../stream/track';
 
-/** What a pane shows, from the least to the most severe. */
+/** States of a pane, in order of severity. */
 export const PANE_STATES = ['live', 'waiting', 'ended', 'doubtful', 'lost', 'refused'] as const;
 
 export interface PaneState {
