@@ -52,7 +52,7 @@ class Sequence {
       status = Compute(particles.arrays(), time, *result);
     }
     RaiseUnlessOk(status);
-    WarnOfDoubts(*result, warned_);
+    WarnOfDoubts(result, warned_);
     return result;
   }
 

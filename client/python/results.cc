@@ -265,15 +265,19 @@ py::tuple ToState(PythonResult& result) {
   if (!message.SerializeToString(&bytes)) {
     throw py::value_error("pickle: the result has more than 2 GiB");
   }
-  return py::make_tuple(py::bytes(bytes), sections, result.particles, result.dropped, result.gap,
+  const py::bytes particles(reinterpret_cast<const char*>(result.particles.data()),
+                            result.particles.size() * sizeof(double));
+  return py::make_tuple(py::bytes(bytes), sections, particles, result.dropped, result.gap,
                         result.rejoined);
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
   if (state.size() != 6) throw py::value_error("pickle: not the state of a partiemc Result");
   v1::ReconstructedFrame message;
-  if (!message.ParseFromString(state[0].cast<std::string>())) {
-    throw py::value_error("pickle: the message of a partiemc Result is damaged");
+  const auto particles = state[2].cast<std::string_view>();
+  if (!message.ParseFromString(state[0].cast<std::string>()) ||
+      particles.size() % (2 * sizeof(double)) != 0) {
+    throw py::value_error("pickle: the state of a partiemc Result is damaged");
   }
   wire::ReconstructedFrame decoded;
   RaiseUnlessOk(wire::DecodeResult(message, decoded));
@@ -285,7 +289,8 @@ std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
   result->frame.rings_digest = decoded.rings_digest;
   result->frame.mesh_digest = decoded.mesh_digest;
   result->sections = state[1].cast<std::vector<std::shared_ptr<PythonResult>>>();
-  result->particles = state[2].cast<std::vector<double>>();
+  result->particles.resize(particles.size() / sizeof(double));
+  std::copy(particles.begin(), particles.end(), reinterpret_cast<char*>(result->particles.data()));
   result->dropped = state[3].cast<std::uint64_t>();
   result->gap = state[4].cast<std::uint64_t>();
   result->rejoined = state[5].cast<std::string>();
@@ -294,13 +299,13 @@ std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
 
 }  // namespace
 
-void WarnOfDoubts(const PythonResult& result, Doubts& warned) {
-  const Doubts doubts = result.frame.result.statistics.doubts;
+void WarnOfDoubts(const std::shared_ptr<PythonResult>& result, Doubts& warned) {
+  const Doubts doubts = result->frame.result.statistics.doubts;
   for (const Doubt doubt : kAllDoubts) {
     if (!doubts.Has(doubt) || warned.Has(doubt)) continue;
     warned.Add(doubt);
     const std::string text = std::string(Name(doubt)) + ": " + std::string(Explanation(doubt));
-    py::module_::import("partiemc._errors").attr("warn")(text);
+    py::module_::import("partiemc._errors").attr("warn")(text, result);
   }
 }
 

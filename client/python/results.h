@@ -43,8 +43,8 @@ class ResultPool : public std::enable_shared_from_this<ResultPool> {
 };
 
 /// Issues a PartiemcWarning for each doubt of the result that is not in `warned`, and adds it.
-/// Requires the GIL. Throws if warnings are errors.
-void WarnOfDoubts(const PythonResult& result, Doubts& warned);
+/// Requires the GIL. Throws if warnings are errors; the exception then carries the result.
+void WarnOfDoubts(const std::shared_ptr<PythonResult>& result, Doubts& warned);
 
 void DefineResults(pybind11::module_& module);
 

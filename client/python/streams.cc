@@ -1,5 +1,6 @@
 #include "client/python/streams.h"
 
+#include <grpc/grpc.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -40,6 +41,10 @@ constexpr milliseconds kSlice(100);
 // How long `send` waits for a thread that receives, if it has seen none, and its poll interval.
 constexpr milliseconds kReceiverWait(500), kReceiverPoll(5);
 
+// How long a stream that is dropped after `finish` waits for its last frames. A healthy server
+// needs far less; a lost one must not keep a program from ending.
+constexpr std::chrono::seconds kDropWait(10);
+
 std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
   constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
   if (!seconds) return std::nullopt;
@@ -70,7 +75,12 @@ absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   }
 }
 
+// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream,
+// and can wait 10 s for its own objects.
+void KeepGrpc() { [[maybe_unused]] static const bool is_kept = (grpc_init(), true); }
+
 std::string AddressOf(const std::optional<std::string>& address) {
+  KeepGrpc();
   return address ? *address : client::ServerFromEnvironment();
 }
 
@@ -98,8 +108,9 @@ class ProducerStream {
   }
   ~ProducerStream() {
     const py::gil_scoped_release others_may_run;
+    if (finished_) Drain(std::chrono::steady_clock::now() + kDropWait);
     if (finisher_.joinable()) {
-      stream_->Cancel();
+      stream_->Cancel();  // Ends `finisher_` if frames are left. Does nothing after the end.
       finisher_.join();
     }
     latest_.reset();
@@ -154,7 +165,7 @@ class ProducerStream {
       ++answered_;
       result->sequence = event.sequence;
       result->time = event.time;
-      WarnOfDoubts(*result, warned_);
+      WarnOfDoubts(result, warned_);
       return result;
     }
   }
@@ -177,8 +188,8 @@ class ProducerStream {
       if (latest_ == nullptr) {
         status = stream_->FinishSending();
       } else {
-        // Waits until the newest frame is sent, so it needs a receiver: maybe the calling thread.
-        // `Receive` reports the error that ends the stream.
+        // `LatestSender::Finish` blocks until a thread receives. That may be the calling thread, so
+        // it runs in a thread of its own. `Receive` reports the error that ends the stream.
         finisher_ = std::thread([this] { static_cast<void>(latest_->Finish()); });
       }
     }
@@ -190,10 +201,7 @@ class ProducerStream {
     const py::gil_scoped_release others_may_run;
     std::thread receiver([this] {
       const std::scoped_lock lock(receiving_);
-      Event event;
-      for (auto got = stream_->Receive(event); got.ok() && *got == Received::kEvent;
-           got = stream_->Receive(event)) {
-      }
+      Drain(std::nullopt);
     });
     {
       const MutexLock lock(sending_);
@@ -246,6 +254,15 @@ class ProducerStream {
     ProducerStream& stream_;
   };
 
+  // Drops events until the stream has ended or `until` has passed.
+  void Drain(std::optional<std::chrono::steady_clock::time_point> until) {
+    Event event;
+    for (auto got = stream_->Receive(event, kSlice); got.ok() && *got != Received::kEnd;
+         got = stream_->Receive(event, kSlice)) {
+      if (until && std::chrono::steady_clock::now() >= *until) return;
+    }
+  }
+
   absl::Status Offer(const client::ParticleArrays& particles, double time)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(sending_) {
     if (finished_) return absl::FailedPreconditionError("frame: sent after finish()");
@@ -261,8 +278,8 @@ class ProducerStream {
     return receives_ == 0 && (last == std::thread::id() || last == std::this_thread::get_id());
   }
 
-  // Fails if the window is full and only the calling thread could receive: SendArrays would wait
-  // for its own caller. A thread that receives for the first time gets kReceiverWait.
+  // Fails if the window is full and only the calling thread could receive. In that case SendArrays
+  // would deadlock. A thread that receives for the first time gets kReceiverWait.
   absl::Status ExpectReceiver() const {
     const auto until = std::chrono::steady_clock::now() + kReceiverWait;
     while (stream_->InFlight() >= Window() && NoOtherReceives()) {
@@ -337,6 +354,7 @@ class Watch {
     result->dropped = frame.dropped;
     result->gap = frame.gap;
     result->rejoined = std::move(frame.rejoined);
+    WarnOfDoubts(result, warned_);
     return result;
   }
 
@@ -359,6 +377,7 @@ class Watch {
  private:
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::unique_ptr<client::Watcher> watcher_;
+  Doubts warned_;               // With the GIL.
   std::timed_mutex receiving_;  // Held by the receiving thread.
 };
 
@@ -428,8 +447,9 @@ void DefineStreams(py::module_& module) {
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &ProducerStream::Next)
       .def("finish", &ProducerStream::Finish,
-           "Declares that no frame follows: iteration ends with the last result. Never waits. With "
-           "latest=True the newest frame is still sent.")
+           "Declares that no frame follows: iteration ends with the last result. Never waits. "
+           "Frames on the way, and with latest=True the newest frame, still arrive if the program "
+           "goes on receiving, leaves `with` or drops the stream, which waits up to 10 s.")
       .def("cancel", &ProducerStream::Cancel, "Ends the stream at once, from any thread.")
       .def("__enter__", [](py::object self) { return self; })
       .def(

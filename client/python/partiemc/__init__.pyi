@@ -21,7 +21,8 @@ class Error(Exception):
     rule: str
     sequence: int
 
-class PartiemcWarning(UserWarning): ...
+class PartiemcWarning(UserWarning):
+    result: Result | None
 
 class Rings:
     @property

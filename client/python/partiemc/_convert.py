@@ -32,8 +32,8 @@ def to_path(rings):
 def to_triangulation(mesh):
     """A matplotlib Triangulation, for triplot, tripcolor and tricontour.
 
-    Its interpolators and get_trifinder refuse T-junctions. Without them are the fills "conforming" and
-    "polygon", and "greedy" if the particles carry attributes.
+    Its interpolators and get_trifinder refuse T-junctions. The fills "conforming" and "polygon" have no
+    T-junctions; "greedy" has none if particles carry attributes.
     """
     from matplotlib.tri import Triangulation
 

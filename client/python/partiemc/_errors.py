@@ -29,13 +29,22 @@ class Error(Exception):
 class PartiemcWarning(UserWarning):
     """A doubt: suspicious but legal input. README.md lists the kinds.
 
-    Each Reconstructor and Stream warns once of each kind; Result.doubts has the names in every frame.
+    Each Reconstructor, Stream and Watch warns once of each kind; Result.doubts has the names in every
+    frame.
+
+    result: the Result of the frame, if the warning is raised as an error; otherwise None.
     """
 
+    result = None
 
-def warn(text):
-    """Warns at the line of the caller outside of this package."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+
+def warn(text, result):
+    """Warns at the line of the caller outside of this package. An error carries `result`."""
+    frame, level = sys._getframe().f_back, 2  # No frame if a thread began with a method of this package.
+    while frame and frame.f_back and frame.f_globals.get("__package__") == __package__:
         frame, level = frame.f_back, level + 1
-    warnings.warn(text, PartiemcWarning, stacklevel=level)
+    try:
+        warnings.warn(text, PartiemcWarning, stacklevel=level)
+    except PartiemcWarning as raised:
+        raised.result = result
+        raise

@@ -1,5 +1,6 @@
 """The core in this process: arrays in, views out."""
 
+import _thread
 import contextlib
 import copy
 import gc
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import tracemalloc
 import unittest
 import warnings
@@ -274,7 +276,8 @@ class Results(unittest.TestCase):
             for its in (pickle.loads(pickle.dumps(mine)), copy.copy(mine), copy.deepcopy(mine)):
                 self.assertEqual(its.points.tolist(), mine.points.tolist())
         state = result.__getstate__()
-        for damaged in (state[:5], (state[0][:-1], *state[1:])):
+        for damaged in (state[:5], (state[0][:-1], *state[1:]),
+                        (*state[:2], bytes(15), *state[3:])):
             with self.assertRaises(ValueError):
                 result.__class__.__new__(result.__class__).__setstate__(damaged)
         for outline in (partiemc.reconstruct(particles, spacing=1, fill="none", attributes={"p": x}),
@@ -528,8 +531,27 @@ class Doubts(unittest.TestCase):
     def test_a_warning_can_be_an_error(self):
         with warnings.catch_warnings():
             warnings.simplefilter("error", partiemc.PartiemcWarning)
-            with self.assertRaises(partiemc.PartiemcWarning):
+            with self.assertRaises(partiemc.PartiemcWarning) as raised:
                 partiemc.reconstruct(block(), spacing=9)
+            warnings.simplefilter("ignore", partiemc.PartiemcWarning)
+            expected = partiemc.reconstruct(block(), spacing=9)
+        self.assertEqual(digests(raised.exception.result), digests(expected))
+
+    def test_a_thread_without_a_python_frame_warns_too(self):
+        sequence = partiemc.Reconstructor(spacing=9)
+        unraisable = []
+        hook, sys.unraisablehook = sys.unraisablehook, unraisable.append
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                _thread.start_new_thread(sequence.reconstruct, (block(),))
+                until = time.monotonic() + 30
+                while not caught and not unraisable and time.monotonic() < until:
+                    time.sleep(0.01)
+        finally:
+            sys.unraisablehook = hook
+        self.assertEqual(unraisable, [])
+        self.assertEqual([one.category for one in caught], [partiemc.PartiemcWarning])
 
     def test_the_readme_lists_every_kind(self):
         header = document("core/include/partiemc/doubt.h")

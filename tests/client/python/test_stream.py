@@ -155,6 +155,20 @@ class Streams(unittest.TestCase):
         self.assertEqual([one.category for one in caught], [partiemc.PartiemcWarning])
         self.assertEqual(caught[0].filename, __file__)
 
+    def test_a_warning_as_an_error_carries_the_result(self):
+        with partiemc.connect(self.address, spacing=9, name="doubtful") as stream, \
+                partiemc.watch(self.address, "doubtful", mode="every") as watch:
+            for k in range(2):
+                stream.send(block(0.1 * k))
+            for source in (stream, watch):
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error", partiemc.PartiemcWarning)
+                    with self.assertRaises(partiemc.PartiemcWarning) as raised:
+                        source.receive()
+                    self.assertEqual(raised.exception.result.sequence, 1)
+                    self.assertEqual(raised.exception.result.doubts, ["spacing-contradicted"])
+                    self.assertEqual(source.receive().sequence, 2)
+
     def test_parts_of_several_connections_make_whole_frames(self):
         frames = [block(0.3 * k) for k in range(12)]
         received = [[], [], []]
@@ -298,6 +312,45 @@ class Streams(unittest.TestCase):
             self.assertEqual(watch.end, "FINISHED")
             self.assertEqual(seen[-1].time, stream.window - 1)
 
+    def test_a_finished_stream_that_is_dropped_sends_its_frames(self):
+        for latest in (False, True):
+            # The window is full, and with latest=True two frames wait in addition.
+            script = (f"import partiemc, time, sys\nsys.path.append({os.path.dirname(__file__)!r})\n"
+                      "from scenes import block\n"
+                      f"stream = partiemc.connect({self.address!r}, spacing=1, name='dropped', "
+                      f"latest={latest})\n"
+                      "print(stream.window, flush=True)\nsys.stdin.readline()\n"
+                      "for k in range(stream.window + 2 * stream.latest):\n"
+                      "    stream.send(block(0.1 * k, side=200), k)\n"
+                      "    time.sleep(0.05 * stream.latest)\n"
+                      "stream.finish()\n")
+            with self.subTest(latest=latest), subprocess.Popen(
+                    [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                    text=True) as program:
+                window = int(program.stdout.readline())
+                watch = partiemc.watch(self.address, "dropped", mode="every", credits=20)
+                program.stdin.write("\n")
+                program.stdin.flush()
+                times = [result.time for result in watch]
+                self.assertEqual(times, list(range(window + 2 * latest)))
+                self.assertEqual(watch.end, "FINISHED")
+                self.assertEqual(program.wait(), 0)
+
+    def test_dropping_a_finished_stream_does_not_wait_for_a_lost_server(self):
+        with Server() as lost:
+            for latest in (False, True):
+                stream = partiemc.connect(lost.address, spacing=1, latest=latest)
+                for k in range(stream.window + 2 * latest):
+                    stream.send(block(), k)
+                stream.finish()
+                if not latest:  # An end that was received, a cancelled stream: no wait.
+                    list(stream)
+                else:
+                    lost.process.kill()
+                start = time.monotonic()
+                del stream
+                self.assertLess(time.monotonic() - start, 15 if latest else 0.5)
+
     def test_watchers_see_what_the_producer_gets(self):
         with partiemc.connect(self.address, spacing=1, name="watched", labels={"run": "7"},
                               echo_particles=True) as stream:
@@ -313,6 +366,7 @@ class Streams(unittest.TestCase):
                     self.assertTrue((seen.particles == block(0.3 * k)).all())
                     self.assertIs(seen.particles.base, seen)
                     self.assertEqual((seen.dropped, seen.gap, seen.rejoined), (0, 0, ""))
+                    self.assertEqual(seen.__getstate__()[2], seen.particles.tobytes())
                     again = pickle.loads(pickle.dumps(seen))
                     self.assertEqual((digests(again), again.particles.tolist()),
                                      (digests(seen), seen.particles.tolist()))
