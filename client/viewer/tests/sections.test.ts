@@ -78,6 +78,14 @@ test('a picture has all outlines of its plane as lines, and names another one', 
   assert.equal(pictureOf(frame, outlines, 9).ringsDigest, frame.ringsDigest);
 });
 
+test('a plane above that of the particles has none', () => {
+  const above = create(ReconstructionParametersSchema, {
+    slice: { originZ: 0.5, normalZ: 1 }, sections: [{ slice: { originZ: 0.75, normalZ: 1 } }],
+  });
+  const frame = decodeFrame(message([0, 0, 1, 0, 0, 1], [0, 0, 1, 0, 0, 1]), 0);
+  assert.equal(pictureOf(frame, outlinesOf(above), 1).particles, null);
+});
+
 test('isolines of 2D particles are drawn together', () => {
   const frame = decodeFrame(message([0, 0, 1, 0, 0, 1], [2, 0, 3, 0, 2, 1], [4, 0, 5, 0, 4, 1]), 0);
   const outlines = outlinesOf(create(ReconstructionParametersSchema, { sections: [{ isovalue: 0.3 }, { isovalue: 0.7 }] }));

@@ -57,12 +57,16 @@ export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: num
   });
   if (base === 0) return { ...frame, isolines };
   // Particles lie around the plane of the stream's own outline.
-  const isOwnPlane = shiftBetween(outlines[0]?.plane, outlines[base]?.plane)?.every((part) => part === 0);
+  const isOwnPlane = isSamePlane(outlines[0]?.plane, outlines[base]?.plane);
   return {
     ...all[base], sections, isolines,
     particles: isOwnPlane ? moved(frame.particles, frame.origin, all[base].origin) : null,
     particleAttributes: isOwnPlane ? frame.particleAttributes : null,
   };
+}
+
+function isSamePlane(a: SectionPlane | null | undefined, b: SectionPlane | null | undefined): boolean {
+  return shiftBetween(a, b) !== null && (!a || !b || a.origin.every((part, k) => part === b.origin[k]));
 }
 
 /** Points relative to the origin `from`, relative to the origin `to`. */
