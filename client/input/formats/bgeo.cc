@@ -59,9 +59,11 @@ class BgeoReader final : public OneFrameReader {
     }
     ArrayTable table{.rows = static_cast<std::size_t>(points)};
     for (const Attribute& attribute : layout) {
+      const char* const first =
+          bytes.empty() ? nullptr : bytes.data() + kBgeoWordBytes * attribute.offset;
       table.Add(attribute.name, attribute.components,
                 {attribute.whole ? ElementType::kInt32 : ElementType::kFloat32, !kBigEndianMachine,
-                 bytes.data() + kBgeoWordBytes * attribute.offset, row_bytes});
+                 first, row_bytes});
     }
     return FillRows(table, request_, stream_->path(), rows);
   }

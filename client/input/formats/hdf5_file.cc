@@ -3,6 +3,8 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "client/input/base/array_table.h"
@@ -206,7 +208,10 @@ absl::Status Hdf5File::Read(const std::string& dataset, std::uint64_t begin, std
     return damaged(Concat("declares ", count, " rows; at most ", kMaxParticles));
   }
   const std::uint64_t row_bytes = array->components * ElementBytes(array->type);
-  const std::uint64_t stored = H5Dget_storage_size(opened.id());
+  // The size of contiguous numbers is a claim of the header.
+  std::error_code no_size;
+  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(opened.id()),
+                                                       std::filesystem::file_size(path_, no_size));
   if (stored == 0 || ExpandsTooMuch(array->rows * row_bytes, stored, max_expansion_)) {
     return damaged(Concat("declares ", array->rows, " rows, but the file holds ", stored,
                           " bytes; the file is truncated or damaged"));

@@ -222,7 +222,7 @@ class LammpsDumpReader final : public FrameReader {
       if (!plan_->images[axis]) continue;
       const std::string_view cell = cells_[*plan_->images[axis]];
       const auto image = ParseNumber(cell);
-      if (!image || std::trunc(*image) != *image) {
+      if (!image || !std::isfinite(*image) || std::trunc(*image) != *image) {
         return absl::DataLossError(
             Concat("the image flag '", cell, "' must be a whole number; the file is damaged"));
       }

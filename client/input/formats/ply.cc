@@ -241,8 +241,8 @@ class PlyReader final : public OneFrameReader {
     ArrayTable table{.rows = static_cast<std::size_t>(element.count)};
     std::size_t offset = 0;
     for (const PlyProperty& property : element.properties) {
-      table.Add(property.name, 1,
-                {property.type, header_.swapped(), bytes.data() + offset, row_bytes});
+      const char* const first = bytes.empty() ? nullptr : bytes.data() + offset;
+      table.Add(property.name, 1, {property.type, header_.swapped(), first, row_bytes});
       offset += ElementBytes(property.type);
     }
     return FillRows(table, request_, stream_->path(), rows);
