@@ -43,7 +43,8 @@ inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
 /// Upper bound of the memory of a new Workspace, Result and State after frames of this size. At
-/// most 2.2 times the actual memory, if that exceeds a few MB (tests/core/allocation_test.cc).
+/// most 2.2 times the actual memory, if that exceeds a few MB (tests/core/allocation_test.cc); at
+/// most 4 times if attributes are smooth, whose meshes are small.
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +

@@ -35,7 +35,9 @@ class PartiemcWarning(UserWarning):
     result: the Result of the frame, if the warning is raised as an error; otherwise None.
     """
 
-    result = None
+    def __init__(self, message):
+        super().__init__(message)
+        self.result = None
 
 
 def warn(text, result):
