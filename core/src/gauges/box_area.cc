@@ -33,7 +33,7 @@ BoxArea AreaInBox(const Rings& rings, const Point& min, const Point& max) {
   // Sums relative to the middle of the box, which loses no digits far from the origin.
   const Point middle{min.x + (max.x - min.x) / 2, min.y + (max.y - min.y) / 2};
   double twice_area = 0, moment_x = 0, moment_y = 0;
-  double magnitude = 0;  // Of the terms of twice_area.
+  double magnitude = 0;  // Sum of the absolute terms of twice_area.
   std::vector<Point> polygon, clipped;
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const std::span<const double> points = rings.RingPoints(ring);
