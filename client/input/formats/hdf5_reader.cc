@@ -1,5 +1,5 @@
 // HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget, and of other programs by the names of
-// datasets. In each a frame is a group of arrays with a row per particle.
+// datasets. A frame is a group of arrays with one row per particle.
 #include <algorithm>
 #include <utility>
 

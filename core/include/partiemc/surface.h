@@ -122,7 +122,7 @@ class SurfaceReconstructor {
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
   /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// Errors with a Violation: those of Reconstructor, without memory guard and cancellation.
+  /// Errors with a Violation: as Reconstructor, but there is no memory guard and no cancellation.
   /// `surface` is then empty. After an exception (std::bad_alloc) surface and workspace must be
   /// replaced.
   absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
