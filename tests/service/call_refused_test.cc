@@ -1,5 +1,6 @@
 // The rows of "A call is refused or ended" in proto/PROTOCOL.md: one test per row, named by its
-// reason, with exact code, reason and words. error_table_test.cc finds rows without a test.
+// reason, with exact code, reason and message (golden_messages.txt). error_table_test.cc finds rows
+// without a test.
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
@@ -19,27 +20,23 @@ namespace {
 
 constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
 
-constexpr char kOfOneCaller[] =
-    " of one caller, which is a token or, without tokens, an address; try again when a call of it "
-    "has ended";
-
 class CallRefused : public ErrorTable {
  protected:
   void Expect(const grpc::Status& status, const std::string& found, grpc::StatusCode code,
-              const std::string& reason, const std::string& message) {
+              const std::string& reason) {
     EXPECT_EQ(status.error_code(), code) << status.error_message();
     EXPECT_EQ(found, reason);
-    EXPECT_EQ(status.error_message(), message);
+    messages_.Expect(status.error_message());
     ExpectDetails(status, reason);
   }
   // Expects this end of a stream with the first request `open`.
   void ExpectOfOpen(const v1::ReconstructRequest& open, grpc::StatusCode code,
-                    const std::string& reason, const std::string& message) {
+                    const std::string& reason) {
     if (!server_) Serve();
     StreamClient client(channel_);
     client.Send(open);
     const auto status = client.Finish();
-    Expect(status, client.reason(), code, reason, message);
+    Expect(status, client.reason(), code, reason);
   }
   static v1::ReconstructFrameRequest CallRequest() {
     v1::ReconstructFrameRequest request;
@@ -48,13 +45,13 @@ class CallRefused : public ErrorTable {
     return request;
   }
   // Expects this end of a ReconstructFrame call with a good frame.
-  void ExpectOfCall(grpc::StatusCode code, const std::string& reason, const std::string& message) {
+  void ExpectOfCall(grpc::StatusCode code, const std::string& reason) {
     Serve();
     grpc::ClientContext context;
     SetDeadline(context);
     v1::ReconstructFrameResponse response;
     const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
-    Expect(status, ReasonOf(context), code, reason, message);
+    Expect(status, ReasonOf(context), code, reason);
   }
   void WantToken(const std::string& terms = "") {
     options_.token_file = folder_.Write("tokens", std::string(kToken) + " " + terms + "\n");
@@ -66,8 +63,7 @@ class CallRefused : public ErrorTable {
   }
   // Expects this end of a second stream, "dam", of a caller with these terms that has the stream
   // "tank-1".
-  void ExpectOfTerms(const std::string& terms, grpc::StatusCode code, const std::string& reason,
-                     const std::string& message) {
+  void ExpectOfTerms(const std::string& terms, grpc::StatusCode code, const std::string& reason) {
     WantToken(terms);
     grpc::ClientContext first_context, second_context;
     Identify(first_context);
@@ -79,19 +75,18 @@ class CallRefused : public ErrorTable {
     second->Write(OpenRequest("dam"));
     EXPECT_FALSE(second->Read(&opened));
     const auto status = second->Finish();
-    Expect(status, ReasonOf(second_context), code, reason, message);
+    Expect(status, ReasonOf(second_context), code, reason);
     first_context.TryCancel();
   }
   // Expects this end of GetServerInfo on a server that requires a token.
-  void ExpectOfCaller(const std::string& authorization, const std::string& reason,
-                      const std::string& message) {
+  void ExpectOfCaller(const std::string& authorization, const std::string& reason) {
     WantToken();
     grpc::ClientContext context;
     SetDeadline(context);
     if (!authorization.empty()) context.AddMetadata("authorization", authorization);
     v1::GetServerInfoResponse response;
     const auto status = stub_->GetServerInfo(&context, {}, &response);
-    Expect(status, ReasonOf(context), grpc::StatusCode::UNAUTHENTICATED, reason, message);
+    Expect(status, ReasonOf(context), grpc::StatusCode::UNAUTHENTICATED, reason);
   }
   static v1::ReconstructRequest Resume(const std::string& checkpoint, const std::string& token) {
     auto open = OpenRequest("tank");
@@ -114,38 +109,28 @@ class CallRefused : public ErrorTable {
 using grpc::StatusCode;
 
 TEST_F(CallRefused, PROTOCOL) {
-  ExpectOfOpen(BlobRequest(1, 1, 0), StatusCode::INVALID_ARGUMENT, "PROTOCOL",
-               "request: frame; the first must be `open`");
+  ExpectOfOpen(BlobRequest(1, 1, 0), StatusCode::INVALID_ARGUMENT, "PROTOCOL");
 }
 
 TEST_F(CallRefused, OUT_OF_RANGE) {
   auto open = OpenRequest();
   open.mutable_open()->mutable_parameters()->set_kernel_radius(20);
-  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-               "parameters.kernel_radius: 20; must be in [1.5, 8] spacings");
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   // These outputs require others that are off.
   auto normals = OpenRequest();
   normals.mutable_open()->mutable_outputs()->set_normals(true);
-  ExpectOfOpen(
-      normals, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-      "outputs.normals: true; must come with outputs.rings: normals are at the vertices of "
-      "the rings");
+  ExpectOfOpen(normals, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   auto format = OpenRequest();
   format.mutable_open()->mutable_outputs()->set_coordinate_format(v1::COORDINATE_FORMAT_FLOAT64);
-  ExpectOfOpen(format, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-               "outputs.coordinate_format: COORDINATE_FORMAT_FLOAT64; must come with outputs.rings "
-               "or outputs.mesh: nothing else has coordinates");
+  ExpectOfOpen(format, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   auto attributes = OpenRequest();
   attributes.mutable_open()->mutable_outputs()->add_attributes("pressure");
-  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-               "outputs.attributes: pressure; must come with outputs.rings or outputs.mesh: they "
-               "are at their vertices");
+  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   attributes.mutable_open()->mutable_outputs()->set_mesh(true);
   for (int k = 0; k < 16; ++k) {
     attributes.mutable_open()->mutable_outputs()->add_attributes(std::to_string(k));
   }
-  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-               "outputs.attributes: 17 names; must be at most 16");
+  ExpectOfOpen(attributes, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
 }
 
 TEST_F(CallRefused, DUPLICATE) {
@@ -154,85 +139,66 @@ TEST_F(CallRefused, DUPLICATE) {
   for (const char* name : {"pressure", "density", "pressure"}) {
     open.mutable_open()->mutable_outputs()->add_attributes(name);
   }
-  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "DUPLICATE",
-               "outputs.attributes: 3 names; must all be different");
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "DUPLICATE");
 }
 
 TEST_F(CallRefused, UNSUPPORTED) {
   auto open = OpenRequest();
   open.mutable_open()->mutable_parameters()->set_placement(static_cast<v1::Placement>(99));
-  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
-               "parameters.placement: 99; must be a value that this version knows");
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED");
   v1::ReconstructRequest sliced = OpenRequest();
   sliced.mutable_open()->mutable_parameters()->mutable_slice()->set_normal_z(1);
   sliced.mutable_open()->mutable_outputs()->set_rings(true);
   sliced.mutable_open()->mutable_outputs()->set_echo_particles(true);
-  ExpectOfOpen(sliced, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED",
-               "outputs.echo_particles: true; must be false with a slice, whose particles are not "
-               "in its plane");
+  ExpectOfOpen(sliced, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED");
 }
 
 TEST_F(CallRefused, NAME) {
-  ExpectOfOpen(OpenRequest("a b"), StatusCode::INVALID_ARGUMENT, "NAME",
-               "open.stream_name: \"a b\"; must be at most 128 characters of [A-Za-z0-9._-]");
+  ExpectOfOpen(OpenRequest("a b"), StatusCode::INVALID_ARGUMENT, "NAME");
 }
 
 TEST_F(CallRefused, LABELS) {
   auto open = OpenRequest();
   (*open.mutable_open()->mutable_labels())["key"] = std::string(200, 'x');
-  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "LABELS",
-               "open.labels: \"key\"; must have a key and a value of at most 128 bytes each");
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "LABELS");
   for (const char* text : {"\x1b[31m", "\xc2\x9b", "exe.\xe2\x80\xaegpj", "two\nlines"}) {
     auto hostile = OpenRequest();
     (*hostile.mutable_open()->mutable_labels())["key"] = text;
-    ExpectOfOpen(hostile, StatusCode::INVALID_ARGUMENT, "LABELS",
-                 "open.labels: \"key\"; must have a key and a value of UTF-8 without control "
-                 "characters");
+    ExpectOfOpen(hostile, StatusCode::INVALID_ARGUMENT, "LABELS");
   }
 }
 
 TEST_F(CallRefused, STREAM_TOKEN) {
-  ExpectOfOpen(Resume("", "mine"), StatusCode::INVALID_ARGUMENT, "STREAM_TOKEN",
-               "open.resume.stream_token: 4 characters; must be the stream_token of StreamOpened");
+  ExpectOfOpen(Resume("", "mine"), StatusCode::INVALID_ARGUMENT, "STREAM_TOKEN");
 }
 
 TEST_F(CallRefused, CORRUPT_CHECKPOINT) {
-  ExpectOfOpen(Resume("nonsense", kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_CHECKPOINT",
-               "open.resume.checkpoint: 8 bytes; must be as a server sent it; start the stream "
-               "anew");
+  ExpectOfOpen(Resume("nonsense", kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_CHECKPOINT");
 }
 
 TEST_F(CallRefused, CORRUPT_STATE) {
   std::string damaged = Checkpoint();
   damaged.back() = static_cast<char>(damaged.back() ^ 1);
-  ExpectOfOpen(Resume(damaged, kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_STATE",
-               "open.resume.checkpoint: a wrong checksum; must be as a server sent it; start the "
-               "stream anew");
+  ExpectOfOpen(Resume(damaged, kToken), StatusCode::INVALID_ARGUMENT, "CORRUPT_STATE");
 }
 
 TEST_F(CallRefused, CHECKPOINT_MISMATCH) {
   auto open = Resume(Checkpoint(), kToken);
   open.mutable_open()->mutable_parameters()->set_kernel_radius(2);
-  ExpectOfOpen(open, StatusCode::FAILED_PRECONDITION, "CHECKPOINT_MISMATCH",
-               "open.resume.checkpoint: other parameters; must be resumed with all of `open` that "
-               "it was made with");
+  ExpectOfOpen(open, StatusCode::FAILED_PRECONDITION, "CHECKPOINT_MISMATCH");
 }
 
 TEST_F(CallRefused, CHECKPOINT_SIGNATURE) {
   const std::string checkpoint = Checkpoint();
   options_.checkpoint_key_file = folder_.Write("keys", "a-key-of-test-0123456789\n");
   Serve();
-  ExpectOfOpen(Resume(checkpoint, kToken), StatusCode::FAILED_PRECONDITION, "CHECKPOINT_SIGNATURE",
-               "open.resume.checkpoint: not signed by this server's keys; must come from a server "
-               "with a key of this one's --checkpoint-key-file; resume on such a server, or start "
-               "the stream anew");
+  ExpectOfOpen(Resume(checkpoint, kToken), StatusCode::FAILED_PRECONDITION, "CHECKPOINT_SIGNATURE");
 }
 
 TEST_F(CallRefused, CHECKPOINT_BYTES) {
   options_.limits.max_frame_bytes = 2000;
   ExpectOfOpen(Resume(std::string(2001, 'x'), kToken), StatusCode::RESOURCE_EXHAUSTED,
-               "CHECKPOINT_BYTES",
-               "open.resume.checkpoint: 2001 bytes; must be at most 2000 bytes");
+               "CHECKPOINT_BYTES");
 }
 
 TEST_F(CallRefused, TAKEN_OVER) {
@@ -244,17 +210,14 @@ TEST_F(CallRefused, TAKEN_OVER) {
   StreamClient new_call(channel_);
   ASSERT_TRUE(new_call.SendAndReceive(Resume("", opened.opened().stream_token())).has_opened());
   const auto status = old_call.Finish();
-  Expect(status, old_call.reason(), StatusCode::ABORTED, "TAKEN_OVER",
-         "stream: resumed by its producer in another call; must be read where it was resumed");
+  Expect(status, old_call.reason(), StatusCode::ABORTED, "TAKEN_OVER");
 }
 
 TEST_F(CallRefused, NAME_IN_USE) {
   Serve();
   StreamClient first(channel_);
   ASSERT_TRUE(first.SendAndReceive(OpenRequest("tank")).has_opened());
-  ExpectOfOpen(OpenRequest("tank"), StatusCode::ALREADY_EXISTS, "NAME_IN_USE",
-               "open.stream_name: \"tank\"; must not be the name of an open stream; choose "
-               "another, or none");
+  ExpectOfOpen(OpenRequest("tank"), StatusCode::ALREADY_EXISTS, "NAME_IN_USE");
 }
 
 TEST_F(CallRefused, TOO_MANY_STREAMS) {
@@ -262,16 +225,12 @@ TEST_F(CallRefused, TOO_MANY_STREAMS) {
   Serve();
   StreamClient first(channel_);
   ASSERT_TRUE(first.SendAndReceive(OpenRequest()).has_opened());
-  ExpectOfOpen(OpenRequest(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_STREAMS",
-               "streams: 1 open; must be at most 1; try again when one has ended, or start the "
-               "server with a larger --max-streams");
+  ExpectOfOpen(OpenRequest(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_STREAMS");
 }
 
 TEST_F(CallRefused, TOO_MANY_CALLS) {
   options_.limits.max_streams = 0;
-  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS",
-               "calls of ReconstructFrame: 0 going on, 0 of this caller; must be at most 0, and of "
-               "one caller no more than are free; try again later");
+  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS");
 }
 
 TEST_F(CallRefused, TOO_MANY_OPENING) {
@@ -289,9 +248,7 @@ TEST_F(CallRefused, TOO_MANY_OPENING) {
       const std::lock_guard lock(mutex);
       if (status.error_code() == StatusCode::CANCELLED) return;
       ++gave_way;
-      Expect(status, client->reason(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_OPENING",
-             "calls without a request: more than 64; must send the first request at once: of the "
-             "caller with most of them the oldest gives way; try again");
+      Expect(status, client->reason(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_OPENING");
     });
   }
   EXPECT_TRUE(Eventually([&] {
@@ -304,13 +261,11 @@ TEST_F(CallRefused, TOO_MANY_OPENING) {
 }
 
 TEST_F(CallRefused, CALLER_CALLS) {
-  ExpectOfTerms("calls=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_CALLS",
-                "caller.calls: 1 going on; must be at most 1" + std::string(kOfOneCaller));
+  ExpectOfTerms("calls=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_CALLS");
 }
 
 TEST_F(CallRefused, CALLER_STREAMS) {
-  ExpectOfTerms("streams=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_STREAMS",
-                "caller.streams: 1 going on; must be at most 1" + std::string(kOfOneCaller));
+  ExpectOfTerms("streams=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_STREAMS");
 }
 
 TEST_F(CallRefused, CALLER_BYTES) {
@@ -319,26 +274,17 @@ TEST_F(CallRefused, CALLER_BYTES) {
   Identify(context);
   v1::ReconstructFrameResponse response;
   const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
-  Expect(status, ReasonOf(context), StatusCode::RESOURCE_EXHAUSTED, "CALLER_BYTES",
-         "caller.bytes: " + std::to_string(CallRequest().ByteSizeLong()) +
-             " more; must not make it more than is free, nor more than the `bytes=`" +
-             std::string(kOfOneCaller));
+  Expect(status, ReasonOf(context), StatusCode::RESOURCE_EXHAUSTED, "CALLER_BYTES");
 }
 
 TEST_F(CallRefused, NOT_PERMITTED) {
-  ExpectOfTerms(
-      "names=tank-*", StatusCode::PERMISSION_DENIED, "NOT_PERMITTED",
-      "open.stream_name: \"dam\"; must be a name that this token may use (`names=` in the "
-      "server's --token-file)");
+  ExpectOfTerms("names=tank-*", StatusCode::PERMISSION_DENIED, "NOT_PERMITTED");
 }
 
 TEST_F(CallRefused, MEMORY_BUDGET) {
   options_.limits.memory_budget = 100;
   options_.limits.history_bytes = 0;  // It shares the budget.
-  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET",
-               "request: " + std::to_string(CallRequest().ByteSizeLong()) +
-                   " bytes; must fit with what is being worked on into 100 bytes; try again later, "
-                   "or start the server with a larger --memory-budget");
+  ExpectOfCall(StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET");
 }
 
 TEST_F(CallRefused, IDLE) {
@@ -346,9 +292,7 @@ TEST_F(CallRefused, IDLE) {
   Serve();
   StreamClient client(channel_);
   const auto status = client.Finish();
-  Expect(status, client.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE",
-         "client: sends no `open` for 0.05 s; must do so within this time "
-         "(Limits.idle_timeout_seconds once open); open a new stream");
+  Expect(status, client.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE");
 }
 
 TEST_F(CallRefused, DRAINING) {
@@ -357,20 +301,13 @@ TEST_F(CallRefused, DRAINING) {
   ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
   server_->Drain(std::chrono::seconds(60));
   const auto status = client.Finish();
-  Expect(status, client.reason(), StatusCode::UNAVAILABLE, "DRAINING",
-         "server: draining; connect to another one, or again later");
+  Expect(status, client.reason(), StatusCode::UNAVAILABLE, "DRAINING");
 }
 
-TEST_F(CallRefused, TOKEN_MISSING) {
-  ExpectOfCaller(
-      "", "TOKEN_MISSING",
-      "authorization: absent; must be \"Bearer \" and a token of this server's --token-file");
-}
+TEST_F(CallRefused, TOKEN_MISSING) { ExpectOfCaller("", "TOKEN_MISSING"); }
 
 TEST_F(CallRefused, TOKEN_UNKNOWN) {
-  ExpectOfCaller("Bearer " + std::string(32, 'f'), "TOKEN_UNKNOWN",
-                 "authorization: a token that is not known; must be \"Bearer \" and a token of "
-                 "this server's --token-file");
+  ExpectOfCaller("Bearer " + std::string(32, 'f'), "TOKEN_UNKNOWN");
 }
 
 TEST_F(CallRefused, NoReason_RESOURCE_EXHAUSTED) {
@@ -387,9 +324,7 @@ TEST_F(CallRefused, NoReason_RESOURCE_EXHAUSTED) {
 TEST_F(CallRefused, OPEN_BYTES) {
   auto open = OpenRequest();
   open.mutable_open()->set_stream_name(std::string(100'000, 'x'));
-  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OPEN_BYTES",
-               "open: " + std::to_string(open.ByteSizeLong()) +
-                   " bytes; must be at most 65536 bytes beside its checkpoint");
+  ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OPEN_BYTES");
 }
 
 TEST_F(CallRefused, MALFORMED) {
@@ -409,9 +344,7 @@ TEST_F(CallRefused, MALFORMED) {
     void* tag = nullptr;
     bool ok = false;
     queue.Next(&tag, &ok);
-    Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "MALFORMED",
-           "request: 1 bytes; must be a " + method + "Request of at most " +
-               (method == "ReconstructFrame" ? "1250000" : "4096") + " bytes and 4096 fields");
+    Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "MALFORMED");
   }
 }
 
@@ -423,15 +356,13 @@ TEST_F(CallRefused, PAGE_TOKEN) {
   request.set_page_token("elsewhere");
   v1::ListStreamsResponse response;
   const auto status = stub_->ListStreams(&context, request, &response);
-  Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "PAGE_TOKEN",
-         "page_token: 9 characters; must be the next_page_token of an answer");
+  Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "PAGE_TOKEN");
   grpc::ClientContext second;
   SetDeadline(second);
   request.clear_page_token();
   request.set_page_size(-1);
   const auto negative = stub_->ListStreams(&second, request, &response);
-  Expect(negative, ReasonOf(second), StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
-         "page_size: -1; must be at least 0");
+  Expect(negative, ReasonOf(second), StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
 }
 
 TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {
@@ -449,8 +380,7 @@ TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {
   grpc::Status status;
   call->Finish(&status, nullptr);
   queue.Next(&tag, &ok);
-  Expect(status, ReasonOf(context), StatusCode::UNAUTHENTICATED, "",
-         "authorization: absent; must be \"Bearer \" and a token of this server's --token-file");
+  Expect(status, ReasonOf(context), StatusCode::UNAUTHENTICATED, "");
 }
 
 }  // namespace

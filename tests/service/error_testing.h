@@ -9,6 +9,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "service/error_table.h"
+#include "service/golden_messages.h"
 #include "service/service_testing.h"
 
 namespace partiemc::server {
@@ -44,12 +45,15 @@ inline void ExpectDetails(const grpc::Status& status, const std::string& reason)
 
 class ErrorTable : public ::testing::Test {
  protected:
+  void TearDown() override { messages_.ExpectAllSeen(); }
+
   void Serve() {
     server_ = StartServer(options_);
     channel_ = Connect(*server_, Transport::kTcp);
     stub_ = v1::ReconstructionService::NewStub(channel_);
   }
 
+  GoldenMessages messages_;
   ServerOptions options_ = TestOptions();
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;

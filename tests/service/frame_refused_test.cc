@@ -1,5 +1,6 @@
 // The rows of "A frame is refused" in proto/PROTOCOL.md: one test per row, named by its reason,
-// with exact reason and words. The stream continues. error_table_test.cc finds rows without a test.
+// with exact reason and message (golden_messages.txt). The stream continues. error_table_test.cc
+// finds rows without a test.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -25,15 +26,14 @@ class FrameRefused : public ErrorTable {
 
   // Expects this answer to `frame` on a stream opened by `open`, and that the stream continues.
   void Expect(const v1::ReconstructRequest& frame, const std::string& reason,
-              const std::string& message, std::uint64_t next_sequence = 2,
-              const v1::ReconstructRequest& open = OpenRequest()) {
+              std::uint64_t next_sequence = 2, const v1::ReconstructRequest& open = OpenRequest()) {
     StreamClient client(channel_);
     ASSERT_TRUE(client.SendAndReceive(open).has_opened());
     const auto answer = client.SendAndReceive(frame);
     ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);
     const v1::FrameError& error = answer.error();
     EXPECT_EQ(error.reason(), reason);
-    EXPECT_EQ(error.message(), message);
+    messages_.Expect(error.message());
     EXPECT_EQ(error.message(), error.field() + ": " + error.value() + "; " + error.rule());
     EXPECT_TRUE(IsFieldOrSubject(error.field())) << error.field();
     EXPECT_EQ(error.sequence(), frame.frame().sequence());
@@ -63,22 +63,14 @@ class FrameRefused : public ErrorTable {
   }
 };
 
-TEST_F(FrameRefused, SEQUENCE_GAP) {
-  Expect(BlobRequest(7, 1, 0), "SEQUENCE_GAP",
-         "sequence: 7; must be 1; a frame before it is missing", 1);
-}
+TEST_F(FrameRefused, SEQUENCE_GAP) { Expect(BlobRequest(7, 1, 0), "SEQUENCE_GAP", 1); }
 
-TEST_F(FrameRefused, SEQUENCE_DUPLICATE) {
-  Expect(BlobRequest(0, 1, 0), "SEQUENCE_DUPLICATE",
-         "sequence: 0; must be 1; this number has been used", 1);
-}
+TEST_F(FrameRefused, SEQUENCE_DUPLICATE) { Expect(BlobRequest(0, 1, 0), "SEQUENCE_DUPLICATE", 1); }
 
 TEST_F(FrameRefused, FRAME_BYTES) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_positions(std::string(16 * 65'000, '\0'));
-  Expect(request, "FRAME_BYTES",
-         "frame: " + std::to_string(request.frame().ByteSizeLong()) +
-             " bytes; must be at most 1000000 bytes");
+  Expect(request, "FRAME_BYTES");
 }
 
 TEST_F(FrameRefused, MALFORMED) {
@@ -88,7 +80,7 @@ TEST_F(FrameRefused, MALFORMED) {
   ASSERT_EQ(end.answers.size(), 2u) << end.status.error_message();
   const v1::FrameError& error = end.answers[1].error();
   EXPECT_EQ(error.reason(), "MALFORMED");
-  EXPECT_EQ(error.message(), "frame: 7 bytes; must be a ParticleFrame of at most 4096 fields");
+  messages_.Expect(error.message());
   EXPECT_EQ(error.next_sequence(), 2u);
 }
 
@@ -98,9 +90,7 @@ class FrameOfManyFields : public FrameRefused {};
 TEST_F(FrameOfManyFields, IsMalformed) {
   auto scalars = BlobRequest(1, 1, 0);
   while (scalars.frame().scalars_size() <= 4096) scalars.mutable_frame()->add_scalars();
-  Expect(scalars, "MALFORMED",
-         "frame: " + std::to_string(scalars.ByteSizeLong()) +
-             " bytes; must be a ParticleFrame of at most 4096 fields");
+  Expect(scalars, "MALFORMED");
   // The number after too many fields is not read and not used up.
   std::string unknown;
   for (int i = 0; i < 4097; ++i) unknown += std::string("\x7a\0", 2);
@@ -116,31 +106,26 @@ TEST_F(FrameOfManyFields, IsMalformed) {
 TEST_F(FrameRefused, UNSUPPORTED) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_UNSPECIFIED);
-  Expect(request, "UNSUPPORTED",
-         "position_format: 0; must be FLOAT32_2, FLOAT64_2, FLOAT32_3 or FLOAT64_3");
+  Expect(request, "UNSUPPORTED");
 }
 
 TEST_F(FrameRefused, BYTE_COUNT) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_ids("123");
   const auto particles = std::to_string(request.frame().positions().size() / 16);
-  Expect(request, "BYTE_COUNT",
-         "ids: 3 bytes; must be empty or 8 bytes for each of " + particles + " particles");
+  Expect(request, "BYTE_COUNT");
 }
 
 TEST_F(FrameRefused, NO_SUCH_ATTRIBUTE) {
   auto request = BlobRequest(1, 1, 0);
   Carry("density", request);
-  Expect(request, "NO_SUCH_ATTRIBUTE",
-         "attributes: pressure; must be in every frame, as it is asked for", 2,
-         OpenFor("pressure"));
+  Expect(request, "NO_SUCH_ATTRIBUTE", 2, OpenFor("pressure"));
 }
 
 TEST_F(FrameRefused, TOO_MANY_PARTICLES) {
   auto request = BlobRequest(1, 1, 0);
   request.mutable_frame()->set_positions(std::string(16 * 20'001, '\0'));
-  Expect(request, "TOO_MANY_PARTICLES",
-         "positions: 20001 particles; must be at most 20000 in one frame");
+  Expect(request, "TOO_MANY_PARTICLES");
 }
 
 TEST_F(FrameRefused, TOO_MANY_TILES) {
@@ -148,9 +133,7 @@ TEST_F(FrameRefused, TOO_MANY_TILES) {
   std::vector<double> line;
   for (int k = 0; k < 200; ++k) line.insert(line.end(), {100.0 * k, 0.0});
   request.mutable_frame()->set_positions(line.data(), line.size() * sizeof(double));
-  Expect(request, "TOO_MANY_TILES",
-         "positions: more than 100 tiles of 32 x 32 cells; must reach at most 100 tiles: is the "
-         "spacing of 0.05 right?");
+  Expect(request, "TOO_MANY_TILES");
 }
 
 TEST_F(FrameRefused, DUPLICATE) {
@@ -159,27 +142,22 @@ TEST_F(FrameRefused, DUPLICATE) {
   for (std::size_t k = 0; k < ids.size(); ++k) ids[k] = k;
   ids[5] = 2;
   request.mutable_frame()->set_ids(ids.data(), ids.size() * sizeof(std::uint64_t));
-  Expect(request, "DUPLICATE",
-         "ids[5]: 2; must be that of one particle only, but ids[2] is the same; leave ids out "
-         "where particles have none");
+  Expect(request, "DUPLICATE");
 }
 
 TEST_F(FrameRefused, NOT_FINITE) {
-  Expect(WithCoordinate(7, std::numeric_limits<double>::quiet_NaN()), "NOT_FINITE",
-         "positions[3].y: nan; must be finite");
+  Expect(WithCoordinate(7, std::numeric_limits<double>::quiet_NaN()), "NOT_FINITE");
   auto request = BlobRequest(1, 1, 0);
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(Carry("pressure", request).mutable_values()->data() + 8, &nan, sizeof(nan));
-  Expect(request, "NOT_FINITE", "attributes[0].values[2]: nan; must be finite", 2,
-         OpenFor("pressure"));
+  Expect(request, "NOT_FINITE", 2, OpenFor("pressure"));
 }
 
 TEST_F(FrameRefused, OUT_OF_RANGE) {
-  Expect(WithCoordinate(7, 1e300), "OUT_OF_RANGE",
-         "positions[3].y: 1e+300; must be at most 1e69 in magnitude");
+  Expect(WithCoordinate(7, 1e300), "OUT_OF_RANGE");
   auto request = BlobRequest(1, 1, 0);
   Carry("stress", request).set_components(4);
-  Expect(request, "OUT_OF_RANGE", "scalars[0].components: 4; must be 1, 2 or 3");
+  Expect(request, "OUT_OF_RANGE");
 }
 
 TEST_F(FrameRefused, NOT_PLANAR) {
@@ -187,8 +165,7 @@ TEST_F(FrameRefused, NOT_PLANAR) {
   const std::vector<double> corner = {0, 0, 0, 1, 0, 0, 0, 1, 0.5};
   request.mutable_frame()->set_position_format(v1::POSITION_FORMAT_FLOAT64_3);
   request.mutable_frame()->set_positions(corner.data(), corner.size() * sizeof(double));
-  Expect(request, "NOT_PLANAR",
-         "positions[2].z: 0.5; particles must lie in the xy plane, but z ranges over [0, 0.5]");
+  Expect(request, "NOT_PLANAR");
 }
 
 // float32 positions so far from the origin that a step is many spacings.
@@ -238,8 +215,7 @@ TEST_F(FrameRefused, COUNT) {
       session.Answer(1, frame, worker, [](auto&, auto&) { return absl::OkStatus(); });
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(FindViolation(status)->reason, "COUNT");
-  EXPECT_EQ(std::string(status.message()),
-            "volumes: 2 values; must be empty or one per particle (3)");
+  messages_.Expect(std::string(status.message()));
 }
 
 TEST_F(FrameRefused, OUT_OF_MEMORY) {
@@ -251,9 +227,7 @@ TEST_F(FrameRefused, OUT_OF_MEMORY) {
                                      [](auto&, auto&) -> absl::Status { throw std::bad_alloc(); });
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(FindViolation(status)->reason, "OUT_OF_MEMORY");
-  EXPECT_EQ(status.message(),
-            "frame: 3 particles; must fit into the server's memory; send a smaller frame or try "
-            "again later");
+  messages_.Expect(std::string(status.message()));
   EXPECT_EQ(session.next_sequence(), 2u);
 }
 

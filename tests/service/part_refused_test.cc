@@ -1,5 +1,5 @@
 // The rows of "A part is refused" in proto/PROTOCOL.md: one test per row, named by its reason, with
-// exact reason and words. error_table_test.cc finds rows without a test.
+// exact reason and message (golden_messages.txt). error_table_test.cc finds rows without a test.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -28,35 +28,32 @@ class PartRefused : public ErrorTable {
       return stub_->GetServerInfo(&context, {}, &info).ok() && info.load().memory_held() >= bytes;
     }));
   }
-  static void ExpectError(const v1::ReconstructResponse& answer, const std::string& reason,
-                          const std::string& message) {
+  void ExpectError(const v1::ReconstructResponse& answer, const std::string& reason) {
     ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);
     const v1::FrameError& error = answer.error();
     EXPECT_EQ(error.reason(), reason);
-    EXPECT_EQ(error.message(), message);
+    messages_.Expect(error.message());
     EXPECT_TRUE(IsFieldOrSubject(error.field())) << error.field();
   }
-  void ExpectEnd(StreamClient& client, grpc::StatusCode code, const std::string& reason,
-                 const std::string& message) {
+  void ExpectEnd(StreamClient& client, grpc::StatusCode code, const std::string& reason) {
     const grpc::Status status = client.Finish();
     EXPECT_EQ(status.error_code(), code);
     EXPECT_EQ(client.reason(), reason);
-    EXPECT_EQ(status.error_message(), message);
+    messages_.Expect(status.error_message());
     ExpectDetails(status, reason);
   }
   void ExpectNotOpened(const v1::ReconstructRequest& open, grpc::StatusCode code,
-                       const std::string& reason, const std::string& message) {
+                       const std::string& reason) {
     StreamClient client(Connect(*server_, Transport::kTcp));
     EXPECT_FALSE(client.SendAndReceive(open).has_opened());
-    ExpectEnd(client, code, reason, message);
+    ExpectEnd(client, code, reason);
   }
 };
 
 TEST_F(PartRefused, PARTS_MISSING) {
   Ranks ranks(*server_, "tank", 3, 50);
   ranks.Send(0, 1);
-  ExpectError(ranks[0].Receive(), "PARTS_MISSING",
-              "parts: 1, 2; must come within 50 ms of the first part of their frame");
+  ExpectError(ranks[0].Receive(), "PARTS_MISSING");
 }
 
 // One Reconstruct call, optionally with a token.
@@ -102,10 +99,7 @@ TEST_F(PartRefused, MEMORY_BUDGET) {
   options_.limits.streams_beyond_budget = 1;
   Serve();
   const auto part = PartRequest(1, 2, 1, 1, 0, true);
-  ExpectError(AnswerAfterIdling(*stub_, "", part), "MEMORY_BUDGET",
-              "frame: " + std::to_string(part.ByteSizeLong()) +
-                  " bytes; must fit with what is being worked on into 100 bytes; try again later, "
-                  "or start the server with a larger --memory-budget");
+  ExpectError(AnswerAfterIdling(*stub_, "", part), "MEMORY_BUDGET");
 }
 
 TEST_F(PartRefused, CALLER_BYTES) {
@@ -115,11 +109,7 @@ TEST_F(PartRefused, CALLER_BYTES) {
   options_.limits.streams_beyond_budget = 1;
   Serve();
   const auto part = PartRequest(1, 2, 1, 1, 0, true);
-  ExpectError(AnswerAfterIdling(*stub_, kToken, part), "CALLER_BYTES",
-              "caller.bytes: " + std::to_string(part.ByteSizeLong()) +
-                  " more; must not make it more than is free, nor more than the `bytes=` of one "
-                  "caller, which is a token or, without tokens, an address; try again when a call "
-                  "of it has ended");
+  ExpectError(AnswerAfterIdling(*stub_, kToken, part), "CALLER_BYTES");
 }
 
 TEST_F(PartRefused, PART_MISMATCH) {
@@ -127,8 +117,7 @@ TEST_F(PartRefused, PART_MISMATCH) {
   ranks.Send(0, 1, 1, /*ids=*/true);
   ranks.Send(1, 1, 1, /*ids=*/false);
   const auto answer = ranks[0].Receive();
-  ExpectError(answer, "PART_MISMATCH",
-              "parts[1].ids: 0 bytes; must be there, as in the parts before");
+  ExpectError(answer, "PART_MISMATCH");
   EXPECT_EQ(answer.error().next_sequence(), 2u);
   ranks.ExpectTaken(1, 1);
   ranks.SendAll(2);
@@ -140,8 +129,7 @@ TEST_F(PartRefused, PART_LATE) {
   ranks.Send(0, 1);
   EXPECT_TRUE(ranks[0].Receive().has_error());
   ranks.Send(1, 1);
-  ExpectError(ranks[1].Receive(), "PART_LATE",
-              "sequence: 1; must be at least 2; this frame is over");
+  ExpectError(ranks[1].Receive(), "PART_LATE");
 }
 
 TEST_F(PartRefused, PART_DUPLICATE) {
@@ -152,15 +140,13 @@ TEST_F(PartRefused, PART_DUPLICATE) {
   WaitUntilHeld(2 * PartRequest(1, 2, 1, 1, 0, true).ByteSizeLong());
   ranks.Send(0, 1);
   ranks.ExpectTaken(1, 1);
-  ExpectError(ranks[1].Receive(), "PART_DUPLICATE",
-              "sequence: 1; must be sent once by part 1; the first one counts");
+  ExpectError(ranks[1].Receive(), "PART_DUPLICATE");
 }
 
 TEST_F(PartRefused, PART_AHEAD) {
   Ranks ranks(*server_, "tank", 2);
   ranks.Send(1, 5);
-  ExpectError(ranks[1].Receive(), "PART_AHEAD",
-              "sequence: 5; must be below 5; frames before it are unanswered");
+  ExpectError(ranks[1].Receive(), "PART_AHEAD");
 }
 
 TEST_F(PartRefused, FRAME_BYTES) {
@@ -178,33 +164,28 @@ TEST_F(PartRefused, MALFORMED) {
   auto strange = PartRequest(1, 2, 1, 1, 0, true);
   for (int k = 0; k < 5000; ++k) strange.mutable_frame()->add_scalars()->set_name("s");
   ranks[1].Send(strange);
-  ExpectError(ranks[1].Receive(), "MALFORMED",
-              "frame: " + std::to_string(strange.ByteSizeLong()) +
-                  " bytes; must be a ParticleFrame of at most 4096 fields");
+  ExpectError(ranks[1].Receive(), "MALFORMED");
   ranks.SendAll(1);
   EXPECT_TRUE(ranks[0].Receive().has_frame());
 }
 
 TEST_F(PartRefused, OUT_OF_RANGE) {
-  const auto expect = [this](const v1::ReconstructRequest& open, const std::string& message) {
-    ExpectNotOpened(open, grpc::StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE", message);
+  const auto expect = [this](const v1::ReconstructRequest& open) {
+    ExpectNotOpened(open, grpc::StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   };
-  expect(OpenPart("tank", 0, 5),
-         "open.parts: 5; must be at most 4; start the server with a larger --max-parts");
-  expect(OpenPart("tank", 3, 3), "open.part: 3; must be below open.parts");
-  expect(OpenPart("tank", 1, 0), "open.part: 1; must be below open.parts");
+  expect(OpenPart("tank", 0, 5));
+  expect(OpenPart("tank", 3, 3));
+  expect(OpenPart("tank", 1, 0));
   auto open = OpenPart("tank", 0, 2);
   open.mutable_open()->set_part_timeout_ms(600'001);
-  expect(open, "open.part_timeout_ms: 600001; must be at most 600000");
+  expect(open);
   open = OpenPart("tank", 0, 2);
   open.mutable_open()->set_parts_token("line\nbreak");
-  expect(open, "open.parts_token: 10 bytes; must be at most 128 bytes of printable ASCII");
+  expect(open);
 }
 
 TEST_F(PartRefused, NO_SUCH_STREAM) {
-  ExpectNotOpened(OpenPart("tank", 1, 2), grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM",
-                  "open.stream_name: \"tank\"; must be the name of an open stream; ListStreams "
-                  "tells them");
+  ExpectNotOpened(OpenPart("tank", 1, 2), grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM");
 }
 
 TEST_F(PartRefused, PARTS_COUNT) {
@@ -212,19 +193,16 @@ TEST_F(PartRefused, PARTS_COUNT) {
   auto open = OpenRequest("whole");
   open.mutable_open()->set_parts_token(kPartsToken);
   ASSERT_TRUE(whole.SendAndReceive(open).has_opened());
-  ExpectNotOpened(OpenPart("whole", 1, 2), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT",
-                  "open.parts: 2; must be 0, as in part 0");
+  ExpectNotOpened(OpenPart("whole", 1, 2), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT");
   Ranks ranks(*server_, "tank", 2);
-  ExpectNotOpened(OpenPart("tank", 2, 3), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT",
-                  "open.parts: 3; must be 2, as in part 0");
+  ExpectNotOpened(OpenPart("tank", 2, 3), grpc::StatusCode::FAILED_PRECONDITION, "PARTS_COUNT");
 }
 
 TEST_F(PartRefused, PARTS_TOKEN) {
   Ranks ranks(*server_, "tank", 2);
   auto open = OpenPart("tank", 1, 2);
   open.mutable_open()->set_parts_token("guessed");
-  ExpectNotOpened(open, grpc::StatusCode::PERMISSION_DENIED, "PARTS_TOKEN",
-                  "open.parts_token: 7 characters; must be that of part 0");
+  ExpectNotOpened(open, grpc::StatusCode::PERMISSION_DENIED, "PARTS_TOKEN");
   ranks.SendAll(1);
   EXPECT_TRUE(ranks[0].Receive().has_frame());
 }
@@ -233,26 +211,20 @@ TEST_F(PartRefused, TOO_MANY_PARTS) {
   Ranks first(*server_, "first", 4), second(*server_, "second", 2);
   StreamClient third(channel_);
   ASSERT_TRUE(third.SendAndReceive(OpenPart("third", 0, 2)).has_opened());
-  ExpectNotOpened(
-      OpenPart("third", 1, 2), grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_PARTS",
-      "streams: 4 connections that send parts; must be at most 4; start the server with "
-      "a larger --max-parts");
+  ExpectNotOpened(OpenPart("third", 1, 2), grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_PARTS");
 }
 
 TEST_F(PartRefused, TAKEN_OVER) {
   Ranks ranks(*server_, "tank", 2);
   StreamClient second(Connect(*server_, Transport::kTcp));
   ASSERT_TRUE(second.SendAndReceive(OpenPart("tank", 1, 2)).has_opened());
-  ExpectEnd(ranks[1], grpc::StatusCode::ABORTED, "TAKEN_OVER",
-            "open.part: sent by another call now; must be sent by one call of the stream");
+  ExpectEnd(ranks[1], grpc::StatusCode::ABORTED, "TAKEN_OVER");
 }
 
 TEST_F(PartRefused, LEADER_GONE) {
   Ranks ranks(*server_, "tank", 2);
   ranks[0].Cancel();
-  ExpectEnd(
-      ranks[1], grpc::StatusCode::UNAVAILABLE, "LEADER_GONE",
-      "stream: part 0 has left; must have a part 0; try again when it has resumed the stream");
+  ExpectEnd(ranks[1], grpc::StatusCode::UNAVAILABLE, "LEADER_GONE");
 }
 
 }  // namespace
