@@ -15,6 +15,7 @@ from .report import Evaluation, as_html, as_json, as_text
 from .scenes import SETS, digest, make_scene, make_set
 from .shapes import TUNING_SHAPES, VALIDATION_SHAPES
 from .study import PLACEMENTS, Method, all_methods, run_study
+from .surfaces import run_surfaces, surface_digest, surface_sets, surface_tables
 
 _ABOUT = """Measures the placements of PartiEMC on sequences whose true outline is known, and on recordings. Needs
 PYTHONPATH=BUILD/python:client/evaluation, where BUILD has the package partiemc."""
@@ -58,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--quiet", action="store_true", help="no progress")
     parser = argparse.ArgumentParser("partiemc_evaluation", description=_ABOUT, epilog=_EXAMPLES,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="set|paper")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="set|paper|surfaces")
     one = verbs.add_parser("set", parents=[shared], help="measure every method on a set of synthetic sequences: ratios "
                            "to marching squares in accuracy, area and jitter, by group and by sampler, with intervals")
     one.add_argument("set", choices=(*SETS, "none"), help="the set; 'none' for recordings alone")
@@ -67,6 +68,14 @@ def _parser() -> argparse.ArgumentParser:
     paper = verbs.add_parser("paper", parents=[shared], help="the same, then the paper's Tables 1 to 4 and Figures 5 to "
                              "14 from our own scenes, and a verdict on each of its 27 claims")
     paper.add_argument("--set", choices=SETS, default="tuning", help="set of Tables 3 and 4; tuning by default")
+    space = verbs.add_parser("surfaces", help="measure the placements of surfaces in space on a set of scenes with known "
+                             "truth; each surface is checked (S1 to S5 of core/SURFACES.md)")
+    space.add_argument("set", choices=surface_sets())
+    space.add_argument("--digests", action="store_true", help="print a digest of the particles of each scene, and measure "
+                       "nothing")
+    space.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1, help="scenes at a time; one for "
+                       "each processor by default")
+    space.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 
 
@@ -119,11 +128,28 @@ def _run(options: argparse.Namespace) -> None:
         (options.output_dir / "evaluation.json").write_text(as_json(evaluation))
 
 
+def _run_surfaces(options: argparse.Namespace) -> None:
+    recipes = surface_sets()[options.set]
+    if options.digests:
+        for recipe in recipes:
+            print(f"{surface_digest(recipe)}  {options.set}/{recipe.name}", flush=True)
+        return
+
+    def progress(done: int) -> None:
+        if not options.quiet:
+            print(f"\r\x1b[K{done} of {len(recipes)} scenes", end="\n" if done == len(recipes) else "", file=sys.stderr,
+                  flush=True)
+    for table in surface_tables(run_surfaces(recipes, options.jobs, progress)):
+        print(table.as_text())
+
+
 def main(arguments: Seq[str] | None = None) -> int:
     """Exit code: 0; 1 if an input cannot be read or measured; 2 for a wrong flag."""
     options = _parser().parse_args(arguments)
     try:
-        if options.verb == "set" and options.digests:
+        if options.verb == "surfaces":
+            _run_surfaces(options)
+        elif options.verb == "set" and options.digests:
             _print_digests(options.set)
         else:
             _run(options)
