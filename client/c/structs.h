@@ -1,5 +1,5 @@
-// Copies C structs between callers and libraries of different versions: `size` gives the caller's
-// length.
+// Copies C structs between a program and a library of different versions. The member `size` of a
+// struct is its length in the program's version.
 #pragma once
 
 #include <algorithm>

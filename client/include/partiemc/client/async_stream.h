@@ -43,9 +43,10 @@ class AsyncStream {
   std::future<Answer> Send(const Frame& frame, double time);
   std::future<Answer> SendArrays(const ParticleArrays& particles, double time);
 
-  /// Same as above, with a callback. `answered` is called once: on the receiving thread in the
-  /// order of the frames, or before Send returns if the stream does not accept the frame. Later
-  /// answers wait until it returns. It must not call this object.
+  /// Sends like the methods above, but passes the answer to `answered`, which is called once. It is
+  /// called on the receiving thread, in the order of the frames, or before Send returns if the
+  /// stream does not accept the frame. Until `answered` returns, later answers wait. `answered`
+  /// must not call this object.
   void Send(const Frame& frame, double time, Answered answered);
   void SendArrays(const ParticleArrays& particles, double time, Answered answered);
 
