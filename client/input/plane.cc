@@ -13,7 +13,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// Above the rounding error of text with six digits, and far below a real third dimension.
+// An axis is constant if its extent is below this share of the largest extent. The share is above
+// the rounding error of text with six digits, and far below a real third dimension.
 constexpr double kFlatRelativeTolerance = 1e-6;
 
 constexpr std::string_view kAxisNames[] = {"x", "y", "z"};

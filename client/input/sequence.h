@@ -50,13 +50,11 @@ struct SequenceOptions {
   /// - Files with column names (CSV header, LAMMPS dump, NPZ): the two or three columns of the
   ///   positions, by name or by number from 1: "xu,yu", "Points:0,Points:2", "8,10".
   /// - Files without names (CSV without header, NPY): the numbers of the two or three columns of
-  /// the
-  ///   positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
+  ///   the positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
   ///   skips a column.
   /// - HDF5: datasets, "PartType0/Coordinates" or "run/x,run/y"; "*" in a path stands for the
-  /// groups
-  ///   of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses the
-  ///   particle array NAME instead of fluid.
+  ///   groups of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses
+  ///   the particle array NAME instead of fluid.
   /// - VTK files define their positions; the option is refused.
   std::string columns = {};
 
@@ -71,15 +69,16 @@ struct SequenceOptions {
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present.
   std::string times = {};
 
-  /// Time of one time step, where frames have the number of their step (LAMMPS, GSD). A frame
-  /// without it is refused. Excludes `times`; a `times.csv` beside the files is not used.
+  /// Duration of a time step, for formats that state a step number for each frame (LAMMPS, GSD). A
+  /// frame without a step number is refused. Excludes `times`; a `times.csv` beside the files is
+  /// not used.
   std::optional<double> time_step = {};
 
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part is optional. "A" is one
   /// frame. Empty: all.
   std::string frames = {};
 
-  /// A packed file may unpack to 64 MiB, and to this many times its size beyond.
+  /// Largest ratio of unpacked to packed bytes of a file. A file may always unpack to 64 MiB.
   double max_expansion = input::kMaxExpansion;
 };
 
@@ -88,21 +87,22 @@ struct SequenceOptions {
 /// Reads, plain or packed (.gz, .zst): CSV and other text tables, LAMMPS text dumps, LAMMPS and
 /// extended xyz, PLY, BGEO. Reads also NPY, NPZ and GSD. Builds with VTK read legacy VTK, VTP, VTU.
 /// Builds with HDF5 read HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget. ParaView's collections
-/// .pvd and .series list files and their times. From a LAMMPS dump it
-/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled). Image flags ix iy iz unwrap
-/// x y and xs ys, unless `columns` names the positions.
+/// .pvd and .series list files and their times.
+///
+/// In a LAMMPS dump the positions are x y (wrapped), else xu yu (unwrapped), else xs ys (scaled).
+/// Image flags ix iy iz unwrap x y and xs ys, unless `columns` names the positions.
 ///
 /// Data with three coordinates is 2D if one axis is constant to 1e-6 of the largest extent. The
 /// first frame with particles determines this axis; the other two axes become x and y in this
 /// order. If several axes are constant, the last of them is dropped. A later frame outside the
 /// plane is an error.
 ///
-/// Errors are one line with the problem, the place (file, line, frame) and the remedy:
-/// kInvalidArgument: a wrong option; kNotFound, kPermissionDenied: the file; kUnimplemented: an
-/// unsupported format; kFailedPrecondition: the input is ambiguous (several series, columns without
-/// names, 3D) or `select` holds for no particle of all frames; kDataLoss: damaged or truncated
-/// input; kResourceExhausted: it unpacks to too much. Files are not trusted: memory grows with the
-/// bytes read, never with a declared count.
+/// Errors are one line with the problem, the place (file, line, frame) and the remedy.
+/// kInvalidArgument: a wrong option. kNotFound, kPermissionDenied: the file. kUnimplemented: an
+/// unsupported format. kFailedPrecondition: the input is ambiguous (several series, columns without
+/// names, 3D), or `select` holds for no particle of all frames. kDataLoss: damaged or truncated
+/// input. kResourceExhausted: the input unpacks to too many bytes. Files are not trusted: memory
+/// grows with the bytes read, never with a declared count.
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.

@@ -28,7 +28,8 @@ constexpr std::uint16_t kStored = 0;
 constexpr std::uint16_t kDeflated = 8;
 constexpr std::uint32_t kInZip64 = 0xFFFFFFFF;
 
-// An entry, unpacked: ends after the bytes that the directory says, and checks them.
+// The unpacked bytes of an entry. Ends after the size that the directory states, and verifies size
+// and checksum.
 class CheckedEntry final : public ByteSource {
  public:
   CheckedEntry(std::string name, std::unique_ptr<ByteSource> source, const ZipEntry& entry)
