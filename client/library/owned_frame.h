@@ -36,7 +36,7 @@ class OwnedFrame {
     CopyAttributes(frame.attributes);
   }
 
-  /// Same as above for arrays with arbitrary strides.
+  /// Same as Assign above, for arrays with arbitrary strides.
   void Assign(const wire::FrameRows& rows, double time, std::uint64_t number) {
     Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
   }
