@@ -60,7 +60,8 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   if (!shared) InsertPoints(rings.points, points);
   const vtkIdType first = shared ? 0 : static_cast<vtkIdType>(mesh.PointCount());
 
-  // VTK numbers the lines of polygonal data before its polygons.
+  // VTK numbers the lines of polygonal data before its polygons, so the values for rings come
+  // first.
   vtkNew<vtkUnsignedCharArray> classes;
   classes->SetName("class");
   vtkNew<vtkIntArray> ring_of;
@@ -91,7 +92,8 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   data->GetCellData()->AddArray(classes);
   data->GetCellData()->AddArray(ring_of);
   AddField(data, "TimeValue", frame.time);
-  // A mesh that does not start with the points of the rings has more points than values.
+  // A mesh that does not start with the points of the rings has more points than attribute values.
+  // Attributes are then left out.
   if (shared || mesh.points.empty()) AddAttributes(frame.result, data);
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);
