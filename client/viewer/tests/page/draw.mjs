@@ -99,7 +99,8 @@ test('parts have their colours in dark and light', () =>
       const { line, band } = await page.evaluate(() => {
         const { rings, mesh } = bench.makeFrame();
         const k = rings.offsets[rings.outerOf.indexOf(0xffffffff)];
-        // Centre of the largest triangle of the band.
+        // The centre of the largest boundary triangle (class 0), which lies in the band along the
+        // outline.
         let best = { area: 0, place: [0, 0] };
         for (let t = 0; t < mesh.classes.length; ++t) {
           if (mesh.classes[t] !== 0) continue;
