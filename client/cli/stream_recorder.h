@@ -1,5 +1,5 @@
 // `partiemc watch --record`: records the frames that a producer sends. A replay of the recording
-// has the same bits.
+// has the same results, bit for bit.
 #pragma once
 
 #include <cstdint>

@@ -21,7 +21,8 @@ struct RecordedFrame {
   std::size_t index = 0;  ///< Index in the input, counted from 0, before any selection.
   std::optional<double>
       time;  ///< From the times file, else `step` times SequenceOptions::time_step, else the frame.
-  /// Number of the time step. Without `time` it orders the frames, but velocities are useless.
+  /// Number of the time step. If `time` is absent, the step orders the frames, but velocities
+  /// cannot be used.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
   int components = 2;  ///< 3 with SequenceOptions::in_space.
@@ -58,8 +59,8 @@ struct SequenceOptions {
   /// - VTK files define their positions; the option is refused.
   std::string columns = {};
 
-  /// Particle attributes to read: column names, or arrays of two or three components; "velocity" is
-  /// `velocities`. A file without one of them is refused.
+  /// Particle attributes to read: column names, or arrays of two or three components. "velocity"
+  /// selects `velocities`. A file without one of the attributes is refused.
   std::vector<std::string> attributes = {};
 
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
@@ -122,7 +123,8 @@ class Sequence {
   /// A short description of the input: "75 CSV files, frame_0000.csv to frame_0074.csv".
   virtual std::string Description() const = 0;
 
-  /// Notices for the user: skipped files, the recognised plane, ignored arrays. Grows with Next.
+  /// Notices for the user: skipped files, the recognised plane, ignored arrays. Next may add
+  /// notices.
   virtual const std::vector<std::string>& notices() const = 0;
 };
 

@@ -19,8 +19,8 @@ namespace {
 constexpr int kFirstBackoffMs = 100;
 constexpr int kLongestBackoffMs = 500;
 
-// A dead connection is detected after the sum of both: the silence before a ping, and the time for
-// its acknowledgement. The latter must cover a slow connection with megabytes on the way.
+// A dead connection is detected after the sum of two times: the silence before a ping, and the time
+// for its acknowledgement. The second time must cover a slow connection with megabytes on the way.
 constexpr int kKeepaliveMs = 4000;
 constexpr int kKeepaliveTimeoutMs = 6000;
 

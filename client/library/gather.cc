@@ -40,8 +40,8 @@ const std::byte* InPlace(const std::array<View, N>& columns) {
   return first;
 }
 
-// Copies rows [begin, end) of one column. `to` is the address of the first copied number in its
-// row.
+// Copies rows [begin, end) of one column. The first number is written to `to`, each further number
+// `row_bytes` behind the previous one.
 template <typename To, typename View>
 void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::size_t row_bytes,
                   std::byte* to) {

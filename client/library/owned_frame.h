@@ -20,7 +20,7 @@ class OwnedFrame {
   OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep the addresses of their elements.
   OwnedFrame& operator=(OwnedFrame&&) = default;
 
-  /// Copies `frame` and sets its time to `time`.
+  /// Copies `frame`, with `time` instead of its time.
   void Assign(const Frame& frame, double time, std::uint64_t number) {
     frame_ = frame;
     frame_.time = time;

@@ -16,8 +16,8 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// Sets `xy` to the two coordinates of each vector that lie in `plane`. Each vector has `components`
-// values. If there are only two, both are copied.
+// Sets `xy` to two coordinates of each vector, along the axes of `plane`. Each vector has
+// `components` values. If it has only two, both are copied.
 template <typename From, typename To>
 void Project(std::span<const From> vectors, std::size_t components, Plane plane,
              std::vector<To>& xy) {

@@ -16,7 +16,8 @@
 
 namespace partiemc::client {
 
-/// A frame of a replay. Owns nothing: all views must outlive the call.
+/// A frame of a replay. It owns nothing: all views must stay valid during the call that receives
+/// it.
 struct FrameRecord {
   std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.

@@ -88,8 +88,8 @@ class GlbBuffer {
     return count_++;
   }
 
-  // Returns the whole file. `scene` holds all JSON members except the arrays' accessors, views and
-  // buffer.
+  // Returns the whole file. `scene` holds the JSON members besides the asset and the members that
+  // describe the arrays.
   std::string File(std::string_view scene) const {
     std::string json = Concat(R"({"asset":{"version":"2.0","generator":"PartiEMC"},)", scene);
     if (count_ > 0) {

@@ -22,8 +22,8 @@ constexpr double kSteps = 1000;  // Rounding steps per unit.
 // Margin around the box, as a share of its longer side.
 constexpr double kMargin = 0.02;
 
-// Diameter of a particle's dot: in spacings; in SVG units if the spacing is unknown; lower limit in
-// SVG units.
+// Diameter of a particle's dot: in spacings; in SVG units, if the spacing is unknown; lower limit,
+// in SVG units.
 constexpr double kDotSpacings = 0.4;
 constexpr double kDefaultDot = 1.5;
 constexpr double kSmallestDot = 0.4;

@@ -36,7 +36,8 @@ void AddField(vtkPolyData* data, const char* name, double value) {
   data->GetFieldData()->AddArray(array);
 }
 
-// Adds the attributes at the points of the mesh, or of the rings without a mesh.
+// Adds the attributes at the points of the mesh. If there is no mesh, adds the attributes at the
+// points of the rings.
 void AddAttributes(const Result& result, vtkPolyData* data) {
   for (const AttributeValues& attribute : result.attributes) {
     vtkNew<vtkFloatArray> array;

@@ -77,8 +77,8 @@ absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   }
 }
 
-// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream,
-// and can wait 10 s for its own objects.
+// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream.
+// This shutdown can wait 10 s for gRPC's own objects.
 void KeepGrpc() { [[maybe_unused]] static const bool is_kept = (grpc_init(), true); }
 
 std::string AddressOf(const std::optional<std::string>& address) {

@@ -187,7 +187,7 @@ void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& 
     if (*got == Received::kEnd) return;
     if (*got != Received::kEvent) continue;
     const auto now = Clock::now();
-    // The watcher may receive the result before the producer.
+    // If the watcher received the result before the producer, the delay counts as 0.
     const auto answered = stream.AnsweredAt(frame.sequence);
     shared.watches.Add(answered ? std::max(Milliseconds(now - *answered), 0.0) : 0.0);
   }
@@ -207,7 +207,7 @@ double MemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-// Results of all windows except the first, in which buffers grow.
+// Results of the run. They leave out the first window, in which buffers grow.
 struct Figures {
   double seconds = 0;
   bool settled = false;

@@ -48,8 +48,8 @@ absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request);
 
-/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects its
-/// components. `source` begins errors and becomes rows.source.
+/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects the
+/// components of the array. Error messages begin with `source`, which also becomes rows.source.
 absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
                       const std::string& source, ParticleRows& rows);
 

@@ -35,7 +35,8 @@ struct ColumnRequest {
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
 };
 
-/// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.
+/// Parses the options --select and --columns. kInvalidArgument if an expression is not
+/// "COLUMN=VALUE" or an entry of `columns` is empty.
 absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
                                                  std::string_view columns);
 

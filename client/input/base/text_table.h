@@ -14,10 +14,9 @@ namespace partiemc::client::input {
 void SplitAtBlanks(std::string_view line, std::vector<std::string_view>& cells);
 
 /// Returns the number of lines of `stream` before the header of its table. Some programs write
-/// titles and settings there.
-/// The header is the first line with names of positions, or with all names of `columns`, that has
-/// as many cells as the following line. Returns 0 if the first 64 KiB have no such line, or if the
-/// table begins at once. Consumes nothing.
+/// titles and settings there. The header is the first line with names of positions, or with all
+/// names of `columns`, that has the same number of cells as the following line. Returns 0 if the
+/// first 64 KiB have no such line, or if the table begins at once. Consumes nothing.
 absl::StatusOr<std::size_t> CountPreambleLines(InputStream& stream,
                                                const std::vector<std::string>& columns);
 

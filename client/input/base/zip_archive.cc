@@ -54,7 +54,8 @@ class CheckedEntry final : public ByteSource {
     return absl::DataLossError(Concat(name_, ": the checksum is wrong; the file is damaged"));
   }
 
-  // Returns 0. An entry that is longer than its size is an error.
+  // Returns 0 at the end of the entry. It is an error if the source has more bytes than the entry's
+  // size.
   absl::StatusOr<std::size_t> CheckEnd() {
     if (seen_crc_ != crc_) return WrongChecksum();  // The entry is empty.
     char surplus = 0;

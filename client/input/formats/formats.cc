@@ -36,8 +36,8 @@ struct FileHead {
   }
 };
 
-// Whether a file is an NPY array of several frames: it has one extent more than an array of one
-// frame.
+// Whether a file is an NPY array of several frames. Such an array has one extent more than an array
+// of one frame.
 bool HasFramesInNpy(const FileHead& head) {
   constexpr std::string_view kShape = "'shape': (";
   const std::size_t at = head.bytes.find(kShape);

@@ -61,8 +61,8 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
   return table;
 }
 
-// If --columns is one name, the name of an array, replaces it by the names of the array's
-// components.
+// Expands the name of an array: if --columns has only this name, replaces it by the names of the
+// array's components.
 ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& table) {
   if (request.columns.size() != 1) return request;
   ColumnRequest expanded = request;

@@ -22,7 +22,7 @@ const StoredArray* FindArray(const std::vector<StoredArray>& arrays, std::string
   return found == arrays.end() ? nullptr : &*found;
 }
 
-// A column of the quotients of two columns.
+// Returns a column of the quotients above / below.
 StoredArray Quotient(const std::string& name, std::size_t rows, StoredArray above,
                      StoredArray below) {
   const auto load = [rows, above, below](std::vector<char>& bytes) {

@@ -1,4 +1,4 @@
-// What the two formats of PySPH's output, HDF5 and NPZ, have in common.
+// Functions that the readers of PySPH's two formats, HDF5 and NPZ, share.
 #pragma once
 
 #include <string>

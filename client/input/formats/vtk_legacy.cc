@@ -65,7 +65,7 @@ class ParticlesReader final : public vtkDataReader {
     return false;
   }
 
-  // Returns false at the end and after an error.
+  // Reads the next section. Returns false at the end of the file and after an error.
   bool ReadSection(vtkPolyData& particles) {
     const std::string keyword(Keyword());
     std::int64_t count = 0;

@@ -59,7 +59,8 @@ class MessageCatcher final : public vtkOutputWindow {
   void DisplayGenericWarningText(const char* text) override { TakeWarning(text); }
   void DisplayDebugText(const char* /*text*/) override {}
 
-  // "ERROR: In FILE, line N\nvtkThing (0x...): message\n\n" -> "message", in one line.
+  // Returns VTK's text "ERROR: In FILE, line N\nvtkThing (0x...): message\n\n" as "message", in one
+  // line.
   std::string Message() const {
     std::string_view text = error_;
     const std::size_t object_end = text.find("): ");

@@ -96,7 +96,8 @@ class XyzReader final : public FrameReader {
     return absl::OkStatus();
   }
 
-  // Names of the columns of "species:S:1:pos:R:3". Returns false if it has another form.
+  // Sets `names` to the columns of "species:S:1:pos:R:3". Returns false if `properties` has another
+  // form.
   static bool NamesOf(const std::string& properties, std::vector<std::string>& names) {
     names.clear();
     const std::vector<std::string_view> parts = partiemc::Split(properties, ':');

@@ -1,4 +1,4 @@
-// Particles as a simulator holds them: each quantity anywhere in its memory, any stride.
+// Particles in a simulator's own arrays. Each quantity may be anywhere in memory, with any stride.
 //
 //   stream->SendArrays({.count = n, .x = x, .y = y}, time);                    // arrays apart
 //   constexpr std::ptrdiff_t kStride = 3 * sizeof(double);               // x, y, z, x, y, z, ...
@@ -18,8 +18,8 @@
 
 namespace partiemc::client {
 
-/// A view of one number per particle, with a byte stride; its type is one of `Numbers`. Owns
-/// nothing.
+/// A view of one number per particle, with a byte stride. All numbers have the same type, one of
+/// `Numbers`. Owns nothing.
 template <typename... Numbers>
 class StridedView {
  public:

@@ -32,8 +32,8 @@ namespace partiemc::client {
 struct Outputs {
   bool mesh = true;
   bool normals = false;  ///< Outward unit normals at ring vertices.
-  /// Sends coordinates as float32 relative to an origin: half the bytes. A frame is refused if it
-  /// is so wide that a vertex would move by more than 1e-4 spacings.
+  /// The server sends coordinates as float32 relative to an origin: half the bytes. A frame is
+  /// refused if it is so wide that a vertex would move by more than 1e-4 spacings.
   bool relative_float32 = false;
   bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
   /// Attributes to interpolate to the vertices (Result::attributes), by the names of
@@ -83,7 +83,8 @@ struct StreamOptions {
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Shown in lists of streams. At most 16; each at most 128 bytes without control characters.
+  /// Labels, shown in lists of streams. At most 16; each at most 128 bytes without control
+  /// characters.
   std::map<std::string, std::string> labels = {};
   /// TLS, certificates and token. Loopback and Unix sockets need none unless the server requires
   /// them.

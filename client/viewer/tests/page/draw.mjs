@@ -1,5 +1,5 @@
-// Draws known frames in Chromium, by software, and checks the pixels; then reports the main-thread
-// time of decoding, showing and drawing a mesh of 100,000 vertices. Build the page first.
+// Draws known frames in Chromium with software rendering, and checks the pixels. Then reports how long
+// the main thread takes to decode, show and draw a mesh of 100,000 vertices. Build the page first.
 //   node tests/page/draw.mjs [--frames N] [--pictures DIR]
 // CHROMIUM names another browser than /usr/bin/chromium.
 import assert from 'node:assert/strict';

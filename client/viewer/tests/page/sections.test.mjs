@@ -1,4 +1,4 @@
-// Sections and isolines of a 3D stream, in the page and in the report. Leaves screenshots in
+// Tests sections and isolines of a 3D stream, in the page and in the report. Leaves screenshots in
 // build/screenshots.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
