@@ -12,7 +12,7 @@ namespace partiemc::c {
 /// Stores `status` for partiemc_last_error of this thread and returns its code.
 partiemc_code Keep(const absl::Status& status);
 
-/// Returns the code of `body`'s status. Converts exceptions to an error.
+/// Runs `body` and returns the code of its status. Converts an exception to an error code.
 template <typename Body>
 partiemc_code Guarded(Body body) noexcept {
   try {

@@ -9,9 +9,9 @@
 
 namespace partiemc::c {
 
-/// Returns a view of `particles`; fills `attributes` and refers to it. Errors: INVALID_ARGUMENT
-/// with a Violation (reason UNSUPPORTED) for a type that the array must not have, (reason COUNT)
-/// for an array without an address.
+/// Returns a view of `particles`. The view refers to `attributes`, which this function fills.
+/// Errors: INVALID_ARGUMENT with a Violation. Reason UNSUPPORTED: an array has an element type that
+/// is not allowed for it. Reason COUNT: an array has no address.
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes);
 

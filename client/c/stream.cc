@@ -245,7 +245,7 @@ absl::Status ViewSection(partiemc_stream& stream, std::size_t index, partiemc_ev
     return absl::InvalidArgumentError(
         absl::StrCat("section: ", index, "; must be below the ", count, " of the last event"));
   }
-  // Grows only: pointers into other sections must stay valid.
+  // Events returned for other sections point into `section_values`, so it never shrinks.
   if (stream.section_values.size() < count) stream.section_values.resize(count);
   partiemc_event view = Empty(PARTIEMC_RESULT);
   view.sequence = stream.event.sequence;

@@ -1,5 +1,5 @@
-// Copies C structs between callers and libraries of different versions: `size` gives the caller's
-// length.
+// Copies C structs between a program and a library of different versions. The member `size` of a
+// struct is its length in the program's version.
 #pragma once
 
 #include <algorithm>
@@ -8,14 +8,15 @@
 
 namespace partiemc::c {
 
-/// Copies the first `size` bytes of `ours` to the caller's struct.
+/// Copies the first `size` bytes of the library's struct `ours` to the program's struct `theirs`.
 template <typename T>
 void Give(T ours, std::size_t size, T* theirs) {
   ours.size = size;
   std::memcpy(static_cast<void*>(theirs), &ours, std::min(size, sizeof ours));
 }
 
-/// Copies `theirs`; members beyond its size come from `defaults`.
+/// Returns a copy of the program's struct `theirs`. Members beyond its size have the values of
+/// `defaults`.
 template <typename T>
 T Take(const T* theirs, T defaults) {
   if (theirs != nullptr) {

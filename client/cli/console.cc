@@ -56,7 +56,7 @@ std::string AsFlag(const absl::Status& status) {
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.erase(0, kPrefix.size());
-  // --slice and --isolines take several values; the index means nothing to a user.
+  // Removes the prefix "sections[K].": a user of --slice and --isolines does not know the index K.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:")}) {

@@ -32,12 +32,12 @@ std::string OneLine(const absl::Status& status);
 /// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...".
 std::string AsFlag(const absl::Status& status);
 
-/// Prints why a server could not be reached. Returns kUsage for INVALID_ARGUMENT, a wrong flag, and
-/// kServer for every other status.
+/// Prints why a server could not be reached. Returns kUsage for INVALID_ARGUMENT, which means a
+/// wrong flag, and kServer for every other status.
 int ComplainOfServer(const absl::Status& status);
 
-/// The search for a server as a line of progress: "lost HOST:PORT (WHY), trying again: 12 of 300
-/// s".
+/// Returns a line of progress that describes a reconnection: "lost HOST:PORT (WHY), trying again:
+/// 12 of 300 s".
 std::string WaitingText(const Reconnecting& reconnecting);
 
 /// After this call the first SIGINT or SIGTERM sets a flag and the second ends the program.

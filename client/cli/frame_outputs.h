@@ -25,7 +25,7 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges);
 
 class FrameOutputs {
  public:
-  /// The values of the flags with the same names. Empty: no such output.
+  /// The values of the flags with the same names. An empty value disables the output.
   struct Places {
     std::string output_dir, format, stats, color_by;
     std::vector<std::string> gauges = {};
@@ -42,7 +42,8 @@ class FrameOutputs {
   void AddRefused() { summary_.AddRefused(); }
   void EndEarly(std::string why) { summary_.EndEarly(std::move(why)); }
 
-  /// Writes the collections of the frames and the statistics file, which do not exist before.
+  /// Writes the statistics file, and the collection files that list the frames. These files do not
+  /// exist before this call.
   absl::Status Finish();
 
   const Summary& summary() const { return summary_; }

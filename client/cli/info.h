@@ -17,7 +17,7 @@ CLI::App* AddInfo(CLI::App& app, QueryFlags& flags);
 /// Returns the exit code.
 int Info(const QueryFlags& flags);
 
-/// Aligned lines for a person; every line ends in '\n'.
+/// Returns aligned lines for a person to read; every line ends in '\n'.
 std::string InfoText(const ServerInfo& info, const ServerFlags& server);
 
 /// One JSON object on one line.

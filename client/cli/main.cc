@@ -26,7 +26,8 @@ int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // gRPC's log lines are for its developers. This program reports connection errors itself.
+  // Disables gRPC's log lines, which are for its developers. This program reports connection errors
+  // itself.
   setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
   CLI::App app("Outlines and meshes of streamed particle frames (SPH, granular), stable over time.",
                "partiemc");

@@ -16,7 +16,7 @@ class App;
 
 namespace partiemc::client {
 
-/// The values of the flags. ParametersOf parses those that are still text.
+/// The values of the flags. Some are still text, which ParametersOf parses.
 struct ReplayFlags {
   std::string input;
   SequenceOptions sequence;

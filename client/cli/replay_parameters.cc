@@ -43,7 +43,7 @@ std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
   return numbers;
 }
 
-// Parses --slice. Empty if the text has neither of its two forms.
+// Parses --slice. Empty if the text is neither x=C, y=C or z=C nor six numbers.
 std::optional<SlicePlane> SliceOf(std::string_view text) {
   if (text.size() > 2 && text[1] == '=' && text[0] >= 'x' && text[0] <= 'z') {
     const auto at = Number(text.substr(2));
@@ -51,7 +51,7 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
     const auto axis = static_cast<std::size_t>(text[0] - 'x');
     SlicePlane slice{.normal = {}};
     slice.origin[axis] = *at;
-    // With this sign the picture shows the two other axes in alphabetical order.
+    // With this sign of the normal, the picture has the two other axes in alphabetical order.
     slice.normal[axis] = axis == 1 ? -1 : 1;
     return slice;
   }

@@ -1,5 +1,5 @@
 // `partiemc watch --record`: records the frames that a producer sends. A replay of the recording
-// has the same bits.
+// has the same results, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -23,16 +23,16 @@ class StreamRecorder {
                                                const std::string& stream_name,
                                                const WatchedStream& stream);
 
-  /// Writes the particles of `frame`, which is unchanged afterwards.
+  /// Writes the particles of `frame`, which is the same after the call as before.
   /// Errors: FAILED_PRECONDITION if the producer does not echo its particles; the errors of
   /// RecordingWriter.
   absl::Status Add(WatchedFrame& frame);
 
-  /// Writes the file, unless there was no frame.
+  /// Completes the file. Does nothing if no frame was added.
   absl::Status Finish();
 
-  /// Lines for a user: the path, the command that replays the recording, and why a replay would
-  /// have other bits, if it would.
+  /// Returns lines for a user: the path and the command that replays the recording. If a replay may
+  /// have other bits, another line states the reason.
   std::string Summary() const;
 
  private:
@@ -46,8 +46,8 @@ class StreamRecorder {
   std::uint64_t first_sequence_ = 0, missed_ = 0;
 };
 
-/// The flags of `partiemc replay` for these parameters, each after a space, without the defaults.
-/// A given spacing is left out, because the recording holds it.
+/// Returns the flags of `partiemc replay` for parameters that differ from the defaults, each after
+/// a space. Leaves out a given spacing, because the recording holds it.
 std::string ReplayFlagsOf(const ReconstructionParameters& parameters);
 
 }  // namespace partiemc::client

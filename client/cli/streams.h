@@ -18,7 +18,7 @@ CLI::App* AddStreams(CLI::App& app, QueryFlags& flags);
 /// Returns the exit code.
 int Streams(const QueryFlags& flags);
 
-/// An aligned table for a person; every line ends in '\n'.
+/// Returns an aligned table for a person to read; every line ends in '\n'.
 std::string StreamsText(std::span<const StreamSummary> streams);
 
 /// One JSON object on one line.

@@ -70,7 +70,7 @@ struct Ended {
   }
 };
 
-// "t = 1.25, 2278 particles, 5 polylines, 3 dropped".
+// Details of a frame for the line of progress: "t = 1.25, 2278 particles, 5 polylines, 3 dropped".
 std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
   std::string detail = Concat("t = ", frame.time, ", ", frame.frame.result.statistics.particles,
                               " particles, ", frame.frame.result.rings.RingCount(), " polylines");
@@ -149,9 +149,9 @@ Progress::Options ProgressOptions(const WatchFlags& flags) {
   return options;
 }
 
-// Opens the watch; with --wait as soon as the stream exists. While waiting, a server may restart.
-// Shows `progress` as soon as there is something to wait for. Errors: those of Watcher::Open;
-// CANCELLED after Ctrl-C.
+// Opens the watch. With --wait it retries until the stream exists, even if the server becomes
+// unreachable in between, for example to restart. Shows `progress` from the first retry on. Errors:
+// those of Watcher::Open; CANCELLED after Ctrl-C.
 absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
                                                     std::optional<Progress>& progress) {
   for (bool waited = false;; waited = true) {

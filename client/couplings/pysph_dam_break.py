@@ -23,7 +23,7 @@ class LiveDamBreak(DamBreak2D):
                            help="Never wait for the server; skip frames while it is behind")
 
     def post_step(self, solver):
-        # PySPH increments step and time after this call.
+        # PySPH increments the number of the step and the time after this call.
         if (solver.count + 1) % self.options.every:
             return
         fluid = self.particles[0]  # Views of PySPH's memory; `send` copies each once.

@@ -81,7 +81,7 @@ std::vector<Member> MembersOfPvd(std::string_view text) {
   return members;
 }
 
-// Takes a JSON string behind its opening quote. Escapes of other than ASCII become '?'.
+// Reads a JSON string after its opening quote. Unicode escapes become '?'.
 bool TakeJsonString(std::string_view& rest, std::string& text) {
   text.clear();
   while (!rest.empty()) {

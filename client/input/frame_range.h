@@ -9,7 +9,7 @@
 
 namespace partiemc::client::input {
 
-/// Frames begin, begin + step, ... below end.
+/// Selects the frames with the indices `begin`, `begin + step`, and so on, below `end`.
 struct FrameRange {
   std::size_t begin = 0;
   std::size_t end = std::numeric_limits<std::size_t>::max();

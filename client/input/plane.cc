@@ -13,7 +13,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// Above the rounding error of text with six digits, and far below a real third dimension.
+// An axis is constant if its extent is below this share of the largest extent. The share is above
+// the rounding error of text with six digits, and far below a real third dimension.
 constexpr double kFlatRelativeTolerance = 1e-6;
 
 constexpr std::string_view kAxisNames[] = {"x", "y", "z"};
@@ -94,7 +95,8 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
     for (std::size_t i = 0; i < rows.count; ++i) frame.positions[components * i + c] = along[i];
   }
   if (HasThreeAxes(rows) && components == 2) {
-    // A particle with a non-finite coordinate stays non-finite, even if that coordinate is dropped.
+    // If the dropped coordinate of a particle is not finite, it replaces x. The particle then still
+    // counts as non-finite.
     const std::vector<double>& off_plane = rows.positions[3 - (*axes)[0] - (*axes)[1]];
     for (std::size_t i = 0; i < rows.count; ++i) {
       if (!std::isfinite(off_plane[i])) frame.positions[2 * i] = off_plane[i];

@@ -20,7 +20,8 @@ namespace {
 
 using namespace input;
 
-// Largest total size that is scanned to count frames, in a fraction of a second.
+// Largest total size of files that are scanned to count their frames. The scan takes a fraction of
+// a second.
 constexpr std::size_t kMaxScannedBytes = std::size_t{64} << 20;
 
 // The files of the input and their format.

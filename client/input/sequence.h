@@ -21,7 +21,8 @@ struct RecordedFrame {
   std::size_t index = 0;  ///< Index in the input, counted from 0, before any selection.
   std::optional<double>
       time;  ///< From the times file, else `step` times SequenceOptions::time_step, else the frame.
-  /// Number of the time step. Without `time` it orders the frames, but velocities are useless.
+  /// Number of the time step. If `time` is absent, the step orders the frames, but velocities
+  /// cannot be used.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
   int components = 2;  ///< 3 with SequenceOptions::in_space.
@@ -50,18 +51,16 @@ struct SequenceOptions {
   /// - Files with column names (CSV header, LAMMPS dump, NPZ): the two or three columns of the
   ///   positions, by name or by number from 1: "xu,yu", "Points:0,Points:2", "8,10".
   /// - Files without names (CSV without header, NPY): the numbers of the two or three columns of
-  /// the
-  ///   positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
+  ///   the positions, "2,3", or names for the first columns in order, "id,x,y,vx,vy"; the name "-"
   ///   skips a column.
   /// - HDF5: datasets, "PartType0/Coordinates" or "run/x,run/y"; "*" in a path stands for the
-  /// groups
-  ///   of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses the
-  ///   particle array NAME instead of fluid.
+  ///   groups of the frames, "data/*/particles/fluid/position". PySPH: "NAME/x,NAME/y" chooses
+  ///   the particle array NAME instead of fluid.
   /// - VTK files define their positions; the option is refused.
   std::string columns = {};
 
-  /// Particle attributes to read: column names, or arrays of two or three components; "velocity" is
-  /// `velocities`. A file without one of them is refused.
+  /// Particle attributes to read: column names, or arrays of two or three components. "velocity"
+  /// selects `velocities`. A file without one of the attributes is refused.
   std::vector<std::string> attributes = {};
 
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
@@ -71,15 +70,16 @@ struct SequenceOptions {
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present.
   std::string times = {};
 
-  /// Time of one time step, where frames have the number of their step (LAMMPS, GSD). A frame
-  /// without it is refused. Excludes `times`; a `times.csv` beside the files is not used.
+  /// Duration of a time step, for formats that state a step number for each frame (LAMMPS, GSD). A
+  /// frame without a step number is refused. Excludes `times`; a `times.csv` beside the files is
+  /// not used.
   std::optional<double> time_step = {};
 
   /// "A:B" or "A:B:STEP": frames A, A + STEP, ... below B; each part is optional. "A" is one
   /// frame. Empty: all.
   std::string frames = {};
 
-  /// A packed file may unpack to 64 MiB, and to this many times its size beyond.
+  /// Largest ratio of unpacked to packed bytes of a file. A file may always unpack to 64 MiB.
   double max_expansion = input::kMaxExpansion;
 };
 
@@ -88,21 +88,22 @@ struct SequenceOptions {
 /// Reads, plain or packed (.gz, .zst): CSV and other text tables, LAMMPS text dumps, LAMMPS and
 /// extended xyz, PLY, BGEO. Reads also NPY, NPZ and GSD. Builds with VTK read legacy VTK, VTP, VTU.
 /// Builds with HDF5 read HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget. ParaView's collections
-/// .pvd and .series list files and their times. From a LAMMPS dump it
-/// uses x y (wrapped), else xu yu (unwrapped), else xs ys (scaled). Image flags ix iy iz unwrap
-/// x y and xs ys, unless `columns` names the positions.
+/// .pvd and .series list files and their times.
+///
+/// In a LAMMPS dump the positions are x y (wrapped), else xu yu (unwrapped), else xs ys (scaled).
+/// Image flags ix iy iz unwrap x y and xs ys, unless `columns` names the positions.
 ///
 /// Data with three coordinates is 2D if one axis is constant to 1e-6 of the largest extent. The
 /// first frame with particles determines this axis; the other two axes become x and y in this
 /// order. If several axes are constant, the last of them is dropped. A later frame outside the
 /// plane is an error.
 ///
-/// Errors are one line with the problem, the place (file, line, frame) and the remedy:
-/// kInvalidArgument: a wrong option; kNotFound, kPermissionDenied: the file; kUnimplemented: an
-/// unsupported format; kFailedPrecondition: the input is ambiguous (several series, columns without
-/// names, 3D) or `select` holds for no particle of all frames; kDataLoss: damaged or truncated
-/// input; kResourceExhausted: it unpacks to too much. Files are not trusted: memory grows with the
-/// bytes read, never with a declared count.
+/// Errors are one line with the problem, the place (file, line, frame) and the remedy.
+/// kInvalidArgument: a wrong option. kNotFound, kPermissionDenied: the file. kUnimplemented: an
+/// unsupported format. kFailedPrecondition: the input is ambiguous (several series, columns without
+/// names, 3D), or `select` holds for no particle of all frames. kDataLoss: damaged or truncated
+/// input. kResourceExhausted: the input unpacks to too many bytes. Files are not trusted: memory
+/// grows with the bytes read, never with a declared count.
 class Sequence {
  public:
   /// Finds the files, recognises their format and reads the beginning of the first one.
@@ -122,7 +123,8 @@ class Sequence {
   /// A short description of the input: "75 CSV files, frame_0000.csv to frame_0074.csv".
   virtual std::string Description() const = 0;
 
-  /// Notices for the user: skipped files, the recognised plane, ignored arrays. Grows with Next.
+  /// Notices for the user: skipped files, the recognised plane, ignored arrays. Next may add
+  /// notices.
   virtual const std::vector<std::string>& notices() const = 0;
 };
 

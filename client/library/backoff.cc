@@ -7,7 +7,7 @@ namespace partiemc::client {
 std::chrono::milliseconds Backoff::NextPause() {
   const std::size_t attempt = attempts_++;
   if (attempt < address_count_) return std::chrono::milliseconds(0);
-  // A round tries all its addresses without pauses.
+  // Only the first attempt of a round over the addresses has a pause.
   if (attempt % address_count_ != 0) return std::chrono::milliseconds(0);
   constexpr std::size_t kMostDoublings = 30;
   const std::size_t doublings = std::min(attempt / address_count_ - 1, kMostDoublings);

@@ -16,8 +16,9 @@ class Backoff {
   Backoff(const ReconnectPolicy& policy, std::size_t address_count, std::uint64_t random)
       : policy_(policy), address_count_(address_count), random_(random) {}
 
-  /// 0 until every address has been tried once. Then a pause at the start of each round over the
-  /// addresses: it doubles up to the longest, and the jitter removes up to half of it.
+  /// Returns the pause before the next attempt. It is 0 until every address has been tried once.
+  /// Then each round over the addresses begins with a pause. The pause doubles up to the longest,
+  /// and the jitter removes up to half of it.
   std::chrono::milliseconds NextPause();
 
  private:

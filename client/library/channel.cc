@@ -19,15 +19,16 @@ namespace {
 constexpr int kFirstBackoffMs = 100;
 constexpr int kLongestBackoffMs = 500;
 
-// A dead connection is detected after the sum of both: the silence before a ping, and the time for
-// its acknowledgement. The latter must cover a slow connection with megabytes on the way.
+// A dead connection is detected after the sum of two times: the silence before a ping, and the time
+// for its acknowledgement. The second time must cover a slow connection with megabytes on the way.
 constexpr int kKeepaliveMs = 4000;
 constexpr int kKeepaliveTimeoutMs = 6000;
 
 // Enough for a server that is starting.
 constexpr std::chrono::milliseconds kConnectTimeout(2000);
 
-// For the call that returns gRPC's reason for the missing connection, which gRPC already has.
+// Timeout of the call that obtains gRPC's reason for a missing connection. gRPC already has the
+// reason, so the call returns at once.
 constexpr std::chrono::seconds kReasonTimeout(1);
 
 absl::StatusOr<Address> ParseTarget(const std::string& address) {
@@ -70,13 +71,13 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstBackoffMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
-  // Disables gRPC's retries: this library resumes streams itself, and a call that a proxy has
-  // refused could hang in them after a cancel.
+  // Disables gRPC's retries, because this library resumes streams itself. With gRPC's retries, a
+  // call that a proxy has refused could hang after it is cancelled.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // Opens a new connection instead of sharing one, which may be dead after a loss.
+  // Opens a new connection instead of sharing an existing one, which may be dead after a loss.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // Frames go directly to the address; an http_proxy for browsers must not redirect them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);

@@ -28,8 +28,8 @@ absl::Status CheckAddress(const std::string& address, const Credentials& credent
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
-/// MakeChannel and Connect for one call that ends at `deadline`. Connect waits long enough for a
-/// server that is just starting.
+/// Calls MakeChannel and Connect for one call that ends at `deadline`. Connect waits long enough
+/// for a server that is just starting.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::string& address,
                                                                 const Credentials& credentials,
                                                                 std::chrono::milliseconds deadline);

@@ -71,7 +71,7 @@ class TokenSender final : public experimental::Interceptor {
   std::string header_;
 };
 
-// An interceptor, because gRPC allows call credentials with TLS only.
+// Adds the token with an interceptor, because gRPC allows call credentials with TLS only.
 class TokenSenderFactory final : public experimental::ClientInterceptorFactoryInterface {
  public:
   explicit TokenSenderFactory(Credentials credentials) : credentials_(std::move(credentials)) {}

@@ -14,8 +14,9 @@
 
 namespace partiemc::client {
 
-/// Credentials of the connection; clear text without `tls`. Errors: INVALID_ARGUMENT with the field
-/// of Credentials for a file that cannot be read or is not PEM.
+/// Returns gRPC's credentials for the connection; without `tls` it is clear text. Errors:
+/// INVALID_ARGUMENT, which names the field of Credentials, for a file that cannot be read or is not
+/// PEM.
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
     const Credentials& credentials);
 

@@ -15,16 +15,17 @@
 namespace partiemc::client {
 namespace {
 
-// Rows gathered at once, column by column: few enough for the L1 cache.
+// Number of rows that are gathered at once, column by column. They fit in the L1 cache.
 constexpr std::size_t kRowsAtOnce = 512;
 
-// True if numbers of type From have the bits of type To.
+// True if a number of type From has the same bits when it is converted to type To.
 template <typename From, typename To>
 constexpr bool kSameBits = std::is_same_v<From, To> ||
                            (std::is_integral_v<From> && std::is_integral_v<To> &&
                             sizeof(From) == sizeof(To));
 
-// The address of the first row if the columns are interleaved like a row; otherwise null.
+// Returns the address of the first row if the numbers already lie in memory as rows of To;
+// otherwise null.
 template <typename To, typename View, std::size_t N>
 const std::byte* InPlace(const std::array<View, N>& columns) {
   const std::byte* first = nullptr;
@@ -39,7 +40,8 @@ const std::byte* InPlace(const std::array<View, N>& columns) {
   return first;
 }
 
-// Copies one column; `to` is its place in the first row.
+// Copies rows [begin, end) of one column. The first number is written to `to`, each further number
+// `row_bytes` behind the previous one.
 template <typename To, typename View>
 void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::size_t row_bytes,
                   std::byte* to) {
@@ -57,7 +59,8 @@ void GatherColumn(const View& column, std::size_t begin, std::size_t end, std::s
   });
 }
 
-// Writes `count` rows of the `columns`, each number as a `To`.
+// Returns `count` rows of the columns, with each number as a `To`. The rows are used in place if
+// the memory has this layout; otherwise `write` copies them.
 template <typename To, typename View, std::size_t N>
 wire::RowArray Rows(std::size_t count, const std::array<View, N>& columns) {
   constexpr std::size_t kRowBytes = N * sizeof(To);

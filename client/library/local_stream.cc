@@ -116,7 +116,8 @@ absl::StatusOr<std::uint64_t> Worker::Submit(const Particles& frame, double time
   }
   const std::uint64_t sequence = next_sequence_++;
   {
-    // Safe: the only sender is this thread, so the slot in the window stays free.
+    // Unlocking is safe: only this thread sends, so no other frame takes the free slot in the
+    // window.
     const MutexUnlock unlock(mutex_);
     owned.Assign(frame, time, sequence);
   }

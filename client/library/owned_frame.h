@@ -20,7 +20,7 @@ class OwnedFrame {
   OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep the addresses of their elements.
   OwnedFrame& operator=(OwnedFrame&&) = default;
 
-  /// Copies `frame` and sets its time to `time`.
+  /// Copies `frame`, with `time` instead of its time.
   void Assign(const Frame& frame, double time, std::uint64_t number) {
     frame_ = frame;
     frame_.time = time;
@@ -36,7 +36,7 @@ class OwnedFrame {
     CopyAttributes(frame.attributes);
   }
 
-  /// Same as above for arrays with arbitrary strides.
+  /// Same as Assign above, for arrays with arbitrary strides.
   void Assign(const wire::FrameRows& rows, double time, std::uint64_t number) {
     Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
   }

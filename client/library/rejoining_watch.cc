@@ -32,8 +32,8 @@ class RejoiningWatch::Calls final : public Attempts {
         news_ ? *std::exchange(news_, {}) : call.WaitUntilOpened(watch_.clock_.Now());
     if (!opened.ok()) {
       const std::string reason = call.reason();
-      // Can change: the producer may still be reconnecting, and the lost call may still hold its
-      // slot.
+      // These refusals can change: the producer may still be reconnecting, and the lost call may
+      // still hold its slot.
       retryable = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
                   reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
                   reason == "CALLER_CALLS" || call.lost();
@@ -82,8 +82,8 @@ RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_v
       retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout,
              surroundings) {}
 
-// Tries all addresses. A server's refusal says more than an address without a server, so it is the
-// error that is returned.
+// Tries all addresses. If all fail, returns the refusal of a server rather than the error of an
+// address without a server, because the refusal is more informative.
 absl::Status RejoiningWatch::Connect() {
   const std::size_t count = retry_.addresses().size();
   const auto time = options_.connect_timeout / static_cast<int>(count);
@@ -148,13 +148,14 @@ absl::StatusOr<Received> RejoiningWatch::ReceiveOrLose(
 
 std::optional<std::uint64_t> RejoiningWatch::From() const {
   if (last_ == 0) return options_.from_sequence;
-  // A watcher of the newest frames does not need those it missed.
+  // A watcher of the newest frames does not need the frames that it missed.
   const bool goes_on = options_.mode == WatchMode::kEvery || options_.from_sequence;
   return goes_on ? std::optional(last_ + 1) : std::nullopt;
 }
 
-// Nothing counts the results between two calls: they were dropped, or computed while the watch was
-// lost, or refused.
+// Sets `rejoined`, `gap` and `dropped` of `frame`, and ends a loss. Across a loss the client cannot
+// distinguish dropped results, results that were computed during the loss, and refused frames.
+// `gap` therefore counts all missing sequence numbers.
 void RejoiningWatch::Account(WatchedFrame& frame) {
   frame.gap = 0;
   frame.rejoined.clear();
@@ -172,7 +173,7 @@ void RejoiningWatch::Account(WatchedFrame& frame) {
   last_ = frame.sequence;
 }
 
-// Begins a loss; false if a retry cannot succeed.
+// Records the loss of the call. Returns false if a retry cannot succeed.
 bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   end_ = call_->end();
   end_.dropped += unreported_drops_;
@@ -184,7 +185,8 @@ bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   if (!retry_.lost()) lost_ = received;
   retry_.Lose(absl::StrCat("lost the stream at ", address(), " (", call_->why(), ")"));
   SetCall(nullptr);
-  // The producer was lost but the server is not: the producer may come back to it.
+  // If the producer was lost but the server was not, the same address is tried again: the producer
+  // may return to it.
   if (!end_.reason.empty() && received.ok()) {
     retry_.TryAgain(received.status());
   } else {

@@ -50,8 +50,8 @@ class RejoiningWatch final : public Watcher {
   // The sequence number to request; absent: the newest.
   std::optional<std::uint64_t> From() const;
   bool Lose(const absl::StatusOr<Received>& received);
-  // kEvent if the watch continues, kNothingYet if it has not rejoined at `until`. Errors end the
-  // watch.
+  // Continues to rejoin. Returns kEvent if the watch has rejoined, kNothingYet if it has not
+  // rejoined by `until`. Errors end the watch.
   absl::StatusOr<Received> Rejoin(std::optional<TimePoint> until);
   void Account(WatchedFrame& frame);
   void SetCall(std::shared_ptr<WatchCall> call) ABSL_LOCKS_EXCLUDED(mutex_);

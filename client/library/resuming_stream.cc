@@ -31,8 +31,8 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
 
 constexpr auto kNever = Clock::TimePoint::max();
 
-// Purpose for classifying the end of an open call. Only a resuming part 0 may wait for its former
-// call.
+// Returns the purpose with which the end of an opened call is classified. It is not kResume: only a
+// part 0 that is resuming may wait until its former call releases a name or a slot.
 CallPurpose LossPurpose(const StreamOptions& options) {
   return options.parts.part > 0 ? CallPurpose::kJoin : CallPurpose::kOpen;
 }
@@ -117,7 +117,8 @@ absl::Status ResumingStream::OpenFirst() {
   }
   survives_ = options_.reconnect.give_up_after.count() > 0 && options_.checkpoint_interval > 0 &&
               (sends_other_part() || !opened->message.stream_token().empty());
-  // A part that joins late still numbers its frames from 1, by step.
+  // A part other than 0 numbers its frames from 1 even if it joins late, because all parts number
+  // frames by time step.
   checkpoint_next_ = next_answer_ =
       sends_other_part() ? 1 : std::max<std::uint64_t>(1, opened->message.next_sequence());
   resend_ = ResendBuffer(next_answer_);
@@ -159,16 +160,16 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   return sequence;
 }
 
-// True if a frame of `bytes` may be queued now.
+// Whether a frame of `bytes` bytes may be queued now.
 bool ResumingStream::MaySend(std::uint64_t bytes) const {
   AssertShared();
   if (resend_.end() - next_answer_ >= info_.frames_in_flight) return false;
   if (resend_.bytes() + bytes > options_.max_held_bytes && !all_answered()) return false;
-  // Only one frame at a time waits to be written. The queue of a lost call does not count.
+  // At most one frame waits in the call's queue. The queue of a lost call does not count.
   return call_ == nullptr || call_->reads_over() || call_->backlog() == 0;
 }
 
-// The status that ended the stream; absent if its call continues or a retry can succeed.
+// The status that ended the stream. Absent if the call continues or a retry can succeed.
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
   AssertShared();
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
@@ -340,7 +341,7 @@ absl::StatusOr<bool> ResumingStream::Deliver(StreamCall::Response response, Even
   return is_new;
 }
 
-// Stores the checkpoint of an answer. The frames up to this one need not be resent.
+// Stores the checkpoint of `answer`. Drops the frames that it covers, which need not be resent.
 void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
   if (answer.has_part() && survives_) {
     checkpoint_next_ =
@@ -354,7 +355,7 @@ void ResumingStream::Remember(const v1::ReconstructResponse& answer) {
   resend_.DropBelow(checkpoint_next_);
 }
 
-// Handles the end of the call: true if the stream has ended, false if it reconnects.
+// Handles the end of the call. Returns true if the stream has ended, false if it reconnects.
 absl::StatusOr<bool> ResumingStream::EndCall() {
   AssertShared();
   const Loss loss = LossOf(*call_, LossPurpose(options_));
@@ -378,7 +379,7 @@ void ResumingStream::LoseCall(std::unique_ptr<StreamCall> call, const Loss& loss
   connector_.Drop(std::move(call));
 }
 
-// Reconnects; false if no call is open at `until`.
+// Continues to reconnect. Returns false if no call is open by `until`.
 absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
   AssertShared();
   auto opened = connector_.OpenAgain(until);
@@ -420,7 +421,8 @@ absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                    " has smaller limits than the first: give all servers of a stream the same"));
 }
 
-// Parts of frames that are already over are not resent.
+// Returns the number of the first frame to send through a new call. A part other than 0 does not
+// resend its parts of frames that are already complete.
 std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened) const {
   if (!sends_other_part()) return checkpoint_next_;
   return std::clamp(opened.message.next_sequence(), checkpoint_next_, resend_.end());
@@ -435,7 +437,7 @@ void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
   StreamCall& call = *opened.call;
   call.AssertLocked();
   call.SetWindow(window);
-  // Until the call is the stream's, the sender only adds to the buffer, so frames stay in order.
+  // Until `call_` is set, the sender only adds frames to `resend_`, so the frames stay in order.
   for (std::uint64_t k = next_of_call_; k < resend_.end(); ++k) call.Queue(resend_.at(k));
   due_since_ = adopted_at_ = monitor_.Now();
   call_ = std::move(opened.call);

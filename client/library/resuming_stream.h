@@ -1,9 +1,9 @@
 // Implements Stream over successive calls.
 //
-// Holds every frame from Send until a checkpoint covers it. After a loss it opens a new call with
-// the last checkpoint and resends all later frames in order. It drops results that the caller has
-// already received. Each result is therefore delivered once. Results depend only on checkpoint and
-// frames, so their bits do not change.
+// The stream holds every frame from Send until a checkpoint covers it. After a loss the stream
+// opens a new call with the last checkpoint and resends all later frames in order. It drops results
+// that the caller has already received, so each result is delivered once. Results depend only on
+// checkpoint and frames, so their bits do not change.
 //
 //   streaming (call_) --lost--> StreamConnector --opened--> streaming
 //       |                           +-- refused, or give_up_after passed: failed (failure_)
@@ -55,7 +55,7 @@ class ResumingStream final : public Stream {
   ResumingStream(std::vector<std::string> addresses, const StreamOptions& options,
                  const TimeAndChance& surroundings);
 
-  // Methods that require the mutex may release it while they wait. Receiver's thread:
+  // Called by the receiver's thread. Methods that require the mutex may release it while they wait.
   absl::Status OpenFirst() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   absl::StatusOr<Received> Advance(Event& event, OptionalTime until)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
@@ -87,7 +87,8 @@ class ResumingStream final : public Stream {
   bool sends_other_part() const { return options_.parts.part > 0; }
   std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // States to the analysis that the connector and the call use the same monitor. Checks nothing.
+  // Declares to Clang's thread-safety analysis that the connector and the call use the same
+  // monitor. Does nothing at run time.
   void AssertShared() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.mutex(), call_->mutex()) {}
 
@@ -108,11 +109,12 @@ class ResumingStream final : public Stream {
   std::string checkpoint_ ABSL_GUARDED_BY(monitor_.mutex);
   // The first frame after the checkpoint.
   std::uint64_t checkpoint_next_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
-  // The next frame whose response the caller gets, and the next frame that call_ answers. After a
-  // reconnection call_ repeats responses, which are dropped.
+  // The next frame whose response the caller has not received, and the next frame that call_
+  // answers. After a reconnection call_ repeats some responses, which are dropped.
   std::uint64_t next_answer_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   std::uint64_t next_of_call_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
-  // All parts below this frame are over, as reported by call_.
+  // call_ does not answer this part's frames below this number, because the server has already
+  // completed them.
   std::uint64_t over_below_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
   // Starts of deadlines.
   TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);

@@ -71,7 +71,8 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
       }
       if (now >= *attempt_until_) {
         attempts.Drop();
-        // An attempt that was cut short by give_up_at says nothing, so the earlier error stays.
+        // If give_up_at cut the attempt short, its timeout does not show that the server is slow.
+        // The earlier error stays.
         if (*attempt_until_ < give_up_at) TryNext(NotAccepted(address(), call_, connect_timeout_));
         attempt_until_.reset();
         continue;

@@ -47,13 +47,13 @@ class RetryLoop {
   const std::vector<std::string>& addresses() const { return addresses_; }
   /// The address in use, or the next one to try.
   const std::string& address() const { return addresses_[address_]; }
-  /// Replaces the addresses learned before; the given addresses and the one in use stay. Only the
-  /// first few of a long list are used.
+  /// Replaces the addresses that were learned before. The addresses passed to the constructor and
+  /// the address in use stay. Only the first few addresses of a long list are used.
   void Learn(const std::vector<std::string>& addresses);
   void UseNextAddress() { address_ = (address_ + 1) % addresses_.size(); }
 
-  /// Begins a loss of the call at address(); `description` describes it. A loss before Recovered
-  /// extends the previous one.
+  /// Records the loss of the call at address(), with a description. Until Recovered, further losses
+  /// count as part of this one: its description and its start do not change.
   void Lose(std::string description);
   /// Schedules the next attempt, after a pause: TryNext at the next address, TryAgain at the same.
   /// `refusal` is the error of the last attempt.
@@ -64,8 +64,8 @@ class RetryLoop {
   /// From Lose to Recovered.
   bool lost() const { return backoff_.has_value(); }
 
-  /// Makes attempts until one has opened a call, at most until `until`. Requires lost(). Errors:
-  /// from `attempts`.
+  /// Makes attempts until one has opened a call, but no longer than `until`. Requires lost().
+  /// Errors: from `attempts`.
   absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<TimePoint> until);
 
   /// Requires lost().

@@ -28,12 +28,14 @@ enum class CallPurpose {
 };
 
 /// Classifies the end of a call. Requires: the call is done.
-/// With a reason, the server has decided. Draining is retryable. When a stream is resumed, so are
-/// refusals that another replica or a later attempt can change; for a part also the absence of part
-/// 0.
-/// Without a reason, the connection was lost. The code then depends on the intermediary:
-/// UNAVAILABLE for none, INTERNAL, UNKNOWN or CANCELLED for a proxy, OK for a proxy that closes
-/// cleanly.
+///
+/// A status with a reason is a decision of the server. DRAINING is always retryable. With kResume,
+/// refusals that another replica or a later attempt can change are retryable too. With kJoin, the
+/// absence of part 0 is retryable too.
+///
+/// A status without a reason usually means a lost connection, which is retryable. Its code then
+/// depends on the intermediary: UNAVAILABLE without one; INTERNAL, UNKNOWN or CANCELLED with a
+/// proxy; OK with a proxy that closes cleanly.
 Loss LossOf(const StreamCall& call, CallPurpose purpose);
 
 }  // namespace partiemc::client

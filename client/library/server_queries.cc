@@ -16,7 +16,7 @@ namespace {
 
 using Stub = v1::ReconstructionService::Stub;
 
-// One connection for calls that share a deadline.
+// A connection for several calls that share one deadline.
 class Query {
  public:
   static absl::StatusOr<Query> Connect(std::string_view address, std::chrono::milliseconds deadline,

@@ -9,7 +9,8 @@
 namespace partiemc::client {
 namespace {
 
-// One for a notice in addition to the window's responses, and one for the current read.
+// Messages in addition to one for each frame of the window: one for a notice, and one for the
+// current read.
 constexpr std::size_t kSpareMessages = 2;
 
 std::string MethodName() {
@@ -69,7 +70,8 @@ void StreamCall::Cancel() {
   EndReadsIfCancelled();
 }
 
-// Without a pending read, no callback would report that the call has ended.
+// Ends the reads of a cancelled call if no read is pending, because then no callback would report
+// the end of the call.
 void StreamCall::EndReadsIfCancelled() {
   if (!cancelled_ || reading_ != nullptr) return;
   reads_over_ = true;
@@ -118,8 +120,8 @@ void StreamCall::ReadNext() {
   RunOutside([this, into = reading_.get()] { StartRead(into); });
 }
 
-// Starts an operation without the lock, since gRPC may call back immediately. The hold stays until
-// it has started.
+// Starts a gRPC operation without the lock, because gRPC may call back immediately. The hold stays
+// until the operation has started.
 template <typename Operation>
 void StreamCall::RunOutside(Operation operation) {
   ++outside_operations_;
@@ -139,7 +141,7 @@ void StreamCall::ReleaseHoldWhenIdle() {
 }
 
 void StreamCall::OnWriteDone(bool ok) {
-  // The end of the reads and OnDone report a failed write with its reason.
+  // A failed write is not handled here: the end of the reads and OnDone report it with its reason.
   const MutexLock lock(monitor_.mutex);
   writing_ = !ok;
   request_.Clear();

@@ -41,7 +41,8 @@ struct Monitor {
   const TimeAndChance surroundings;
 };
 
-/// A call that takes longer to end after its last message is treated as broken.
+/// Time limit for the end of a call after its last message. A call that takes longer is treated as
+/// broken.
 inline constexpr std::chrono::seconds kEndTimeout(1);
 
 /// Methods that require the monitor's mutex may release it while they run.
@@ -57,13 +58,14 @@ class StreamCall final
   ~StreamCall() override;
 
   Mutex& mutex() const ABSL_LOCK_RETURNED(monitor_.mutex) { return monitor_.mutex; }
-  /// States to the analysis that this thread holds the monitor's mutex. Checks nothing.
+  /// Declares to Clang's thread-safety analysis that this thread holds the monitor's mutex. Does
+  /// nothing at run time.
   void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(monitor_.mutex) {}
 
   /// Sends `open`. Call first and once.
   void Start(const v1::OpenStream& open) ABSL_LOCKS_EXCLUDED(monitor_.mutex);
   /// Sets the number of frames that may be written ahead of their answers, and starts reading. Call
-  /// once, after the first response; before, only that response is read.
+  /// once, after the first response. Before this call, only the first response is read.
   void SetWindow(std::size_t frames) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
   /// Appends `frame` to the queue.
@@ -82,7 +84,7 @@ class StreamCall final
   }
   /// Responses that can be taken.
   std::size_t ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return ready_.size(); }
-  /// Time of the last message from the server, or of the last resumed read.
+  /// Time of the last message from the server, or of the last read that started after a pause.
   TimePoint progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
     return progress_at_;
   }

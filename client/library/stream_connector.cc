@@ -12,8 +12,8 @@
 namespace partiemc::client {
 namespace {
 
-// When a new stream has several addresses: time limit for connecting to each, and pause between two
-// attempts.
+// For a new stream with several addresses: time limit for connecting to each address, and pause
+// between two attempts.
 constexpr std::chrono::milliseconds kShortConnect(250);
 constexpr std::chrono::milliseconds kRest(20);
 
@@ -52,7 +52,8 @@ class StreamConnector::Calls final : public Attempts {
  public:
   explicit Calls(StreamConnector& connector) : connector_(connector) {}
 
-  // States to the analysis that this thread holds the connector's mutex. Checks nothing.
+  // Declares to Clang's thread-safety analysis that this thread holds the connector's mutex. Does
+  // nothing at run time.
   void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.monitor_.mutex) {}
 
   bool Cancelled() override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {
@@ -113,7 +114,7 @@ StreamConnector::StreamConnector(Monitor& monitor, std::vector<std::string> addr
              monitor.surroundings) {}
 
 absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNew() {
-  // Part 0 may come later than the others.
+  // The other parts may open before part 0, so they wait for it, up to `deadline`.
   const auto give_up_at =
       monitor_.Now() + (options_.parts.part > 0 ? options_.deadline : options_.connect_timeout);
   for (;; retry_.UseNextAddress()) {
@@ -158,7 +159,7 @@ absl::StatusOr<StreamConnector::Opened> StreamConnector::OpenNewAt(TimePoint giv
 void StreamConnector::Learn(const v1::StreamNotice& notice) {
   std::vector<std::string> usable;
   for (const std::string& address : notice.addresses()) {
-    // A path of the server's machine means nothing here.
+    // A Unix socket on the server's machine cannot be reached from this machine.
     const auto parsed = ParseAddress(address);
     const bool is_path = parsed.ok() && !parsed->unix_path.empty();
     if (!is_path && CheckAddress(address, options_.credentials).ok()) usable.push_back(address);
@@ -211,7 +212,7 @@ void StreamConnector::Start(std::shared_ptr<grpc::Channel> channel) {
   attempt_ = std::move(call);
 }
 
-// Unlocks the mutex, because gRPC's threads need it to end a call.
+// Ends `call`. Unlocks the mutex, because gRPC's threads need it to end a call.
 void StreamConnector::Drop(std::unique_ptr<StreamCall> call) {
   const MutexUnlock unlock(monitor_.mutex);
   call.reset();

@@ -39,8 +39,8 @@ class StreamConnector {
 
   /// Adds addresses from a server's notice for failover, if the credentials suit them.
   void Learn(const v1::StreamNotice& notice);
-  /// Records that the stream lost its call; OpenAgain then resumes it with `resume`. A loss before
-  /// Recovered extends the previous one.
+  /// Records that the stream lost its call; OpenAgain then resumes the stream with `resume`. Until
+  /// Recovered, further losses count as part of this one.
   void Lost(const Loss& loss, v1::ResumeStream resume);
   /// Continues to reconnect: waits, connects, opens. Returns nothing if no call is open at `until`.
   /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after.
@@ -68,7 +68,8 @@ class StreamConnector {
   absl::StatusOr<Opened> OpenNewAt(TimePoint give_up_at, bool& retryable)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   void Start(std::shared_ptr<grpc::Channel> channel) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // States to the analysis that the attempt uses the same monitor. Checks nothing.
+  // Declares to Clang's thread-safety analysis that the attempt uses the same monitor. Does nothing
+  // at run time.
   void AssertAttemptLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(attempt_->mutex()) {}
   const std::string& address() const { return retry_.address(); }

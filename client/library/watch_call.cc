@@ -16,8 +16,8 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// Sets `xy` to the two coordinates in `plane` of each vector. A vector has `components` values; two
-// are copied unchanged.
+// Sets `xy` to two coordinates of each vector, along the axes of `plane`. Each vector has
+// `components` values. If it has only two, both are copied.
 template <typename From, typename To>
 void Project(std::span<const From> vectors, std::size_t components, Plane plane,
              std::vector<To>& xy) {
@@ -208,7 +208,7 @@ bool WatchCall::lost() {
   const MutexLock lock(mutex_);
   if (!status_ || cancelled_) return false;
   if (!status_->ok()) {
-    // The other one: the server was short of memory.
+    // TOO_MANY_OPENING counts as a loss, because it is temporary: the server was short of memory.
     return IsLostConnection(status_->error_code(), reason_) || reason_ == "TOO_MANY_OPENING";
   }
   return end_.reason.empty() || end_.reason == "TAKEN_OVER" || end_.reason == "PRODUCER_LOST";

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 64 * 1024;
 
-// Attempts to find an unused name. A process of the same id may have left files, for example in a
-// container, where the id is always 1.
+// Maximum number of attempts to find an unused temporary name. An earlier process with the same id
+// may have left files, for example in a container, where the id is always 1.
 constexpr int kMaxLeftOverNames = 1000;
 
 std::string_view Advice(int error) {
@@ -141,7 +141,7 @@ absl::Status AtomicFile::Flush(std::string_view bytes) {
 absl::Status AtomicFile::Commit() {
   if (status_.ok()) status_ = Flush(buffer_);
   buffer_.clear();
-  // A network file system may report a full disk only here.
+  // A network file system may report a full disk only when the file is closed.
   if (::close(std::exchange(descriptor_, -1)) != 0 && status_.ok()) {
     status_ = WriteError(errno, target_);
   }

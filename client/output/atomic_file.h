@@ -10,13 +10,14 @@
 
 namespace partiemc::client {
 
-/// A file that is written under a hidden temporary name in its directory. Commit renames it. Before
-/// Commit an older file of the same name is unchanged; without Commit nothing remains. A device or
-/// a pipe (/dev/stdout) is written directly. A symbolic link is followed. The process may end at
-/// any moment; protection from a power loss depends on the file system.
+/// A file that is written under a hidden temporary name in its directory. Commit renames it. Until
+/// then an older file of the same name is unchanged, even if the process is killed. Protection from
+/// a power loss depends on the file system. Without Commit the destructor removes the temporary
+/// file. A device or a pipe (/dev/stdout) is written directly. A symbolic link is followed.
 ///
-/// Errors of all calls: one line "FILE: cannot be written: CAUSE; REMEDY" with the code NOT_FOUND
-/// (no such directory), PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full) or another one for errno.
+/// Errors of all calls: one line "FILE: cannot be written: CAUSE; REMEDY". The code is NOT_FOUND
+/// (no such directory), PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full) or the code for another
+/// errno.
 class AtomicFile {
  public:
   /// Opens the temporary file, so that a path that cannot be written fails early.

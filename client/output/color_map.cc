@@ -8,8 +8,8 @@
 namespace partiemc::client {
 namespace {
 
-// rampStops of the light `violet-yellow` of client/viewer/src/draw/ramp.ts; a test there compares
-// both.
+// The colours of the map `violet-yellow` in the light theme of the page (rampStops in
+// client/viewer/src/draw/ramp.ts). A test of the page compares both lists.
 constexpr std::array<std::array<double, 3>, 9> kStops{{{0x3d, 0x00, 0x6f},
                                                        {0x28, 0x26, 0x88},
                                                        {0x03, 0x47, 0x7c},

@@ -14,7 +14,7 @@ namespace partiemc::client {
 /// Number of colours in a picture.
 inline constexpr std::size_t kColorBands = 32;
 
-/// "#rrggbb" of a share, clamped to 0 to 1.
+/// Returns the colour "#rrggbb" at a position in the map. `share` is clamped to 0 to 1.
 std::string ColorOf(double share);
 
 /// The attribute of this name, or null.

@@ -20,8 +20,8 @@ std::string EncodeGlb(const FrameRecord& frame);
 absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame);
 #endif
 
-/// Whether the mesh starts with the points of the rings, bit for bit (guarantee M3 of result.h,
-/// except for `farthest-particle`), so that both can share vertices.
+/// Whether the mesh starts with the points of the rings, bit for bit, so that both can share
+/// vertices. Guarantee M3 of result.h states this for all placements except `farthest-particle`.
 bool MeshSharesRingPoints(const Result& result);
 
 }  // namespace partiemc::client

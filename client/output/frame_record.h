@@ -16,7 +16,8 @@
 
 namespace partiemc::client {
 
-/// A frame of a replay. Owns nothing: all views must outlive the call.
+/// A frame of a replay. It owns nothing: all views must stay valid during the call that receives
+/// it.
 struct FrameRecord {
   std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.
@@ -29,13 +30,15 @@ struct FrameRecord {
   std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
   /// Indices of the sections that the picture of the frame shows as thin lines.
   std::span<const std::size_t> sections_in_plane = {};
-  /// The attribute that colours the particles in a report, with its values at them; or null.
+  /// The attribute that colours the particles in a report, with its values at the particles. Null
+  /// if there is none.
   const AttributeValues* particle_color = nullptr;
   std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
 };
 
-/// Section `k` of a frame, from 0 on, as a record. Has no particles, which may lie outside its
-/// plane, and no times, which belong to the frame.
+/// Returns section `k` of a frame, from 0 on, as a record. The record has no particles, because
+/// they may lie outside the section's plane. It has no wall times, because they belong to the whole
+/// frame.
 inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
   const OutlineDigests digests =
       k < frame.section_digests.size() ? frame.section_digests[k] : OutlineDigests();
@@ -47,7 +50,8 @@ inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
           .section = k + 1};
 }
 
-/// Indices of the sections in the plane of the stream's own outline: isolines.
+/// Indices of the sections that lie in the plane of the stream's own outline. These sections are
+/// isolines.
 inline std::vector<std::size_t> SectionsInPlane(const ReconstructionParameters& parameters) {
   std::vector<std::size_t> sections;
   for (std::size_t k = 0; k < parameters.sections.size(); ++k) {

@@ -27,7 +27,7 @@ constexpr std::array kFormats = {
     FrameFormat::kCsv,     FrameFormat::kPly, FrameFormat::kStl, FrameFormat::kGlb,
 };
 
-// Whether coordinates, and their differences, are finite as 32-bit floats.
+// Whether coordinates and their differences stay finite as 32-bit floats.
 bool AreFloats(std::span<const double> points) {
   return std::ranges::all_of(
       points, [](double x) { return std::abs(x) < std::numeric_limits<float>::max() / 2; });

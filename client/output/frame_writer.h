@@ -18,33 +18,34 @@
 namespace partiemc::client {
 
 enum class FrameFormat : std::uint8_t {
-  /// RFC 7946 FeatureCollection: one Polygon per outer ring with its holes, outer rings
-  /// counter-clockwise, holes clockwise in any case, first point repeated at the end. Properties:
-  /// area
-  /// (without holes), perimeter (with holes), particles, ring, identity, parents, frame, time, and
-  /// of each attribute at the vertices NAME_mean, NAME_min and NAME_max (NAME:0_mean for a vector).
-  /// A ring of `farthest-particle` that crosses itself is written unchanged.
+  /// RFC 7946 FeatureCollection with one Polygon per outer ring and its holes. In every case outer
+  /// rings are counter-clockwise, holes are clockwise, and the first point is repeated at the end.
+  /// Properties: area (without holes), perimeter (with holes), particles, ring, identity, parents,
+  /// frame, time. For each attribute at the vertices also NAME_mean, NAME_min and NAME_max (for a
+  /// vector NAME:0_mean and so on). A ring of `farthest-particle` that crosses itself is written
+  /// unchanged.
   kGeoJson,
-  /// A picture of mesh edges, outline and particles; y up; longer side 1000 units, rounded to
-  /// 0.001.
+  /// A picture of mesh edges, outline and particles. The y axis points up. The longer side has 1000
+  /// units; coordinates are rounded to 0.001.
   kSvg,
-  /// Wavefront: "v x y 0", groups "mesh" (faces) and "rings" (closed polylines), 1-based.
+  /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
+  /// polylines). Indices begin at 1.
   kObj,
-  /// VTK XML PolyData: rings as closed lines, triangles as polygons; cell data "class" (0 boundary
-  /// and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for triangles); point data:
-  /// the attributes; field data TimeValue. Only in builds with VTK.
+  /// VTK XML PolyData, only in builds with VTK: rings as closed lines, triangles as polygons. Cell
+  /// data: "class" (0 boundary and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for
+  /// triangles). Point data: the attributes. Field data: TimeValue.
   kVtp,
-  /// ring,index,x,y,nx,ny: one row per vertex of the rings; nx,ny empty without normals. Then a
-  /// column
-  /// for each attribute; NAME:0, NAME:1 and NAME:2 for a vector.
+  /// CSV with one row per vertex of the rings and the columns ring,index,x,y,nx,ny. Without normals
+  /// nx and ny are empty. Then follows a column for each attribute, or NAME:0, NAME:1 and NAME:2
+  /// for a vector.
   kCsv,
-  /// Binary PLY: the mesh with its attributes, NAME_0, NAME_1 and NAME_2 for a vector; without a
-  /// mesh the rings as edges.
+  /// Binary PLY: the mesh with its attributes (NAME_0, NAME_1 and NAME_2 for a vector). Without a
+  /// mesh, the rings as edges.
   kPly,
   /// Binary STL: the triangles of the mesh in float32. It cannot hold rings and attributes.
   kStl,
-  /// Binary glTF: triangles and the lines of the rings, in float32 relative to the node's
-  /// translation; attributes as _NAME.
+  /// Binary glTF: triangles, and lines for the rings, in float32 relative to the node's
+  /// translation. Attributes have the names _NAME.
   kGlb,
 };
 
@@ -55,8 +56,8 @@ std::span<const FrameFormat> AllFrameFormats();
 /// file's extension.
 std::string_view Name(FrameFormat format);
 
-/// Formats from a list of names separated by commas, each once, in the order given.
-/// Errors: INVALID_ARGUMENT with the unknown word and the known ones.
+/// Parses a list of format names separated by commas. Returns each format once, in the order given.
+/// Errors: INVALID_ARGUMENT, which names the unknown word and lists the known formats.
 absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names);
 
 struct FrameWriterOptions {
@@ -66,8 +67,8 @@ struct FrameWriterOptions {
   /// each picture fits its frame.
   std::optional<Box> picture_box = {};
   bool picture_particles = true;  ///< Draw the particles where the record has them.
-  /// Attribute to colour pictures by, with a legend; the length of a vector. Empty, or missing in a
-  /// frame: plain colours.
+  /// Attribute that colours the pictures, with a legend. A vector is coloured by its length. If the
+  /// name is empty, or a frame lacks the attribute, the picture has plain colours.
   std::string color_by = {};
 };
 
@@ -82,11 +83,13 @@ class FrameWriter {
   /// Errors: as for AtomicFile, for the directory.
   static absl::StatusOr<FrameWriter> Create(FrameWriterOptions options);
 
-  /// Errors: as for EncodeFrame and AtomicFile. Formats before the failed one are written.
+  /// Errors: as for EncodeFrame and AtomicFile. If a format fails, the formats before it have been
+  /// written.
   absl::Status Write(const FrameRecord& frame);
 
-  /// Writes ParaView's collections of the VTP files with their times: DIR/frames.pvd and
-  /// DIR/frames.vtp.series; DIR/frames_section_K.* of section K. Nothing without VTP files.
+  /// Writes ParaView's collections, which list the VTP files with their times: DIR/frames.pvd and
+  /// DIR/frames.vtp.series. For section K they are DIR/frames_section_K.*. Writes nothing if there
+  /// are no VTP files.
   absl::Status Finish() const;
 
   /// DIR/frame_%06d.EXT, with more digits for larger indices; DIR/frame_%06d_section_K.EXT for
@@ -94,7 +97,8 @@ class FrameWriter {
   std::filesystem::path PathOf(const FrameRecord& frame, FrameFormat format) const;
 
  private:
-  // A file of a collection. The time of a frame without a finite one is its index.
+  // A file in a collection, with the time of its frame. A frame without a finite time has its index
+  // as time.
   struct Listed {
     std::string file;
     double time;

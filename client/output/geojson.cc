@@ -9,7 +9,8 @@
 namespace partiemc::client {
 namespace {
 
-/// Twice the signed area relative to the first point, which keeps the sign far from the origin.
+/// Returns twice the signed area. It is computed relative to the first point, so that its sign is
+/// also right far from the origin.
 double TwiceArea(std::span<const double> ring) {
   double sum = 0;
   for (std::size_t k = 2; k + 3 < ring.size(); k += 2) {
@@ -45,7 +46,8 @@ void AppendFinite(std::string& out, Number number) {
   }
 }
 
-// The mean, least and largest value of each number of the attributes at the vertices of `rings_of`.
+// Appends the mean, least and largest value of each component of each attribute at the vertices of
+// the rings `rings_of`.
 void AppendAttributes(std::string& out, const FrameRecord& frame,
                       std::span<const std::size_t> rings_of) {
   const Rings& rings = frame.result.rings;

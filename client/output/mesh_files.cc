@@ -20,7 +20,8 @@ void Put(T value, std::string& out) {
   out.append(raw.data(), raw.size());
 }
 
-// The vertices of mesh and rings, which share points if they can.
+// The vertices of the mesh and of the rings. If the mesh starts with the points of the rings, both
+// use the same vertices.
 struct SharedVertices {
   std::vector<double> points;
   std::uint32_t first_of_rings = 0;
@@ -53,7 +54,7 @@ std::vector<std::uint32_t> SidesOf(const Rings& rings, std::uint32_t first) {
   return sides;
 }
 
-// A name of letters, digits and "_", as PLY requires.
+// Replaces all characters except letters, digits and "_" by "_", as PLY requires.
 std::string PlyName(std::string_view name) {
   std::string plain(name);
   for (char& c : plain) {
@@ -71,7 +72,8 @@ std::string JsonText(std::string_view text) {
 // Collects the buffer of a GLB and the JSON that describes it.
 class GlbBuffer {
  public:
-  // Adds an array and returns the index of its accessor. `more` ends the accessor's members.
+  // Adds an array and returns the index of its accessor. `more` is appended to the JSON members of
+  // the accessor.
   template <typename T>
   std::size_t Add(std::span<const T> values, std::size_t components, std::string_view more = "") {
     constexpr bool kFloats = std::is_same_v<T, float>;
@@ -86,7 +88,8 @@ class GlbBuffer {
     return count_++;
   }
 
-  // The file with `scene`, the members of the JSON besides the buffer's.
+  // Returns the whole file. `scene` holds the JSON members besides the asset and the members that
+  // describe the arrays.
   std::string File(std::string_view scene) const {
     std::string json = Concat(R"({"asset":{"version":"2.0","generator":"PartiEMC"},)", scene);
     if (count_ > 0) {
@@ -113,7 +116,8 @@ class GlbBuffer {
   std::size_t count_ = 0;
 };
 
-// The point that the coordinates of a GLB are relative to, so that float32 is enough far away.
+// Returns the centre of the points. The coordinates of a GLB are relative to it, so that float32 is
+// precise enough far from the origin.
 std::array<double, 2> CentreOf(std::span<const double> points) {
   Box box;
   box.Include(points);

@@ -105,7 +105,7 @@ void Progress::ShowLine(std::string_view line) {
     options_.write(Concat(line, "\n"));
     return;
   }
-  // A line as wide as the terminal would wrap and could not be drawn over.
+  // The line is cut: a line as wide as the terminal would wrap, and then it could not be redrawn.
   const std::size_t columns = std::max<std::size_t>(options_.columns(), 2);
   options_.write(Concat(kRestartLine, line.substr(0, columns - 1)));
 }

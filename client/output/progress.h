@@ -10,9 +10,9 @@
 
 namespace partiemc::client {
 
-/// On a terminal: one line, redrawn at most ten times per second, that never wraps. Elsewhere:
-/// plain lines, at most one every two seconds. Nothing if quiet. Always shows the last state. Not
-/// thread-safe.
+/// Shows the progress of a run. On a terminal it is one line, redrawn at most ten times per second,
+/// that never wraps. Elsewhere it is plain lines, at most one every two seconds. If `quiet` is set,
+/// nothing is shown. The last state is always shown. Not thread-safe.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;
@@ -34,14 +34,16 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done`: frames completed since the start; `detail`: about the last one, shown if it fits.
+  /// `done`: number of frames completed since the start. `detail`: text about the last frame, shown
+  /// if it fits.
   void Update(std::uint64_t done, std::string detail = {});
 
-  /// Shows `text` instead of the state until the next Update, while no frame can arrive. Without a
-  /// terminal it prints a line at once and then every ten seconds.
+  /// Shows `text` instead of the progress until the next Update, while no frame can arrive. Without
+  /// a terminal, prints a line at once and then every ten seconds.
   void Wait(std::string_view text);
 
-  /// Shows a separate line, such as a warning, without breaking the bar. Also if quiet.
+  /// Shows a separate line, such as a warning, without breaking the line of progress. Also shown if
+  /// `quiet` is set.
   void Note(std::string_view line);
 
   /// Shows the last state and ends the line. Further calls do nothing.

@@ -71,7 +71,8 @@ void AppendBox(std::string& out, const Box& box) {
   out += ']';
 }
 
-/// The box of the rings without spray, or of the particles of a frame without rings.
+/// The box of the rings, except small ones (kMinorShare). If the frame has no rings, the box of its
+/// particles.
 Box MainBox(const FrameRecord& frame) {
   const Rings& rings = frame.result.rings;
   double largest = 0;

@@ -31,9 +31,10 @@ struct ReportOptions {
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters);
 
-/// Writes one HTML file that requires no network and no other file. Frames are written at once, so
-/// memory does not grow. The file appears with Finish. Size: 140 kB, about four bytes per particle
-/// and vertex, eight per triangle and 200 per ring. Geometry is rounded to 1/128 of the spacing.
+/// Writes one HTML file that requires no network and no other file. Each frame is written at once,
+/// so memory does not grow. The file appears with Finish. Its size is 140 kB, plus about four bytes
+/// per particle and vertex, eight per triangle and 200 per ring. Geometry is rounded to 1/128 of
+/// the spacing.
 class ReportWriter {
  public:
   /// Errors: as for AtomicFile.

@@ -15,7 +15,8 @@
 namespace partiemc::client {
 namespace {
 
-// Steps per spacing. Finer than visible, and differences between neighbours fit two bytes.
+// Number of rounding steps per spacing. The steps are finer than visible, and differences between
+// neighbours fit in two bytes.
 constexpr double kStepsPerSpacing = 128;
 
 // Steps across a frame without a spacing.
@@ -189,7 +190,8 @@ void EncodeColors(const FrameRecord& frame, const ReportGeometryOptions& options
   if (attribute == nullptr) return encoder.Count(0);
   const std::size_t points =
       attribute->values.size() / static_cast<std::size_t>(attribute->components);
-  // Values of the rings' points come first. A mesh that shares these points continues them.
+  // The values begin with the points of the rings. If the mesh shares these points, the values of
+  // its further points follow.
   const bool has_mesh = result.mesh.TriangleCount() > 0 &&
                         result.mesh.TriangleCount() <= options.max_triangles &&
                         points == result.mesh.PointCount();

@@ -22,21 +22,20 @@ struct ReportGeometryOptions {
 ///   rings       count; per ring: number of points, index of its outer ring + 1 (0: an outer ring)
 ///   points      x, y differences of all points of the rings
 ///   normals     count (0 or the number of points); per point one byte, 256 per full turn
-///   mesh points count, x, y differences: the points after those of the rings, or all points of a
-///   mesh
-///               that does not share the points of the rings
+///   mesh points count, x, y differences: if the mesh shares the points of the rings, only its
+///               further points; otherwise all points of the mesh
 ///   triangles   shared (1 if the mesh shares the points of the rings), count; per triangle
 ///               (a - previous a) * 2 + interior, b - a, c - a
 ///   particles   count; x, y differences, in an order that keeps them small
-///   sections    count; per section: count of rings, per ring as above; x, y differences of all
-///   points colours     count of channels (color_map.h, 0 without an attribute); per channel twice:
-///   count,
-///               and per point one byte, the position in the frame's range of the channel from 0 to
-///               255. First the points of the mesh, or of the rings alone; then the particles, or
-///               none if their values are unknown
+///   sections    count; per section: count of rings, per ring as above; x, y differences of
+///               all points
+///   colours     count of channels (color_map.h, 0 without an attribute); per channel two lists:
+///               first for the points of the mesh, or of the rings without a mesh; then for the
+///               particles, empty if their values are unknown; per list: count, per value one
+///               byte, its position in the channel's range for this frame, from 0 to 255
 std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryOptions& options);
 
-/// Range of a channel of `attribute` at the vertices and at the particles.
+/// Returns the range of a channel of `attribute` over the vertices and the particles.
 ValueRange ReportRange(const FrameRecord& frame, const AttributeValues& attribute,
                        std::size_t channel);
 

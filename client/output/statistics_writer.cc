@@ -31,7 +31,7 @@ constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
                                                            "section"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
-// "vertices" is a count and a stage, so stages have the suffix "_ms".
+// "vertices" is the name of a count and of a stage, so the columns of stages have the suffix "_ms".
 constexpr std::string_view kStageSuffix = "_ms";
 
 const std::array<std::string_view, kColumnCount>& Columns() {

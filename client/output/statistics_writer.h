@@ -16,16 +16,18 @@
 namespace partiemc::client {
 
 /// The columns in order: frame, particles, polylines, vertices, triangles_grid, triangles, area,
-/// milliseconds; one per stage, "bins_ms" to "attributes_ms"; perimeter, self_intersections,
-/// folded_triangles, dropped_holes, dropped_components, dropped_spray, rings_digest, mesh_digest,
-/// time, doubts (names separated by blanks), section (0: the frame's own outline; then a row per
-/// section). Then the columns of the gauges: NAME for a gauge with one value, otherwise NAME_VALUE
-/// (partiemc/gauges.h); "nan" where the outline has no such point. Digests have 16 hexadecimal
-/// digits, times are milliseconds of wall time, areas and lengths world units. `polylines` counts
+/// milliseconds; one column of milliseconds per stage, "bins_ms" to "attributes_ms"; perimeter,
+/// self_intersections, folded_triangles, dropped_holes, dropped_components, dropped_spray,
+/// rings_digest, mesh_digest, time, doubts (names separated by blanks), section.
+///
+/// Section 0 is the frame's own outline; a row for each section follows. After `section` come the
+/// columns of the gauges (partiemc/gauges.h): NAME for a gauge with one value, otherwise
+/// NAME_VALUE. A gauge is "nan" if the outline has no such point. Digests have 16 hexadecimal
+/// digits. Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts
 /// rings, `vertices` their vertices.
 std::span<const std::string_view> StatisticsColumns();
 
-/// Parses gauges and checks that their columns differ from each other and from those above.
+/// Parses gauges. Checks that their columns differ from each other and from StatisticsColumns().
 /// Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
 absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts);
 

@@ -25,13 +25,14 @@ class Summary {
   /// Counts a refused frame.
   void AddRefused() { ++refused_; }
 
-  /// Adds to the headline that the replay ended early, and the reason.
+  /// Makes the headline state that the replay ended early, with the reason.
   void EndEarly(std::string why) { ended_early_ = std::move(why); }
 
   std::uint64_t frame_count() const { return particles_.size(); }
   std::uint64_t refused_count() const { return refused_; }
 
-  /// Mean of 1 - triangles / triangles_grid, in percent, over frames with triangles; 0 without.
+  /// Mean of 1 - triangles / triangles_grid, in percent, over the frames with triangles. 0 if there
+  /// are none.
   double MeanReductionPercent() const;
 
   /// Mean, median and 99th percentile (nearest rank) over frames: particles, rings, vertices,

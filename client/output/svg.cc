@@ -14,14 +14,16 @@
 namespace partiemc::client {
 namespace {
 
-// Size of the picture. Readers of SVG use single precision, which world coordinates can exceed.
+// Length of the picture's longer side, in SVG units. World coordinates are scaled to it, because
+// readers of SVG use single precision, which world coordinates can exceed.
 constexpr double kLongerSide = 1000;
 constexpr double kSteps = 1000;  // Rounding steps per unit.
 
 // Margin around the box, as a share of its longer side.
 constexpr double kMargin = 0.02;
 
-// Diameter of a particle's dot in spacings; in units without a spacing; smallest in units.
+// Diameter of a particle's dot: in spacings; in SVG units, if the spacing is unknown; lower limit,
+// in SVG units.
 constexpr double kDotSpacings = 0.4;
 constexpr double kDefaultDot = 1.5;
 constexpr double kSmallestDot = 0.4;
@@ -40,7 +42,8 @@ constexpr std::string_view kStyle =
     ".legend{font:22px sans-serif;fill:#333}"
     "</style>\n";
 
-// Legend below a picture that is coloured by an attribute: a bar and the ends of the range.
+// The legend below a picture that is coloured by an attribute: height of the legend, and length of
+// its colour bar.
 constexpr double kLegendHeight = 70;
 constexpr double kLegendBar = 400;
 
@@ -97,7 +100,7 @@ std::string RingPath(const Rings& rings, const Picture& picture) {
   return path;
 }
 
-/// Path of the edges. Every edge occurs once.
+/// Returns the path of the mesh edges. Every edge occurs once.
 std::string EdgePath(const Mesh& mesh, const Picture& picture) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
   edges.reserve(mesh.triangles.size());
@@ -119,7 +122,7 @@ std::string EdgePath(const Mesh& mesh, const Picture& picture) {
   return path;
 }
 
-/// Path of dots: lines without length, for round line caps.
+/// Returns a path of lines with length 0. Round line caps show them as dots.
 std::string DotPath(std::span<const double> particles, const Picture& picture) {
   std::string path;
   for (std::size_t k = 0; k + 1 < particles.size(); k += 2) {
@@ -136,7 +139,7 @@ struct Corner {
   double x, y, share;
 };
 
-/// The part of a convex polygon with shares above `bound` (side 1) or below (side -1).
+/// Returns the part of a convex polygon whose shares are above `bound` (side 1) or below (side -1).
 /// Source: Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
 std::vector<Corner> Clip(const std::vector<Corner>& polygon, double bound, double side) {
   std::vector<Corner> kept;
@@ -157,7 +160,8 @@ std::size_t BandOf(double share) {
   return std::min(static_cast<std::size_t>(band), kColorBands - 1);
 }
 
-/// Paths of the mesh, one per colour. The attribute is linear in each triangle.
+/// One path for each colour of the map. The attribute is linear in each triangle, so the parts of a
+/// triangle with one colour are bands.
 using BandPaths = std::array<std::string, kColorBands>;
 
 void AppendTriangle(const std::array<Corner, 3>& triangle, const Picture& picture,
@@ -194,7 +198,7 @@ BandPaths InsideByBand(const Mesh& mesh, std::span<const double> values, const V
   return paths;
 }
 
-/// Paths of the segments of rings, by the colour at their centre.
+/// Returns the paths of ring segments. Each segment has the colour of the value at its centre.
 BandPaths RingsByBand(const Rings& rings, std::span<const double> values, const ValueRange& range,
                       const Picture& picture) {
   BandPaths paths;
@@ -259,7 +263,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   const std::vector<double> values =
       attribute != nullptr ? MagnitudesOf(*attribute) : std::vector<double>();
   const ValueRange range = RangeOf(values);
-  // Values of the rings' points, then of further points of the mesh.
+  // The values begin with the points of the rings; the further points of the mesh follow.
   const bool inside = values.size() == mesh.PointCount() && !mesh.triangles.empty();
   if (inside) AppendBands(out, "bands", InsideByBand(mesh, values, range, picture));
   AppendAll(out, R"(<path class="mesh" d=")", EdgePath(frame.result.mesh, picture), "\"/>\n");

@@ -36,7 +36,8 @@ void AddField(vtkPolyData* data, const char* name, double value) {
   data->GetFieldData()->AddArray(array);
 }
 
-// Adds the attributes at the points of the mesh, or of the rings without a mesh.
+// Adds the attributes at the points of the mesh. If there is no mesh, adds the attributes at the
+// points of the rings.
 void AddAttributes(const Result& result, vtkPolyData* data) {
   for (const AttributeValues& attribute : result.attributes) {
     vtkNew<vtkFloatArray> array;
@@ -60,7 +61,8 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   if (!shared) InsertPoints(rings.points, points);
   const vtkIdType first = shared ? 0 : static_cast<vtkIdType>(mesh.PointCount());
 
-  // VTK numbers the lines of polygonal data before its polygons.
+  // VTK numbers the lines of polygonal data before its polygons, so the values for rings come
+  // first.
   vtkNew<vtkUnsignedCharArray> classes;
   classes->SetName("class");
   vtkNew<vtkIntArray> ring_of;
@@ -91,7 +93,8 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   data->GetCellData()->AddArray(classes);
   data->GetCellData()->AddArray(ring_of);
   AddField(data, "TimeValue", frame.time);
-  // A mesh that does not start with the points of the rings has more points than values.
+  // A mesh that does not start with the points of the rings has more points than attribute values.
+  // Attributes are then left out.
   if (shared || mesh.points.empty()) AddAttributes(frame.result, data);
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);

@@ -105,7 +105,8 @@ void PythonParticles::TakeAttributes(const py::dict& given) {
   arrays_.attributes = attributes_;
 }
 
-// Converts to float or double in this machine's byte order, if necessary.
+// Converts `given` to float or double in this machine's byte order, unless it already has one of
+// these types.
 py::array PythonParticles::Real(const py::array& given, const char* field) {
   py::array array = given;
   if (!Is<float>(array.dtype()) && !Is<double>(array.dtype())) {

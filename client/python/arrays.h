@@ -55,7 +55,8 @@ pybind11::array View(const void* first, std::vector<pybind11::ssize_t> shape,
   return view;
 }
 
-/// Returns the numbers of a vector in rows of `columns`; one-dimensional if `columns` is 1.
+/// Returns a read-only array of a vector's numbers, in rows of `columns` numbers. The array is
+/// one-dimensional if `columns` is 1.
 template <typename As, typename T>
 pybind11::array View(const std::vector<T>& numbers, std::size_t columns, pybind11::handle owner) {
   static_assert(sizeof(As) == sizeof(T));

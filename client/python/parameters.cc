@@ -20,7 +20,7 @@ namespace {
 
 namespace py = pybind11;
 
-// Removes `name` from the arguments; empty if it is absent or None.
+// Removes `name` from the arguments and returns its value. Empty if the argument is absent or None.
 template <typename T>
 std::optional<T> Take(py::dict& arguments, const char* name) {
   if (!arguments.contains(name)) return std::nullopt;
@@ -72,7 +72,8 @@ void TakeTime(py::dict& arguments, const char* name,
   time = given;
 }
 
-// Reads ("z", 0.5), or a point and a normal.
+// Removes the argument `slice`: an axis and a coordinate such as ("z", 0.5), or a point and a
+// normal.
 void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   const auto given = Take<py::object>(arguments, "slice");
   if (!given) return;
@@ -89,7 +90,7 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
       if (axis == std::string_view::npos) return refuse();
       slice->normal = {};
       slice->origin[axis] = pair.second.cast<double>();
-      // Normal along -y, so that results have the axes x and z in this order.
+      // The normal points along -y, so that results have the axes x and z in this order.
       slice->normal[axis] = axis == 1 ? -1 : 1;
     } else {
       slice->origin = pair.first.cast<std::array<double, 3>>();

@@ -10,8 +10,8 @@
 
 namespace partiemc::python {
 
-/// Takes the reconstruction parameters; None means not given. Raises partiemc.Error for an unknown
-/// name of a value, TypeError for a value of the wrong type.
+/// Takes the reconstruction parameters; None means not given. Raises partiemc.Error if a value is
+/// an unknown name, for example of a placement. Raises TypeError for a value of the wrong type.
 ReconstructionParameters TakeParameters(pybind11::dict arguments);
 /// Takes tls, ca_file, cert_file, key_file, token and token_file. Setting a certificate enables
 /// TLS.

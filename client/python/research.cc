@@ -14,7 +14,8 @@ namespace {
 
 namespace py = pybind11;
 
-// Applies the dict research[kind] to the `named` members of `target`.
+// Sets members of `target` to the values in the dict research[kind]. `named` maps the names to
+// members.
 template <typename Value, typename Named, typename Target>
 void TakeAll(py::dict& research, const char* kind, const Named& named, Target& target) {
   if (!research.contains(kind)) return;

@@ -32,7 +32,7 @@ struct PartOf {
 using RingsView = PartOf<Rings>;
 using MeshView = PartOf<Mesh>;
 
-// One member of all measures, as a strided view.
+// One member of the measures of all rings, as a strided view.
 template <typename As, typename T>
 py::array Column(const RingsView& rings, T RingMeasures::*member, py::ssize_t columns = 0) {
   const auto& measures = rings.part.measures;
@@ -52,7 +52,7 @@ py::array RingPoints(const RingsView& rings, py::ssize_t index) {
                       {2 * sizeof(double), sizeof(double)}, rings.owner);
 }
 
-// The arguments of a gauge by name, in the order of its kind.
+// Makes a gauge of the kind `kind` from keyword arguments, in the order that the kind defines.
 Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
   const std::span<const GaugeTraits> all = AllGauges();
   const auto traits = std::ranges::find(all, kind, &GaugeTraits::name);
@@ -99,7 +99,8 @@ py::array Heights(const RingsView& rings, double x) {
   return py::array_t<double>(static_cast<py::ssize_t>(heights.size()), heights.data());
 }
 
-// Pickles a part of a result as an attribute of the result.
+// Pickles a part of a result (such as its rings) as a reference: the result, and the name of the
+// attribute that holds the part.
 template <typename View>
 auto Reduce(const char* attribute) {
   return [attribute](const View& view) {
@@ -248,7 +249,8 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
   return result.sections;
 }
 
-// The state of a pickled result: the message of the protocol, and the values that it lacks.
+// Returns the state that pickle stores: the result as a message of the protocol, and the values
+// that the message cannot hold.
 py::tuple ToState(PythonResult& result) {
   const auto& sections = SectionsOf(result);  // Leaves empty results in their places in the frame.
   const client::FrameResult& frame = result.frame;
@@ -327,7 +329,7 @@ std::shared_ptr<PythonResult> ResultPool::Take() {
 void DefineResults(py::module_& module) {
   DefineRings(module);
   DefineMesh(module);
-  // Views hold the object they come from, so that their memory stays valid.
+  // A view holds a reference to the object that it comes from, so that its memory stays valid.
   py::class_<PythonResult, std::shared_ptr<PythonResult>>(
       module, "Result", "The result of one frame. It can be pickled and copied.")
       .def(py::pickle(&ToState, &FromState))

@@ -26,7 +26,8 @@ struct PythonResult {
   std::vector<double> particles;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
-  /// Sections as Python objects, filled at the first access. They take over the results of `frame`.
+  /// Sections as Python objects, filled at the first access. Their results are then moved out of
+  /// `frame`.
   std::vector<std::shared_ptr<PythonResult>> sections;
 };
 
@@ -42,8 +43,9 @@ class ResultPool : public std::enable_shared_from_this<ResultPool> {
   std::vector<client::FrameResult> kept_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// Issues a PartiemcWarning for each doubt of the result that is not in `warned`, and adds it.
-/// Requires the GIL. Throws if warnings are errors; the exception then carries the result.
+/// Issues a PartiemcWarning for each doubt of the result that is not yet in `warned`, and adds the
+/// doubt to `warned`. Requires the GIL. If Python turns warnings into errors, throws; the exception
+/// then carries the result.
 void WarnOfDoubts(const std::shared_ptr<PythonResult>& result, Doubts& warned);
 
 void DefineResults(pybind11::module_& module);

@@ -38,11 +38,12 @@ using std::chrono::milliseconds;
 // Poll interval for Ctrl-C while waiting for a response.
 constexpr milliseconds kSlice(100);
 
-// How long `send` waits for a thread that receives, if it has seen none, and its poll interval.
+// Maximum time that `send` waits for another thread to receive for the first time, and its poll
+// interval.
 constexpr milliseconds kReceiverWait(500), kReceiverPoll(5);
 
-// How long a stream that is dropped after `finish` waits for its last frames. A healthy server
-// needs far less; a lost one must not keep a program from ending.
+// Maximum time to wait for the last frames of a stream that the program drops after `finish`. A
+// healthy server needs far less. A lost server must not keep a program from ending.
 constexpr std::chrono::seconds kDropWait(10);
 
 std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
@@ -53,8 +54,9 @@ std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double>
              std::chrono::duration<double>(std::min(std::max(*seconds, 0.0), kLongest)));
 }
 
-// Calls `receive` with successive waits until it returns an event or `seconds` have passed. Runs
-// without the GIL, except for the check of signals, which may raise.
+// Calls `receive` repeatedly, each time with a short wait, until it returns an event or `seconds`
+// have passed. Waits without the GIL. Between the waits it checks for signals, whose handlers may
+// raise.
 template <typename Receive>
 absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   const auto until = Until(seconds);
@@ -75,8 +77,8 @@ absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
   }
 }
 
-// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream,
-// and can wait 10 s for its own objects.
+// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream.
+// This shutdown can wait 10 s for gRPC's own objects.
 void KeepGrpc() { [[maybe_unused]] static const bool is_kept = (grpc_init(), true); }
 
 std::string AddressOf(const std::optional<std::string>& address) {
@@ -140,7 +142,7 @@ class ProducerStream {
     return latest_ != nullptr ? std::nullopt : std::optional(*sent);
   }
 
-  // None if no event arrives in time, and for an accepted part.
+  // Returns None if no event arrives in time, or if the event is the acceptance of a part.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     const ReceiveMark mark(*this);
@@ -188,15 +190,15 @@ class ProducerStream {
       if (latest_ == nullptr) {
         status = stream_->FinishSending();
       } else {
-        // `LatestSender::Finish` blocks until a thread receives. That may be the calling thread, so
-        // it runs in a thread of its own. `Receive` reports the error that ends the stream.
+        // `LatestSender::Finish` blocks until a thread receives. This may be the calling thread, so
+        // Finish runs in another thread. `Receive` reports the error that ends the stream.
         finisher_ = std::thread([this] { static_cast<void>(latest_->Finish()); });
       }
     }
     RaiseUnlessOk(status);
   }
 
-  // Drops unreceived results, so that frames on the way are still sent.
+  // Finishes the stream and drops unreceived results, so that frames on the way are still sent.
   void Close() {
     const py::gil_scoped_release others_may_run;
     std::thread receiver([this] {
@@ -220,7 +222,7 @@ class ProducerStream {
     stream_->Cancel();
   }
 
-  // With `latest`, frames that wait to be sent count, too.
+  // The number of frames without an answer. With `latest` it includes frames that wait to be sent.
   std::uint64_t InFlight() const {
     if (latest_ == nullptr) return stream_->InFlight();
     const std::uint64_t answered = answered_;
@@ -254,7 +256,7 @@ class ProducerStream {
     ProducerStream& stream_;
   };
 
-  // Drops events until the stream has ended or `until` has passed.
+  // Receives and drops events until the stream has ended or `until` has passed.
   void Drain(std::optional<std::chrono::steady_clock::time_point> until) {
     Event event;
     for (auto got = stream_->Receive(event, kSlice); got.ok() && *got != Received::kEnd;
@@ -272,14 +274,14 @@ class ProducerStream {
     return status;
   }
 
-  // Whether the calling thread is the only one that has received, or none has.
+  // Whether no thread has received so far, or only the calling thread.
   bool NoOtherReceives() const {
     const std::thread::id last = last_receiver_;
     return receives_ == 0 && (last == std::thread::id() || last == std::this_thread::get_id());
   }
 
-  // Fails if the window is full and only the calling thread could receive. In that case SendArrays
-  // would deadlock. A thread that receives for the first time gets kReceiverWait.
+  // Fails if the window is full and no thread but the calling one receives, because SendArrays
+  // would then never return. Waits up to kReceiverWait for another thread to begin receiving.
   absl::Status ExpectReceiver() const {
     const auto until = std::chrono::steady_clock::now() + kReceiverWait;
     while (stream_->InFlight() >= Window() && NoOtherReceives()) {
@@ -330,7 +332,7 @@ class Watch {
     watcher_.reset();
   }
 
-  // None if no frame arrives in time; the end raises an exception.
+  // Returns None if no frame arrives in time. Raises an exception at the end of the watch.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     client::WatchedFrame frame;

@@ -18,14 +18,15 @@
 
 namespace partiemc::client::recording {
 
-/// Largest decompressed size of a block: a frame of 2^24 particles with all arrays.
+/// Maximum size of a decompressed block: enough for a frame of 2^24 particles with all arrays.
 inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
 
 inline constexpr std::string_view kFileTag = "PEMCFILE";
 inline constexpr std::string_view kTailTag = "PEMCTAIL";
 inline constexpr std::uint64_t kVersion = 1;
 
-/// A mark: zstd's magic number of a skippable frame, its length, a tag of 8 bytes, a value.
+/// Size of a mark: zstd's magic number of a skippable frame, its length, a tag of 8 bytes, a value
+/// of 8 bytes.
 inline constexpr std::size_t kMarkBytes = 4 + 4 + 8 + 8;
 std::string MakeMark(std::string_view tag, std::uint64_t value);
 /// The value of a mark with this tag. Requires: bytes.size() == kMarkBytes.
@@ -60,8 +61,8 @@ class BlockReader {
   static absl::StatusOr<BlockReader> Open(const std::string& path,
                                           double max_expansion = input::kMaxExpansion);
 
-  /// Errors: kDataLoss; kResourceExhausted where blocks expand too much. `block` is valid until the
-  /// next call.
+  /// Reads the next piece. `block` is valid until the next call. Errors: kDataLoss;
+  /// kResourceExhausted if blocks expand too much.
   absl::StatusOr<Piece> Next(std::string_view& block);
 
   /// The frame count of the tail; valid after Next has returned kTail.

@@ -51,9 +51,10 @@ class RecordingWriter {
                                                                  const RecordingOptions& options);
   ~RecordingWriter();
 
-  /// Appends a frame with its arrays. Frames are numbered in the order of calls. A frame without a
-  /// time gets its time step, or else its number, as time and loses its velocities. Errors:
-  /// INVALID_ARGUMENT (float32 is too coarse); the errors of AtomicFile.
+  /// Appends a frame with its arrays. Frames are numbered in the order of calls. If a frame has no
+  /// time, the number of its time step is stored as time, else the number of the frame; its
+  /// velocities are not stored. Errors: INVALID_ARGUMENT (float32 is too coarse); the errors of
+  /// AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();
@@ -73,7 +74,7 @@ bool IsRecording(const std::string& path);
 /// Reads a recording. A truncated file ends after its last complete block, with a notice; a damaged
 /// block is kDataLoss. Every block is checked before its frames are delivered. Files are not
 /// trusted: a block is at most 1 GiB, and memory grows with its actual content. Ids are returned
-/// unchanged; velocities only if all of a frame are finite.
+/// unchanged. Velocities are returned only if all velocities of the frame are finite.
 class RecordingReader final : public Sequence {
  public:
   /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.

@@ -111,7 +111,8 @@ absl::Status TakeMessage(std::string_view& block, Message& message) {
   return absl::OkStatus();
 }
 
-// The number of frames from the tail of the file. A hint; checked while reading.
+// Reads the number of frames from the tail of the file. It is only a hint, which is checked while
+// frames are read.
 std::optional<std::size_t> CountAtTail(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   file.seekg(-static_cast<std::streamoff>(recording::kMarkBytes), std::ios::end);
@@ -184,8 +185,8 @@ class RecordingReader::Impl {
                                  "--in-space"));
   }
 
-  // Reads the next message into `message_`. Returns false at the end; adds a notice if it is
-  // premature.
+  // Reads the next message into `message_`. Returns false at the end of the file. Adds a notice if
+  // the file is truncated.
   absl::StatusOr<bool> Take() {
     if (block_.empty()) {
       const auto piece = blocks_.Next(block_);

@@ -32,8 +32,8 @@ void AppendDelimited(const google::protobuf::MessageLite& message, std::string& 
   google::protobuf::util::SerializeDelimitedToZeroCopyStream(message, &stream);
 }
 
-// The spacing of particles that fill their bounding box evenly, or lie on a line along it,
-// whichever is larger; 0 for an empty box.
+// Estimates the spacing of a frame under two assumptions: the particles fill their bounding box
+// evenly, or they lie on a line along it. Returns the larger estimate, or 0 for an empty box.
 double SuggestedSpacing(const RecordedFrame& frame) {
   const auto axes = static_cast<std::size_t>(frame.components);
   const double count = static_cast<double>(frame.ParticleCount());
@@ -81,7 +81,7 @@ class RecordingWriter::Impl {
     if (!status.ok()) return status;
     wire::AssignBytes(std::span<const std::uint64_t>(frame.ids), *message_.mutable_ids());
     wire::AssignBytes(std::span<const float>(frame.volumes), *message_.mutable_volumes());
-    // Velocities are useless with a time step or an index instead of a time.
+    // Without a time, the interval between frames is unknown, so velocities are dropped.
     wire::AssignBytes(
         frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
         *message_.mutable_velocities());

@@ -14,7 +14,7 @@ struct Percentiles {
   std::size_t count = 0;
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
-/// All 0 if `times` is empty. Sorts `times`.
+/// Returns 0 for every percentile if `times` is empty. Sorts `times`.
 Percentiles PercentilesOf(std::vector<double>& times);
 
 /// Whether medians and 99th percentiles of two windows of equal length differ by at most 5 % or

@@ -34,9 +34,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Length of a window. The run ends once consecutive windows agree (HaveSettled).
+// Length of a measuring window. The run ends once the percentiles of two consecutive windows agree
+// (HaveSettled).
 constexpr std::chrono::seconds kWindow(2);
-// Larger than any number of frames in flight.
+// Size of the ring buffers that hold times by sequence number. It is larger than any number of
+// frames in flight.
 constexpr std::size_t kRemembered = 4096;
 
 double Milliseconds(Clock::duration time) {
@@ -108,7 +110,7 @@ class LoadedStream {
   // Processor time of the two threads, which includes most of gRPC's work.
   double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
-  // Arrival time of the response to a frame; empty before.
+  // Arrival time of the response to a frame; empty if the response has not arrived.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
     const auto at = answered_at_[sequence % kRemembered].load();
     if (at == Clock::duration::rep{0}) return std::nullopt;
@@ -156,7 +158,7 @@ class LoadedStream {
       const Clock::time_point due{Clock::duration(due_[event.sequence % kRemembered].load())};
       shared_.answers.Add(Milliseconds(now - due));
       ++shared_.answered;
-      // Late: the response came after the next frame was due.
+      // A frame is late if its response came after the next frame was due.
       if (shared_.flags.rate > 0 && now > due + PeriodTimes(1)) ++shared_.late;
     }
   }
@@ -185,7 +187,7 @@ void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& 
     if (*got == Received::kEnd) return;
     if (*got != Received::kEvent) continue;
     const auto now = Clock::now();
-    // The watcher may receive the result before the producer.
+    // If the watcher received the result before the producer, the delay counts as 0.
     const auto answered = stream.AnsweredAt(frame.sequence);
     shared.watches.Add(answered ? std::max(Milliseconds(now - *answered), 0.0) : 0.0);
   }
@@ -205,7 +207,7 @@ double MemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-// Results of all windows except the first, in which buffers grow.
+// Results of the run. They leave out the first window, in which buffers grow.
 struct Figures {
   double seconds = 0;
   bool settled = false;

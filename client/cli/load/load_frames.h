@@ -20,7 +20,8 @@ inline std::vector<std::vector<float>> LoadFrames(int particles) {
   for (int frame = 0; frame < kFrames; ++frame) {
     const double angle = 2 * std::numbers::pi * frame / kFrames;
     std::vector<float>& xy = frames[frame];
-    // Row by row. The disc may hold some particles more than wanted.
+    // Adds particles row by row until there are `particles` of them. The disc may contain a few
+    // more lattice points.
     for (int j = -reach; j <= reach && xy.size() < coordinates; ++j) {
       for (int i = -reach; i <= reach && xy.size() < coordinates; ++i) {
         if (i * i + j * j > radius * radius) continue;

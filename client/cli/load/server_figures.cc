@@ -11,7 +11,7 @@
 namespace partiemc::client {
 namespace {
 
-// The number that follows a name at the beginning of a line.
+// Returns the number that follows `name` at the beginning of a line of `text`.
 std::optional<double> ValueOf(std::string_view text, std::string_view name) {
   const std::string begin = Concat("\n", name, " ");
   const auto at = text.find(begin);

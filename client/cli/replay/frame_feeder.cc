@@ -101,7 +101,7 @@ void FrameFeeder::SendAll() {
       return;
     }
   }
-  // An error ends the stream; Receive reports it.
+  // If this fails, the stream has ended with an error, and Receive reports it.
   (latest ? latest->Finish() : stream_.FinishSending()).IgnoreError();
 }
 
@@ -121,7 +121,7 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
               .components = recorded.components,
               .volumes = recorded.volumes,
               .ids = recorded.ids};
-  // Velocities are useless without times: the distance between two frames is unknown.
+  // Velocities are sent only with times. Without times the interval between two frames is unknown.
   if (recorded.time) frame.velocities = recorded.velocities;
   ViewAttributes(recorded);
   frame.attributes = attributes_;
@@ -135,7 +135,8 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
   return frame;
 }
 
-// Views the requested attributes that exist. The stream reports a missing one.
+// Sets `attributes_` to views of the requested attributes that the frame has. The stream refuses a
+// frame that lacks one.
 void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
   attributes_.clear();
   for (const std::string& name : attribute_names_) {
@@ -152,7 +153,7 @@ bool FrameFeeder::SendOne(FramePointer owned) {
   const RecordedFrame& recorded = *owned;
   const Frame frame = View(recorded);
   {
-    // Before Send, because the response may arrive before Send returns.
+    // The frame is queued before Send, because its response may arrive before Send returns.
     const MutexLock lock(mutex_);
     unanswered_.push_back(std::move(owned));
   }
@@ -168,14 +169,15 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   const Frame frame = View(recorded);
   const double time = TimeOf(recorded);
   {
-    // Before Offer, because the response may arrive before Offer returns.
+    // The frame is queued before Offer, because its response may arrive before Offer returns.
     const MutexLock lock(mutex_);
     offered_.push_back(std::move(owned));
   }
   return sender.Offer(frame, time).ok();
 }
 
-// The sender sends and skips frames in the order of Offer.
+// The sender sends or skips frames in the order of Offer, so the first two hooks concern the front
+// of `offered_`.
 OfferHooks FrameFeeder::Hooks() {
   return {.sending =
               [this](std::uint64_t) {

@@ -39,15 +39,16 @@ class FrameFeeder {
     std::string message;
   };
 
-  /// Starts both threads. Requires: `input` and `stream` outlive it. Without a rate it sends as
-  /// fast as possible. `attributes` names the attributes to send.
+  /// Starts both threads. Requires: `input` and `stream` outlive this object. If
+  /// `frames_per_second` is absent, frames are sent as fast as possible. `attributes` names the
+  /// attributes to send.
   FrameFeeder(Sequence& input, FrameStream& stream, std::optional<double> frames_per_second,
               SendPolicy policy, std::vector<std::string> attributes);
   /// Calls Stop and Join.
   ~FrameFeeder();
 
-  /// The frame of the response received last. Requires: one call for each result or refusal, in
-  /// order.
+  /// Returns the frame that the last received response answers. Requires: one call for each result
+  /// or refusal, in order.
   std::unique_ptr<RecordedFrame> TakeAnswered() ABSL_LOCKS_EXCLUDED(mutex_);
   void Recycle(std::unique_ptr<RecordedFrame> frame) ABSL_LOCKS_EXCLUDED(mutex_);
   std::vector<Refused> TakeRefused() ABSL_LOCKS_EXCLUDED(mutex_);

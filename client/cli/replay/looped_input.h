@@ -14,8 +14,9 @@
 
 namespace partiemc::client {
 
-/// Repeats the frames of `input` with their recorded times. Times decrease at each new round, so
-/// the stream uses no velocity across it. Ends if the input cannot be read again or is empty.
+/// Repeats the frames of `input` with their recorded times. The time therefore decreases when a new
+/// round begins, so the stream ignores velocities between the last frame and the first. Ends if
+/// `input` is empty or cannot be opened again.
 class LoopedInput final : public Sequence {
  public:
   /// `first` is OpenInput(input, options).

@@ -141,13 +141,15 @@ class Receiver {
     return status;
   }
 
-  /// Particles of 3D frames are not in the plane of the outline, so that no output draws them.
+  /// Returns no particles for 3D frames. They do not lie in the plane of the outline, so no output
+  /// draws them.
   static std::span<const double> PlaneParticles(const RecordedFrame& frame) {
     if (frame.components != 2) return {};
     return frame.positions;
   }
 
-  /// The attribute of --color-by at the particles, for the report; empty without one.
+  /// The values of the attribute --color-by at the particles, for the report. Empty without a
+  /// report or without such an attribute.
   AttributeValues ParticleColor(const RecordedFrame& frame) const {
     if (flags_.color_by.empty() || flags_.report.empty()) return {};
     for (const ParticleAttribute& attribute : frame.attributes) {
@@ -166,7 +168,8 @@ class Receiver {
       valid.Update(Validate(section, fill));
     }
     if (valid.ok()) return;
-    // A placement without guarantees breaks them in almost every frame; report it once.
+    // A placement without guarantees breaks them in almost every frame, so only the first failure
+    // is printed.
     const std::uint64_t told = KeepsGuarantees(*FindPlacement(flags_.placement)) ? 10 : 1;
     if (++failed_checks_ > told) return;
     progress_.Note(Concat("partiemc: ", source, ": --check: ", OneLine(valid)));
@@ -207,7 +210,7 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
     code = kInput;
   }
   if (failed_checks > 0) {
-    // Count and report, but do not fail: the placement guarantees nothing.
+    // If the placement guarantees nothing, failures are printed but do not change the exit code.
     const bool expected = !KeepsGuarantees(parameters.placement);
     Complain(kFailed, Concat("--check: ", Plural(failed_checks, "frame"), " of ",
                              summary.frame_count(), " broke a guarantee",
@@ -223,7 +226,8 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
 int Replay(const ReplayFlags& flags) {
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
-  // The recording may hold the spacing that a slice requires.
+  // Checks the flags before the input is opened. A slice requires a spacing, which the recording
+  // may provide, so 1.0 stands for it here.
   const auto without_input = ParametersOf(flags, 1.0);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
@@ -283,7 +287,8 @@ int Replay(const ReplayFlags& flags) {
   } else if (early.empty()) {
     return Complain(kInput, Concat(flags.input, ": has no frame to replay; check --frames"));
   }
-  // After kFailed the outputs cannot be completed, for the same reason.
+  // After kFailed an output is broken, and Finish fails for the same reason. Its error is not
+  // printed again.
   if (!finished.ok() && ended.code != kFailed) Complain(kFailed, finished);
   if (ended.code == kInterrupted) {
     return Complain(kInterrupted,

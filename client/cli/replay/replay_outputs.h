@@ -28,10 +28,11 @@ class ReplayOutputs {
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { frames_.AddRefused(); }
-  /// The report and the summary will say that the replay ended early, and why.
+  /// Makes the report and the summary state that the replay ended early, with the reason.
   void EndEarly(std::string why) { frames_.EndEarly(std::move(why)); }
 
-  /// Writes statistics and report, each even if the other fails. Neither exists before.
+  /// Completes the statistics and the report. If one of them fails, the other is still written.
+  /// Neither file exists before this call.
   absl::Status Finish(double wall_seconds);
 
   const Summary& summary() const { return frames_.summary(); }

@@ -13,8 +13,8 @@ from .advection import Advection
 from .geometry import SAMPLE_STEP, Bools, Boundary, Curve, Floats, Outline, Points, cross, dot
 from .motions import Motion
 
-# Jitter leaves out a sample whose surroundings depart from the map by more than this, in spacings. It is well below the
-# differences of methods, and well above the errors of truths and fits.
+# Jitter ignores a sample if the motion there deviates from the assumed motion, or is uncertain, by more than this, in
+# spacings. The limit is well below the differences between methods and well above the errors of truths and fits.
 _MOTION_TOLERANCE = 0.1
 ABSENT = float("nan")
 

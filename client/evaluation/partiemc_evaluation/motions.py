@@ -72,7 +72,7 @@ class FlowMotion:
             wave = np.sin(shear.wavenumber * cross(shear.along, points) + shear.phase)
             points = points + (shear.amplitude * wave)[:, None] * shear.along
         arm = points - self.center
-        # The angle depends on the radius alone: circles around the centre slide on each other.
+        # The angle depends only on the distance from the centre, so each circle around the centre turns as a whole.
         turn = self.angle * np.maximum(0, 1 - dot(arm, arm) / self.radius ** 2) ** 2
         cosine, sine = np.cos(turn), np.sin(turn)
         return self.center + np.stack([cosine * arm[:, 0] - sine * arm[:, 1],

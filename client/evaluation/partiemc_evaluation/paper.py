@@ -25,7 +25,7 @@ FILLS = ("grid", "greedy", "conforming", "polygon")
 _SEED, _REPETITIONS, _CELLS = 5_310, 3, (0.25, 4.0)  # Smallest and largest cell that the core accepts.
 
 
-# A row of the paper's Tables 2 to 4, and the placement and fill that measure it here.
+# A row of the paper's Tables 2 to 4, with the placement and the fill of PartiEMC that correspond to it.
 PaperRow = namedtuple("PaperRow", "name placement fill milliseconds triangles hausdorff mean_deviation area_deviation "
                       "triangle_deviation")
 PAPER_ROWS = (PaperRow("Marching Squares (MS)", BASELINE, "grid", 11.8, 548, 0.043, 0.018, 0.071, 64.2),
@@ -197,7 +197,7 @@ def _run_grids(runs: PaperRuns) -> None:
 FINDINGS = {"reproduces": "reproduces", "weaker": "the direction reproduces, the size does not",
             "fails": "does not reproduce"}
 _SHARE_OF_EFFECT, _NO_EFFECT = 0.9, 0.98  # An effect is 1 - ratio; a ratio above the second is no gain.
-# "Stable" and "consistent" have no numbers in the paper.
+# The paper claims that results are "stable" and "consistent" but gives no numbers. These limits are our own choice.
 _STABLE, _CONSISTENT_CELLS, _CONSISTENT_AREA = 1.5, 0.25, 0.02
 
 

@@ -49,7 +49,7 @@ class Sequence:
     truth_follows_motion: bool = True
 
 
-# Rigid motion: shortest and longest shift in spacings, largest turn in radians, a frame.
+# Rigid motion per frame: shortest and longest shift in spacings, largest turn in radians.
 PACES = {"drift": (0.05, 0.3, 0.01), "steady": (0.5, 3.0, 0.1), "leaps": (5.0, 30.0, 1.0),
          "still": (0.0, 0.0, 0.0), "turn": (0.0, 0.0, 0.1)}
 
@@ -80,8 +80,8 @@ _STRAIN, _WAVE, _VORTEX_ANGLE = (0.04, 0.10), (0.8, 1.6), (0.075, 0.15)  # Of a 
 _AREA_GROWTH = 1.05    # A frame.
 _BODY_GAP, _BODY_DEPTH = 3.1, 7.3  # Bodies come from this gap and end this deep in each other, in spacings.
 
-# Size of the second body over the size of the first. Half axis of the first towards the second over its radius. Sideways
-# offset over the reach of both. Whether a third body comes from the other side.
+# Per set of bodies: size of the second body over the size of the first; half axis of the first body towards the second
+# over its radius; sideways offset over the sum of both sizes; whether a third body comes from the opposite side.
 _BODIES: dict[str, tuple[float, float, float, bool]] = {
     "discs": (0.8, 1, 0, False), "uneven-discs": (0.45, 1, 0.1, False),
     "glancing-discs": (0.9, 1, 0.5, False), "disc-chain": (0.7, 1, 0.15, True),
@@ -91,7 +91,8 @@ _BODIES: dict[str, tuple[float, float, float, bool]] = {
     "glancing-pebbles": (0.85, 0.9, 0.42, False), "pebble-chain": (0.62, 0.85, 0.14, True)}
 _TUNING_BODIES, _VALIDATION_BODIES = tuple(_BODIES)[:8], tuple(_BODIES)[8:]
 
-# The frames of a scene in spacings: outline, particles and, where they are not 0, 1, ..., their ids.
+# A scene in units of the spacing: for each frame its outline, its particles and their ids (None: 0, 1, ...); then the
+# motion.
 _Draft = tuple[list[tuple[Outline, Points, Indices | None]], Motion]
 
 
@@ -169,7 +170,8 @@ def _make_bodies(shape: str, area: float, steps: int, rng: Rng) -> BodiesMotion:
     a, b, heading = radius * stretch, radius / stretch, rng.uniform(0, 2 * np.pi)
     drift = rng.uniform(0.1, 0.5) * _unit_vector(rng)
     bodies = [Body(a, b, heading, np.zeros(2), drift)]
-    # Ellipses of one orientation are circles in stretched coordinates, where they touch at `reach`.
+    # All ellipses have the same orientation. In coordinates stretched along the axes of the ellipses they are circles,
+    # which touch when their centres are `reach` apart.
     reach = 1 + second
     ahead = (reach ** 2 - (sideways * reach) ** 2) ** 0.5 * a
     for side, late in ((1, 1.0), (-1, 1.37))[:2 if third else 1]:
@@ -232,7 +234,8 @@ def _recipes(shapes: Seq[str], bodies: Seq[str], seed: int, plan: _Plan) -> Iter
     for group, samplers in plan:
         for k, sampler in enumerate(samplers):
             shape, next_shape = shapes[next_shape % len(shapes)], next_shape + 1
-            # A lattice fills boxes, layer by layer; on merging bodies curves cut it.
+            # The sampler "lattice" fills only shapes made of boxes, so other shapes are skipped. In the group
+            # "topology" the bodies are ellipses, and their curves cut the lattice.
             while sampler == "lattice" and group != "topology" and not fits_lattice(shape):
                 shape, next_shape = shapes[next_shape % len(shapes)], next_shape + 1
             count, noise, share = _COUNTS[(serial + k // 8) % 8], _NOISES[k % 3], _SHARES[k % 4]

@@ -14,8 +14,8 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from .geometry import Floats, Outline, ellipse_ring
 
 CURVE_STEP = 0.04  # Distance of points on curves, in spacings: chords are off by 1e-4 or less.
-# Gaps between bodies, in spacings: below two kernel radii, so that only the guard of the level set keeps the
-# bodies apart.
+# Gaps between bodies, in spacings. They are below two kernel radii, so the kernels of two bodies overlap. Only the term
+# "guard" of the level set (METHOD.md) keeps the bodies apart.
 _DISC_GAP, _ELLIPSE_GAP, _THREE_DISC_GAP, _BAR_GAP = 2.5, 2.0, 2.3, 2.2
 
 Shape = Callable[[float], Any]
@@ -70,8 +70,8 @@ def _path(x: float, y: float, steps: str) -> Any:
     return Polygon(corners)
 
 
-# Sides of these lie along the axes at whole numbers of spacings, so that a lattice fits: a unit becomes the
-# whole number of spacings that brings the area nearest.
+# The sides of these shapes are parallel to the axes and have whole lengths. One unit is scaled to a whole number of
+# spacings, so that a lattice fits. The number is chosen so that the area is nearest to the requested one.
 _LATTICE: dict[str, Any] = {
     "ell": _path(0, 0, "R2 U1 L1 U1 L1"),
     "cross": _path(1, 0, "R1 U1 R1 U1 L1 U1 L1 D1 L1 D1 R1"),
@@ -147,7 +147,8 @@ def make_shape(shape: str, area: float, straight_step: float) -> Outline:
         x, y = (np.array(_LATTICE[shape].bounds[2:]) * unit) // 2
         region = affinity.affine_transform(_LATTICE[shape], [unit, 0, 0, unit, -x, -y])
     else:
-        # The area depends on h only by the chords of the curves, 1e-7 of it.
+        # The spacing h changes the area of a shape only through the chords of its curves, by 1e-7 of the area. Any
+        # small h gives the scale.
         scale = float(np.sqrt(area / _SHAPES[shape](0.03).area))
         region = affinity.scale(_SHAPES[shape](1 / scale), scale, scale, origin=(0, 0))
     return Outline.of_shapely(region).densified(straight_step)

@@ -19,7 +19,8 @@ from .scenes import Frame, Recipe, Sequence, make_scene
 BASELINE, PAPER, DEFAULT = "marching-squares", "farthest-particle", "virtual-plane"
 PLACEMENTS = (BASELINE, "qef", PAPER, DEFAULT)
 
-# Numbers of a row, each the mean over frames unless said otherwise; lengths in spacings, areas relative, absent ones NaN.
+# The numbers of a row. Each is a mean over frames unless noted. Lengths are in spacings, areas are relative, absent
+# numbers are NaN.
 METRICS = (
     "hausdorff", "mean_deviation",      # To the true boundary.
     "bias", "area_deviation",           # |mean of area_error|; Eq. 29-30 on area / true area, frames after the first.
@@ -190,11 +191,11 @@ def _summary(frames: list[dict[str, float]]) -> dict[str, float]:
     share = 1 + columns["area_error"]
     values["bias"] = abs(values["area_error"])
     values["area_error_size"] = mean_of(np.abs(columns["area_error"]))
-    # Without an area in the first frame: as if all of it came and went.
+    # If the first frame has no area, the deviation counts as 100 %.
     values["area_deviation"] = 1.0 if share[0] <= 0 else mean_of(np.abs(share[1:] / share[0] - 1))
     values["triangle_deviation"] = float(columns["triangles"].std())
     for metric in ("known_hausdorff_jitter", "known_mean_jitter"):
-        # Pairs of frames count by the share of their samples that is used.
+        # Each pair of frames is weighted by the share of its samples that is used.
         values[metric] = mean_of(columns[metric], columns["known_share"])
     return values
 
@@ -222,7 +223,7 @@ def run_study(sources: Seq[Recipe | Sequence], methods: list[Method], given: lis
     """Every method on every sequence. The rows are the same for any number of jobs, except times. jobs: processes
     that each take one sequence at a time. progress: called with the number of sequences done."""
     run, rows = partial(_run_all, methods, given), []
-    # Spawned: the native module has threads, which a fork would lose.
+    # Starts new processes instead of forking, because a fork would lose the threads of the native module.
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
     try:
         for k, of_sequence in enumerate(pool.map(run, sources) if pool else map(run, sources)):

@@ -11,7 +11,7 @@ from .comparisons import LOSS_RATIO, TIE_SHARE, Ratio, compare_parts, compare_ro
 from .paper import FILLS, GRIDS, PAPER_MERGING, PAPER_ROWS, PaperRuns
 from .study import BASELINE, DEFAULT, METRICS, Study
 
-# The metrics that methods are judged by: of scenes against the truth, of recordings what is known.
+# The metrics by which methods are compared: for scenes against the truth, for recordings with the little that is known.
 SCENE_METRICS = ("hausdorff", "mean_deviation", "bias", "area_deviation", "hausdorff_jitter", "mean_jitter")
 RECORDING_METRICS = ("mean_deviation", "area_error_size", "area_deviation", "hausdorff_jitter", "mean_jitter",
                      "known_hausdorff_jitter", "known_mean_jitter", "wall_roughness")

@@ -7,7 +7,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// "--columns pos" with the name of an array selects its components.
+// Expands the name of an array: if --columns has only this name, replaces it by the names of the
+// array's components.
 ColumnRequest WithComponents(const ColumnRequest& request, const ArrayTable& table) {
   ColumnRequest expanded = request;
   if (request.columns.size() != 1) return expanded;

@@ -15,7 +15,8 @@
 
 namespace partiemc::client::input {
 
-/// Arrays with more components are no attributes of particles.
+/// Maximum number of components of an array. An array with more is no attribute of particles and is
+/// ignored.
 inline constexpr std::size_t kMaxArrayComponents = 16;
 
 struct ArrayTable {
@@ -27,8 +28,8 @@ struct ArrayTable {
   void Add(std::string_view name, std::size_t components, ArrayColumn first);
 };
 
-/// An array of a file that is loaded only if the particles need it: `components` per row,
-/// interleaved.
+/// An array of a file with `components` numbers per row, interleaved. `load` is called only if the
+/// particles need the array.
 struct StoredArray {
   std::string name;
   std::size_t components = 1;
@@ -37,16 +38,18 @@ struct StoredArray {
   std::function<absl::Status(std::vector<char>& bytes)> load;
 };
 
-/// As below, of arrays with `row_count` rows each.
+/// Fills `rows` with the particles of `arrays`, which have `row_count` rows each. `request` and
+/// `source` have the same meaning as in the overload below.
 absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count,
                       const ColumnRequest& request, const std::string& source, ParticleRows& rows);
 
-/// The index of the array with the first position. Errors: as PlanNamedColumns.
+/// Returns the index of the array that holds the first position column. Errors: as
+/// PlanNamedColumns.
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request);
 
-/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects its
-/// components. `source` begins errors and becomes rows.source.
+/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects the
+/// components of the array. Error messages begin with `source`, which also becomes rows.source.
 absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
                       const std::string& source, ParticleRows& rows);
 

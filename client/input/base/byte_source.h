@@ -16,12 +16,13 @@ namespace partiemc::client::input {
 /// Largest number of particles of a frame (1.1 GB of positions).
 inline constexpr std::size_t kMaxParticles = std::size_t{1} << 26;
 
-/// Largest ratio of unpacked to packed bytes of a file, beyond kFreeExpansionBytes. Particle dumps
-/// pack to a third of their size, or to a hundredth if nothing moves.
+/// Largest ratio of unpacked to packed bytes of a file. A file may always unpack to
+/// kFreeExpansionBytes. Particle dumps pack to a third of their size, or to a hundredth if nothing
+/// moves.
 inline constexpr double kMaxExpansion = 1000;
 inline constexpr std::uint64_t kFreeExpansionBytes = std::uint64_t{64} << 20;
 
-/// Whether `unpacked` bytes are more than `packed` bytes are allowed to become.
+/// Whether `unpacked` bytes are more than a file of `packed` bytes may unpack to (kMaxExpansion).
 bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion);
 /// The broken rule and the remedy, for an error message.
 std::string ExpansionRule(double max_expansion);
@@ -37,7 +38,7 @@ class ByteSource {
 /// A regular file. Errors: kNotFound, kPermissionDenied, kFailedPrecondition (not a regular file).
 absl::StatusOr<std::unique_ptr<ByteSource>> OpenFile(const std::string& path);
 
-/// The bytes [offset, offset + size) of a file. Reading fails behind its end.
+/// The bytes [offset, offset + size) of a file. Reading beyond the end of the file is an error.
 std::unique_ptr<ByteSource> OpenFilePart(const std::string& path, std::uint64_t offset,
                                          std::uint64_t size);
 absl::StatusOr<std::string> ReadFilePart(const std::string& path, std::uint64_t offset,
@@ -48,7 +49,8 @@ absl::StatusOr<std::string> ReadFilePart(const std::string& path, std::uint64_t 
 /// first.
 class InputStream final : public ByteSource {
  public:
-  /// Errors: also kResourceExhausted for a file that expands too much, when it is read so far.
+  /// Errors: as OpenFile. Reading fails with kResourceExhausted once the file has expanded too
+  /// much.
   static absl::StatusOr<std::unique_ptr<InputStream>> Open(const std::string& path,
                                                            double max_expansion = kMaxExpansion);
 

@@ -98,7 +98,8 @@ Axes FindVelocities(const Names& canonical) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     axes[axis] = FindFirst(canonical, Spellings({"v", "vel", "velocity", "velocities"}, axis));
   }
-  // PySPH's names, only if both are present: a single "u" or "v" can mean anything.
+  // Velocities in PySPH have the names "u" and "v". They are recognised only together, because a
+  // single "u" or "v" can mean anything.
   const auto u = FindFirst(canonical, {"u"});
   const auto v = FindFirst(canonical, {"v"});
   if (CountFound(axes) == 0 && u && v) axes = {u, v, FindFirst(canonical, {"w"})};
@@ -121,8 +122,9 @@ std::optional<std::size_t> FindAsked(const Names& names, const Names& canonical,
   return FindFirst(canonical, {Canonical(asked)});
 }
 
-// Positions from the listed columns. If the names contain axes in rising order (x and z), these are
-// the axes, so that velocities have the same ones; otherwise the first column is x.
+// Plans positions in the listed columns. If the names contain axes in rising order (such as x and
+// z), the positions have these axes, and velocities too. Otherwise the first column is x, and there
+// are no velocities.
 absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
                                 const ColumnRequest& request, ColumnPlan& plan) {
   const Names& asked = request.columns;
@@ -189,7 +191,7 @@ absl::Status PlanConditions(const Names& names, const Names& canonical,
   return absl::OkStatus();
 }
 
-// The columns "NAME:0", "NAME:1" and optionally "NAME:2", or NAME_x, NAME_y, NAME_z.
+// Finds the columns of a vector: NAME:0, NAME:1 and optionally NAME:2, or NAME_x, NAME_y, NAME_z.
 std::vector<std::size_t> FindComponents(const Names& names, const Names& canonical,
                                         const std::string& asked) {
   const std::string stem = Canonical(asked);
@@ -206,7 +208,8 @@ std::vector<std::size_t> FindComponents(const Names& names, const Names& canonic
 absl::Status PlanAttributes(const Names& names, const Names& canonical,
                             const ColumnRequest& request, ColumnPlan& plan) {
   for (const std::string& asked : request.attributes) {
-    // Rows store velocities by axis; the projection selects the axes of the plane.
+    // The attribute "velocity" needs no columns here. Rows store velocities by axis, and the
+    // projection selects the axes of the plane.
     if (asked == kVelocityAttribute && CountFound(plan.velocities) >= 2) continue;
     std::vector<std::size_t> columns = FindComponents(names, canonical, asked);
     if (const auto column = FindAsked(names, canonical, asked); column && columns.empty()) {

@@ -35,7 +35,8 @@ struct ColumnRequest {
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
 };
 
-/// kInvalidArgument if an expression is not "COLUMN=VALUE" or an entry of `columns` is empty.
+/// Parses the options --select and --columns. kInvalidArgument if an expression is not
+/// "COLUMN=VALUE" or an entry of `columns` is empty.
 absl::StatusOr<ColumnRequest> ParseColumnRequest(const std::vector<std::string>& select,
                                                  std::string_view columns);
 
@@ -53,8 +54,9 @@ struct ColumnPlan {
   std::optional<std::size_t> volume;
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
-  /// LAMMPS's ix iy iz: how many boxes a wrapped position has left behind. Not set with
-  /// ColumnRequest::columns, which keeps positions as they are.
+  /// Columns ix iy iz of LAMMPS (image flags): how often the particle has crossed the periodic box
+  /// along each axis. Not set if ColumnRequest::columns names the positions, which then stay as
+  /// they are.
   std::array<std::optional<std::size_t>, 3> images;
   std::size_t column_count = 0;
   bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.

@@ -11,7 +11,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// std::from_chars does not convert numbers out of range. Requires: `text` is a well-formed number.
+// Converts a number that is out of range, which std::from_chars does not: overflow gives infinity,
+// underflow zero. Requires: `text` is a well-formed number.
 double OutOfRange(std::string_view text) {
   const bool negative = text.front() == '-';
   const std::size_t exponent = text.find_first_of("eE");

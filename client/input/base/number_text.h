@@ -14,7 +14,8 @@ std::optional<double> ParseNumber(std::string_view text);
 /// A count or an index: digits only, below 2^64.
 std::optional<std::uint64_t> ParseCount(std::string_view text);
 
-/// An identity: a count, or a number that is whole and below 2^53 ("3.000e+00" of NumPy's savetxt).
+/// Parses an identity: a count, or a floating-point number that is an integer below 2^53
+/// ("3.000e+00", as NumPy's savetxt writes it).
 std::optional<std::uint64_t> ParseId(std::string_view text);
 
 /// ParseId of a parsed number.

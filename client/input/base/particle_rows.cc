@@ -10,7 +10,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// Messages quote at most this much of a cell.
+// Maximum number of bytes of a cell that an error message quotes.
 constexpr std::size_t kShownCellBytes = 40;
 
 absl::StatusOr<double> NumberOf(std::string_view cell) {

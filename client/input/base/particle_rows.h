@@ -37,8 +37,9 @@ struct ParticleRows {
   void Begin(const ColumnPlan& plan);
 };
 
-/// Adds one row of a text table if the conditions hold. Requires: rows.Begin(plan).
-/// Errors, without a place: kDataLoss if cells are missing or not numbers.
+/// Adds one row of a text table if it fulfils the conditions of `request`. Requires:
+/// rows.Begin(plan). Errors: kDataLoss if cells are missing or not numbers. The message does not
+/// state the file and the line; the caller adds them.
 absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
                            const ColumnRequest& request, ParticleRows& rows);
 
@@ -69,9 +70,9 @@ struct ArrayColumn {
   std::optional<std::uint64_t> Id(std::size_t row) const;
 };
 
-/// Adds the rows of a binary table that fulfil the conditions. Requires: rows.Begin(plan); every
-/// column of the plan has `row_count` elements. Errors: kFailedPrecondition if a condition compares
-/// with text.
+/// Adds the rows of a binary table that fulfil the conditions of `request`. Requires:
+/// rows.Begin(plan); every column of the plan has `row_count` elements. Errors: kFailedPrecondition
+/// if a condition compares a column with text.
 absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t row_count,
                              const ColumnPlan& plan, const ColumnRequest& request,
                              ParticleRows& rows);

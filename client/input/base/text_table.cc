@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t";
 
-// Most columns of a table. A line of binary data has many more.
+// Maximum number of columns of a table. It rejects binary data, whose lines would have many more.
 constexpr std::size_t kMaxColumns = 4096;
 
 constexpr std::size_t kPreambleBytes = std::size_t{64} << 10;
@@ -86,7 +86,8 @@ struct NumberedLine {
   std::string_view text;
 };
 
-// The lines with content, without the last one, which may be cut off.
+// Returns the lines of `head` that are neither blank nor comments. Leaves out the last line, which
+// may be cut off.
 std::vector<NumberedLine> ContentLines(std::string_view head) {
   std::vector<NumberedLine> lines;
   for (std::size_t index = 0; !head.empty(); ++index) {

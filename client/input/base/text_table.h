@@ -13,10 +13,10 @@ namespace partiemc::client::input {
 /// Splits `line` at runs of blanks. `cells` are views into `line`.
 void SplitAtBlanks(std::string_view line, std::vector<std::string_view>& cells);
 
-/// Number of lines of `stream` before the header of its table: titles and settings that programs
-/// write first. The header is the first line with names of positions (or, with `columns`, with all
-/// of these names) that has the cells of the line that follows. 0 without such a line in the first
-/// 64 KiB, or if the table begins at once. Consumes nothing.
+/// Returns the number of lines of `stream` before the header of its table. Some programs write
+/// titles and settings there. The header is the first line with names of positions, or with all
+/// names of `columns`, that has the same number of cells as the following line. Returns 0 if the
+/// first 64 KiB have no such line, or if the table begins at once. Consumes nothing.
 absl::StatusOr<std::size_t> CountPreambleLines(InputStream& stream,
                                                const std::vector<std::string>& columns);
 

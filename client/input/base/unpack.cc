@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kPackedBlockBytes = std::size_t{128} << 10;
 
-// A window over 128 MiB is never needed for text dumps, and would be allocated on the file's word.
+// Largest window of zstd: 128 MiB. Text dumps never need more, and zstd would allocate any size
+// that the file declares.
 constexpr int kMaxZstdWindowLog = 27;
 
 absl::Status Damaged(const std::string& name, std::string_view packing, std::string_view what) {
@@ -42,7 +43,7 @@ class CountedSource final : public ByteSource {
   std::uint64_t& count_;
 };
 
-// An unpacked source with a bound on its expansion.
+// Unpacks a source. Fails if it expands by more than `max_expansion`.
 class BoundedSource final : public ByteSource {
  public:
   BoundedSource(Packing packing, const std::string& name, std::unique_ptr<ByteSource> packed,
@@ -92,14 +93,16 @@ class InflateSource final : public ByteSource {
         stream_.avail_in = static_cast<uInt>(*count);
       }
       if (absl::Status status = Step(); !status.ok()) return status;
-      // zlib may hold more bytes if the output is full.
+      // If the output is full, zlib may hold more bytes. Then the next call to zlib needs no
+      // further input.
       flushing_ = stream_.avail_out == 0 && !between_members_ && !finished_;
     }
     return wanted - stream_.avail_out;
   }
 
  private:
-  // Raw deflate is a part of a file and ends with it.
+  // Raw deflate data is a part of a file, such as an entry of a zip archive. No bytes may follow
+  // its end.
   absl::Status CheckEnd() {
     char surplus = 0;
     const auto count = stream_.avail_in > 0 ? std::size_t{1} : packed_->Read(&surplus, 1);
@@ -111,7 +114,7 @@ class InflateSource final : public ByteSource {
 
   absl::Status Step() {
     if (between_members_) {
-      // Zeros after the last member are padding (tar, tapes).
+      // Zero bytes after the last gzip member are padding, as in tar files or on tapes.
       if (members_ > 0 && *stream_.next_in == 0) {
         stream_.avail_in = 0;
         finished_ = true;
@@ -169,7 +172,8 @@ class ZstdSource final : public ByteSource {
       const std::size_t rest = ZSTD_decompressStream(stream_.get(), &output, &input_);
       if (ZSTD_isError(rest) != 0) return Damaged(name_, "zstd", ZSTD_getErrorName(rest));
       between_frames_ = rest == 0;
-      // The decoder may hold more bytes if the output is full.
+      // If the output is full, zstd may hold more bytes. Then the next call to zstd needs no
+      // further input.
       flushing_ = rest != 0 && output.pos == output.size;
     }
     return output.pos;

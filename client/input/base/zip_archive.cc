@@ -28,7 +28,8 @@ constexpr std::uint16_t kStored = 0;
 constexpr std::uint16_t kDeflated = 8;
 constexpr std::uint32_t kInZip64 = 0xFFFFFFFF;
 
-// An entry, unpacked: ends after the bytes that the directory says, and checks them.
+// The unpacked bytes of an entry. Ends after the size that the directory states, and verifies size
+// and checksum.
 class CheckedEntry final : public ByteSource {
  public:
   CheckedEntry(std::string name, std::unique_ptr<ByteSource> source, const ZipEntry& entry)
@@ -53,7 +54,8 @@ class CheckedEntry final : public ByteSource {
     return absl::DataLossError(Concat(name_, ": the checksum is wrong; the file is damaged"));
   }
 
-  // Returns 0. An entry that is longer than its size is an error.
+  // Returns 0 at the end of the entry. It is an error if the source has more bytes than the entry's
+  // size.
   absl::StatusOr<std::size_t> CheckEnd() {
     if (seen_crc_ != crc_) return WrongChecksum();  // The entry is empty.
     char surplus = 0;

@@ -29,9 +29,9 @@ class ZipArchive {
 
   const std::vector<ZipEntry>& entries() const { return entries_; }
 
-  /// The bytes of an entry. At the end the checksum and the size are verified: kDataLoss if they
-  /// differ.
-  /// kUnimplemented for other methods and encrypted entries.
+  /// Opens an entry for reading. At the end of the entry its checksum and size are verified:
+  /// kDataLoss if they differ. kUnimplemented for encrypted entries and for methods other than
+  /// stored and deflated.
   absl::StatusOr<std::unique_ptr<ByteSource>> OpenEntry(const ZipEntry& entry) const;
 
  private:

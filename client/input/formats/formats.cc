@@ -36,7 +36,8 @@ struct FileHead {
   }
 };
 
-// Whether an NPY array has an extent more than one frame needs.
+// Whether a file is an NPY array of several frames. Such an array has one extent more than an array
+// of one frame.
 bool HasFramesInNpy(const FileHead& head) {
   constexpr std::string_view kShape = "'shape': (";
   const std::size_t at = head.bytes.find(kShape);
@@ -53,7 +54,7 @@ bool IsXyz(const FileHead& head) {
   return head.extension == "xyz" || head.Line(1).starts_with("Atoms. Timestep:");
 }
 
-// Whether a line begins with a command that every LAMMPS script contains.
+// Whether a line begins with a command that is typical of LAMMPS scripts.
 bool IsLammpsScript(const FileHead& head) {
   if (!head.text) return false;
   constexpr std::string_view kCommands[] = {"\nunits ", "\natom_style ", "\npair_style ",
@@ -85,14 +86,16 @@ bool IsPickle(const FileHead& head) {
   return head.extension == "pkl" || head.extension == "pickle" || head.Begins("\x80\x04\x95");
 }
 
-// A supported format, or an unsupported one with a remedy.
+// A row of the table of formats: a supported format, or an unsupported one with a remedy in
+// `refusal`.
 struct Entry {
   bool (*matches)(const FileHead&);
   Format format;
   std::string_view refusal;
 };
 
-// The first match decides: signatures in the content, then names, then any text.
+// The rows are tried in this order, and the first match decides: signatures in the content, then
+// names, then any text.
 constexpr Entry kEntries[] = {
     {HasFramesInNpy, {"NPY", OpenNpy, false}, ""},
     {[](const FileHead& head) { return head.Begins("\x93NUMPY"); }, {"NPY", OpenNpy, true}, ""},
@@ -148,7 +151,8 @@ constexpr Entry kEntries[] = {
     {[](const FileHead& head) { return head.text; }, {"CSV", OpenTextTable, true}, ""},
 };
 
-// Text has no control characters. The head may end inside a UTF-8 sequence.
+// Whether `bytes` have no control characters except white space. UTF-8 is not checked, because the
+// head may end inside a sequence.
 bool IsText(std::string_view bytes) {
   return std::all_of(bytes.begin(), bytes.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

@@ -20,7 +20,7 @@ constexpr std::size_t kGsdEntryBytes = 32;
 constexpr std::size_t kGsdNameBytes = 64;
 constexpr std::size_t kMaxGsdNames = 65535;  // Ids have two bytes.
 
-// The type of an element by its number in the file, from 1.
+// The types of elements, in the order of their numbers in the file. The numbers begin at 1.
 constexpr ElementType kGsdTypes[] = {
     ElementType::kUInt8,   ElementType::kUInt16,  ElementType::kUInt32, ElementType::kUInt64,
     ElementType::kInt8,    ElementType::kInt16,   ElementType::kInt32,  ElementType::kInt64,
@@ -74,7 +74,8 @@ class GsdIndex {
   }
 
  private:
-  // A product that stays beyond every file if it overflows.
+  // Multiplies two numbers. On overflow the result is larger than any file, so that later checks
+  // against the file's size fail.
   static std::uint64_t Product(std::uint64_t a, std::uint64_t b) {
     constexpr std::uint64_t kBeyond = std::uint64_t{1} << 62;
     return b != 0 && a > kBeyond / b ? kBeyond : a * b;
@@ -89,7 +90,7 @@ class GsdIndex {
     return ReadFilePart(path_, offset, static_cast<std::size_t>(size));
   }
 
-  // Version 1 has 64 bytes for each name, version 2 separates names by a zero.
+  // In version 1 each name has 64 bytes. In version 2 a zero byte ends each name.
   void ReadNames(std::string_view list) {
     while (!list.empty() && list.front() != '\0' && names_.size() < kMaxGsdNames) {
       const std::size_t end = std::min(list.find('\0'), list.size());
@@ -192,7 +193,7 @@ class GsdReader final : public FrameReader {
     return absl::OkStatus();
   }
 
-  // The arrays with a row per particle, of the schema and of logs.
+  // Returns the arrays with one row per particle: those of the GSD schema and logged quantities.
   std::vector<StoredArray> Arrays(std::uint64_t frame, std::uint64_t particles) const {
     std::vector<StoredArray> arrays;
     const auto add = [&](const GsdChunk& chunk) {

@@ -16,10 +16,11 @@
 namespace partiemc::client::input {
 namespace {
 
-// A group with more members is no recording.
+// Maximum number of members of a group. A group with more is no recording of particles.
 constexpr std::size_t kMaxHdf5Members = std::size_t{1} << 20;
 
-// Of all frames of a file. Products with bytes per row do not overflow.
+// Maximum number of rows of an array, over all frames. Up to this limit, rows times bytes per row
+// does not overflow.
 constexpr std::uint64_t kMaxRows = std::uint64_t{1} << 48;
 
 Mutex& LibraryMutex() {
@@ -44,10 +45,11 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-// The library prints errors unless this is called for each thread.
+// Disables the error messages that libhdf5 prints. Each thread must call this, because the setting
+// is per thread.
 void Silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
-// Whether every link of `path` exists and stays in the file.
+// Whether every link of `path` exists and leads to an object in the same file.
 bool LinksStayInFile(hid_t file, const std::string& path) {
   std::size_t end = 0;
   while (end < path.size()) {
@@ -208,7 +210,8 @@ absl::Status Hdf5File::Read(const std::string& dataset, std::uint64_t begin, std
     return damaged(Concat("declares ", count, " rows; at most ", kMaxParticles));
   }
   const std::uint64_t row_bytes = array->components * ElementBytes(array->type);
-  // The size of contiguous numbers is a claim of the header.
+  // For contiguous numbers the storage size is only declared by the header, so the size of the file
+  // bounds it.
   std::error_code no_size;
   const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(opened.id()),
                                                        std::filesystem::file_size(path_, no_size));

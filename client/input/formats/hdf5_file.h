@@ -1,4 +1,5 @@
-// Reads HDF5 files with libhdf5. Not thread-safe in Debian: the functions here share one lock.
+// Reads HDF5 files with libhdf5. Debian's libhdf5 is not thread-safe, so the functions here share
+// one lock.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,7 @@ struct Hdf5Array {
 };
 
 /// A file. Paths have the form "group/dataset". Links to other files, virtual datasets and external
-/// data are not followed: a file is read alone.
+/// data are not followed, so no other file is read.
 class Hdf5File {
  public:
   /// Errors: kDataLoss if libhdf5 cannot open it.

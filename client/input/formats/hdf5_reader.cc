@@ -1,5 +1,5 @@
-// HDF5 of PySPH, H5Part, VTKHDF, openPMD and Gadget, and of other programs by the names of
-// datasets. A frame is a group of arrays with one row per particle.
+// Reads HDF5 files of PySPH, H5Part, VTKHDF, openPMD and Gadget. Reads files of other programs by
+// the names of their datasets. A frame is a group of arrays with one row per particle.
 #include <algorithm>
 #include <utility>
 
@@ -29,7 +29,7 @@ std::string ParentOf(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-// A dataset, or rows of it, as an array of a frame.
+// A dataset, or a range of its rows, that holds one array of a frame.
 struct Hdf5Column {
   std::string name;
   std::string dataset;
@@ -52,7 +52,7 @@ struct Hdf5Content {
   bool pysph = false;
 };
 
-// The number behind the last character that is no digit: 12 of "Step#12".
+// Returns the number after the last character that is not a digit: 12 for "Step#12".
 std::optional<double> NumberAtEnd(std::string_view name) {
   const std::size_t begin = name.find_last_not_of("0123456789") + 1;
   return ParseNumber(name.substr(begin));
@@ -136,8 +136,9 @@ class Hdf5Survey {
     });
   }
 
-  // "--columns PartType0/Coordinates" or "data/*/particles/fluid/position": the group before the
-  // last slash, where * stands for each name in its place.
+  // Adds the groups that --columns names. In "PartType0/Coordinates" or
+  // "data/*/particles/fluid/position" the group is the path before the last slash. Each * stands
+  // for every name in its place.
   absl::Status TakeNamedGroups() {
     auto& columns = content_.request.columns;
     while (columns.front().starts_with('/')) columns.front().erase(0, 1);
@@ -169,7 +170,7 @@ class Hdf5Survey {
     return Refuse(Concat("has no group ", pattern, "; the datasets are ", Listed()));
   }
 
-  // The number in the place of the first * of `pattern`.
+  // Returns the number at the end of the name that stands in place of the first * of `pattern`.
   static std::optional<double> StepOf(const std::string& group, const std::string& pattern) {
     const std::vector<std::string_view> parts = Split(pattern, '/');
     const auto star = std::find(parts.begin(), parts.end(), "*") - parts.begin();
@@ -197,8 +198,9 @@ class Hdf5Survey {
     return absl::OkStatus();
   }
 
-  // https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format: one frame, or ranges of the
-  // arrays for each step.
+  // Takes the frames of a VTKHDF file,
+  // https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format. The file holds one frame,
+  // or a range of each array for each step.
   absl::Status TakeVtk() {
     std::vector<Hdf5Column> columns = {{"Points", "VTKHDF/Points"}};
     for (const std::string& name : file_.Members("VTKHDF/PointData")) {
@@ -291,7 +293,7 @@ class Hdf5Survey {
                Listed()));
   }
 
-  // The first datasets of numbers of the file.
+  // Lists the first datasets of numbers of the file, for messages.
   std::string Listed() const {
     std::vector<std::string> found, queue = {""};
     for (std::size_t k = 0; k < queue.size() && queue.size() < kMaxVisited; ++k) {
@@ -344,7 +346,8 @@ class Hdf5Reader final : public FrameReader {
     std::optional<Hdf5Column> offset;
   };
 
-  // The arrays with as many rows as the positions, and this number.
+  // Sets `arrays` to the arrays that have the same number of rows as the positions. Returns this
+  // number.
   absl::StatusOr<std::size_t> ArraysOf(const Hdf5Frame& frame, const std::string& source,
                                        std::vector<StoredArray>& arrays) const {
     std::vector<Candidate> candidates;
@@ -357,7 +360,8 @@ class Hdf5Reader final : public FrameReader {
     const auto positions = PositionArray(all, content_.request);
     if (!positions.ok()) return WithPrefix(source, positions.status());
     const std::uint64_t rows = candidates[*positions].array.rows;
-    // A constant has any number of rows in no bytes.
+    // A constant of openPMD can declare any number of rows without storing them. At least one
+    // stored array must therefore have this number of rows.
     if (std::none_of(candidates.begin(), candidates.end(), [&](const Candidate& candidate) {
           return !candidate.constant && candidate.array.rows == rows;
         })) {
@@ -376,7 +380,8 @@ class Hdf5Reader final : public FrameReader {
     candidates.push_back({column, *array, std::nullopt, std::nullopt});
   }
 
-  // The datasets of `group`, and of the groups in it: openPMD's position/x has the name position:x.
+  // Adds the datasets of `group` and of the groups in it to `candidates`. The name of openPMD's
+  // dataset position/x becomes position:x.
   void AddGroup(const std::string& group, const std::string& prefix,
                 std::vector<Candidate>& candidates) const {
     for (const std::string& name : file_->Members(group)) {
@@ -401,7 +406,8 @@ class Hdf5Reader final : public FrameReader {
     }
   }
 
-  // openPMD's positions are position + positionOffset, each in its unit.
+  // In openPMD a position is the sum of position and positionOffset, each in a unit that the file
+  // states.
   void AddOffset(const std::string& group, const std::string& name, Candidate& candidate) const {
     if (!group.ends_with("/position")) return;
     const std::string path = Concat(ParentOf(group), "/positionOffset/", name);
@@ -438,7 +444,7 @@ class Hdf5Reader final : public FrameReader {
     for (std::uint64_t k = 0; k < rows; ++k) bytes.insert(bytes.end(), raw, raw + sizeof(value));
   }
 
-  // position + unit * positionOffset, which is a dataset or constant.
+  // Computes position + unit * positionOffset. The offset is a dataset or a constant.
   absl::Status LoadSum(const StoredArray& stored, const std::string& path, double unit,
                        std::uint64_t rows, std::vector<char>& bytes) const {
     std::vector<char> near, far;

@@ -21,8 +21,8 @@ struct Box {
   std::array<Vector3, 3> edges = {};
 };
 
-// Lower and upper bounds and, for a triclinic box, the tilts xy xz yz. The bounds of a triclinic
-// box belong to its bounding box, which is wider than the box.
+// Makes a box from its lower and upper bounds and, for a triclinic box, the tilts xy, xz and yz.
+// For a triclinic box, LAMMPS writes the bounds of its bounding box, which is wider.
 Box BoxOfBounds(const std::array<std::vector<double>, 3>& lines) {
   Vector3 low = {lines[0][0], lines[1][0], lines[2][0]};
   Vector3 high = {lines[0][1], lines[1][1], lines[2][1]};
@@ -109,7 +109,7 @@ class LammpsDumpReader final : public FrameReader {
     }
   }
 
-  // Reads the value line after an ITEM line as one cell.
+  // Reads the line after an ITEM line and sets `value` to its first cell.
   absl::Status ReadValue(std::string_view name, std::string& value) {
     std::string_view line;
     const auto found = ReadContentLine(line);
@@ -186,7 +186,8 @@ class LammpsDumpReader final : public FrameReader {
 
   absl::StatusOr<bool> ReadAtoms(const std::string& columns, ParticleRows* rows) {
     if (!head_.atoms) return Error("ITEM: ATOMS comes before the number of atoms");
-    // Check for the end of the file first: it may have cut off some columns.
+    // Checks for the end of the file before it plans the columns, because a truncated file may lack
+    // some of their names.
     const auto next = stream_->Peek(1);
     if (!next.ok()) return next.status();
     if (next->empty() && *head_.atoms > 0) return EndsAfter(0);
@@ -216,7 +217,7 @@ class LammpsDumpReader final : public FrameReader {
     return true;
   }
 
-  // Adds the image flags of the last row, which count boxes, to its position.
+  // Unwraps the position of the last row by its image flags, which count crossed boxes.
   absl::Status UnwrapLast(ParticleRows& rows) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!plan_->images[axis]) continue;

@@ -158,7 +158,7 @@ absl::Status ParseShape(std::string_view value, const std::string& name, NpyHead
       return DamagedNpy(name, "the NPY header has no valid shape");
     }
     if (*extent > kMaxArrayBytes / bytes) return DamagedNpy(name, "the array is over 4 GiB");
-    // Keeps the product valid for the extents that follow an extent of 0.
+    // An extent of 0 counts as 1, so that the limit also applies to the extents that follow.
     bytes *= std::max<std::size_t>(*extent, 1);
     header.shape.push_back(*extent);
   }

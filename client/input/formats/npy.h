@@ -11,7 +11,7 @@
 
 namespace partiemc::client::input {
 
-/// A field of a structured array; the only, unnamed one of a plain array.
+/// A field of a structured array. A plain array has one field without a name.
 struct NpyField {
   std::string name;
   ElementType type = ElementType::kFloat64;
@@ -36,7 +36,7 @@ struct NpyHeader {
 /// half precision).
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
 
-/// Reads the header up to the elements: the text of a Python dict. Errors: kDataLoss.
+/// Reads the header, the text of a Python dict, and stops before the elements. Errors: kDataLoss.
 absl::Status ReadNpyHeaderText(ByteSource& source, const std::string& name,
                                std::vector<char>& bytes);
 
@@ -48,8 +48,9 @@ absl::Status ReadNpyElements(ByteSource& source, const NpyHeader& header, const 
 absl::Status ReadNpyBytes(ByteSource& source, std::size_t size, const std::string& name,
                           std::vector<char>& bytes);
 
-/// The table of an array of shape (N,) or (N, K), a view into `bytes`. Columns of a structured
-/// array have the names of its fields, others the names `name`, or `name`:0, `name`:1, ...
+/// Returns a table of an array of shape (N,) or (N, K). The table is a view into `bytes`. Columns
+/// of a structured array have the names of its fields. Other columns have the name `name`, or
+/// `name`:0, `name`:1, ...
 ArrayTable NpyTable(const NpyHeader& header, const std::string& name,
                     const std::vector<char>& bytes);
 

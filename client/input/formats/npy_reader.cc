@@ -1,4 +1,4 @@
-// NPY: an array with a row per particle, or with such an array per frame.
+// Reads NPY files: an array with one row per particle, or an array of such frames.
 #include <utility>
 
 #include "absl/strings/str_join.h"
@@ -9,10 +9,11 @@
 namespace partiemc::client::input {
 namespace {
 
-// A row has a few columns. More columns indicate a transposed array.
+// Maximum number of columns. More columns indicate a transposed array.
 constexpr std::size_t kMaxNpyColumns = 4096;
 
-// Frames without particles take no bytes, so their number is limited.
+// Maximum number of frames without particles. They take no bytes, so the size of the file does not
+// limit their number.
 constexpr std::size_t kMaxEmptyFrames = 65536;
 
 class NpyReader final : public FrameReader {
@@ -57,7 +58,8 @@ class NpyReader final : public FrameReader {
   const ColumnRequest& request_;
 };
 
-// Removes the first extent of an array of frames.
+// If the array holds several frames, removes its first extent, the number of frames, and returns
+// this number.
 absl::StatusOr<std::optional<std::size_t>> TakeFrameCount(NpyHeader& header,
                                                           const std::string& path) {
   if (header.shape.size() != (header.structured ? 2 : 3)) return std::nullopt;

@@ -61,7 +61,8 @@ absl::StatusOr<NpzTable> ReadTable(const ZipArchive& archive, const std::string&
   return table;
 }
 
-// "--columns pos" with the name of an array selects its components.
+// Expands the name of an array: if --columns has only this name, replaces it by the names of the
+// array's components.
 ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& table) {
   if (request.columns.size() != 1) return request;
   ColumnRequest expanded = request;
@@ -73,7 +74,7 @@ ColumnRequest WithArraysExpanded(const ColumnRequest& request, const NpzTable& t
   return expanded;
 }
 
-// Ignores optional arrays with another number of rows than the positions.
+// Removes optional arrays from the plan if they have another number of rows than the positions.
 void DropForeignColumns(const NpzTable& table, ColumnPlan& plan) {
   std::vector<std::size_t> rows;
   for (const NamedArray& array : table.arrays) {
@@ -137,7 +138,8 @@ class NpzReader final : public OneFrameReader {
     if (!source.ok()) return source.status();
     const auto header = ReadNpyHeader(**source, name);
     if (!header.ok()) return header.status();
-    // Uses the header of the plan, even if the file has changed since.
+    // The plan was made with the earlier header, so this header is used even if the file has
+    // changed since.
     return ReadNpyElements(**source, array.header, name, bytes);
   }
 

@@ -13,7 +13,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// More values are no description of arrays. Bounds the memory of a small hostile file.
+// Maximum number of values. A description of arrays has fewer. Limits the memory that a small
+// hostile file can use.
 constexpr std::size_t kMaxPickleValues = std::size_t{1} << 20;
 constexpr std::size_t kMaxNameBytes = 1 << 16;
 
@@ -73,8 +74,9 @@ class PickleMachine {
     return absl::DataLossError(Concat(name_, ": its pickle ", what));
   }
 
-  // Counts bytes that operations make from other values, which may be named any number of times.
-  // False if they are more than the pickle itself has, and a few names.
+  // Counts bytes that operations copy from other values. A pickle may refer to one value any number
+  // of times, so these bytes are limited to the size of the pickle plus kMaxNameBytes. Returns
+  // false above the limit.
   bool MayMake(std::size_t bytes) {
     made_bytes_ += bytes;
     return made_bytes_ <= pickle_.bytes_.size() + kMaxNameBytes;
@@ -127,7 +129,8 @@ class PickleMachine {
     return Push({.kind = Kind::kGlobal, .text = pickle_.texts_.back()});
   }
 
-  // A little-endian number in two's complement of 1 to 8 bytes. Larger ones are no counts.
+  // Pushes a little-endian number in two's complement of at most 8 bytes. A larger number cannot be
+  // a count and becomes kOther.
   Outcome PushLong(std::optional<std::uint64_t> size) {
     if (!size) return Outcome::kBroken;
     const auto bytes = Bytes(*size);
@@ -141,7 +144,7 @@ class PickleMachine {
     return PushNumber(static_cast<double>(static_cast<std::int64_t>(value)));
   }
 
-  // The values above the last mark, which are removed with it.
+  // Removes the last mark and the values above it, and returns these values.
   std::optional<std::vector<const PickleValue*>> TakeToMark() {
     const auto mark = std::find(stack_.rbegin(), stack_.rend(), nullptr);
     if (mark == stack_.rend()) return std::nullopt;
@@ -199,7 +202,7 @@ class PickleMachine {
     return Outcome::kGood;
   }
 
-  // The result of a known function for its arguments; kOther for every other one.
+  // Pushes the result of a known function for its arguments, or kOther for an unknown function.
   Outcome Reduce() {
     const PickleValue* const arguments = Take();
     const PickleValue* const function = Take();
@@ -222,7 +225,7 @@ class PickleMachine {
     return Push({});
   }
 
-  // Bytes that protocol 2 stores as the text of their Latin-1 characters, in UTF-8.
+  // Pushes bytes from text. Protocol 2 stores each byte as a Latin-1 character, encoded in UTF-8.
   Outcome PushLatin1(std::string_view text) {
     if (!MayMake(text.size())) return Outcome::kBroken;
     std::string bytes;
@@ -249,7 +252,8 @@ class PickleMachine {
     return PushNumber(ArrayColumn{*element, swapped, content.text.data(), 0}.Number(0));
   }
 
-  // Sets the state of a type, (3, '<', ...), or of an array, (1, shape, type, fortran, content).
+  // Sets the state of a NumPy type, (3, '<', ...), or of a NumPy array, (1, shape, type, fortran,
+  // content).
   Outcome Build() {
     const PickleValue* const state = Take();
     if (state == nullptr || stack_.empty() || stack_.back() == nullptr) return Outcome::kBroken;

@@ -21,7 +21,7 @@ struct PickleValue {
   double number = 0;
   std::string_view text;                  ///< Of text, bytes, or a global ("module.name").
   std::vector<const PickleValue*> items;  ///< Of a sequence; of a dict: key, value, key, value, ...
-  // Of a type ("f8") and of an array.
+  // Set for a NumPy type (its name, such as "f8") and for a NumPy array:
   std::string_view type;
   bool big_endian = false;
   std::vector<std::uint64_t> shape;
@@ -34,8 +34,9 @@ struct PickleValue {
 /// A pickle and its values. The values refer to the bytes.
 class Pickle {
  public:
-  /// Protocols 2 to 4 as NumPy and PySPH use them. `name` is for messages. kDataLoss if the pickle
-  /// is damaged; kUnimplemented for operations that such data has no need of.
+  /// Parses a pickle of the protocols 2 to 4, as NumPy and PySPH write them. `name` is for
+  /// messages. kDataLoss if the pickle is damaged; kUnimplemented for operations that NumPy and
+  /// PySPH do not use.
   static absl::StatusOr<std::unique_ptr<Pickle>> Parse(std::vector<char> bytes,
                                                        const std::string& name);
 
@@ -50,7 +51,8 @@ class Pickle {
   const PickleValue* root_ = nullptr;
 };
 
-/// An array of numbers of one extent as a column; false for other values.
+/// Sets `column` to an array of numbers with one extent, and `rows` to its length. Returns false
+/// for other values.
 bool ColumnOf(const PickleValue& value, ArrayColumn& column, std::size_t& rows);
 
 }  // namespace partiemc::client::input

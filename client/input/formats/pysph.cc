@@ -13,7 +13,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// The column that FillRows finds instead of "tag", which would pass for an id.
+// The new name of PySPH's column "tag". FillRows would take a column named "tag" for ids.
 constexpr std::string_view kTagColumn = "particle tag";
 
 const StoredArray* FindArray(const std::vector<StoredArray>& arrays, std::string_view name) {
@@ -22,7 +22,7 @@ const StoredArray* FindArray(const std::vector<StoredArray>& arrays, std::string
   return found == arrays.end() ? nullptr : &*found;
 }
 
-// A column of the quotients of two columns.
+// Returns a column of the quotients above / below.
 StoredArray Quotient(const std::string& name, std::size_t rows, StoredArray above,
                      StoredArray below) {
   const auto load = [rows, above, below](std::vector<char>& bytes) {
@@ -42,7 +42,7 @@ StoredArray Quotient(const std::string& name, std::size_t rows, StoredArray abov
   return {name, 1, ElementType::kFloat64, false, load};
 }
 
-// The object that numpy.savez has pickled as an array without extents.
+// Reads an object that numpy.savez has pickled as an array without extents.
 absl::StatusOr<std::unique_ptr<Pickle>> LoadObject(const std::string& path,
                                                    const ZipArchive& archive,
                                                    std::string_view name) {
@@ -60,7 +60,7 @@ absl::StatusOr<std::unique_ptr<Pickle>> LoadObject(const std::string& path,
   return Pickle::Parse(std::move(bytes), place);
 }
 
-// The dict in a pickled array without extents, or null.
+// Returns the dict in a pickled array without extents; null if there is none.
 const PickleValue* DictOf(const Pickle& pickle) {
   const PickleValue& array = pickle.root();
   if (array.kind != PickleValue::Kind::kArray || array.content == nullptr ||

@@ -1,4 +1,4 @@
-// What the two formats of PySPH's output, HDF5 and NPZ, have in common.
+// Functions that the readers of PySPH's two formats, HDF5 and NPZ, share.
 #pragma once
 
 #include <string>
@@ -11,14 +11,15 @@
 
 namespace partiemc::client::input {
 
-/// Selects the particle array to read: that of request.columns ("solid/x,solid/y"; the array is
-/// removed from the names), else "fluid", else the only one. Errors: kFailedPrecondition, with the
-/// names.
+/// Selects the particle array to read: the one that request.columns names ("solid/x,solid/y"), else
+/// "fluid", else the only one. Removes the name of the array from request.columns. Errors:
+/// kFailedPrecondition with the names of the arrays.
 absl::StatusOr<std::string> ChoosePysphArray(const std::vector<std::string>& names,
                                              ColumnRequest& request, const std::string& path);
 
-/// As partiemc.read_pysph of the Python package: keeps real particles only (tag 0), and adds
-/// volumes m / rho. Requires: all arrays have `rows` rows. The arrays must outlive the result.
+/// Completes the arrays like partiemc.read_pysph of the Python package: keeps only real particles
+/// (tag 0), and adds volumes m / rho. Requires: all arrays have `rows` rows. The arrays must
+/// outlive the result.
 void CompletePysphArrays(std::size_t rows, std::vector<StoredArray>& arrays,
                          ColumnRequest& request);
 

@@ -15,7 +15,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// Smallest size of a number in a file, with its separator.
+// Smallest number of bytes of a number in a file, with its separator.
 constexpr std::int64_t kLeastBytes = 2;
 
 // Keywords of cell lists: each cell is a count of points and their indices.
@@ -65,7 +65,7 @@ class ParticlesReader final : public vtkDataReader {
     return false;
   }
 
-  // Returns false at the end and after an error.
+  // Reads the next section. Returns false at the end of the file and after an error.
   bool ReadSection(vtkPolyData& particles) {
     const std::string keyword(Keyword());
     std::int64_t count = 0;
@@ -98,8 +98,9 @@ class ParticlesReader final : public vtkDataReader {
     return count == 0 || ReadCellsLegacy(count, skipped.data());
   }
 
-  // Up to version 4.2: the numbers of cells and of integers, then the integers. From 5.0: the
-  // numbers of offsets and of indices, then both as typed arrays.
+  // Skips cells. Files up to version 4.2 have the number of cells, the number of integers, and the
+  // integers. Files from version 5.0 on have the number of offsets, the number of indices, and both
+  // as typed arrays.
   bool SkipCells() {
     std::int64_t first = 0, second = 0;
     if (!ReadCount(first) || !ReadCount(second)) return false;

@@ -33,12 +33,13 @@
 namespace partiemc::client::input {
 namespace {
 
-// Size of the head that is searched for declared counts: the XML of usual files, or the POINTS line
-// of a legacy file.
+// Number of bytes at the beginning of a file that are searched for declared counts. They contain
+// the XML of usual files, or the POINTS line of a legacy file.
 constexpr std::size_t kHeadBytes = 65536;
 
-// Smallest size of a point: three digits with separators, or three coordinates of four bytes
-// compressed with zlib's best ratio of about 1:1000.
+// Smallest number of bytes of a point in a file. A plain point needs at least three digits with
+// separators. A compressed point needs three coordinates of four bytes at zlib's best ratio of
+// about 1:1000.
 constexpr double kLeastBytesPerPlainPoint = 6;
 constexpr double kLeastBytesPerPackedPoint = 0.01;
 
@@ -58,7 +59,8 @@ class MessageCatcher final : public vtkOutputWindow {
   void DisplayGenericWarningText(const char* text) override { TakeWarning(text); }
   void DisplayDebugText(const char* /*text*/) override {}
 
-  // "ERROR: In FILE, line N\nvtkThing (0x...): message\n\n" -> "message", in one line.
+  // Returns VTK's text "ERROR: In FILE, line N\nvtkThing (0x...): message\n\n" as "message", in one
+  // line.
   std::string Message() const {
     std::string_view text = error_;
     const std::size_t object_end = text.find("): ");
@@ -244,7 +246,7 @@ class VtkReader final : public OneFrameReader {
     if (points->GetPoints() != nullptr && points->GetNumberOfPoints() > 0) {
       table = TableOf(*points);
     } else {
-      // Files omit empty arrays of frames without particles.
+      // Files omit the arrays of a frame without particles, so the names are added here.
       table.names = {"Points:0", "Points:1", "Points:2"};
       for (const Condition& condition : request_.conditions) {
         table.names.push_back(condition.column);

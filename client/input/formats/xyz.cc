@@ -96,7 +96,8 @@ class XyzReader final : public FrameReader {
     return absl::OkStatus();
   }
 
-  // Names of the columns of "species:S:1:pos:R:3". Returns false if it has another form.
+  // Sets `names` to the columns of "species:S:1:pos:R:3". Returns false if `properties` has another
+  // form.
   static bool NamesOf(const std::string& properties, std::vector<std::string>& names) {
     names.clear();
     const std::vector<std::string_view> parts = partiemc::Split(properties, ':');
@@ -104,7 +105,7 @@ class XyzReader final : public FrameReader {
     for (std::size_t k = 0; k < parts.size(); k += 3) {
       const auto count = ParseCount(parts[k + 2]);
       if (!count || *count > kMaxXyzColumns - names.size()) return false;
-      // "velo" is the name of OVITO and others.
+      // OVITO and other programs name velocities "velo".
       const std::string_view name = parts[k] == "velo" ? "velocity" : parts[k];
       for (std::uint64_t c = 0; c < *count; ++c) {
         names.push_back(*count == 1 ? std::string(name) : Concat(name, ":", c));
@@ -113,8 +114,8 @@ class XyzReader final : public FrameReader {
     return !names.empty();
   }
 
-  // The text after `key` in the comment, which begins the comment or follows a blank; up to a blank
-  // or, if it is quoted, up to the closing quote.
+  // Returns the value after `key` in the comment. The key begins the comment or follows a blank.
+  // The value ends at the next blank or, if it is quoted, at the closing quote.
   static std::string_view Value(std::string_view comment, std::string_view key) {
     for (std::size_t at = comment.find(key); at != std::string_view::npos;
          at = comment.find(key, at + 1)) {

@@ -13,7 +13,8 @@ namespace {
 using Answer = AsyncStream::Answer;
 using Answered = AsyncStream::Answered;
 
-/// Fulfils `promise`. It is shared because std::function must be copyable.
+/// Returns a callback that fulfils `promise`. The promise is shared because std::function must be
+/// copyable.
 Answered FulfilmentOf(const std::shared_ptr<std::promise<Answer>>& promise) {
   return [promise](Answer answer) { promise->set_value(std::move(answer)); };
 }
@@ -33,9 +34,9 @@ class AsyncStream::Receiving {
 
   FrameStream& stream() { return stream_; }
 
-  /// `send` sends the frame. Frames are answered in order, so the front of the queue is answered
-  /// next. The callback is queued before its frame is sent, because the answer may arrive before
-  /// `send` returns.
+  /// Queues `answered`, then calls `send`, which sends the frame. The callback is queued first,
+  /// because the answer may arrive before `send` returns. Frames are answered in order, so the
+  /// front of the queue is answered next.
   template <typename Sending>
   void Send(Answered answered, const Sending& send) ABSL_LOCKS_EXCLUDED(mutex_) {
     {
@@ -96,7 +97,8 @@ class AsyncStream::Receiving {
     return oldest;
   }
 
-  /// Null if the end of the stream has already answered it.
+  /// Removes the callback of the newest frame. Returns null if the end of the stream has already
+  /// called it.
   Answered TakeNewest() ABSL_LOCKS_EXCLUDED(mutex_) {
     const MutexLock lock(mutex_);
     if (waiting_.empty()) return nullptr;

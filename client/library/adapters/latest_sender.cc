@@ -69,7 +69,8 @@ class LatestSender::Sending {
       std::swap(in_hand, waiting_);
       is_waiting_ = false;
       ++counts_.sent;
-      // Called before the frame is sent: its answer may arrive before Send returns.
+      // The hook is called before the frame is sent, because the answer may arrive before Send
+      // returns.
       hooks_.sending(in_hand.number());
       absl::Status sent;
       {

@@ -19,7 +19,7 @@ def to_path(rings):
     import numpy
     from matplotlib.path import Path
 
-    # numpy.insert adds to these indices in place and requires signed ones.
+    # Copies the offsets: numpy.insert modifies its indices in place, and requires signed integers.
     offsets = rings.offsets.astype(numpy.intp)
     starts, ends = offsets[:-1], offsets[1:]
     vertices = numpy.insert(rings.points, ends, rings.points[starts], axis=0)
@@ -48,7 +48,8 @@ def to_meshio(mesh, attributes=None):
     import meshio
     import numpy
 
-    # Some of its writers require three coordinates; Gmsh requires signed indices.
+    # Some writers of meshio require three coordinates per point. The writer of Gmsh files requires signed
+    # indices.
     points = numpy.pad(mesh.points, ((0, 0), (0, 1)))
     return meshio.Mesh(points, [("triangle", mesh.triangles.astype(numpy.int64))],
                        point_data=dict(attributes or {}))

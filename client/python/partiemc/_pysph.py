@@ -8,7 +8,7 @@ import zipfile
 
 from ._errors import Error
 
-# Deflate's maximum ratio. Data that the file does not store at all is refused, too.
+# Maximum ratio at which deflate can compress. Larger arrays are refused, as are arrays without stored data.
 _MOST_INFLATED = 1032
 _WANTED = ("x", "y", "z", "u", "v", "w", "m", "rho", "gid", "tag")
 

@@ -49,8 +49,8 @@ export function makeFrame(options: FrameOptions = {}): Frame {
   }
   const inside = (node: number): boolean => values[node] < 0;
 
-  // Segments of marching squares, with the inside on the left, from one edge of a cell to another. The
-  // number of an edge is its lower node, times 2, plus 1 if vertical.
+  // Segments of marching squares lead from one edge of a cell to another, with the inside on the left.
+  // The number of an edge is twice its lower node, plus 1 if the edge is vertical.
   const following = new Map<number, number>();
   const corners = (node: number): number[] => [node, node + 1, node + stride + 1, node + stride];
   const edgesOf = (node: number): number[] =>

@@ -5,7 +5,7 @@ import { PlayoutClock } from '../src/stream/playout_clock';
 
 test('bursts of frames are drawn evenly', () => {
   const clock = new PlayoutClock(100);
-  // Fifty frames per second, in bursts of five.
+  // Frames arrive at fifty per second, in bursts of five.
   const shown: number[] = [];
   let sequence = 0;
   for (let now = 0; now < 4000; now += 10) {

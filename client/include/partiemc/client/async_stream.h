@@ -19,7 +19,7 @@
 namespace partiemc::client {
 
 /// Adapter that receives from a stream on its own thread. Each result is moved out with its
-/// buffers, so they are not reused. One thread sends.
+/// buffers, so the stream cannot reuse these buffers. One thread sends.
 class AsyncStream {
  public:
   /// The result of one frame; empty for parts other than 0 (StreamOptions). Errors: a status with a
@@ -27,7 +27,7 @@ class AsyncStream {
   /// ended the stream.
   using Answer = absl::StatusOr<FrameResult>;
   using Answered = std::function<void(Answer)>;
-  /// Receives the events that answer no frame: Event::Kind::kNotice and kReconnected.
+  /// Receives the events that do not answer a frame: Event::Kind::kNotice and kReconnected.
   using Told = std::function<void(const Event&)>;
 
   /// `stream` must outlive this object; no other code sends or receives on it. `told` runs on the
@@ -38,14 +38,15 @@ class AsyncStream {
   AsyncStream(const AsyncStream&) = delete;
   AsyncStream& operator=(const AsyncStream&) = delete;
 
-  /// Sends like FrameStream::Send and SendArrays: waits for the window. The future is ready at the
-  /// latest when the stream's deadline for the frame expires.
+  /// Sends like FrameStream::Send and SendArrays: waits while the window is full. The future is
+  /// ready when the stream's deadline for the frame expires, or earlier.
   std::future<Answer> Send(const Frame& frame, double time);
   std::future<Answer> SendArrays(const ParticleArrays& particles, double time);
 
-  /// Same as above, with a callback. `answered` is called once: on the receiving thread in the
-  /// order of the frames, or before Send returns if the stream does not accept the frame. Later
-  /// answers wait until it returns. It must not call this object.
+  /// Sends like the methods above, but passes the answer to `answered`, which is called once. It is
+  /// called on the receiving thread, in the order of the frames, or before Send returns if the
+  /// stream does not accept the frame. Until `answered` returns, later answers wait. `answered`
+  /// must not call this object.
   void Send(const Frame& frame, double time, Answered answered);
   void SendArrays(const ParticleArrays& particles, double time, Answered answered);
 

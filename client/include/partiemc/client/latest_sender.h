@@ -17,7 +17,7 @@
 
 namespace partiemc::client {
 
-/// Counts of offered frames by outcome. A frame in none of them is still waiting.
+/// Counts of offered frames by outcome. A frame that is in none of the counts is still waiting.
 struct OfferCounts {
   std::uint64_t sent = 0;     ///< Sent or being sent.
   std::uint64_t skipped = 0;  ///< Replaced by a newer frame before the stream accepted them.
@@ -36,8 +36,8 @@ struct OfferHooks {
       [](std::uint64_t, const absl::Status&) {};
 };
 
-/// Skips frames while the server is lost. Set ReconnectPolicy::give_up_after to kShortPatience if
-/// the simulator must soon learn that its server is lost.
+/// While the server is lost, the sender skips frames. If the simulator must soon learn that its
+/// server is lost, set ReconnectPolicy::give_up_after to kShortPatience.
 ///
 /// Two frames wait in addition to the window: one that is being sent and the newest one. Their
 /// memory is reused. One thread offers; an internal thread sends. Events are received from the

@@ -18,8 +18,8 @@ struct LocalStreamOptions {
   FrameLimits limits = {};
   /// Compute threads, at least 1; 0: one per processor.
   int threads = 0;
-  /// Frames that wait or are being computed, at least 1. A caller with 2 can read the next frame
-  /// while one is computed.
+  /// Maximum number of frames that wait or are being computed, at least 1. With 2, the caller can
+  /// read the next frame while the current one is computed.
   std::size_t frames_in_flight = 2;
   /// Same as StreamOptions::send_timeout (stream.h); absent: no limit.
   std::optional<std::chrono::milliseconds> send_timeout = {};

@@ -1,4 +1,4 @@
-// Particles as a simulator holds them: each quantity anywhere in its memory, any stride.
+// Particles in a simulator's own arrays. Each quantity may be anywhere in memory, with any stride.
 //
 //   stream->SendArrays({.count = n, .x = x, .y = y}, time);                    // arrays apart
 //   constexpr std::ptrdiff_t kStride = 3 * sizeof(double);               // x, y, z, x, y, z, ...
@@ -18,8 +18,8 @@
 
 namespace partiemc::client {
 
-/// A view of one number per particle, with a byte stride; its type is one of `Numbers`. Owns
-/// nothing.
+/// A view of one number per particle, with a byte stride. All numbers have the same type, one of
+/// `Numbers`. Owns nothing.
 template <typename... Numbers>
 class StridedView {
  public:
@@ -51,14 +51,15 @@ class StridedView {
 using Reals = StridedView<float, double>;
 using Ids = StridedView<std::uint64_t, std::int64_t, std::uint32_t, std::int32_t>;
 
-/// Same as Attribute, with one view per component: a number, or a vector of two or three.
+/// Same as Attribute, with one view per component. A number has only `x`, a vector of two
+/// components `x` and `y`, a vector of three all.
 struct AttributeArrays {
   std::string_view name;  ///< As in Attribute.
   Reals x, y = {}, z = {};
 };
 
-/// Same as Frame, with one view per quantity. Views must stay valid during the call they are passed
-/// to; it copies each number once, directly into the message.
+/// Same as Frame, with one view per quantity. Each view must stay valid until the call that
+/// receives it returns. The call copies each number once, directly into the message.
 struct ParticleArrays {
   std::size_t count = 0;  ///< Number of particles; the length of each view that is given.
 
@@ -69,8 +70,8 @@ struct ParticleArrays {
 
   // Optional, as in Frame. Doubles are rounded to float.
   Reals volumes;
-  Ids ids;  ///< The same components as the coordinates, or none.
-  /// As many components as coordinates, or none.
+  Ids ids;
+  /// The same components as the coordinates, or none.
   Reals velocity_x, velocity_y, velocity_z;
   /// Rounded to float.
   std::span<const AttributeArrays> attributes = {};

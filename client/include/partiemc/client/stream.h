@@ -32,8 +32,8 @@ namespace partiemc::client {
 struct Outputs {
   bool mesh = true;
   bool normals = false;  ///< Outward unit normals at ring vertices.
-  /// Sends coordinates as float32 relative to an origin: half the bytes. A frame is refused if it
-  /// is so wide that a vertex would move by more than 1e-4 spacings.
+  /// The server sends coordinates as float32 relative to an origin: half the bytes. A frame is
+  /// refused if it is so wide that a vertex would move by more than 1e-4 spacings.
   bool relative_float32 = false;
   bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
   /// Attributes to interpolate to the vertices (Result::attributes), by the names of
@@ -42,15 +42,15 @@ struct Outputs {
   std::vector<std::string> attributes = {};
 };
 
-/// Default time before a client gives up reconnecting. kShortPatience is for watchers and for
-/// producers that skip frames.
+/// Default times before a client gives up reconnecting: kPatience for producers, kShortPatience for
+/// watchers and for producers that skip frames.
 inline constexpr std::chrono::minutes kPatience{5};
 inline constexpr std::chrono::seconds kShortPatience{30};
 
 /// How a stream reconnects after it lost its connection or its server.
 struct ReconnectPolicy {
-  /// Time from the loss to the next new result; after it the stream ends with an error. A lost
-  /// connection is detected within 10 s. 0: do not reconnect.
+  /// Maximum time from the loss to the next new result. If it is exceeded, the stream ends with an
+  /// error. A lost connection is detected within 10 s. 0: do not reconnect.
   std::chrono::milliseconds give_up_after{kPatience};
   /// Each address is first tried once without a pause. Then pauses follow; each is twice as long as
   /// the previous one, minus a random part, so that many clients do not reconnect at the same
@@ -72,8 +72,9 @@ struct FrameParts {
   /// Secret shared by all parts, at most 128 bytes of printable ASCII. Empty: any caller that may
   /// produce a stream of this name may send its parts.
   std::string token = {};
-  /// A frame is refused (PARTS_MISSING) if a part is missing this long after its first part
-  /// arrived. Below `deadline`, at most ten minutes; the value of part 0 applies.
+  /// Time limit for all parts of a frame, from the arrival of the first part. If a part is missing
+  /// then, the server refuses the frame (PARTS_MISSING). Must be below `deadline`, at most ten
+  /// minutes. The value of part 0 applies to all parts.
   std::chrono::milliseconds timeout{10000};
 };
 
@@ -82,44 +83,47 @@ struct StreamOptions {
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Shown in lists of streams. At most 16; each at most 128 bytes without control characters.
+  /// Labels, shown in lists of streams. At most 16; each at most 128 bytes without control
+  /// characters.
   std::map<std::string, std::string> labels = {};
   /// TLS, certificates and token. Loopback and Unix sockets need none unless the server requires
   /// them.
   Credentials credentials = {};
-  /// Time to reach the server, including the time until it has started.
+  /// Maximum time to reach the server. It includes the wait for a server that is still starting.
   std::chrono::milliseconds connect_timeout{2000};
-  /// Time for the server to accept the stream, and for each response. It starts at the latest of
-  /// three events: the frame was sent, the previous response, a reconnection.
+  /// Maximum time for the server to accept the stream, and for each response. The time starts at
+  /// the latest of three events: the frame was sent, the previous response, a reconnection.
   std::chrono::milliseconds deadline{30000};
-  /// Time for Send to get a slot in the window, in any state of connection and server. A frame
-  /// without a slot is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream continues. Absent:
-  /// `deadline`; after a loss `reconnect.give_up_after` longer.
+  /// Maximum time that Send waits for a slot in the window, even while the connection is lost. A
+  /// frame that gets no slot is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream
+  /// continues. If absent, Send waits for `deadline`, after a loss `reconnect.give_up_after`
+  /// longer; then the stream ends.
   std::optional<std::chrono::milliseconds> send_timeout = {};
-  /// Servers to fail over to, in addition to the address of Open. They need the same version and
-  /// limits that are not smaller. Behind a proxy one address is enough.
+  /// Servers to fail over to, in addition to the address of Open. Each needs the same version, and
+  /// limits that are at least as large. Behind a proxy one address is enough.
   std::vector<std::string> fallback_addresses = {};
-  /// Number of frames between checkpoints. Fewer frames mean less to hold and to repeat after a
-  /// loss, and more bytes: each checkpoint has the size of the outline. 0: do not reconnect.
+  /// Number of frames between checkpoints. A smaller number means fewer frames to hold and to
+  /// resend after a loss, but more traffic: each checkpoint has the size of the outline. 0: do not
+  /// reconnect.
   std::uint32_t checkpoint_interval = 4;
   ReconnectPolicy reconnect = {};
-  /// Requires a name. All other options apply to part 0 only, except credentials, addresses and
-  /// times.
+  /// Settings for frames in parts; they require a name. Each part sets its own credentials,
+  /// addresses and times. All other options are read from part 0 only.
   FrameParts parts = {};
   /// Maximum total bytes of the frames held for resending (up to `checkpoint_interval` frames plus
-  /// the window). Send waits for room. A frame that does not fit after all responses is refused
-  /// (HELD_BYTES).
+  /// the window). Send waits until responses free memory. A frame that does not fit even after all
+  /// responses is refused (HELD_BYTES).
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
 /// Never drops frames: Send waits while the server's window is full. A frame above the server's
-/// limits is refused before anything is sent. Reading runs in the background, so sender and
-/// receiver only wait for each other through the window.
+/// limits is refused before anything is sent. Responses are read in the background, so the sender
+/// waits for the receiver only while the window is full.
 ///
-/// Survives the loss of its connection and its server: Receive reconnects, to the next address
-/// first, and resumes from the last checkpoint. Every frame is still answered once, in order, with
-/// the same bits. Send does not fail during that time; it waits for the window, at most
-/// `send_timeout`.
+/// Survives the loss of its connection and its server: Receive reconnects, beginning with the next
+/// address, and resumes from the last checkpoint. Every frame is still answered once, in order,
+/// with the same bits. Send does not fail while the stream reconnects; it waits for the window, at
+/// most `send_timeout`.
 class Stream : public FrameStream {
  public:
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH. Errors: INVALID_ARGUMENT (address,

@@ -31,23 +31,24 @@ enum class WatchMode : std::uint8_t {
 
 struct WatcherOptions {
   WatchMode mode = WatchMode::kLatest;
-  /// Frames on the way or waiting to be received, at least 1. More credits hide a slow connection;
-  /// fewer show newer frames.
+  /// Number of frames that may be on the way or waiting to be received, at least 1. More credits
+  /// hide a slow connection; with fewer credits the received frames are newer.
   std::uint32_t credits = 2;
-  /// Starts with the frames that the server still holds, from this sequence number on (0: the
-  /// oldest), in order and without gaps in either mode; live frames follow. A number above all of
-  /// them selects that frame only. Absent: from the newest frame on.
+  /// First frame to receive: this sequence number, or the oldest frame that the server still holds
+  /// if that is newer. Held frames come in order and without gaps in either mode; live frames
+  /// follow. If all held frames are older, only live frames are received. Absent: starts with the
+  /// newest frame.
   std::optional<std::uint64_t> from_sequence = {};
   Credentials credentials = {};
   /// Servers where the stream may be, in addition to the address of Open.
   std::vector<std::string> fallback_addresses = {};
-  /// How a watch continues after it lost its connection or server, or after the stream was taken
-  /// over or lost its producer: it looks for the stream at every address. In mode kEvery, and with
-  /// from_sequence, it continues after the last received frame, so it misses no frame that the
-  /// server still holds; otherwise with the newest frame. `announce` is not used: WatchedFrame
-  /// reports it.
+  /// How a watch continues after it lost its connection or server, or after its stream was taken
+  /// over or lost its producer. The watch looks for the stream at every address. In mode kEvery, or
+  /// with from_sequence, it continues after the last received frame and misses no frame that the
+  /// server still holds. Otherwise it continues with the newest frame. `announce` is not used,
+  /// because WatchedFrame reports a loss.
   ReconnectPolicy rejoin = {.give_up_after = kShortPatience};
-  /// Time to reach the server, including the time until it has started.
+  /// Maximum time to reach the server. It includes the wait for a server that is still starting.
   std::chrono::milliseconds connect_timeout{2000};
   /// Time for the server to accept the watcher. There is no timeout for frames: they depend on the
   /// producer.
@@ -64,7 +65,7 @@ struct WatchedStream {
   std::string stream_id;                ///< The id in the server's log.
   ReconstructionParameters parameters;  ///< Resolved.
   std::map<std::string, std::string> labels;
-  /// Set when the watch is opened or rejoined; absent if there are no frames.
+  /// Frames that the server held when the watch was opened or rejoined; absent if there were none.
   std::optional<HeldFrames> held = {};
 };
 
@@ -80,11 +81,11 @@ struct WatchedFrame {
   std::vector<std::uint64_t> particle_ids;
   std::vector<float> particle_volumes, particle_velocities;
   std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
-  /// Set for the first frame after a loss: one line with the place, cause and duration; otherwise
-  /// empty.
+  /// Set for the first frame after a loss: one line with the lost address, the cause and the
+  /// duration. Otherwise empty.
   std::string rejoined;
   /// Set together with `rejoined`: number of sequence numbers between the previous frame and this
-  /// one. It includes results and refused frames; `dropped` is then 0.
+  /// one. They belong to missed results and to refused frames, and `dropped` is then 0.
   std::uint64_t gap = 0;
   /// The oldest frame that WatcherOptions::from_sequence could request when this one was sent; 0 if
   /// the server has no histories.
@@ -98,8 +99,8 @@ struct WatchEnd {
   std::uint64_t dropped = 0;  ///< Frames dropped since the last one.
 };
 
-/// One thread receives; any thread may call Cancel. Reading runs in the background. Each received
-/// frame returns its credit.
+/// One thread receives; any thread may call Cancel. Messages are read in the background. Receiving
+/// a frame returns its credit to the server.
 class Watcher {
  public:
   /// `stream_name` is a name from ListStreams; `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.

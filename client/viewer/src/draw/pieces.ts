@@ -45,7 +45,8 @@ function piecesOf(count: number, triangles: Uint32Array): Uint32Array {
     const smallest = Math.min(a, b, c);
     parent[a] = parent[b] = parent[c] = smallest;
   }
-  // A parent is never larger than its child, so its own root is already known.
+  // Points are visited in ascending order, and a parent is never larger than its child. So the root of
+  // the parent is already known.
   for (let k = 0; k < count; ++k) parent[k] = parent[parent[k]];
   return parent;
 }

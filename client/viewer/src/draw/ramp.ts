@@ -11,7 +11,7 @@ const MAPS = {
   // Lightness in equal steps.
   'violet-yellow': (t: number, dark: boolean) =>
     [dark ? 0.52 + 0.4 * t : 0.3 + 0.36 * t, 0.16 - 0.02 * t, 300 - 200 * t],
-  // For numbers on both sides of zero: the middle is grey.
+  // Diverging map for numbers on both sides of zero: the middle is grey.
   'blue-red': (t: number, dark: boolean) => {
     const away = Math.abs(2 * t - 1);
     return [dark ? 0.9 - 0.26 * away : 0.64 - 0.22 * away, 0.19 * away, t < 0.5 ? 255 : 27];

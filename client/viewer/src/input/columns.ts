@@ -1,4 +1,4 @@
-// Meaning of table columns by their names, with the rules of client/input/base/columns.h.
+// Recognises table columns by their names, with the rules of client/input/base/columns.h.
 import { InputError } from './source';
 
 export interface ColumnPlan {

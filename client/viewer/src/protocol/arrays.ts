@@ -1,4 +1,5 @@
-// Arrays of messages: packed little-endian bytes. Every machine with a browser is little-endian.
+// Arrays in messages are packed little-endian bytes. Every machine with a browser is little-endian, so
+// arrays can be views of these bytes.
 
 interface ArrayType<T> {
   readonly BYTES_PER_ELEMENT: number;

@@ -56,7 +56,7 @@ export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: num
     return shift ? [{ index, rings, origin: [origin[0] + shift[0], origin[1] + shift[1]] }] : [];
   });
   if (base === 0) return { ...frame, isolines };
-  // Particles lie around the plane of the stream's own outline.
+  // Particles are shown only in the plane of the stream's own outline, because they lie around it.
   const isOwnPlane = isSamePlane(outlines[0]?.plane, outlines[base]?.plane);
   return {
     ...all[base], sections, isolines,

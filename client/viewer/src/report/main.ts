@@ -101,7 +101,8 @@ class Report {
       ...Object.fromEntries(Object.entries(LAYER_KEYS).map(([key, name]) => [key, () => this.look.toggle(name)])),
     };
     releaseFocusAfterClicks();
-    // Captures the event, so that arrows step instead of panning the focused picture.
+    // Captures the event before the focused picture receives it, so that arrow keys step through
+    // frames instead of panning.
     addEventListener('keydown', (event) => {
       const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
       if (!action || event.shiftKey || usesKey(event.target, event)) return;
@@ -145,7 +146,7 @@ class Report {
     try {
       history.replaceState(null, '', this.ownAddress);
     } catch {
-      // Some browsers refuse this for files. The report works without.
+      // Some browsers refuse history.replaceState for local files. The report works without it.
     }
   }
 

@@ -1,6 +1,6 @@
-// Decides when to draw which frame, so that motion is smooth although frames arrive in bursts. A line
-// is fitted to the last arrivals, sequence over time. The drawn position follows this line at a fixed
-// latency.
+// Decides when to draw which frame, so that motion is smooth although frames arrive in bursts. The
+// clock fits a line to the last arrivals: sequence number over time. The drawn position follows this
+// line with a fixed latency.
 
 interface Arrival { sequence: number; at: number }
 

@@ -108,7 +108,8 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     spacingRule: base?.spacingRule,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
-    // The radius is calibrated for a placement and a kernel. Other ones get their own.
+    // A reference radius is calibrated for one placement and one kernel. With another placement or
+    // kernel it is not set, and the server calibrates it.
     referenceRadius: settings.referenceRadius ?? (sameField ? base?.referenceRadius : undefined),
     clean: sameField ? base?.clean : undefined,
     surfaceOffset: farthest ? settings.surfaceOffset ?? base?.surfaceOffset : undefined,

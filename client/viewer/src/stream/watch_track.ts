@@ -129,7 +129,7 @@ export class WatchTrack implements Track {
   private fetchPast(): void {
     const first = this.history.first?.sequence;
     if (!this.isPastMissing || this.backfill || first === undefined) return;
-    // A pane with other settings draws none of these frames.
+    // A pane with other settings draws none of these frames, so received frames count too.
     const hasStarted = this.counts.drawn > 0 || this.counts.received >= FRAMES_BEFORE_PAST;
     if (!hasStarted && this.requested === null) return;
     const from = Math.max(this.serverOldest, Math.min(this.requested ?? -Infinity, first - 1));
@@ -251,7 +251,8 @@ export class WatchTrack implements Track {
 
   private ended(status: CallStatus, end: WatchEnded | null): void {
     this.call = null;
-    // Requests every frame until the page has proved too slow.
+    // The page requests every frame until the server has disconnected it as too slow. Then it requests
+    // the newest frames only.
     if (status.reason === 'FELL_BEHIND') this.mode = WatchMode.LATEST;
     if (!mayRetry(status)) {
       this.state = { kind: 'failed', text: describe(status) };

@@ -152,7 +152,8 @@ export class App {
     const pane = this.stage.chosen;
     if (!pane) return;
     this.status.report('', false);
-    // The first picture of dropped files shows their stream. Others show single frames of it.
+    // If the pane shows dropped files, only the first pane of these files reopens their stream with
+    // the new settings. The other panes request single frames from the server.
     const isFirst = this.stage.panes.find(({ track }) => track === pane.track) === pane;
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);

@@ -14,7 +14,8 @@ export function curvePoints(track: Pick<Track, 'history' | 'labelOf'>): CurvePoi
   const count = Math.min(history.size, MOST_POINTS);
   const chosen = Array.from({ length: count }, (_, k) => Math.round(k * (history.size - 1) / Math.max(1, count - 1)));
   const labels = chosen.map((index) => Number(track.labelOf(history.entry(index).sequence)));
-  // Frames per entry: a stream may be watched, or a report written, with every n-th frame.
+  // Frames per entry. It is above 1 if a stream is watched, or a report written, with every n-th
+  // frame.
   const steps = labels.slice(1).map((label, k) => (label - labels[k]) / (chosen[k + 1] - chosen[k]));
   const step = Math.min(...steps);
   const points: CurvePoints = { x: [], entries: [] };

@@ -116,7 +116,7 @@ export class LookPanel {
   /** Disables the switches of parts that the frame lacks, with the reason. Without WebGL, says so. */
   offer(frame: Frame | null, kind: Track['kind'], hasWebgl: boolean): void {
     const remedy = (text: string) => (kind === 'watch' ? ` ${text}` : '');
-    // The page draws the particles of a file itself.
+    // For a dropped file, the page draws the particles of the file, so they are never missing.
     const missing: Partial<Record<Switch, string>> = {
       edges: frame && !frame.mesh ? 'This frame has no mesh.' : '',
       particles: frame && !frame.particles && kind !== 'file'

@@ -171,7 +171,7 @@ export class Pane {
   /** Shows the current frame, and draws if anything has changed. */
   refresh(now: number): void {
     const sequence = this.track.player.sequence;
-    // A new run or new settings empty the history.
+    // A new run or new settings empty the history. The pane then clears its frame.
     const isStreamed = this.shown !== null && 'summary' in this.shown;
     if (this.frame && isStreamed && this.track.history.size === 0) this.clear();
     if (sequence !== null) this.update(sequence, now);

@@ -39,7 +39,7 @@ export class SettingsPanel {
 
   private read(): void {
     this.offerOffset();
-    // An invalid field keeps its last valid value; the browser names its limits.
+    // If a field is invalid, its last valid value is used. The browser shows the limits of the field.
     byId('settings', HTMLFormElement).reportValidity();
     const numberIn = (name: NumberName) => {
       const { validity, valueAsNumber } = input(NUMBERS[name]);

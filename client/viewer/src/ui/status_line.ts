@@ -34,7 +34,7 @@ export class StatusLine {
     const all: PaneState[] = [];
     if (this.message?.kind === 'refused') all.push(this.message);
     if (this.server) all.push({ kind: 'lost', text: this.server });
-    // The chosen pane first, because the first of equally severe states is shown.
+    // The chosen pane comes first, because the first of equally severe states is shown.
     const order = [...states.keys()].sort((a, b) => Number(b === chosen) - Number(a === chosen));
     for (const k of order) {
       const name = states.length > 1 && k !== chosen ? `Picture ${k + 1}: ` : '';

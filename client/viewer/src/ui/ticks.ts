@@ -8,7 +8,8 @@ export function ticks(min: number, max: number): number[] {
     for (const digit of [5, 2, 1]) {
       const step = digit * 10 ** power;
       const [first, last] = [Math.ceil(min / step), Math.floor(max / step)];
-      // Multiplied by an integer and divided by a power of ten, so that .3 is not .30000000000000004.
+      // Multiplies by an integer and divides by a power of ten, so that .3 does not become
+      // .30000000000000004.
       const at = (k: number) => (power < 0 ? (k * digit) / 10 ** -power : k * step);
       if (last - first + 1 >= FEWEST) return Array.from({ length: last - first + 1 }, (_, k) => at(first + k));
     }

@@ -1,4 +1,5 @@
-// Controls: settings, shortcuts, and what the browser or the stream lacks.
+// Tests of the page's controls: settings, shortcuts, and controls of features that the browser or the
+// stream lacks.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';

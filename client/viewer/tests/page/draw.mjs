@@ -1,5 +1,5 @@
-// Draws known frames in Chromium, by software, and checks the pixels; then reports the main-thread
-// time of decoding, showing and drawing a mesh of 100,000 vertices. Build the page first.
+// Draws known frames in Chromium with software rendering, and checks the pixels. Then reports how long
+// the main thread takes to decode, show and draw a mesh of 100,000 vertices. Build the page first.
 //   node tests/page/draw.mjs [--frames N] [--pictures DIR]
 // CHROMIUM names another browser than /usr/bin/chromium.
 import assert from 'node:assert/strict';
@@ -99,7 +99,8 @@ test('parts have their colours in dark and light', () =>
       const { line, band } = await page.evaluate(() => {
         const { rings, mesh } = bench.makeFrame();
         const k = rings.offsets[rings.outerOf.indexOf(0xffffffff)];
-        // Centre of the largest triangle of the band.
+        // The centre of the largest boundary triangle (class 0), which lies in the band along the
+        // outline.
         let best = { area: 0, place: [0, 0] };
         for (let t = 0; t < mesh.classes.length; ++t) {
           if (mesh.classes[t] !== 0) continue;

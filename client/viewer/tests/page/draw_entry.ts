@@ -55,7 +55,7 @@ function coloursAt(places: [number, number][]): number[][] {
 function ink(colour: readonly number[], dark = false): number {
   const read = pixels();
   const ground = theme(dark).background.map((part) => 255 * part);
-  // Uses the channel with the largest difference from the background.
+  // Measures the colour channel with the largest difference from the background.
   const apart = colour.map((part, k) => Math.abs(part - ground[k]));
   const k = apart.indexOf(Math.max(...apart));
   let sum = 0;
@@ -204,7 +204,7 @@ async function loseContext(): Promise<void> {
   scene.show(makeFrame());
   scene.draw();
   const restored = event('webglcontextrestored');
-  // The context can be restored only after the event of the loss.
+  // The browser allows the context to be restored only after the event of the loss has been handled.
   setTimeout(() => extension?.restoreContext());
   await restored;
 }

@@ -1,4 +1,4 @@
-// A live stream in the page: history, pause, settings, export.
+// Tests of a live stream in the page: history, pause, settings, export.
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
 import { launch, recording, until, Viewer, World } from './support.mjs';
@@ -6,7 +6,7 @@ import { launch, recording, until, Viewer, World } from './support.mjs';
 let world, browser, viewer, truth;
 
 before(async () => {
-  // A minute of the stream, which each page fetches when it opens.
+  // The server's history holds about a minute of the stream. Each page fetches it when it opens.
   world = await World.start('--history-bytes', '24MiB');
   browser = await launch();
   truth = await world.statistics(recording);
@@ -182,7 +182,8 @@ test('two placements are compared side by side', async () => {
   assert.notEqual(left.triangles, right.triangles);
   assert.ok(Number(left.area) > 0 && Number(right.area) > 0);
   assert.notEqual(await viewer.picture(0), await viewer.picture(1));
-  // The captions have the numbers of the chosen picture, and name the curve's settings if they differ.
+  // The captions show the numbers of the chosen picture. They name the settings of the curve if these
+  // differ.
   const caption = viewer.page.locator('#curves figcaption').first();
   await until('the caption has the area of picture 2', async () =>
     await caption.textContent() === `Area (line: as streamed) ${right.area}`);

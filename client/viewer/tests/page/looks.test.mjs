@@ -1,5 +1,5 @@
-// Accessibility of the page: no serious violation, in dark and light, wide and narrow. Leaves
-// screenshots in build/screenshots.
+// Tests the accessibility of the page: no serious violation, in dark and light, wide and narrow.
+// Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';

@@ -72,7 +72,7 @@ const drain = async (stream) => {
   const socket = new WebSocket(location.origin.replace('http', 'ws') + '/v1/watch', ['partiemc.v1']);
   socket.binaryType = 'arraybuffer';
   const name = new TextEncoder().encode(stream);
-  // OpenWatch: stream_name, mode every, credits 64, from_sequence 0.
+  // Bytes of the Protobuf message OpenWatch: stream_name, mode every, credits 64, from_sequence 0.
   const open = [0x0a, name.length, ...name, 0x10, 2, 0x18, 64, 0x20, 0];
   socket.onopen = () => socket.send(new Uint8Array([0x0a, open.length, ...open]));
   let [messages, bytes, begin, end] = [0, 0, 0, 0];

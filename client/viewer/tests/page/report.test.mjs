@@ -1,4 +1,4 @@
-// The report of `partiemc replay --report`, opened from disk.
+// Tests the report of `partiemc replay --report`, opened from disk.
 import assert from 'node:assert/strict';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';

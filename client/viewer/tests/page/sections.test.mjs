@@ -1,4 +1,4 @@
-// Sections and isolines of a 3D stream, in the page and in the report. Leaves screenshots in
+// Tests sections and isolines of a 3D stream, in the page and in the report. Leaves screenshots in
 // build/screenshots.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
@@ -37,7 +37,7 @@ before(async () => {
   report = path.join(world.folder, 'balls.html');
   const stats = path.join(world.folder, 'balls.json');
   await replay(folder, ...FLAGS, '--report', report, '--stats', stats);
-  // One row for each outline of a frame.
+  // The statistics have one row for each outline of a frame.
   truth = JSON.parse(readFileSync(stats, 'utf8')).filter((row) => row.frame === 1).map((row) => row.rings_digest);
   browser = await launch();
 });

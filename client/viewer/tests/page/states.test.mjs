@@ -1,5 +1,5 @@
-// A pane shows nothing under a wrong name: its state, a new run, refusals. Leaves screenshots in
-// build/screenshots.
+// Tests that a pane shows no frame or number under a wrong name: its state, a new run, refusals.
+// Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -103,7 +103,8 @@ test('refused settings show no picture of the former ones', async () => {
   await viewer.shows(5);
   await viewer.button('Pause').click();
   const digest = await viewer.value('rings-digest');
-  // The reference radius must be smaller than the kernel radius, which no field can know.
+  // The reference radius must be smaller than the kernel radius. No input field can check this, so the
+  // server refuses the settings.
   const reference = viewer.page.getByLabel('Reference radius', { exact: true });
   await reference.fill('7');
   await reference.blur();
