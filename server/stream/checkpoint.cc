@@ -14,10 +14,10 @@
 namespace partiemc::server {
 namespace {
 
-// Layout, little-endian:
-// - header: magic, version, method version, is_signed, lineage;
+// Layout of a checkpoint, little-endian:
+// - header: magic, version, method version, is_signed, lineage (LineageOf the stream token);
 // - fingerprint of the parameters, fingerprint of the labels, outputs, checkpoint interval;
-// - next sequence number, length of the name, name, checksum of all bytes so far;
+// - next sequence number, length of the stream's name, the name, checksum of all bytes so far;
 // - the state, with its own checksum;
 // - the signature of all bytes so far, if is_signed.
 constexpr std::uint32_t kMagic = 0x43504d45;  // "EMPC"
@@ -31,9 +31,10 @@ static_assert(kHeaderBytes + kMaxStreamNameBytes + kChecksumBytes +
 
 constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 
-// A hash of all values of the parameters.
+// Returns a hash of all values of the parameters.
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
-  // Names each member: after a new member is added, this does not compile until it is hashed too.
+  // Lists each member by name. If a member is added, this statement does not compile until the
+  // author also hashes the new member.
   const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
                surface_offset, attribute_tolerance, normal_memory, clean, min_component_area,
                min_component_particles, plane, slice, isovalue, sections] = parameters;
@@ -53,8 +54,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   PutNumber(surface_offset, bytes);
   put_small(normal_memory);
   put_small(clean ? (*clean ? 2 : 1) : 0);
-  // Steps and constants of the default placement. Requests cannot change them, but a server built
-  // with other values refuses the checkpoint.
+  // Also hashes the steps and constants of the default placement. Requests cannot change them, but
+  // a server built with other values must refuse the checkpoint.
   const VirtualPlaneVariant method;
   for (const NamedStep& step : AllSteps()) put_small(method.steps.*step.value);
   for (const NamedConstant& constant : AllConstants()) {
@@ -68,8 +69,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Absent and default values add no bytes, so that checkpoints from before these parameters
-  // existed stay valid.
+  // Absent parameters and default values add no bytes. So a checkpoint that was written before
+  // these parameters existed stays valid.
   if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     put_small('t');  // Distinguishes it from an isovalue.
     PutNumber(attribute_tolerance, bytes);
@@ -125,7 +126,7 @@ absl::StatusOr<Header> TakeHeader(std::string_view& bytes) {
     return Corrupt(absl::StrCat(whole.size(), " bytes"));
   }
   if (TakeNumber<std::uint32_t>(bytes) != kMagic) return Corrupt("other bytes");
-  // Checked first, because other versions have other layouts.
+  // Checks the version before all other fields, because other versions have another layout.
   if (const auto version = TakeNumber<std::uint32_t>(bytes); version != kVersion) {
     return Mismatch(absl::StrCat("version ", version),
                     absl::StrCat("must be of version ", kVersion, "; resume on the server's like"));

@@ -1,5 +1,5 @@
-// Bytes with which a client resumes a stream on any server. Opaque to the client; untrusted input
-// for the server.
+// Checkpoints: the bytes with which a client resumes a stream on any server. The client does not
+// interpret them; the server treats them as untrusted input.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,8 @@ inline constexpr std::string_view kReasonCorruptCheckpoint = "CORRUPT_CHECKPOINT
 inline constexpr std::string_view kReasonCheckpointMismatch = "CHECKPOINT_MISMATCH";
 inline constexpr std::string_view kReasonCheckpointSignature = "CHECKPOINT_SIGNATURE";
 
-/// Properties of a stream that a resume must not change, in addition to the parameters.
+/// Properties of a stream that must be the same when a client resumes it, in addition to the
+/// parameters.
 struct StreamTerms {
   std::string lineage = {};   ///< LineageOf the stream token.
   std::string name = {};      ///< With the default resolved.
@@ -41,20 +42,22 @@ struct Checkpoint {
 /// Maximum size of a checkpoint without its state, in bytes.
 inline constexpr std::size_t kMaxCheckpointOverhead = 300;
 
-/// Serialises a checkpoint. The bytes have a version and a checksum. They are bound to the method's
-/// version, to `parameters` with defaults resolved, and to `terms`, because other values would
-/// change the results. They are signed if `keys` is not null. Every machine writes the same bytes.
+/// Serialises a checkpoint, with a version and a checksum. The checkpoint is valid only for this
+/// version of the method, for `parameters` (with defaults resolved) and for `terms`, because other
+/// values would change the results. It is signed if `keys` is not null. The bytes do not depend on
+/// the machine.
 /// Requires: `terms` has a valid lineage and name.
 std::string Serialize(std::uint64_t next_sequence, const State& state,
                       const ReconstructionParameters& parameters, const StreamTerms& terms,
                       const CheckpointKeys* keys);
 
 /// Parses a checkpoint that Serialize wrote for the same parameters and terms. If `bytes` is empty,
-/// returns the beginning of a new stream. If `terms.name` is empty, any name matches.
+/// returns the start of a new stream. If `terms.name` is empty, accepts a checkpoint with any name.
 ///
 /// Security: with `keys`, the signature is checked before anything else is read. Without `keys`, a
-/// signature is ignored, and the checksum detects accidents only. A client can then forge a
-/// checkpoint, but every part of it is checked, so it only affects the client's own stream.
+/// signature is ignored, and the checksum only detects accidental damage. A client can then forge a
+/// checkpoint. Every part of the checkpoint is validated, so a forgery affects only this client's
+/// own stream.
 ///
 /// Errors, each with a Violation:
 /// - FAILED_PRECONDITION (CHECKPOINT_SIGNATURE).

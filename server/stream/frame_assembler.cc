@@ -29,7 +29,8 @@ absl::Status PartTakenOver() {
                          "must be sent by one call of the stream"});
 }
 
-// "3, 7, 8 and 5 more". `parts` starts with part 1.
+// Lists the missing parts, for an error text: "3, 7, 8 and 5 more". `parts` starts with part 1.
+// `has_leader`: part 0 has arrived.
 template <typename Parts>
 std::string NamesOfMissing(const Parts& parts, bool has_leader) {
   constexpr std::uint32_t kNamed = 8;
@@ -180,7 +181,8 @@ void FrameAssembler::Leave(const Seat& seat) {
   DropAll(seat.part);
 }
 
-// Frees little under the lock, because the call still holds the bytes.
+// Removes a part. Called with the lock held, but this frees little memory, because the part's call
+// still holds the bytes.
 void FrameAssembler::Drop(Gathered& frame, std::uint32_t part) {
   if (frame.parts[part - 1] == nullptr) return;
   frame.parts[part - 1] = nullptr;

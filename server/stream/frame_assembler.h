@@ -1,5 +1,5 @@
-// Assembles frames from the parts that the ranks of a simulator send, each over its own call. Knows
-// no messages and no threads of calls.
+// Assembles frames from the parts that the ranks of a simulator send, each over its own call.
+// Independent of messages and of the threads of calls.
 #pragma once
 
 #include <chrono>
@@ -23,29 +23,31 @@ inline constexpr std::string_view kReasonPartLate = "PART_LATE";
 inline constexpr std::string_view kReasonPartDuplicate = "PART_DUPLICATE";
 inline constexpr std::string_view kReasonPartAhead = "PART_AHEAD";
 inline constexpr std::string_view kReasonFrameBytes = "FRAME_BYTES";
-/// Reason for the end of a part's call.
+/// Reason with which the call of a part ends when the call of part 0 (the leader) has ended.
 inline constexpr std::string_view kReasonLeaderGone = "LEADER_GONE";
 
-/// The bytes of a part, shared with its call.
+/// The bytes of a part. The assembler shares them with the call that received them.
 class PartBytes {
  public:
   virtual ~PartBytes() = default;
 };
 
-/// The call of a part, part 0 included. Called without a lock, by any thread.
+/// The interface to the call that sends one part (part 0 included). The assembler calls it from any
+/// thread and holds no lock.
 class AssemblyMember {
  public:
   virtual ~AssemblyMember() = default;
-  /// A frame or part of this call may be ready for its response.
+  /// A frame of part 0, or a part, may be ready for its response: the call should check again.
   virtual void LookAgain() = 0;
-  /// The assembler has removed this call. OK: all frames were answered.
+  /// The assembler has removed this call. `status` is OK if all its frames were answered.
   virtual void LeftOut(const absl::Status& status) = 0;
 };
 
-/// Assembles the frames of one call of part 0. Part 0 itself stays with its call. The other parts
-/// are shared with their calls: they count in the memory budget while their call holds them, and
-/// are dropped when it ends. Assembles at most `window` frames at once, each of at most
-/// `max_frame_bytes`. Thread-safe. Calls members without its lock.
+/// Assembles the frames of one stream. The call of part 0 (the leader) owns the stream and keeps
+/// its own part. The assembler shares the other parts with their calls. Such a part counts in the
+/// memory budget while its call holds it, and is dropped when its call ends. At most `window`
+/// frames are assembled at once, each of at most `max_frame_bytes`. Thread-safe. Calls members
+/// without holding its lock.
 class FrameAssembler {
  public:
   using Clock = std::chrono::steady_clock;
@@ -70,52 +72,60 @@ class FrameAssembler {
   // For the call of part 0:
 
   void SetLeader(std::weak_ptr<AssemblyMember> leader);
-  /// Part 0 of frame `sequence` has arrived, so the client has received the responses a window
-  /// earlier. Ignores numbers outside the window.
+  /// Part 0 of frame `sequence` has arrived. So the client has received the responses to all frames
+  /// up to `sequence` - `window`, because it sends at most `window` frames ahead. Ignores numbers
+  /// outside the window.
   void LeaderSent(std::uint64_t sequence);
-  /// Whether frame `sequence`, whose part 0 came at `since`, can be answered at `now`: it is
-  /// complete, its timeout has passed, or it is not the next frame. The timeout starts with the
-  /// first part, of any rank.
+  /// Whether the server can respond to frame `sequence`, whose part 0 arrived at `since`. True if
+  /// the frame is complete, its timeout has passed by `now`, or it is not the next frame (and is
+  /// refused). The timeout starts when the first part of the frame arrives, from any rank.
   bool IsReady(std::uint64_t sequence, Clock::time_point since, Clock::time_point now) const;
-  /// Size of the next frame without its part 0.
+  /// Size of the next frame without part 0, in bytes.
   std::uint64_t BytesOfNext() const;
-  /// Returns parts 1 and on of the next frame and closes it: its later parts are refused.
+  /// Returns parts 1 and above of the next frame and closes the frame: parts of it that arrive
+  /// later are refused.
   /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) with the numbers of the first missing parts.
   absl::StatusOr<std::vector<std::shared_ptr<const PartBytes>>> Take();
-  /// The frames below `next_sequence` were answered, the last one with or without a checkpoint.
+  /// Records that the server has responded to all frames below `next_sequence`. `with_checkpoint`:
+  /// the last response contained a checkpoint.
   /// Requires: `next_sequence` never decreases.
   void Answered(std::uint64_t next_sequence, bool with_checkpoint);
-  /// Calls LookAgain of the other members. Called after Answered.
+  /// Calls LookAgain of the calls of parts 1 and above. Called after Answered.
   void TellMembers();
-  /// No frame will be answered any more. If `status` is an error, members whose part still waits
-  /// leave with UNAVAILABLE (LEADER_GONE).
+  /// The call of part 0 ends, so no further frame gets a response. Removes the other calls: with OK
+  /// if `status` is OK, otherwise with UNAVAILABLE (LEADER_GONE).
   void End(const absl::Status& status);
 
   // For the calls of the other parts:
 
-  /// The call of `member` sends `part` from now on. A former call of this part leaves with ABORTED
-  /// (TAKEN_OVER), and its parts that were not taken are dropped: the new call sends them again.
+  /// Registers the call of `member` as the sender of `part`. An earlier call that sent this part is
+  /// removed with ABORTED (TAKEN_OVER). Its parts are dropped unless Take has returned them; the
+  /// new call sends them again.
   /// Errors: UNAVAILABLE (LEADER_GONE). Requires: 0 < part < parts.
   absl::StatusOr<Seat> Join(std::uint32_t part, std::weak_ptr<AssemblyMember> member);
-  /// The call has ended: drops its parts that were not taken. No effect after a takeover.
+  /// The call has ended. Drops its parts unless Take has returned them. No effect if another call
+  /// has taken over the part.
   void Leave(const Seat& seat);
-  /// Stores a part of frame `sequence`, which came at `now`. Errors, which change nothing:
-  /// PART_LATE, PART_DUPLICATE, PART_AHEAD, FRAME_BYTES, each with a Violation; CANCELLED, without
-  /// a Violation, if the call has left.
+  /// Stores a part of frame `sequence` that arrived at `now`.
+  /// Errors, which change nothing: PART_LATE, PART_DUPLICATE, PART_AHEAD, FRAME_BYTES, each with a
+  /// Violation; CANCELLED, without a Violation, if the assembler has removed the call.
   absl::Status Offer(const Seat& seat, std::uint64_t sequence, std::uint64_t bytes,
                      std::shared_ptr<const PartBytes> part, Clock::time_point now);
-  /// Drops a stored part, unless it was taken.
+  /// Drops a stored part, unless Take has returned it.
   void Withdraw(const Seat& seat, std::uint64_t sequence);
-  /// Whether a part of frame `sequence` can be answered. If part 0 has not come by `now`, within
-  /// the timeout after the first part, this closes the frame: drops its parts, and refuses part 0.
+  /// Whether the server can respond to the parts of frame `sequence`: the frame was answered or has
+  /// failed. If part 0 is missing when the timeout after the first part has passed, this call
+  /// closes the frame: it drops the parts, and part 0 is refused when it arrives.
   bool IsOver(std::uint64_t sequence, Clock::time_point now);
-  /// OK if the frame of a part was answered. Errors: DEADLINE_EXCEEDED (PARTS_MISSING) if part 0
-  /// came too late, PART_LATE if part 0 has ended before this frame.
+  /// The outcome of a frame for the sender of a part; OK if the frame was answered.
+  /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) if part 0 arrived too late, PART_LATE if the call of
+  /// part 0 ended before this frame.
   absl::Status OutcomeOf(std::uint64_t sequence) const;
 
   /// The first frame that still accepts parts.
   std::uint64_t next_wanted() const;
-  /// Frames below this number are never required again, even if part 0 is resumed.
+  /// Clients never need to send frames below this number again, even if the call of part 0 resumes
+  /// from a checkpoint.
   std::uint64_t resume_sequence() const;
   std::uint32_t parts() const { return terms_.parts; }
   std::chrono::milliseconds timeout() const { return terms_.timeout; }
@@ -150,12 +160,14 @@ class FrameAssembler {
   std::uint64_t holders_ ABSL_GUARDED_BY(mutex_) = 0;
   // By sequence, from wanted_ on.
   std::map<std::uint64_t, Gathered> frames_ ABSL_GUARDED_BY(mutex_);
-  // next_ is the next frame to be answered, wanted_ the first that was not taken: next_, or one
-  // more. Part 0 of last_of_leader_ has come.
+  // next_ is the next frame to be answered. wanted_ is the first frame that Take has not closed:
+  // next_, or next_ + 1 while frame next_ is being computed. last_of_leader_ is the highest frame
+  // whose part 0 has arrived.
   std::uint64_t next_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t wanted_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t last_of_leader_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Sent in responses, perhaps not received.
+  // Frames whose responses contained a checkpoint; the client may not have received these
+  // responses.
   std::deque<std::uint64_t> checkpoints_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t resume_ ABSL_GUARDED_BY(mutex_);
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;

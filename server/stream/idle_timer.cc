@@ -8,7 +8,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A call that begins now cannot exceed a limit before this time has passed.
+// Returns the shortest limit. A call that begins now cannot exceed any limit before this time has
+// passed.
 milliseconds ShortestLimit(const ServerLimits& limits) {
   milliseconds shortest = std::chrono::hours(1);
   for (const milliseconds limit :

@@ -11,8 +11,8 @@
 
 namespace partiemc::server {
 
-/// Ends streams, watchers and unary calls that exceed their idle limits. Its thread sleeps until
-/// the earliest deadline of a call.
+/// Ends streams, watchers and unary calls whose clients exceed their idle limits. The timer's
+/// thread sleeps until the earliest deadline of a call.
 class IdleTimer {
  public:
   /// The registries outlive the timer.

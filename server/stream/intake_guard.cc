@@ -10,16 +10,17 @@
 namespace partiemc::server {
 namespace {
 
-// In this time a fast connection brings 15 MB.
+// Interval of the memory checks. A fast connection can deliver 15 MB in this time.
 constexpr std::chrono::milliseconds kPeriod(10);
 
-// Minimum interval between two returns of freed memory to the system. Returning 100 MB takes 15 ms,
-// during which no other thread can allocate.
+// Minimum interval between two returns of freed memory to the operating system. Returning 100 MB
+// takes 15 ms, during which no other thread can allocate.
 constexpr std::chrono::milliseconds kBetweenGivingBack(250);
 
-// Interval between looks at the received bytes of all connections, which cost two system calls for
-// each connection. It is shorter while streams wait. If memory is exhausted, or has grown by
-// kMuchMore since the last look, the next look does not wait.
+// Interval between readings of the bytes that each connection has received (ReadPermits::Look). A
+// reading costs two system calls for each connection. The shorter interval applies while streams
+// wait for memory. The thread reads at once if memory is exhausted, or if it has grown by kMuchMore
+// since the last check.
 constexpr std::chrono::milliseconds kBetweenLooks(250), kBetweenLooksWhileWaiting(50);
 constexpr std::uint64_t kMuchMore = 16 << 20;
 
@@ -74,8 +75,8 @@ void IntakeGuard::FreeMemory(std::chrono::steady_clock::time_point now) {
   }
   if (gives_back && !IsTooMuch()) return;
   opening_.GiveWayToAll();
-  // Watchers stay connected for long, so they are evicted only if freed memory was returned and the
-  // rest still exceeds the limit.
+  // Watchers stay connected for a long time, so their eviction is the last resort: only if freed
+  // memory was just returned and the process still exceeds the limit.
   if (gives_back && IsTooMuch()) opening_.WatchersGiveWay();
 }
 

@@ -1,4 +1,4 @@
-// Bounds the memory of messages that have not arrived completely.
+// Bounds the memory that incomplete messages occupy.
 #pragma once
 
 #include <chrono>
@@ -13,31 +13,33 @@
 
 namespace partiemc::server {
 
-/// gRPC collects a message before it reports its size, even if the message exceeds the limit. So
-/// the server cannot count the bytes of opening calls and of watchers' requests. While there are
-/// such calls (OpeningCalls), a thread checks the memory of the whole process every 10 ms. If it
-/// exceeds the limit, the thread returns freed memory to the system and evicts the older half of
-/// the opening calls of the caller with the most. A call that sends its request at once is hardly
-/// ever among them. Watchers are evicted only if returning freed memory did not suffice.
+/// gRPC collects a whole message before it reports the size, even if the message exceeds the limit.
+/// So the server cannot count the bytes that arrive for opening calls (calls without a first
+/// request) and for watchers. While there are such calls (OpeningCalls), a thread checks the memory
+/// of the whole process every 10 ms. If the process exceeds its limit, the thread returns freed
+/// memory to the system. If that does not suffice, it evicts opening calls: the older half of the
+/// calls of the caller that has the most. A call that sends its request at once is hardly ever
+/// evicted. Watchers are evicted last.
 ///
-/// Frames that are arriving at open streams are planned (ReadPermits), and these streams continue.
-/// Such a stream ends only if memory is exhausted and it has received more than was planned.
+/// Bytes that arrive for open streams are planned in advance (ReadPermits), so open streams
+/// continue. A stream is ended only if memory is exhausted and its read receives more bytes than
+/// planned.
 class IntakeGuard {
  public:
-  /// The process's memory; tests replace it.
+  /// Access to the memory of the process. Tests replace it.
   struct Process {
     std::function<std::uint64_t()> resident_bytes;
-    /// The process may have `most_bytes` + `more_bytes` resident now. `more_bytes` costs more to
-    /// compute and is only called if `most_bytes` alone is exceeded.
+    /// The process may now have at most `most_bytes` + `more_bytes` resident. `more_bytes` is more
+    /// expensive, so it is only called if the memory exceeds `most_bytes`.
     std::function<std::uint64_t()> most_bytes, more_bytes;
     std::function<void()> give_back_freed;
-    /// Upper limit of resident memory at any time.
+    /// Upper limit of the resident memory, constant.
     std::uint64_t limit_bytes = 0;
-    /// Bytes that each connection has received, by peer (ReceivedBytesOfConnections).
+    /// Bytes that each connection has received, by peer address (ReceivedBytesOfConnections).
     std::function<std::map<std::string, std::uint64_t>()> received_bytes = {};
   };
 
-  /// `opening` and `reads` outlive the guard. If `reads` is null, no streams are ended.
+  /// `opening` and `reads` outlive the guard. If `reads` is null, the guard ends no streams.
   IntakeGuard(OpeningCalls& opening, Process process, ReadPermits* reads = nullptr);
   ~IntakeGuard();
   IntakeGuard(const IntakeGuard&) = delete;

@@ -12,30 +12,31 @@
 
 namespace partiemc::server {
 
-/// Maximum memory (MemoryPlan computes the sum):
+/// The sum of these terms bounds the server's memory (MemoryPlan computes it):
 /// - `memory_budget` for requests, responses, workers and histories;
 /// - frames beyond the budget (ReadBytesBeyond);
-/// - the worker of one frame beyond the budget (WorkerBytesBeyond);
+/// - the worker that computes a frame beyond the budget (WorkerBytesBeyond);
 /// - 16 MiB of buffers for each compute thread, which do not count in the budget.
 struct ServerLimits {
   /// Limits of one frame. Larger simulations need higher limits; memory grows with them.
   FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
 
-  /// Maximum size of a serialised ParticleFrame. The default on the server's command line is
+  /// Maximum size of a serialised ParticleFrame. By default the command line sets
   /// DefaultFrameBytes(frame.max_particles), but at most an eighth of the memory budget.
   std::uint64_t max_frame_bytes = DefaultFrameBytes(4'000'000);
 
-  /// Maximum size of a client's message. A larger message ends the stream. It is a quarter more
-  /// than the announced `max_frame_bytes`, so that the response to a slightly too large frame is a
+  /// Maximum size of a client's message. A larger message ends the stream. The limit exceeds the
+  /// announced `max_frame_bytes` by a quarter. So a frame that is slightly too large gets a
   /// FrameError, and the stream continues.
   std::uint64_t MaxMessageBytes() const {
     return std::min<std::uint64_t>(max_frame_bytes + max_frame_bytes / 4,
                                    std::numeric_limits<std::int32_t>::max());
   }
 
-  /// Maximum size of a checkpoint, sent or received. The limit keeps `open` no larger than a frame.
-  /// A state has one or two bytes for each particle of a body, and 370 or more for an isolated
-  /// particle. The limits of tiles and particles alone would permit states larger than any message.
+  /// Maximum size of a checkpoint, sent or received. A resuming client sends its checkpoint in
+  /// `open`, so this limit keeps `open` as small as a frame. A state has one or two bytes for each
+  /// particle of a compact body, but 370 or more for an isolated particle. Therefore the limits of
+  /// tiles and particles would permit states larger than any message.
   std::uint64_t MaxCheckpointBytes() const { return max_frame_bytes; }
 
   /// Maximum number of open streams. The same number limits calls of ReconstructFrame separately.
@@ -45,37 +46,39 @@ struct ServerLimits {
   /// write. Two suffice for large frames, four for small ones; more only costs memory.
   std::uint32_t frames_in_flight = 4;
 
-  /// Bytes that requests, responses, workers and histories hold together. While it is exhausted, a
-  /// stream reads only if it has no frame in flight and gets a slot for a frame beyond the budget.
-  /// Many large streams need more.
+  /// Bytes that requests, responses, workers and histories may hold together. While the budget is
+  /// exhausted, a stream reads only if it has no frame in flight and gets a slot for a frame beyond
+  /// the budget. Servers with several large streams need a larger budget.
   std::uint64_t memory_budget = std::uint64_t{1} << 30;
 
-  /// Maximum number of streams with a frame beyond the budget, at least 1.
+  /// Maximum number of streams that may hold a frame beyond the budget at once; at least 1.
   std::uint32_t streams_beyond_budget = 2;
 
-  /// Maximum size of all frames beyond the budget: one message for each stream, two if frames
-  /// arrive in parts, because part 0 is counted separately.
+  /// Maximum size of all frames beyond the budget: one message for each such stream. If frames
+  /// arrive in parts, two messages, because part 0 is counted separately from the other parts.
   std::uint64_t ReadBytesBeyond() const {
     return streams_beyond_budget * (max_parts > 0 ? 2 : 1) * MaxMessageBytes();
   }
-  /// Maximum size of the one worker beyond the budget: the buffers for a compact body with the
-  /// maximum number of particles.
+  /// Maximum size of the one worker that computes beyond the budget: its buffers for a compact body
+  /// with the maximum number of particles.
   std::uint64_t WorkerBytesBeyond() const {
     const std::uint64_t most =
         std::min<std::uint64_t>(frame.max_particles, max_frame_bytes / kLeastBytesOfParticle);
     return kBytesOfCompactParticle * most;
   }
-  /// Minimum bytes of a particle in a message: two float32.
+  /// Minimum bytes of a particle in a message: two float32 coordinates.
   static constexpr std::uint64_t kLeastBytesOfParticle = 8;
-  /// A worker's bytes for a particle of a compact body (core/src/workspace_bytes.h): 60 bytes, and
-  /// its share of the tiles.
+  /// Bytes that a worker needs for each particle of a compact body: 60 bytes, and the particle's
+  /// share of the tiles (core/src/workspace_bytes.h).
   static constexpr std::uint64_t kBytesOfCompactParticle = 80;
 
-  /// Maximum size of one stream's history, including 512 bytes for each result; 0: no history.
+  /// Maximum size of one stream's history, including an overhead of 512 bytes for each result. 0:
+  /// streams have no history.
   std::uint64_t history_bytes = std::uint64_t{64} << 20;
 
-  /// Maximum size of all histories together, in equal shares: at most an eighth of the budget. It
-  /// is reserved, so that no frame waits for memory that old results hold.
+  /// Maximum size of all histories together, at most an eighth of the budget; streams share it
+  /// equally. This part of the budget is reserved, so that no frame waits for memory that old
+  /// results hold.
   std::uint64_t AllHistoryBytes() const {
     const std::uint64_t most = memory_budget / 8;
     return history_bytes <= most / std::max(1u, max_streams) ? history_bytes * max_streams : most;
@@ -83,40 +86,40 @@ struct ServerLimits {
   /// The budget without the histories.
   std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
 
-  /// An idle stream costs little, but it occupies a name and a slot.
+  /// An idle stream costs little memory, but it occupies a name and a slot.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
 
-  /// Limits of unary calls. A response that is not received in time is dropped, since it holds
-  /// memory.
+  /// Limits of unary calls. If the client does not receive a response in time, the server drops it,
+  /// because the response holds memory.
   UnaryLimits unary{.request = std::chrono::seconds(30), .answer = std::chrono::minutes(2)};
 
   /// Maximum number of watchers of all streams together.
   std::uint32_t max_watchers = 64;
 
-  /// Maximum number of parts of a frame. The same number limits the connections that send parts 1
-  /// and above, for all streams together. 0: frames arrive whole.
+  /// Maximum number of parts of a frame. The same number limits, for all streams together, the
+  /// connections that send parts 1 and above. 0: the server accepts whole frames only.
   std::uint32_t max_parts = 256;
 
-  /// Maximum memory that one watcher can pin: its undelivered frames, which it mostly shares with
-  /// other watchers. A larger frame is not sent to watchers.
+  /// Maximum memory that one watcher can pin: the results that it has not received yet. It usually
+  /// shares them with other watchers. A larger result is not sent to watchers.
   std::uint64_t max_watcher_bytes = std::uint64_t{16} << 20;
 
-  /// Maximum size of a stream's last result that is kept for new watchers: 64 MiB divided by the
-  /// number of streams.
+  /// A stream's last result is kept for new watchers if it is at most this large: 64 MiB divided by
+  /// the maximum number of streams.
   std::uint64_t KeptResultBytes() const { return (std::uint64_t{64} << 20) / max_streams; }
 
   /// Maximum number of calls of all methods that have not sent their first request.
   std::uint32_t MaxOpeningCalls() const { return std::max(64u, max_streams + max_watchers); }
 
-  /// Quota of one caller's calls, unless its token sets one. More than all other limits together
-  /// permit, so that calls that begin or end also have room.
+  /// Quota of concurrent calls of one caller, unless its token sets another quota. It exceeds the
+  /// sum of all other limits, so that calls that are beginning or ending also fit.
   std::uint32_t CallsOfOneCaller() const { return 4 * MaxOpeningCalls() + max_parts; }
 
-  /// Maximum size of a serialised `open`: a checkpoint, and 64 KiB for its other fields.
+  /// Maximum size of a serialised `open`: a checkpoint plus 64 KiB for the other fields.
   std::uint64_t MaxOpenBytes() const { return MaxCheckpointBytes() + kQuickOpenBytes; }
 
-  /// Size of a frame of usual particles (three float64, id, volume, velocity: 44 bytes), with some
-  /// reserve. Frames with many attributes need a larger limit.
+  /// Size of a frame with the usual data of a particle (three float64, id, volume, velocity: 44
+  /// bytes) plus some reserve. Frames with more attributes need a larger limit.
   static constexpr std::uint64_t DefaultFrameBytes(std::uint64_t max_particles) {
     return 48 * max_particles + 4096;
   }

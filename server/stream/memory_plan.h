@@ -1,4 +1,4 @@
-// The maximum memory of a server, computed from its limits before it starts.
+// Computes the maximum memory of a server from its limits, before the server starts.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace partiemc::server {
 
-/// ReadPermits and WorkerMemory enforce it for counted bytes, IntakeGuard for the whole process.
+/// The maximum memory, as a sum of parts. ReadPermits and WorkerMemory enforce it for counted
+/// bytes, IntakeGuard for the whole process.
 struct MemoryPlan {
   struct Part {
     std::uint64_t bytes = 0;
@@ -26,10 +27,11 @@ struct MemoryPlan {
   std::vector<Part> parts;
 };
 
-/// Bytes that a connection buffers before the server reads the call's messages.
+/// Bytes that a connection may buffer before the server reads the messages of its call.
 inline constexpr std::uint64_t kUnreadBytes = 256 << 10;
 
-/// Results that watchers have not received may use 1/16 of the budget in addition to it.
+/// The results that watchers have not received yet may use 1/16 of the budget, in addition to the
+/// budget.
 inline constexpr std::uint64_t kPartsOfBudgetBeyond = 16;
 
 }  // namespace partiemc::server

@@ -139,7 +139,8 @@ OpeningCalls::Place OpeningCalls::Enter(const CallerAccount& caller, GiveWay giv
   GiveWay other;
   {
     const MutexLock lock(mutex_);
-    // Evicts before it adds, so that the new call does not count against its caller.
+    // Evicts before it adds the new call, so that the new call does not count against its own
+    // caller.
     if (opening_.count() >= std::max<std::size_t>(places_, 1)) other = opening_.RemoveNext();
     place = Take(opening_, caller, std::move(give_way));
   }

@@ -1,5 +1,5 @@
-// Tracks the calls whose next request may hold unbounded memory. gRPC reports a message's size only
-// after the whole message has arrived.
+// Tracks the calls whose next request may occupy unbounded memory: gRPC reports a message's size
+// only after the whole message has arrived.
 #pragma once
 
 #include <cstddef>
@@ -21,17 +21,18 @@ namespace partiemc::server {
 /// The violation's reason if a call is evicted (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyOpening = "TOO_MANY_OPENING";
 
-/// Limits the opening calls: calls that have not sent their first request. If one more begins than
-/// the limit permits, an opening call is evicted: the oldest of the caller with the most opening
-/// calls. If several callers have the most, it is the oldest of all their calls. So silent calls
-/// cannot block other callers, and a call that sends its request at once is hardly ever evicted.
+/// Limits the opening calls, that is, the calls that have not sent their first request. If a call
+/// exceeds the limit, an opening call is evicted: the oldest call of the caller that has the most
+/// opening calls. Among several such callers, the caller with the oldest call loses it. So silent
+/// calls cannot block other callers, and a call that sends its request at once is hardly ever
+/// evicted.
 ///
 /// Also tracks watchers, because they may send another request at any time. WatchRegistry limits
-/// their number; here they are evicted only if memory is exhausted. Thread-safe.
+/// their number. This class evicts watchers only if memory is exhausted. Thread-safe.
 class OpeningCalls {
  public:
-  /// Evicts the call: ends it with this status unless its first request has arrived. Called from
-  /// any thread, and possibly after the call's Place was destroyed.
+  /// Function that evicts a call: ends it with this status, unless its first request has arrived.
+  /// Called from any thread, possibly after the call's Place was destroyed.
   using GiveWay = std::function<void(const absl::Status&)>;
 
  private:
@@ -39,19 +40,19 @@ class OpeningCalls {
   class Lines {
    public:
     void Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way);
-    /// Empty if the call was removed already.
+    /// Returns an empty function if the call was removed before.
     GiveWay Remove(const CallerAccount* caller, std::uint64_t number);
     /// Removes the oldest call of the caller with the most calls. Requires: not empty.
     GiveWay RemoveNext();
-    /// Removes the older half, rounded up, of that caller's calls.
+    /// Removes the older half (rounded up) of the calls of the caller with the most calls.
     std::vector<GiveWay> RemoveHalf();
     std::size_t count() const { return count_; }
 
    private:
-    // The key is the call's number; numbers increase.
+    // The calls of one caller by number. Numbers increase, so the oldest call comes first.
     using Line = std::map<std::uint64_t, GiveWay>;
-    // Number of a caller's calls, and the negated number of its oldest call. The caller with the
-    // highest rank loses a call first.
+    // The rank of a caller: the number of its calls, then the negated number of its oldest call.
+    // The caller with the highest rank loses a call first.
     using Rank = std::pair<std::size_t, std::int64_t>;
 
     static Rank RankOf(const Line& line);
@@ -62,7 +63,8 @@ class OpeningCalls {
   };
 
  public:
-  /// A tracked call. Destroyed when the call's next request has arrived or the call ends.
+  /// The registration of a tracked call. Destroyed when the call's next request has arrived, or
+  /// when the call ends.
   class Place {
    public:
     Place() = default;
@@ -87,23 +89,23 @@ class OpeningCalls {
   /// `places`: maximum number of opening calls; 0 counts as 1.
   explicit OpeningCalls(std::size_t places) : places_(places) {}
 
-  /// Tracks an opening call, and may evict another one. Requires: the calling thread holds no lock.
-  /// The account and this object outlive the returned Place.
+  /// Tracks a new opening call; evicts another one if the limit is reached. Requires: the calling
+  /// thread holds no lock. The account and this object outlive the returned Place.
   Place Enter(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Tracks a watcher that may send another request from now on. Evicts none.
+  /// Tracks a watcher, which may send another request from now on. Evicts no call.
   Place EnterWatcher(const CallerAccount& caller, GiveWay give_way) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Memory is exhausted: evicts the older half (at least one) of the opening calls of the caller
-  /// with the most opening calls. Requires: the calling thread holds no lock.
+  /// Called if memory is exhausted. Evicts the older half (at least one) of the opening calls of
+  /// the caller that has the most. Requires: the calling thread holds no lock.
   void GiveWayToAll() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// As GiveWayToAll, for watchers.
+  /// Same as GiveWayToAll, but evicts watchers instead of opening calls.
   void WatchersGiveWay() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Blocks until a call is tracked or `also` returns true; then returns true. Returns false after
-  /// StopWaiting. Used by one thread.
+  /// Blocks until at least one call is tracked or `also` returns true, then returns true. Returns
+  /// false after StopWaiting. Only one thread may wait.
   bool WaitForOne(const std::function<bool()>& also = [] { return false; })
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// WaitForOne calls `also` again.
+  /// Makes WaitForOne evaluate `also` again.
   void LookAgain() ABSL_LOCKS_EXCLUDED(mutex_);
   void StopWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
 

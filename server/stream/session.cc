@@ -93,8 +93,8 @@ absl::Status Session::TryAnswer(std::uint64_t sequence, const absl::StatusOr<Fra
 absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver deliver,
                                   const std::atomic<bool>* cancelled) {
   worker.particles.Used(frame.ParticleCount(), WarmSize::Clock::now());
-  // The core commits an accepted frame to the state, but `deliver` may still refuse the frame.
-  // Therefore the core gets a copy.
+  // Computes with a copy of the state. The core commits an accepted frame to the state that it
+  // receives, but `deliver` may still refuse the frame.
   worker.next_state = state_;
   StageClock clock;
   FrameMemory memory(worker.memory, frame.ParticleCount());
@@ -103,9 +103,9 @@ absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver de
                                  {.observer = &clock, .memory = &memory, .cancelled = cancelled});
   if (status.ok()) status = deliver(worker.result, clock);
   if (!status.ok()) return status;
-  // A new copy, because the worker's buffers have the capacity of the largest stream that it has
-  // computed; moving them would pass that capacity to this stream. If the allocation fails, the
-  // state is unchanged.
+  // Copies the new state instead of moving it. The worker's buffers have the capacity of the
+  // largest stream that the worker has computed; a move would give this capacity to the stream. If
+  // the allocation fails, the stream's state is unchanged.
   State next = worker.next_state;
   state_ = std::move(next);
   if (worker.observer != nullptr) {

@@ -1,4 +1,4 @@
-// The computation of one stream: fixed parameters, the state, and the check of sequence numbers.
+// Computes one stream: keeps its parameters and its state, and checks the sequence numbers.
 // Includes no messages and starts no threads.
 #pragma once
 
@@ -32,34 +32,37 @@ absl::Status OutOfMemory(std::string value);
 /// Computes the frames of a stream, one at a time. Not thread-safe.
 class Session {
  public:
-  /// Writes a result into the response. An error refuses the frame.
+  /// Function that writes a result into the response. If it returns an error, the frame is refused.
   using Deliver = absl::FunctionRef<absl::Status(const Result&, const StageClock&)>;
 
   /// Errors: as Reconstructor::Create.
   static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
                                       const FrameLimits& limits);
 
-  /// Continues the stream of the checkpoint. Results are bit-identical to an uninterrupted stream.
+  /// Continues the stream of the checkpoint. The results are bit-identical to the results of an
+  /// uninterrupted stream.
   void GoOnFrom(Checkpoint checkpoint);
 
-  /// Serialises the state after the last frame (see ParseCheckpoint). Cost and size: proportional
-  /// to the state. Empty if the checkpoint might exceed `max_bytes`.
+  /// Serialises the state after the last frame (see Serialize in checkpoint.h). Returns no bytes if
+  /// the checkpoint might exceed `max_bytes`. Cost and size are proportional to the state.
   std::string MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
                              std::uint64_t max_bytes) const;
 
   /// Reconstructs the frame and passes the result to `deliver`. `frame` is an error if decoding
   /// failed.
   ///
-  /// An error leaves the state unchanged. Each but CANCELLED has a Violation.
-  /// - SEQUENCE_GAP, SEQUENCE_DUPLICATE: `sequence` is not next_sequence(), which stays the same.
-  /// - OUT_OF_MEMORY, and errors of `frame`, the core or `deliver`: next_sequence() increases.
+  /// An error leaves the state unchanged. Every error except CANCELLED has a Violation:
+  /// - SEQUENCE_GAP, SEQUENCE_DUPLICATE: `sequence` is not next_sequence(). The expected number
+  ///   stays the same.
+  /// - OUT_OF_MEMORY, and errors of `frame`, of the core or of `deliver`: the frame uses up its
+  ///   number, so next_sequence() increases.
   /// - CANCELLED: `cancelled` was set (FrameControl). next_sequence() stays the same, so that the
-  ///   frame may be sent again.
+  ///   client may send the frame again.
   absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
                       Deliver deliver, const std::atomic<bool>* cancelled = nullptr);
 
-  /// Refuses a frame whose sequence number could not be decoded. next_sequence() stays the same.
-  /// Returns `why`.
+  /// Refuses a frame whose sequence number could not be decoded; reports the refusal to the
+  /// observer of `worker` and returns `why`. next_sequence() stays the same.
   absl::Status Refuse(absl::Status why, Worker& worker) const;
 
   /// 1 for a new stream.

@@ -25,7 +25,7 @@ absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Makes a client's text safe for messages and the log: escaped and at most 40 characters.
+// Quotes a client's text for messages and the log: escapes it and cuts it after 40 characters.
 std::string Quoted(const std::string& text) {
   constexpr std::size_t kShown = 40;
   return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
@@ -100,7 +100,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
     const MutexLock lock(mutex_);
     opened = OpenLocked(machine, std::move(description), std::move(token), former_machine);
   }
-  // Without the lock, because TakenOver may call Leave.
+  // Called without the lock, because TakenOver may call Leave, which takes the lock.
   if (former_machine != nullptr) former_machine->TakenOver();
   return opened;
 }
@@ -172,7 +172,8 @@ absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
   return place.status();
 }
 
-// Called before the stream can be found, so that no watcher misses a result.
+// Starts the stream's history. Called before watchers can find the stream, so that no watcher
+// misses a result.
 void StreamRegistry::BeginHistory(const StreamDescription& description, const Entry* former) {
   if (history_ == nullptr || description.broadcaster == nullptr) return;
   ResultBroadcaster* const before =
@@ -209,7 +210,8 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
     entries_.at(&machine).sends_part = true;
     if (tell_earlier_look_) tell_earlier_look_();
   }
-  // Without the lock: Join may end a call that sent this part before, and that call then leaves.
+  // Called without the lock: Join may end an earlier call that sent this part, and that call then
+  // calls Leave, which takes the lock.
   const auto& assembler = stream->description.assembler;
   const auto seat = assembler->Join(terms.part, member);
   if (!seat.ok()) return seat.status();
@@ -218,7 +220,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
 
 absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
                                        const PartTerms& terms) const {
-  // Checked first, so that a caller without the token learns nothing about the stream.
+  // Checks the token first, so that a caller without the token learns nothing about the stream.
   if (!SameToken(stream.parts_token, terms.token)) {
     return Refused(absl::StatusCode::kPermissionDenied, kReasonPartsToken, "open.parts_token",
                    absl::StrCat(terms.token.size(), " characters"), "must be that of part 0");
@@ -263,7 +265,8 @@ void StreamRegistry::Leave(const StreamStateMachine& machine) {
   const auto found = entries_.find(&machine);
   if (found == entries_.end()) return;  // The machine was not admitted.
   entries_.erase(found);
-  // Notifies under the lock: a thread in WaitUntilEmpty may destroy the registry afterwards.
+  // Notifies while it holds the lock. Otherwise a thread in WaitUntilEmpty could destroy the
+  // registry before the notification.
   left_.NotifyAll();
 }
 
@@ -343,7 +346,8 @@ void StreamRegistry::Drain() {
     draining_ = true;
     machines = Machines();
   }
-  // Without the lock, because a machine that drains may call Leave.
+  // Called without the lock, because a state machine that drains may call Leave, which takes the
+  // lock.
   for (const auto& machine : machines) machine->Drain();
 }
 

@@ -28,11 +28,11 @@ inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
 inline constexpr std::string_view kReasonLabels = "LABELS";
 inline constexpr std::string_view kReasonTooManyStreams = "TOO_MANY_STREAMS";
 inline constexpr std::string_view kReasonNoSuchStream = "NO_SUCH_STREAM";
-/// Reasons of a refused call that would send parts.
+/// Reasons for refusing a call that would send parts of another call's stream.
 inline constexpr std::string_view kReasonPartsCount = "PARTS_COUNT";
 inline constexpr std::string_view kReasonPartsToken = "PARTS_TOKEN";
 inline constexpr std::string_view kReasonTooManyParts = "TOO_MANY_PARTS";
-/// The reason of a ListStreams with an invalid page token.
+/// Reason for refusing a ListStreams request with an invalid page token.
 inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
 
 /// NOT_FOUND (NO_SUCH_STREAM): there is no open stream of this name.
@@ -59,7 +59,7 @@ struct PartTerms {
   std::string token;
 };
 
-/// A part's seat in the assembler of its stream.
+/// The registration of a call that sends one part of a stream's frames.
 struct JoinedPart {
   std::shared_ptr<FrameAssembler> assembler;
   FrameAssembler::Seat seat;
@@ -76,79 +76,83 @@ struct StreamSummary {
   std::chrono::steady_clock::time_point opened;
 };
 
-/// A state machine enters, opens a stream or joins one with a part, closes, and leaves.
-/// Thread-safe.
+/// The life of a StreamStateMachine ("machine") in the registry: it enters; it opens a stream, or
+/// joins a stream to send one of its parts; it closes; it leaves. Thread-safe.
 class StreamRegistry {
  public:
-  /// `history`: memory for the histories of all streams; null: no histories. It outlives the
-  /// registry. `max_parts`: maximum number of calls that send parts 1 and above.
+  /// `history`: the memory for the histories of all streams, which outlives the registry. Null:
+  /// streams have no histories. `max_parts`: maximum number of calls that send parts 1 and above.
   explicit StreamRegistry(std::uint32_t max_streams, HistoryRoom* history = nullptr,
                           std::uint32_t max_parts = 256);
 
-  /// Registers the machine of a new call, which has not sent its `open`. OpeningCalls limits these.
+  /// Registers the state machine of a new call that has not sent its `open` yet. OpeningCalls
+  /// limits the number of such calls.
   /// Errors: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller = {})
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Opens the stream of a registered machine. If an open stream has the same `token`, the new
-  /// stream continues it with the same slot and history. It also keeps the name if `description`
-  /// has none. The other machine ends. Errors, each with a Violation: INVALID_ARGUMENT (NAME,
-  /// LABELS, STREAM_TOKEN), PERMISSION_DENIED (NOT_PERMITTED: the caller may not use the name),
-  /// ALREADY_EXISTS (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS),
-  /// UNAVAILABLE (DRAINING).
+  /// Opens the stream of a registered state machine. If an open stream has the same `token`, the
+  /// new stream takes over its slot and history, and its name if `description` has none. The
+  /// machine of the former stream ends.
+  /// Errors, each with a Violation: INVALID_ARGUMENT (NAME, LABELS, STREAM_TOKEN),
+  /// PERMISSION_DENIED (NOT_PERMITTED: the caller may not use the name), ALREADY_EXISTS
+  /// (NAME_IN_USE), RESOURCE_EXHAUSTED (TOO_MANY_STREAMS, CALLER_STREAMS), UNAVAILABLE (DRAINING).
   absl::StatusOr<StreamSummary> Open(const StreamStateMachine& machine,
                                      StreamDescription description, std::string token)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Lets a registered machine send one part of the frames of an open stream.
-  /// Errors, each with a Violation: as Find; FAILED_PRECONDITION (PARTS_COUNT: the stream's frames
-  /// have another number of parts); PERMISSION_DENIED (PARTS_TOKEN); RESOURCE_EXHAUSTED
-  /// (TOO_MANY_PARTS); as FrameAssembler::Join.
+  /// Lets a registered state machine send one part of each frame of an open stream.
+  /// Errors, each with a Violation: the errors of Find; FAILED_PRECONDITION (PARTS_COUNT: the
+  /// stream's frames have another number of parts); PERMISSION_DENIED (PARTS_TOKEN);
+  /// RESOURCE_EXHAUSTED (TOO_MANY_PARTS); the errors of FrameAssembler::Join.
   absl::StatusOr<JoinedPart> JoinPart(const StreamStateMachine& machine, const PartTerms& terms)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends the machine's stream: frees its name and its slot. Returns the stream's summary if it was
-  /// open.
+  /// Ends the stream of the state machine: frees its name and its slot. Returns the stream's
+  /// summary if it was open.
   std::optional<StreamSummary> Close(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the machine. Called when its status was sent.
+  /// Removes the state machine. Called after the status of its call was sent.
   void Leave(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// The open stream of this name, for `caller` to watch. Errors: PERMISSION_DENIED (NOT_PERMITTED)
-  /// if the caller may not use the name, whether or not the stream exists; NOT_FOUND
-  /// (NO_SUCH_STREAM).
+  /// Returns the open stream of this name, for `caller` to watch.
+  /// Errors: PERMISSION_DENIED (NOT_PERMITTED) if the caller may not use the name, whether or not
+  /// the stream exists; NOT_FOUND (NO_SUCH_STREAM).
   absl::StatusOr<StreamSummary> Find(const std::string& name, const Caller& caller = {}) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The open streams whose names `caller` may use, sorted by number: at most `count` of those with
-  /// a number above `after`.
+  /// Returns at most `count` open streams with a number above `after`, sorted by number. Includes
+  /// only streams whose names `caller` may use.
   std::vector<StreamSummary> List(std::uint64_t after, std::size_t count,
                                   const Caller& caller = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
   std::size_t OpenCount() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Increases when a stream is opened or closed.
+  /// A counter that increases whenever a stream is opened or closed.
   std::uint64_t changes() const { return changes_; }
 
-  /// Sets the addresses of other servers, which clients receive when this server drains.
+  /// Sets the addresses of other servers, which this server sends to its clients when it drains.
   void SetElsewhere(std::vector<std::string> addresses) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Returns these addresses, rotated by one at each call, so that clients spread evenly.
+  /// Returns these addresses. Each call rotates the list by one, so that clients spread evenly over
+  /// the servers.
   std::vector<std::string> TakeElsewhere() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Drains the present machines one after the other, evenly over the time `within`. Admits new
-  /// machines.
+  /// Drains the present state machines one after the other, evenly distributed over the time
+  /// `within`. New calls are still admitted.
   void SendAway(std::chrono::milliseconds within) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Admits no further machine and drains every machine.
+  /// Refuses new calls and drains every state machine.
   void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
   bool draining() const ABSL_LOCKS_EXCLUDED(mutex_);
   /// UNAVAILABLE (DRAINING) after Drain, otherwise OK.
   absl::Status CheckServing() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Number of callers refused by CheckServing, Enter and Open. It grows while clients still come.
+  /// Number of refusals by CheckServing, Enter and Open because of the drain. It grows while
+  /// clients still arrive.
   std::uint64_t turned_away() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Ends the machines that exceed an idle limit at `now`. Returns the earliest time at which
-  /// another present machine may exceed one.
+  /// Ends the state machines whose clients exceed an idle limit at `now`. Returns the earliest time
+  /// at which another machine may exceed a limit.
   std::chrono::steady_clock::time_point EndIdle(const IdleLimits& limits,
                                                 std::chrono::steady_clock::time_point now)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Sets the function that is called when EndIdle must run earlier than it last returned, because
-  /// of a new stream. Empty: none is called. `tell` must not call the registry.
+  /// Sets the function that the registry calls when EndIdle must run earlier than the time it last
+  /// returned, because a stream has been opened or joined. Empty: no call. `tell` must not call the
+  /// registry.
   void OnEarlierLook(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Blocks until all machines have left; false if `deadline` passes first.
+  /// Blocks until all state machines have left. Returns false if `deadline` passes first.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
@@ -169,7 +173,8 @@ class StreamRegistry {
                                            std::shared_ptr<StreamStateMachine>& former_machine)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckServingLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // An error if no slot is free, or `name` is in use. Ignores the stream of `former`.
+  // Returns an error if no slot is free or `name` is in use. Ignores the stream of `former`, which
+  // is about to be replaced.
   absl::Status CheckPlace(const Entry* former, const std::string& name) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Moves the slot of `former` to `entry`, or else takes a new slot for the caller of `entry`.

@@ -140,7 +140,8 @@ void StreamStateMachine::ReadPermitted() {
   if (state_.reading == Reading::kPermit) Read(Reading::kNext);
 }
 
-// Abandoning the stream also makes its pending read fail.
+// Ends a stream whose read in progress exceeds the memory (ReadPermits). Abandoning the stream also
+// makes the pending read fail.
 void StreamStateMachine::ReadRevoked(const absl::Status& status) {
   const Event event(*this);
   if (state_.reading == Reading::kNext && state_.phase == Phase::kServing) AbandonAndCut(status);
@@ -197,7 +198,8 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
   const bool is_opening = state_.phase == Phase::kOpening;
   const auto limit = is_opening ? limits.opening : limits.streaming;
   if (limit <= limit.zero()) {
-    // The stream may begin to serve at any time, and the other limit then applies.
+    // There is no limit for the current phase. The stream may begin to serve at any time; then the
+    // streaming limit applies.
     if (is_opening && limits.streaming > limit.zero()) {
       look_again = std::min(look_again, now + limits.streaming);
     }
@@ -225,7 +227,8 @@ void StreamStateMachine::Compute(std::size_t slot, Worker& worker) {
 }
 
 void StreamStateMachine::Computed() {
-  // Taken first: after the event below, another frame may be computed.
+  // Takes answered_ first: after the event below, another thread may compute the next frame and set
+  // answered_ again.
   std::optional<Answered> answered = std::exchange(answered_, std::nullopt);
   {
     const Event event(*this);
@@ -254,13 +257,14 @@ void StreamStateMachine::Abandon(absl::Status status) {
   cancelled_ = true;
 }
 
-// Cuts a pending write: a client that does not read would keep the stream from ending.
+// Abandons the stream and cuts a pending write. Without the cut, a client that does not read would
+// keep the stream from ending.
 void StreamStateMachine::AbandonAndCut(absl::Status status) {
   Abandon(std::move(status));
   if (state_.writing != Writing::kIdle) Do([this] { transport_.Cut(); });
 }
 
-// Sets the bytes that the frame with this number, from 0, holds in the budget.
+// Sets the number of bytes that frame number `frame` (counted from 0) holds in the budget.
 void StreamStateMachine::SetSlotBytes(std::uint64_t frame, std::uint64_t bytes) {
   std::uint64_t& held = slot_bytes_[frame % window_];
   if (bytes > held) {
@@ -281,7 +285,8 @@ void StreamStateMachine::Decide() {
   DecideFinish();
 }
 
-// Called first, so that the stream holds no memory when a later action ends it.
+// Releases memory and cancels waits. Decide calls this first, so that the stream holds no memory
+// when a later action ends it.
 void StreamStateMachine::DecideMemory() {
   const bool serves = state_.phase == Phase::kServing;
   if (state_.reading == Reading::kMemory && (!serves || read_ == written_)) {
@@ -320,7 +325,8 @@ void StreamStateMachine::DecideRead() {
   }
 }
 
-// Reads another frame while frames are in flight. The bytes fit, so the read need not wait.
+// Reads another frame while frames are in flight. The caller has checked that the bytes fit into
+// the budget, so the read need not wait for a permit.
 void StreamStateMachine::ReadAhead() {
   budget_.reads().BeginNow(shared_from_this(), NextRead());
   Read(Reading::kNext);
@@ -331,7 +337,8 @@ void StreamStateMachine::Read(Reading what) {
   Do([this, slot = read_ % window_] { transport_.StartRead(slot); });
 }
 
-// Expects the next frame to be at most an eighth larger than the last one.
+// Returns the data of the next read. Expects the next frame to be at most an eighth larger than the
+// last one.
 ReadPermits::Read StreamStateMachine::NextRead() const {
   const void* const assembly = handler_.Assembly();
   return {.stream = assembly != nullptr ? assembly : this,

@@ -33,32 +33,35 @@ struct Answered {
   bool is_result = false;           ///< False: a frame error.
   std::uint64_t last_sequence = 0;  ///< The last sequence number that the stream has used.
   std::uint64_t bytes = 0;          ///< Size of the response.
-  /// Runs after the response is written or queued behind another one; the transport may be gone.
+  /// Function to run after the response's write has started or was queued behind another write. The
+  /// transport may no longer exist then.
   std::function<void()> afterwards = {};
 };
 
-/// A larger `open` contains a checkpoint; a compute thread opens the stream then.
+/// Limit for an `open` that is handled at once. A larger `open` contains a checkpoint, so a compute
+/// thread opens the stream.
 inline constexpr std::uint64_t kQuickOpenBytes = 64 << 10;
 
 class StreamStateMachine;
 
-/// Carries the messages of a stream. There are `window` slots, each with a request and its
-/// response, which the transport shares with the handler. StreamStateMachine has at most one read,
-/// one write and one computation in progress, each on its own slot, and calls the transport without
-/// a lock.
+/// Carries the messages of a stream. There are `window` slots; each holds a request and its
+/// response. The transport shares the slots with the handler. StreamStateMachine has at most one
+/// read, one write and one computation in progress, each on another slot. It calls the transport
+/// without holding a lock.
 class StreamTransport {
  public:
   virtual ~StreamTransport() = default;
 
   /// Starts to read the next request into `slot`; completes by ReadDone or ReadEnded.
   virtual void StartRead(std::size_t slot) = 0;
-  /// Starts a write; completes by WriteDone. `slot` is used for kAnswer only.
+  /// Starts a write; completes by WriteDone. `slot` is used only if `what` is kAnswer.
   virtual void StartWrite(Outgoing what, std::size_t slot) = 0;
   /// Makes the pending read and write fail soon.
   virtual void Cut() = 0;
-  /// The last call to the transport; only a read may still be in progress.
+  /// Ends the call with `status`. This is the last call to the transport; at most a read may still
+  /// be in progress.
   virtual void Finish(const absl::Status& status) = 0;
-  /// As CallChannel::peer. Called with the stream's lock held.
+  /// Address of the client, see CallChannel::peer. Called with the stream's lock held.
   virtual std::string peer() const { return {}; }
 };
 
@@ -67,33 +70,34 @@ class StreamHandler {
  public:
   virtual ~StreamHandler() = default;
 
-  /// Opens `stream` by the request in `slot` and prepares Outgoing::kOpened. An error ends the
-  /// stream.
+  /// Opens `stream` as the request in `slot` demands, and prepares the message Outgoing::kOpened.
+  /// An error ends the stream.
   virtual absl::Status Open(std::size_t slot, const StreamStateMachine& stream) = 0;
-  /// Turns the frame in `slot` into its response, unless `cancelled`. Called by a worker, for one
-  /// frame of a stream at a time, in their order.
+  /// Computes the response to the frame in `slot`, unless `cancelled`. Called on a compute thread,
+  /// for one frame of a stream at a time, in the order of the frames.
   virtual Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) = 0;
 
-  /// Whether the oldest frame without a response, in `slot`, can be computed. A frame that waits
-  /// for parts is checked again at StreamStateMachine::LookAgain, and at intervals of LookEvery.
-  /// Called with the stream's lock held: must not call the stream.
+  /// Whether the frame in `slot`, the oldest one without a response, can be computed. A frame that
+  /// waits for parts is checked again when StreamStateMachine::LookAgain is called, and at
+  /// intervals of LookEvery. Called with the stream's lock held, so it must not call the stream.
   virtual bool MayAnswer(std::size_t /*slot*/) { return true; }
-  /// 0: only LookAgain.
+  /// Interval of these checks. 0: only LookAgain triggers a check.
   virtual std::chrono::milliseconds LookEvery() const { return std::chrono::milliseconds(0); }
-  /// Size of the whole frame in `slot`, whose own message has `bytes`. 0: nothing is computed.
-  /// Called with the stream's lock held.
+  /// Size of the whole frame in `slot`; `bytes` is the size of its own message. Returns 0 if this
+  /// call computes nothing. Called with the stream's lock held.
   virtual std::uint64_t ComputedBytes(std::size_t /*slot*/, std::uint64_t bytes) const {
     return bytes;
   }
-  /// There is no memory for the frame in `slot`. Returns whether its bytes were dropped; `why` is
-  /// then its response. Called with the stream's lock held, before MayAnswer.
+  /// Called if there is no memory for the frame in `slot`. Returns whether the handler has dropped
+  /// the frame's bytes; `why` then becomes its response. Called with the stream's lock held, before
+  /// MayAnswer.
   virtual bool DropFrame(std::size_t /*slot*/, const absl::Status& /*why*/) { return false; }
-  /// The same address for all calls that send parts of one stream; null without parts. Called with
-  /// the stream's lock held.
+  /// An address that is the same for all calls that send parts of one stream. Null if frames arrive
+  /// whole. Called with the stream's lock held.
   virtual const void* Assembly() const { return nullptr; }
 };
 
-/// How long a client may keep a stream waiting; 0: no limit.
+/// Time for which a client may keep a stream waiting; 0: no limit.
 struct IdleLimits {
   std::chrono::milliseconds opening{0};    ///< From the call to its `open`.
   std::chrono::milliseconds streaming{0};  ///< Between frames, and from a write's start to its end.
@@ -115,55 +119,59 @@ struct StreamCounts {
 ///      +-- no open, or refused: ending, with nothing to answer
 ///
 /// While serving, frame n uses slot n % window from the start of its read to the end of its
-/// response's write. So a client that does not read its responses is not read from either.
-/// Ending answers all frames that were read; abandoned sends nothing more. Thread-safe.
+/// response's write. So if a client does not read its responses, the server stops reading from it.
+/// In the phase `ending` the stream still answers all frames that it has read. In the phase
+/// `abandoned` it sends nothing more. Thread-safe.
 ///
-/// A frame in parts is computed when MayAnswer of each of its streams permits it. Closing, caused
-/// by the server or by the stream that the parts belong to, does not answer frames that lack parts.
+/// A frame that arrives in parts is computed when MayAnswer permits it for each of the calls. If
+/// the server, or the stream that the parts belong to, closes this stream, frames with missing
+/// parts get no response.
 ///
-/// Memory: the bytes of requests that were read and of responses that are not written count against
-/// the budget of all streams. While a stream has frames in flight, it reads another frame only if
-/// the budget has room for one of the size of the last. A stream without frames in flight reads one
-/// frame when it has a permit (ReadPermits).
+/// Memory: the budget of all streams counts requests that were read and responses that are not
+/// written yet. While a stream has frames in flight, it reads another frame only if the budget has
+/// room for a frame of the last frame's size. A stream without frames in flight reads one frame
+/// when it has a permit (ReadPermits).
 class StreamStateMachine final : public SerializedCall,
                                  public MemoryBudget::Waiter,
                                  public ReadPermits::Reader,
                                  public AssemblyMember {
  public:
-  /// Requires: `transport` and `handler` live until the transport's Finish returns, `pool` and
-  /// `budget` longer. Memory and computing count for `caller`.
+  /// Requires: `transport` and `handler` live until the transport's Finish returns; `pool` and
+  /// `budget` live longer. Memory and computing time are charged to `caller`.
   StreamStateMachine(StreamTransport& transport, StreamHandler& handler, ComputePool& pool,
                      MemoryBudget& budget, std::size_t window,
                      std::shared_ptr<const CallerAccount> caller = nullptr);
 
-  /// Starts the first read, or ends at once if `admission` is an error. Called once. Every stream,
-  /// refused ones included, ends through this machine, so StreamTransport::Finish is called exactly
+  /// Starts the first read, or ends at once if `admission` is an error. Called once. Every stream
+  /// ends through this machine, even a refused one. So StreamTransport::Finish is called exactly
   /// once.
   void Start(absl::Status admission = absl::OkStatus());
 
-  /// The pending read has returned a request of this kind and size.
+  /// The pending read has completed with a request of this kind and size.
   void ReadDone(RequestKind kind, std::uint64_t bytes);
-  /// The pending read has found the end of requests.
+  /// The pending read has completed without a request: the client will send no more.
   void ReadEnded();
   void WriteDone(bool ok);
   /// The client has disconnected.
   void Cancelled();
-  /// The client has resumed this stream in another call, and its connection may be dead: abandons
-  /// the stream with ABORTED.
+  /// The client has resumed this stream in another call, so the connection of this call may be
+  /// dead. Abandons the stream with ABORTED.
   void TakenOver();
-  /// Ends a stream that has not sent its `open` with this error; other streams go on.
+  /// Ends this stream with this error if it has not received its `open`. Has no effect on other
+  /// streams.
   void GiveWay(const absl::Status& status);
-  /// Reads no further frame, sends Outgoing::kDraining, answers what was read, and ends the stream
-  /// with UNAVAILABLE.
+  /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read, and
+  /// ends the stream with UNAVAILABLE.
   void Drain();
-  /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if at `now` the client has exceeded a limit,
-  /// either without a request or, by cutting it, without taking a response. Waiting for a worker or
-  /// for memory does not count. Returns the time of the next check.
+  /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`: it
+  /// has not sent a request, or it has not received a response (then the call is cut). The time in
+  /// which the stream waits for a worker or for memory does not count. Returns the time of the next
+  /// check.
   std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 
   StreamCounts counts() const;
-  /// Becomes true when no response can be delivered any more.
+  /// Becomes true when responses can no longer be delivered.
   const std::atomic<bool>& cancelled() const { return cancelled_; }
 
   void Granted(std::uint64_t bytes) override;
@@ -211,15 +219,16 @@ class StreamStateMachine final : public SerializedCall,
   std::atomic<bool> cancelled_ = false;
 
   absl::Status status_ ABSL_GUARDED_BY(mutex_);  // The stream's final status, once it is ending.
-  // Numbers of frames: written_ <= computed_ <= read_ <= written_ + window_.
+  // Numbers of frames that were read, computed and written: written_ <= computed_ <= read_ <=
+  // written_ + window_.
   std::uint64_t read_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t computed_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t written_ ABSL_GUARDED_BY(mutex_) = 0;
   // Bytes that each slot holds in the budget.
   std::vector<std::uint64_t> slot_bytes_ ABSL_GUARDED_BY(mutex_);
-  // Bytes that ReturnMemory gives back to the budget.
+  // Bytes that the next ReturnMemory gives back to the budget.
   std::uint64_t surplus_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Size of the last frame, at least 1: the estimate for the next one.
+  // Size of the last frame, at least 1. It is the estimate for the size of the next frame.
   std::uint64_t last_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   StreamCounts counts_ ABSL_GUARDED_BY(mutex_);
 };

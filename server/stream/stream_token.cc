@@ -35,7 +35,8 @@ bool IsStreamToken(std::string_view text) {
 
 absl::Status CheckStreamToken(std::string_view text) {
   if (IsStreamToken(text)) return absl::OkStatus();
-  // The error omits the text, which may be another secret, sent by mistake.
+  // The error does not contain the text, because the client may have sent another secret by
+  // mistake.
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
       {std::string(kReasonStreamToken), "open.resume.stream_token",

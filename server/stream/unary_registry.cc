@@ -62,7 +62,8 @@ void UnaryRegistry::Leave(const UnaryStateMachine& call) {
   const MutexLock lock(mutex_);
   FreePlace(call);  // A request that arrives while the call ends may have taken a slot.
   calls_.erase(&call);
-  // Notifies under the lock: a thread in WaitForFrames may destroy the registry afterwards.
+  // Notifies while it holds the lock. Otherwise a thread in WaitForFrames could destroy the
+  // registry before the notification.
   left_.NotifyAll();
 }
 
@@ -74,7 +75,7 @@ std::size_t UnaryRegistry::count() const {
 std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
     const UnaryLimits& limits, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock, because a call that ends may call Leave.
+  // Called without the lock, because a call that ends may call Leave, which takes the lock.
   for (const auto& call : All()) look_again = std::min(look_again, call->EndIfIdle(limits, now));
   return look_again;
 }
@@ -86,7 +87,8 @@ std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
   return all;
 }
 
-// Ends the calls without the lock, because a call that ends may call Leave.
+// Ends the calls without holding the lock, because a call that ends may call Leave, which takes the
+// lock.
 void UnaryRegistry::Drain() {
   {
     const MutexLock lock(mutex_);

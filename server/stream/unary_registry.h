@@ -20,43 +20,45 @@ namespace partiemc::server {
 /// The violation's reason if there are too many calls (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
-/// Limits the calls of each kind by slots. Thread-safe.
+/// Limits the number of concurrent calls of each kind. Thread-safe.
 class UnaryRegistry {
  public:
-  /// Slots of one caller for calls that return information, and for probes. They take little time.
+  /// Maximum number of calls of one caller that only return information, and of health checks. Such
+  /// calls take little time.
   static constexpr std::uint32_t kInformationCalls = 64;
 
-  /// `max_frame_calls`: slots of one caller for calls with a frame. The number of slots of each
-  /// kind is twice this limit: a caller may only use half of them (FairShare).
+  /// `max_frame_calls`: maximum number of calls with a frame of one caller. The server has twice as
+  /// much capacity for each kind, because FairShare gives one caller at most half of the capacity.
   explicit UnaryRegistry(std::uint32_t max_frame_calls)
       : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls),
                 FairShare(2 * kInformationCalls)} {}
 
-  /// Registers a call that has not sent its request. OpeningCalls limits these calls.
+  /// Registers a call that has not sent its request yet. OpeningCalls limits the number of such
+  /// calls.
   /// Errors, each with a Violation: UNAVAILABLE (DRAINING), for calls with a frame only.
   absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes a slot when the call's request has arrived. The account lives until GiveBackPlace.
+  /// Takes a slot after the call's request has arrived. The account must live until GiveBackPlace.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
   absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller)
       ABSL_LOCKS_EXCLUDED(mutex_);
   /// Frees the call's slot, if it has one. Called when the call's status is known.
   void GiveBackPlace(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the call. Called when its status was sent.
+  /// Removes the call. Called after its status was sent.
   void Leave(const UnaryStateMachine& call) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of calls of all kinds.
   std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends the calls that exceed an idle limit at `now`. Returns the earliest time at which another
-  /// present call may exceed one.
+  /// Ends the calls whose clients exceed an idle limit at `now`. Returns the earliest time at which
+  /// another call may exceed a limit.
   std::chrono::steady_clock::time_point EndIdle(const UnaryLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
 
-  /// Admits no further calls with a frame, and ends the calls without a request.
+  /// Refuses further calls with a frame, and ends the calls that have not sent their request.
   void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Blocks until all calls with a frame have left; false if `deadline` passes first. Other calls
-  /// may continue.
+  /// Blocks until all calls with a frame have left. Returns false if `deadline` passes first. Other
+  /// kinds of calls may continue.
   bool WaitForFrames(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:

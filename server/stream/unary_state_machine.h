@@ -1,5 +1,5 @@
-// When a call of one request and one response reads, computes and writes. It knows neither the
-// messages nor how they travel.
+// Decides when a unary call (one request, one response) reads, computes and writes. Independent of
+// the messages and of the transport.
 #pragma once
 
 #include <atomic>
@@ -18,8 +18,9 @@
 
 namespace partiemc::server {
 
-/// Each kind has its own slots, so that frames never keep out information or a probe. Calls of the
-/// last two kinds are small and take their memory even if the budget is exhausted.
+/// The kinds of unary calls: kFrame computes a frame, kInformation returns information, kProbe is a
+/// health check. Each kind has separate slots, so calls with frames never block the other two
+/// kinds. Calls of these two kinds are small and get memory even if the budget is exhausted.
 enum class UnaryKind { kFrame, kInformation, kProbe };
 
 /// Carries the request and the response. UnaryStateMachine calls it without a lock.
@@ -29,18 +30,19 @@ class UnaryTransport {
 
   /// Starts to read the request; completes by UnaryStateMachine::ReadDone or ReadEnded.
   virtual void StartRead() = 0;
-  /// Turns the request into the response and returns its size. An error ends the call. `worker` is
-  /// null if the machine has no pool.
+  /// Computes the response to the request and returns its size in bytes. An error ends the call.
+  /// `worker` is null if the state machine has no pool.
   virtual absl::StatusOr<std::uint64_t> Answer(Worker* worker) = 0;
   /// Starts to write the response; completes by UnaryStateMachine::WriteDone.
   virtual void StartWrite() = 0;
   /// Makes the pending read and write fail soon.
   virtual void Cut() = 0;
-  /// The last call to the transport; only a read may still be in progress.
+  /// Ends the call with `status`. This is the last call to the transport; at most a read may still
+  /// be in progress.
   virtual void Finish(const absl::Status& status) = 0;
 };
 
-/// How long a client may keep a call waiting; 0: no limit.
+/// Time for which a client may keep a call waiting; 0: no limit.
 struct UnaryLimits {
   std::chrono::milliseconds request{0};  ///< From the start of the call to its request.
   std::chrono::milliseconds answer{0};   ///< From the start to the end of the response's write.
@@ -53,12 +55,13 @@ struct UnaryLimits {
 ///      +--------------------+------- cancelled, cut -------> abandoned ---+
 ///      +-- refused, no request, drained: ending
 ///
-/// Memory: the request counts against the budget of all streams once it was read, its response
-/// until it was written. If the budget has no room for one of them, the call ends. Thread-safe.
+/// Memory: the budget of all streams counts the request after it was read, and the response until
+/// it was written. If one of them does not fit into the budget, the call ends. Thread-safe.
 class UnaryStateMachine final : public SerializedCall {
  public:
-  /// Requires: `transport` lives until its Finish returns, the others longer. Without a pool the
-  /// thread that brings the request computes. Memory and computing count for `caller`.
+  /// Requires: `transport` lives until its Finish returns; `budget`, `pool` and `caller` live
+  /// longer. If `pool` is null, the thread that delivers the request computes the response. Memory
+  /// and computing time are charged to `caller`.
   UnaryStateMachine(UnaryTransport& transport, MemoryBudget& budget, ComputePool* pool,
                     std::shared_ptr<const CallerAccount> caller = nullptr,
                     UnaryKind kind = UnaryKind::kFrame);
@@ -72,14 +75,14 @@ class UnaryStateMachine final : public SerializedCall {
   void WriteDone(bool ok);
   /// The client has disconnected.
   void Cancelled();
-  /// Ends a call without a request, or without a slot, with this error; other calls go on.
+  /// Ends this call with this error if it has no request or no slot. Has no effect on other calls.
   void GiveWay(const absl::Status& status);
-  /// Ends the call with DEADLINE_EXCEEDED (IDLE), or by cutting it, if at `now` its client has
-  /// exceeded a limit. Returns the time of the next check.
+  /// Ends the call if its client has exceeded a limit at `now`: with DEADLINE_EXCEEDED (IDLE), or
+  /// by cutting the call if the response is being written. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfIdle(const UnaryLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 
-  /// Becomes true when the response cannot be delivered any more.
+  /// Becomes true when the response can no longer be delivered.
   const std::atomic<bool>& cancelled() const { return cancelled_; }
 
   std::shared_ptr<UnaryStateMachine> shared_from_this() {
@@ -105,7 +108,7 @@ class UnaryStateMachine final : public SerializedCall {
 
   absl::Status status_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Start of the read, then of the write.
+  // Time at which the read began; later, the time at which the write began.
   std::chrono::steady_clock::time_point began_ ABSL_GUARDED_BY(mutex_) =
       std::chrono::steady_clock::now();
 };
