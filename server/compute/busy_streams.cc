@@ -15,7 +15,7 @@ void BusyStreams::Worked(Mark& stream, std::size_t size, Clock::time_point now) 
   }
   const auto size_class = static_cast<std::size_t>(std::bit_width(size));
   classes_[size_class].last = now;
-  // A stream counts once in each period, in the class of its largest frame.
+  // Each stream counts once in a period, in the size class of its largest frame.
   if (stream.period_ == period_) {
     if (size_class <= stream.size_class_) return;
     --classes_[stream.size_class_].streams;
@@ -33,7 +33,7 @@ std::size_t BusyStreams::Count(std::size_t size, Clock::time_point now) const {
     streams_before += classes_[k].streams_before;
     late = late || now - classes_[k].last < late_;
   }
-  // Early in a period few streams have been counted, so the previous period counts too.
+  // Uses the larger of both counts: early in a period only few streams have been counted yet.
   return late ? std::max(streams, streams_before) : 0;
 }
 

@@ -1,4 +1,5 @@
-// Counts the active streams: the number of workers that may be needed at once.
+// Counts the streams that were active recently. The number shows how many workers may be needed at
+// once.
 #pragma once
 
 #include <array>
@@ -9,13 +10,14 @@
 
 namespace partiemc::server {
 
-/// Counts the streams that computed a frame of at least a given size recently. The count depends
-/// only on the frames sent, not on which frames were computed at the same time. Not thread-safe.
+/// Counts the streams that recently computed a frame of at least a given size. The count depends
+/// only on the frames that were sent, not on the frames that happened to be computed at the same
+/// time. Not thread-safe.
 class BusyStreams {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// The data about one stream. The stream owns it.
+  /// The data that BusyStreams keeps about one stream. The stream owns this object.
   class Mark {
     friend class BusyStreams;
     // The last period in which the stream was counted, and the size class that counted it.
@@ -23,15 +25,16 @@ class BusyStreams {
     std::size_t size_class_ = 0;
   };
 
-  /// `late`: length of the period that counts as recent. Positive.
+  /// `late`: length of a period; activity within this time counts as recent. Positive.
   explicit BusyStreams(Clock::duration late) : late_(late) {}
 
-  /// `stream` has computed a frame of this size. `now` never decreases. Allocates nothing.
+  /// Records that `stream` has computed a frame of `size`. `now` never decreases. Allocates
+  /// nothing.
   void Worked(Mark& stream, std::size_t size, Clock::time_point now);
 
-  /// Number of streams with a frame of at least `size` in the current period or in the previous
-  /// one, whichever is larger. `size` is rounded down to a power of two. 0 if the last such frame
-  /// is older than `late`.
+  /// Number of streams that computed a frame of at least `size` in the current period or in the
+  /// previous one, whichever number is larger. `size` is rounded down to a power of two. Returns 0
+  /// if the last such frame is older than `late`.
   std::size_t Count(std::size_t size, Clock::time_point now) const;
 
  private:

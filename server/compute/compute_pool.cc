@@ -9,10 +9,10 @@
 
 namespace partiemc::server {
 
-// Runners are plain threads, not tasks of the arena. A thread of the arena that waits for parallel
-// parts of one frame may run parts of another frame; a task would make it begin a whole frame. The
-// number of runners equals the number of the arena's slots, so small frames run concurrently, and a
-// single large frame uses all slots.
+// The pool's threads ("runners") are plain threads, not tasks of the oneTBB arena. A thread that
+// waits in an arena for the parallel parts of one frame may run parts of another frame. If frames
+// were tasks, it could even begin a whole other frame. The number of runners equals the number of
+// slots of the arena. So small frames run concurrently, and a single large frame uses all slots.
 ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
                          FrameObserver* observer, MemoryBudget* budget)
     : threads_(std::max(threads, 1u)),
@@ -67,7 +67,8 @@ void ComputePool::Run() {
     {
       const MutexUnlock unlock(mutex_);
       if (shares && !narrow) narrow.emplace(threads_ - 1);
-      // May block, so it must not run on a thread of the arena, which other frames use too.
+      // Runs outside the arena, because BeginFrame may block, and other frames use the arena's
+      // threads too.
       worker->memory.BeginFrame(task->frame_bytes);
       (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
       if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for this memory.
@@ -84,7 +85,7 @@ void ComputePool::Run() {
   }
 }
 
-// Waits for a task that may run. Returns none when the pool stops and no task is left.
+// Waits for a task that may run. Returns nothing if the pool stops and no task is left.
 std::optional<ComputePool::Task> ComputePool::WaitForTask() {
   for (;;) {
     if (auto task = NextTask()) return task;
@@ -101,7 +102,7 @@ std::optional<ComputePool::Task> ComputePool::WaitForTask() {
   }
 }
 
-// The first task whose caller may run one more job.
+// Returns the first task whose caller may run another job now.
 std::optional<ComputePool::Task> ComputePool::NextTask() {
   auto task = tasks_.PopOf([this](const CallerAccount* caller) {
     mutex_.AssertHeld();
@@ -112,7 +113,7 @@ std::optional<ComputePool::Task> ComputePool::NextTask() {
   return task;
 }
 
-// Whether one thread must stay free for other callers.
+// Whether `caller` must leave one thread free, because another caller was active recently.
 bool ComputePool::Shares(const CallerAccount* caller) const {
   return threads_ > 1 && recent_.AnybodyBut(caller, WarmSize::Clock::now() - kSharingTime);
 }
@@ -122,7 +123,8 @@ void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
 void ComputePool::End(const Task& task) {
   running_.erase(std::ranges::find(running_, task.caller));
   recent_.Came(task.caller, WarmSize::Clock::now());
-  // This caller may now run one more job.
+  // The caller of the finished task may run another job, so a waiting thread checks the tasks
+  // again.
   if (waiting_ > 0) task_came_.NotifyOne();
 }
 
@@ -170,8 +172,8 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   return outlived;
 }
 
-// Frees `workers` and returns freed memory to the system, if there are any or if `due`. Unlocks the
-// mutex while it works.
+// Destroys `workers`. Then returns freed memory to the operating system if there were workers or if
+// `due`. Unlocks the mutex during this work.
 void ComputePool::GiveBack(Workers workers, bool due) {
   if (workers.empty() && !due) return;
   gave_back_ = WarmSize::Clock::now();

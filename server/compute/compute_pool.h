@@ -22,13 +22,13 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// Time after which a worker with oversized buffers is dropped.
+/// A worker is dropped after its buffers have been oversized for this time.
 inline constexpr std::chrono::seconds kWarmTime(10);
 
-/// A caller competes for the threads until this long after its last job.
+/// A caller counts as competing for the threads until this time has passed since its last job.
 inline constexpr std::chrono::seconds kSharingTime(1);
 
-/// Idle workers are dropped for lack of memory at most once in this time.
+/// Minimum interval between two times at which idle workers are dropped because memory is short.
 inline constexpr std::chrono::seconds kBetweenShortages(1);
 
 /// Runs jobs on several threads and divides these fairly between callers.
@@ -37,26 +37,26 @@ inline constexpr std::chrono::seconds kBetweenShortages(1);
 /// one stream. A stream has at most one job in the pool. Therefore a stream delays another stream
 /// of its caller by at most one frame, and a caller delays another caller by at most one job.
 ///
-/// Threads: a caller that does not compete with others uses all threads, and its jobs run their
-/// parallel parts in one shared arena. If another caller had a job within kSharingTime and there
-/// are at least two threads, one thread stays free for the others. Each caller then runs at most
-/// `threads - 1` jobs at once, each in its own arena of `threads - 1` slots, so that a job never
-/// waits for a part of another job. A job of a second caller then starts as soon as a thread wakes.
-/// If two callers run long jobs, a third caller may wait for one job.
+/// Threads: a caller without competitors uses all threads, and its jobs run their parallel parts in
+/// one shared arena. A caller has competitors if another caller had a job within kSharingTime and
+/// the pool has at least two threads. It then runs at most `threads - 1` jobs at once, so one
+/// thread stays free for the others. Each of these jobs has its own arena of `threads - 1` slots,
+/// so that it never waits for a part of another job. So a job of a second caller starts as soon as
+/// a thread wakes. If two callers run long jobs, a third caller may wait for one job.
 ///
-/// Memory: a job gets the worker that was used last, so that a single stream always uses the same
-/// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: streams
-/// at least equal in number to the workers sent frames of that size recently. Such frames may need
-/// all workers at any time. Freed memory returns to the system when a worker is dropped, and every
-/// `warm_time` while jobs run. If the budget lacks memory, idle workers that use the budget are
-/// dropped at once.
+/// Memory: a job gets the worker that was used last, so a single stream always uses the same
+/// worker. A worker is dropped after its buffers were oversized for `warm_time`, with one
+/// exception: it is kept if the number of streams that recently sent frames of that size is at
+/// least the number of workers, because all workers may be needed at any time. Freed memory returns
+/// to the system when a worker is dropped, and every `warm_time` while jobs run. If the budget
+/// lacks memory, idle workers whose bytes count in the budget are dropped at once.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
   using Afterwards = std::function<void()>;
 
-  /// `threads`: number of threads for all jobs together, at least 1. It also limits oneTBB in the
-  /// whole process while the pool exists. `budget`: counts the memory of workers
+  /// `threads`: number of threads for all jobs together, at least 1. While the pool exists, this
+  /// number also limits oneTBB in the whole process. `budget`: counts the memory of the workers
   /// (worker_memory.h). `observer` and `budget` outlive the pool.
   explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime,
                        FrameObserver* observer = nullptr, MemoryBudget* budget = nullptr);
@@ -65,10 +65,11 @@ class ComputePool {
   ComputePool(const ComputePool&) = delete;
   ComputePool& operator=(const ComputePool&) = delete;
 
-  /// Queues `job`. `afterwards` runs after it, when its worker is free again, so that a job which
-  /// `afterwards` submits gets the same worker. Neither may throw.
+  /// Queues `job`. `afterwards` runs after the job, when its worker is free again. So if
+  /// `afterwards` submits another job, that job gets the same worker. Neither function may throw.
   /// `stream`: the stream of the frame, or null for a unary call; lives as long as `job`.
-  /// `caller`: the caller whose turn the job uses; only compared, never dereferenced.
+  /// `caller`: the caller whose turn the job uses; the pool compares the pointer and never
+  /// dereferences it.
   /// `frame_bytes`: size of the frame's message. While memory is short, large frames are computed
   /// one after the other (WorkerMemory).
   /// Does not wait for jobs. Thread-safe; jobs may call it.
@@ -122,7 +123,8 @@ class ComputePool {
   Workers idle_ ABSL_GUARDED_BY(mutex_);             // The last one was used last.
   std::size_t working_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of workers that are not idle.
   BusyStreams busy_ ABSL_GUARDED_BY(mutex_);
-  // Time of the last shortage. Idle workers that were made before it are dropped.
+  // Time at which the budget last lacked memory. Idle workers that were created before it are
+  // dropped.
   WarmSize::Clock::time_point memory_was_short_ ABSL_GUARDED_BY(mutex_){};
   WarmSize::Clock::time_point gave_back_ ABSL_GUARDED_BY(mutex_) = WarmSize::Clock::now();
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;

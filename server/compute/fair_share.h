@@ -10,11 +10,13 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// Counts the part of a capacity ("room", in bytes or slots) that each caller holds.
+/// Divides a capacity (the "room", in bytes or slots) between callers: counts the amount that each
+/// caller holds, and decides whether it may take more.
 ///
-/// Rule: a caller that holds something may take more only if the free room afterwards is at least
-/// as large as its own holding. A single caller thus gets up to half of the room, two callers up to
-/// a third each, and some room always stays free for the next caller. Not thread-safe.
+/// Rule: a caller that already holds some of the room may take more only if the room that stays
+/// free is at least as large as the caller's total. So a single caller gets up to half of the room,
+/// and two callers get up to a third each. Some room always stays free for the next caller. Not
+/// thread-safe.
 class FairShare {
  public:
   static constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
@@ -27,22 +29,23 @@ class FairShare {
 
   explicit FairShare(std::uint64_t room) : room_(room) {}
 
-  /// Whether `caller` may take `amount` more. `most` is its quota. A null caller is the server
-  /// itself: only the room limits it.
+  /// Whether `caller` may take `amount` more. `most` is the caller's quota. A null caller stands
+  /// for the server itself, which is limited by the room only.
   Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const {
     return FitsInto(room_ + beyond_, caller, amount, most);
   }
-  /// Whether the holding of `caller` fits if the amount permitted beyond the room drops by
-  /// `beyond`.
+  /// Whether the amount that `caller` holds still fits if the amount permitted beyond the room
+  /// (AddBeyond) decreases by `beyond`.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller, std::uint64_t most) const {
     return FitsInto(room_ + beyond_ - beyond, caller, 0, most) == Fit::kYes;
   }
 
-  /// Permits `amount` of the holdings beyond the room, so that it takes nothing from other callers.
+  /// Enlarges the room by `amount`, for something that may exceed it. So this holding takes no room
+  /// from other callers.
   void AddBeyond(std::uint64_t amount) { beyond_ += amount; }
   void RemoveBeyond(std::uint64_t amount) { beyond_ -= amount; }
 
-  /// Counts `amount` as held, even if it does not fit.
+  /// Counts `amount` as held by `caller`, even if it does not fit.
   void Take(const CallerAccount* caller, std::uint64_t amount);
   void GiveBack(const CallerAccount* caller, std::uint64_t amount);
 

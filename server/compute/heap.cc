@@ -15,16 +15,17 @@ namespace partiemc::server {
 #ifdef __GLIBC__
 
 void KeepFreedMemory() {
-  // Allocations below this size come from the heap. Larger ones are mapped and unmapped each time.
-  // The largest value that glibc accepts.
+  // glibc takes blocks below this size from the heap. It maps and unmaps larger blocks each time,
+  // which is slow. This is the largest value that glibc accepts.
   constexpr int kMappedBytes = 32 << 20;
-  // Free bytes that the heap's end may keep: some frames of a million particles.
+  // Bytes at the end of the heap that may stay free before glibc returns them to the system. They
+  // suffice for some frames of a million particles.
   constexpr int kTopBytes = 64 << 20;
   mallopt(M_MMAP_THRESHOLD, kMappedBytes);
   mallopt(M_TRIM_THRESHOLD, kTopBytes);
-  // One arena for all threads: memory that one thread has freed serves the next thread. Threads
-  // rarely contend for it: a warm worker allocates little, and glibc caches small blocks per
-  // thread.
+  // All threads share one malloc arena, so that another thread can reuse memory that one thread has
+  // freed. Threads rarely contend for the arena: a worker with warm buffers allocates little, and
+  // glibc caches small blocks for each thread.
   mallopt(M_ARENA_MAX, 1);
 }
 

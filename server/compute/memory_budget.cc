@@ -35,7 +35,7 @@ void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
   held_ += bytes;
 }
 
-// As Fits, but also checks that no earlier claim has to be granted first.
+// Like Fits, but also checks that no earlier claim must be granted first.
 Fit MemoryBudget::FitsNow(const Claim& claim) const {
   for (const Claim& before : claims_) {
     const Fit fit = Fits(before);

@@ -17,26 +17,29 @@
 
 namespace partiemc::server {
 
-/// The violation's reason if a ReconstructFrame does not fit into the budget (proto/PROTOCOL.md).
+/// The violation's reason if a call of ReconstructFrame does not fit into the budget
+/// (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 
 /// RESOURCE_EXHAUSTED (MEMORY_BUDGET): `bytes` do not fit into the budget.
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget);
 
-/// Limits of the memory that may be held beyond the budget, so that large frames are possible.
+/// Limits of the memory that streams and one worker may hold beyond the budget, so that large
+/// frames can be computed.
 struct BeyondBudget {
   ReadTerms reads;
-  /// Maximum of the one worker that computes beyond the budget.
+  /// Maximum bytes of the one worker that may compute beyond the budget.
   std::uint64_t worker_bytes = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// Counts bytes, and queues claims that do not fit.
+/// Counts bytes against the budget, and queues claims (requests for bytes) that do not fit.
 ///
-/// Held bytes exist; planned bytes may arrive with reads in progress (ReadPermits). The sum of both
-/// must fit. Callers share the budget (FairShare); if `caller` is null, only the budget itself is a
-/// limit. A claim beyond its caller's share waits for that share, and later claims of this caller
-/// wait behind it. All other claims are granted in order. No later claim overtakes one that does
-/// not fit, so a stream of small frames cannot starve a stream of large frames.
+/// The budget counts held bytes, which exist, and planned bytes, which reads in progress may bring
+/// (ReadPermits). The sum of both must fit. Callers share the budget (FairShare); a null `caller`
+/// is limited by the budget only. If a claim exceeds its caller's share, it waits until that caller
+/// holds less, and later claims of this caller wait behind it. All other claims are granted in
+/// order. A claim never overtakes an earlier claim that does not fit into the budget, so a stream
+/// of small frames cannot starve a stream of large frames.
 ///
 /// Thread-safe. Only TakeForWorker blocks.
 class MemoryBudget {
@@ -44,7 +47,8 @@ class MemoryBudget {
   class Waiter {
    public:
     virtual ~Waiter() = default;
-    /// The waiter now holds `bytes`. Called without a lock, by the thread that freed memory.
+    /// The waiter now holds `bytes`. The thread that freed memory calls this, without holding a
+    /// lock.
     virtual void Granted(std::uint64_t bytes) = 0;
   };
 
@@ -59,35 +63,37 @@ class MemoryBudget {
   /// Decides which streams may read.
   ReadPermits& reads() { return reads_; }
 
-  /// Counts bytes that are held already, even if they do not fit.
+  /// Counts bytes that the caller holds already, even if they do not fit.
   void Take(std::uint64_t bytes, const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes the bytes if they fit and no earlier claim waits. Returns kYes, or why they do not fit.
+  /// Takes the bytes if they fit and no earlier claim waits. Returns kYes, or the reason why they
+  /// were not taken.
   FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// As TryTake. If the bytes do not fit, `Granted` follows as soon as they do, provided that
-  /// `waiter` still exists. The waiter keeps the caller's account alive.
+  /// Takes the bytes like TryTake. If they do not fit, queues a claim and calls `Granted` as soon
+  /// as they do, provided that `waiter` still exists. The waiter keeps the caller's account alive.
   bool TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                   const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the claims of `waiter`. A `Granted` that another thread has begun still arrives.
+  /// Removes the claims of `waiter`. A call of `Granted` that another thread has already begun
+  /// still arrives.
   void StopWaiting(const std::shared_ptr<Waiter>& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Grants waiting claims. Requires: the calling thread holds no lock.
+  /// Gives back bytes and grants claims that then fit. Requires: the calling thread holds no lock.
   void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Takes bytes for a worker, and blocks until they fit or no other worker computes beyond the
-  /// budget. In the second case it takes them beyond the budget, BeyondBudget::worker_bytes at
-  /// most. Returns the bytes taken.
+  /// Takes bytes for a worker. Blocks until they fit into the budget, or until no other worker
+  /// computes beyond the budget. In the second case the bytes are taken beyond the budget, at most
+  /// BeyondBudget::worker_bytes. Returns the number of bytes taken.
   std::uint64_t TakeForWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes bytes beyond the budget. Returns false if another worker computes beyond it, or this one
-  /// would exceed BeyondBudget::worker_bytes.
+  /// Takes bytes for a worker beyond the budget. Returns false if another worker computes beyond
+  /// the budget, or if this worker would exceed BeyondBudget::worker_bytes.
   bool TryTakeBeyond(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Whether the worker computes beyond the budget.
+  /// Whether `worker` holds bytes beyond the budget.
   bool IsBeyond(const void* worker) const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Gives back all `bytes` that a worker holds, within the budget and beyond it.
+  /// Gives back all `bytes` that a worker holds, both within the budget and beyond it.
   void GiveBackOfWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Sets the function that is called when a claim does not fit into the budget. Claims beyond a
-  /// caller's share do not count. Empty: none is called. `tell` must not call MemoryBudget.
+  /// Sets the function that is called when a claim does not fit into the budget. It is not called
+  /// if a claim only exceeds its caller's share. Empty: no call. `tell` must not call MemoryBudget.
   void OnShortage(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::uint64_t held() const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -115,12 +121,14 @@ class MemoryBudget {
   void Plan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   bool TryPlan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   void Unplan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Permits `after` bytes beyond the budget instead of `before`.
+  // Changes the bytes that are permitted beyond the budget: removes `before` and adds `after`.
   void ChangeBeyond(std::uint64_t before, std::uint64_t after) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether the caller's bytes still fit if `beyond` fewer bytes are permitted beyond the budget.
+  // Whether the caller's bytes still fit if the amount permitted beyond the budget decreases by
+  // `beyond`.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  // An error if all bytes, including these held ones, exceed the budget or the caller's quota.
+  // Returns an error if all counted bytes, which include `bytes`, exceed the budget or the caller's
+  // quota.
   absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::uint64_t PlannedBy(const CallerAccount* caller) const ABSL_LOCKS_EXCLUDED(mutex_);

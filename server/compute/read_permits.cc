@@ -9,14 +9,14 @@
 namespace partiemc::server {
 namespace {
 
-// A connection that receives fewer bytes than this in the time below is idle. 16 kB/s is less than
-// a slow connection reaches; one second is longer than a busy client needs to begin a message. The
-// longer time applies if the system does not report the bytes of a connection.
+// A connection is idle if it receives fewer bytes than kMovingBytes within kQuiet. Even a slow
+// connection reaches more than 16 kB/s, and a busy client needs less than one second to begin a
+// message. kQuietUnknown applies if the system does not report the received bytes of a connection.
 constexpr std::uint64_t kMovingBytes = 16 << 10;
 constexpr std::chrono::milliseconds kQuiet(1000), kQuietUnknown(2000);
 
-// Bytes that a connection may receive in addition to the message: frames of HTTP/2, pings, other
-// calls.
+// Bytes that a connection may receive in addition to the expected message: HTTP/2 frames, pings,
+// other calls.
 constexpr std::uint64_t kBeside = 1 << 20;
 
 absl::Status OutOfMemoryForReads() {
@@ -104,7 +104,8 @@ void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
   budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
 }
 
-// Ends the read or the frame of this permit.
+// Ends the read that the permit allows, or the frame that was read, and releases its bytes and its
+// slot.
 void ReadPermits::Finish(Permits::value_type& item) {
   Permit& permit = item.second;
   if (permit.number == 0) return;  // The permit was just created.
@@ -135,7 +136,7 @@ bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
   return true;
 }
 
-// The slot with which this connection may read beyond the budget, or null.
+// Returns the slot that allows this connection to read beyond the budget; null if there is none.
 ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool may_open_slot) {
   const auto found = slots_.find(item.second.read.stream);
   if (found != slots_.end()) {
@@ -148,7 +149,7 @@ ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool m
   return &slots_[item.second.read.stream];
 }
 
-// Frees the slots of frames that now fit into the budget and their caller's share.
+// Frees a slot if its bytes now fit into the budget and into the share of its caller.
 void ReadPermits::FreeSlots() {
   for (auto& [reader, permit] : permits_) {
     if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
@@ -166,20 +167,21 @@ void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
   if (slot->second.open.empty()) slots_.erase(slot);
 }
 
-// Permits the next waiting read that fits. Returns null if none fits.
+// Gives a permit to the next waiting read that fits. Returns null if no read fits.
 std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   std::map<const CallerAccount*, std::size_t> slots_of;
   for (const auto& [reader, permit] : permits_) {
     if (permit.has_slot) ++slots_of[permit.read.caller];
   }
-  // The budget of a caller changes during the sort, so each rank is computed once, before it.
+  // Computes each rank once, before the sort: other threads may change a caller's bytes during the
+  // sort.
   using Rank = std::tuple<bool, std::size_t, std::uint64_t, std::uint64_t>;
   std::vector<std::pair<Rank, Permits::value_type*>> waiting;
   for (auto& item : permits_) {
     const Permit& permit = item.second;
     if (permit.state != State::kWaiting) continue;
     const CallerAccount* const caller = permit.read.caller;
-    // Streams that already have a slot come first: their reads complete frames.
+    // Sorts streams that already have a slot first, because their reads complete frames.
     waiting.push_back({{!slots_.contains(permit.read.stream), slots_of[caller],
                         budget_.PlannedBy(caller), permit.number},
                        &item});
@@ -287,8 +289,9 @@ std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
   std::vector<std::shared_ptr<Reader>> revoked;
   {
     const MutexLock lock(mutex_);
-    // Sorts each caller's reads by received bytes, most first. Then takes the first read of every
-    // caller, the second read of every caller, and so on. The first ones continue.
+    // Orders the reads: sorts each caller's reads by received bytes, most first. Then takes the
+    // first read of every caller, the second read of every caller, and so on. The reads at the
+    // front continue; the others are ended.
     std::map<const CallerAccount*, std::vector<const Permit*>> of_caller;
     for (const auto& [reader, permit] : permits_) {
       if (IsAtRisk(permit)) of_caller[permit.read.caller].push_back(&permit);

@@ -22,33 +22,35 @@ class CallerAccount;
 class MemoryBudget;
 
 struct ReadTerms {
-  /// Streams that may hold a frame beyond the budget at the same time, at least 1.
+  /// Maximum number of streams that may hold a frame beyond the budget at the same time, at least
+  /// 1.
   std::uint32_t streams_beyond = 2;
-  /// The largest message, at least 1.
+  /// Size of the largest message, at least 1.
   std::uint64_t message_bytes = 1;
 };
 
 /// Grants permits to read. gRPC reports the size of a message only after the whole message has
-/// arrived, and a read that has begun cannot be stopped. So a stream that has no frame in flight
+/// arrived, and a read that has begun cannot be stopped. So a stream without a frame in flight
 /// needs a permit for its next read:
 ///
 /// 1. A permit plans the bytes that the read may bring: the size of the stream's last frame, or the
-///    largest message for the first frame. Planned bytes count in the budget like held bytes.
-/// 2. If they do not fit into the budget, the stream may get a slot, which permits one frame beyond
-///    the budget. There are `streams_beyond` slots. Without a slot the read waits. A stream keeps
-///    its slot until the response to the frame is sent. Bytes in a slot do not count in the
-///    budget, so they take nothing from other streams.
+///    size of the largest message for the first frame. Planned bytes count in the budget like held
+///    bytes.
+/// 2. If the planned bytes do not fit into the budget, the stream may get a slot, which permits one
+///    frame beyond the budget. There are `streams_beyond` slots. If no slot is free, the read
+///    waits. A stream keeps its slot until the response to the frame is sent. Bytes in a slot do
+///    not count in the budget, so they take no memory from other streams.
 /// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
-///    other, each once, until they have brought one message's size.
-/// 4. Slots go to the caller with the fewest slots, then the fewest bytes. Within a caller the read
-///    that has waited longest comes first.
-/// 5. While other reads wait, a permit lapses if its connection is idle: the read continues, but
-///    its bytes are no longer planned. So an idle stream does not block others. If a lapsed read
-///    receives bytes after all, or a read receives more than planned, the difference is planned as
-///    soon as it fits. If memory is exhausted before that, `Revoke` ends such streams.
+///    other, each connection once, until they have received the size of the largest message.
+/// 4. Waiting reads get slots in this order: first the reads of the caller with the fewest slots,
+///    then of the caller with the fewest bytes, then the read that has waited longest.
+/// 5. While other reads wait, the permit of an idle connection lapses: its read continues, but its
+///    bytes are no longer planned. So an idle stream does not block others. A lapsed read may
+///    receive bytes after all, and any read may receive more bytes than planned. These bytes are
+///    planned as soon as they fit. If memory is exhausted before that, `Revoke` ends such streams.
 ///
-/// So all streams together hold at most the budget, plus one message for each slot, or two if the
-/// stream's frames arrive in parts. Thread-safe.
+/// So all streams together hold at most the budget plus one message for each slot, or two messages
+/// if the stream's frames arrive in parts. Thread-safe.
 class ReadPermits {
  public:
   using Clock = std::chrono::steady_clock;
@@ -56,9 +58,10 @@ class ReadPermits {
   class Reader {
    public:
     virtual ~Reader() = default;
-    /// The waiting read may begin. Called without a lock.
+    /// The waiting read may begin. Called without holding a lock.
     virtual void ReadPermitted() = 0;
-    /// Memory is exhausted: ends the stream while its read is in progress. Called without a lock.
+    /// Memory is exhausted: the stream must end if its read is still in progress. Called without
+    /// holding a lock.
     virtual void ReadRevoked(const absl::Status& status) = 0;
   };
 
@@ -69,42 +72,48 @@ class ReadPermits {
     std::string peer;  ///< As CallChannel::peer.
   };
 
-  /// Bytes that the connection of a peer has received so far; none if unknown.
+  /// Returns the bytes that the connection of a peer has received so far, or nothing if the number
+  /// is unknown.
   using ReceivedBytes = std::function<std::optional<std::uint64_t>(const std::string& peer)>;
 
   ReadPermits(MemoryBudget& budget, const ReadTerms& terms);
 
-  // For readers. A reader may hold its own lock in these calls; it calls Serve after releasing it.
+  // For readers. A reader may hold its own lock during these calls. It calls Serve after it has
+  // released this lock.
 
-  /// Requests a permit for a reader that has nothing in flight. If false, ReadPermitted follows.
+  /// Requests a permit for a reader that has no frame in flight. Returns false if the read must
+  /// wait; ReadPermitted is called later.
   bool Begin(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// As Begin, but always permits the read. Requires: the expected bytes fit into the budget.
+  /// Like Begin, but always permits the read. Requires: the expected bytes fit into the budget.
   void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The read is complete: it has brought `bytes`, which the budget counts as held. Errors, each
-  /// with a Violation: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed
-  /// and the bytes do not fit.
+  /// Records that the read is complete. It has received `bytes`, which count as held in the budget.
+  /// Errors, each with a Violation: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit
+  /// has lapsed and the bytes do not fit.
   absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Forgets the reader: it neither reads nor waits and has nothing in flight. Idempotent.
+  /// Removes the reader and its permit: it does not read, does not wait, and has no frame in
+  /// flight. Idempotent.
   void End(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Permits waiting reads that fit now. Requires: the calling thread holds no lock.
+  /// Gives permits to waiting reads that fit now. Requires: the calling thread holds no lock.
   void Serve();
 
   // For the thread that watches the memory of the process (IntakeGuard):
 
-  /// True if reads wait, if permits have lapsed, or if the held and planned bytes plus one largest
-  /// message for each read in progress exceed the budget plus one largest message for each slot.
+  /// Whether Look is needed. True if reads wait, or if permits have lapsed, or if the following sum
+  /// exceeds the budget plus one largest message for each slot: held bytes, planned bytes, and one
+  /// largest message for each read in progress.
   bool NeedsLook() const;
-  /// Whether permits may lapse, or have lapsed.
+  /// Whether Look needs the received bytes, because permits may lapse or have lapsed.
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }
   /// Sets the function that is called when a read begins to wait or NeedsLook becomes true. The
-  /// thread that calls it may hold a reader's lock. Empty: none is called.
+  /// calling thread may hold a reader's lock. Empty: no call.
   void OnWaiting(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(tell_mutex_);
-  /// Lets permits of idle connections lapse, and plans bytes that arrived beyond the plan.
+  /// Lets the permits of idle connections lapse. Plans the bytes that arrived in addition to the
+  /// planned bytes.
   void Look(Clock::time_point now, const ReceivedBytes& received) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Memory is exhausted: ends streams whose reads receive more than was planned. One such read
-  /// continues for each largest message that fits into `free_bytes`; callers take turns. Returns
-  /// the number of ended streams.
+  /// Called if memory is exhausted. Ends the streams whose reads receive more bytes than planned,
+  /// except for one read for each largest message that fits into `free_bytes`. Callers take turns
+  /// in keeping reads. Returns the number of ended streams.
   std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const ReadTerms& terms() const { return terms_; }
@@ -127,7 +136,7 @@ class ReadPermits {
     std::optional<Clock::time_point> moved;  // When the connection last was not idle.
   };
   using Permits = std::map<const Reader*, Permit>;
-  // Allows one frame beyond the budget. All connections of a stream share its slot.
+  // Permits one frame beyond the budget. All connections of a stream share one slot.
   struct Slot {
     std::uint64_t bytes = 0;       // Received bytes.
     bool reading = false;          // Whether one of the stream's connections reads.

@@ -1,4 +1,5 @@
-// Remembers recent callers, to decide whether a caller competes with another one.
+// Remembers recent callers, so that the compute pool can determine whether a caller competes with
+// another caller.
 #pragma once
 
 #include <chrono>
@@ -7,7 +8,8 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// Remembers the last caller and the last different caller, which suffices. Not thread-safe.
+/// Remembers the last caller and the last caller that differs from it. These two suffice for
+/// AnybodyBut. Not thread-safe.
 class RecentCallers {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -17,7 +19,7 @@ class RecentCallers {
     if (!last_.came || last_.caller != caller) other_ = last_;
     last_ = {caller, now, true};
   }
-  /// Whether another caller than `caller` came at `since` or later.
+  /// Whether a caller other than `caller` was active at `since` or later.
   bool AnybodyBut(const CallerAccount* caller, TimePoint since) const {
     const Visit& visit = last_.caller == caller ? other_ : last_;
     return visit.came && visit.time >= since;

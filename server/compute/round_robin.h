@@ -27,15 +27,15 @@ class Line {
   std::list<T> items_;  // An empty deque already allocates half a kilobyte.
 };
 
-/// A queue for each key; non-empty queues take turns, one item a turn, in the order in which they
-/// became non-empty. `Lines` is a Line, or again a RoundRobin. Cost: O(log(queues)) an item. Not
-/// thread-safe.
+/// One queue for each key. The non-empty queues take turns, one item in each turn, in the order in
+/// which they became non-empty. `Lines` is the type of a queue: a Line, or again a RoundRobin.
+/// Cost: O(log(queues)) for each item. Not thread-safe.
 template <typename Key, typename Lines>
 class RoundRobin {
  public:
   using Item = typename Lines::Item;
 
-  /// `where`: the keys of inner RoundRobins, if any, then the item.
+  /// `where`: the keys of the inner RoundRobins, if any, and finally the item.
   template <typename... Where>
   void Push(const Key& key, Where&&... where) {
     auto [line, is_new] = lines_.try_emplace(key);
@@ -45,8 +45,8 @@ class RoundRobin {
 
   /// Requires: not empty.
   Item Pop() { return Take(turns_.begin()); }
-  /// Pops from the first queue whose key is `allowed`; queues before it keep their turn. None if no
-  /// key is allowed.
+  /// Pops an item from the first queue whose key is `allowed`. Queues before it keep their turn.
+  /// Returns nothing if no key is allowed.
   template <typename Allowed>
   std::optional<Item> PopOf(Allowed allowed) {
     const auto turn = std::find_if(turns_.begin(), turns_.end(),

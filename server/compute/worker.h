@@ -15,8 +15,9 @@
 
 namespace partiemc::server {
 
-/// Decides when buffers are oversized. Buffers grow to the largest frame and keep that size; they
-/// are oversized if no frame of at least a quarter of it was computed for `warm_time`.
+/// Decides when a worker's buffers are oversized. Buffers grow to the size of the largest frame and
+/// keep it. They are oversized if, for `warm_time`, the worker computed no frame of at least a
+/// quarter of that size.
 class WarmSize {
  public:
   using Clock = std::chrono::steady_clock;
@@ -31,7 +32,8 @@ class WarmSize {
   }
   bool used() const { return largest_ > 0; }
   std::size_t largest() const { return largest_; }
-  /// The size of the last use since the previous call of this method, or 0.
+  /// Returns the size of the last frame since the previous call of this method, or 0 if there was
+  /// none.
   std::size_t TakeLast() { return std::exchange(last_, 0); }
 
   /// The smallest frame for which buffers of size `largest` are not oversized.
@@ -43,8 +45,8 @@ class WarmSize {
   Clock::time_point needed_;
 };
 
-/// Buffers for parsing and writing messages. `server/calls` derives from it, because a session
-/// includes no messages.
+/// Buffers for parsing and writing messages. A class of server/calls derives from it, because the
+/// compute rooms must not include messages.
 class MessageBuffers {
  public:
   virtual ~MessageBuffers() = default;
