@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::chrono::seconds kHealthCheckTimeout{3};
 
-// Time after the grace time for cancelled work to end.
+// Time that cancelled work gets to end, after the grace time has passed.
 constexpr std::chrono::milliseconds kTimeToEnd{500};
 constexpr int kCutOff = 1;  // Exit code if it has not ended.
 
@@ -35,8 +35,8 @@ int Fail(const absl::Status& status) {
   return 1;
 }
 
-// gRPC's listener stops for good if a connection finds no free descriptor (CVE-2023-4785), so the
-// process raises its limit to the maximum.
+// gRPC stops listening forever if a connection arrives while the process has no free descriptor
+// (CVE-2023-4785). Therefore the process raises its limit of descriptors to the maximum.
 void TakeAllDescriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -44,7 +44,8 @@ void TakeAllDescriptors() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// Writes to a temporary name first, so that readers never see half of the file.
+// Writes the address to a temporary file and renames it, so that a reader never sees half of the
+// file.
 absl::Status WritePortFile(const std::string& flag, const std::string& path,
                            const Address& address) {
   const std::string temporary = path + ".part";
@@ -60,7 +61,7 @@ absl::Status WritePortFile(const std::string& flag, const std::string& path,
   return absl::OkStatus();
 }
 
-// Returns the received signal, or 0 after `time`.
+// Waits for a signal. Returns the received signal, or 0 after `time`.
 int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
   const auto until = std::chrono::steady_clock::now() + time;
   for (;;) {
@@ -74,10 +75,12 @@ int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
   }
 }
 
-// The first thread to set it decides how the process ends: the drain or the cut.
+// The thread that sets this flag first ends the process: either the main thread after the drain, or
+// the thread of CutDrainShort.
 std::atomic<bool> leaving = false;
 
-// Ends the process in any state, at a second signal or at the end of the grace time.
+// Waits for a second signal or for the end of the grace time, then ends the process, whatever its
+// state, unless the drain has finished.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
   const int signal = WaitForSignal(signals, grace + kTimeToEnd);
   if (leaving.exchange(true)) return;
@@ -90,10 +93,11 @@ void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
 int Serve(const CommandLine& line) {
   KeepFreedMemory();
   TakeAllDescriptors();
-  // Disables abseil's deadlock detection, which distributions enable and every lock of gRPC pays
-  // for.
+  // Disables abseil's deadlock detection. Linux distributions build abseil with it, and it slows
+  // down every lock of gRPC.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // Blocks the signals before gRPC starts threads, so that only sigwait receives them.
+  // Blocks these signals before gRPC starts threads. The threads inherit the mask, so only sigwait
+  // receives the signals.
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
@@ -132,7 +136,8 @@ int Serve(const CommandLine& line) {
   if (line.drain_delay.count() > 0) (*server)->SendAway(line.drain_delay);
   (*server)->Drain(line.grace);
   server->reset();
-  // The drain finished while CutDrainShort is ending the process.
+  // If CutDrainShort has set the flag first, it is about to end the process; this thread waits for
+  // that.
   while (leaving.exchange(true)) std::this_thread::sleep_for(kTimeToEnd);
   LogEvent(spdlog::level::info, "stopped", {});
   FlushLog();

@@ -39,7 +39,7 @@ constexpr char kFooter[] =
     "Exit codes: 0 success, 1 failed or cut off after --grace-seconds, 2 invalid command line,\n"
     "128 + N ended by a second signal N.";
 
-// Values of the flags before they are checked together.
+// The values of the flags as CLI11 parsed them. Check examines them together.
 struct Raw {
   std::string address = "127.0.0.1:50051";
   std::string health_check;
@@ -60,11 +60,13 @@ struct Raw {
   CommandLine line;
 };
 
-// The receive limit of 1.25 times this value must fit into gRPC's int.
+// Maximum of --max-frame-bytes and --max-watcher-bytes: gRPC's limit for a received message is 1.25
+// times this value and must fit into an int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
 
-// The default frame size is this part of the budget, because a frame is in memory before it is
-// counted. With a very small budget, streams still progress one frame at a time.
+// By default a frame may have 1/kFramesInBudget of the memory budget, because a frame is in memory
+// before it is counted; but at least kLeastFrameBytes. If the budget is very small, streams still
+// progress, one frame at a time.
 constexpr std::uint64_t kFramesInBudget = 8;
 constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
@@ -403,7 +405,7 @@ EarlyExit Wrong(const std::string& message) {
   return {2, "partiemc-server: " + line + "; see --help\n"};
 }
 
-// Rounds up, so that a short time does not become 0.
+// Rounds up, so that a short positive time does not become 0.
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
 }
@@ -493,12 +495,13 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   app.add_flag("--print-memory-plan", raw.print_memory_plan,
                "Print the maximum memory for these options, and exit")
       ->configurable(false);
-  // CLI11 reads the environment after the file, too late for the name of the file.
+  // Reads the variable here, because CLI11 evaluates environment variables after it has read the
+  // config file: too late for the name of this file.
   const char* const config = std::getenv("PARTIEMC_CONFIG");
   app.set_config("--config", config != nullptr ? config : "",
                  "Read options from this file (environment: PARTIEMC_CONFIG)",
                  /*config_required=*/config != nullptr);
-  // Otherwise a misspelt option in the file would be ignored.
+  // Without this mode, CLI11 would ignore a misspelt option in the file.
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.set_version_flag("--version", "partiemc-server " PARTIEMC_VERSION);
   try {

@@ -14,23 +14,23 @@ namespace partiemc::server {
 
 struct CommandLine {
   ServerOptions server;
-  /// Time after SIGTERM for delivering finished frames and ending streams.
+  /// Time after SIGTERM in which the server delivers finished frames and ends its streams.
   std::chrono::milliseconds grace{4000};
-  /// Time after SIGTERM in which the server still serves but reports that it is not ready
-  /// (Server::SendAway).
+  /// Time after SIGTERM in which the server still serves but its health checks report that it does
+  /// not (Server::SendAway). The grace time follows.
   std::chrono::milliseconds drain_delay{0};
-  /// File for the bound address, written when the server serves.
+  /// File to which the server writes its bound address as soon as it serves.
   std::optional<std::string> port_file;
-  /// Same for the gateway.
+  /// File to which the server writes the bound address of the gateway.
   std::optional<std::string> web_port_file;
-  /// Only checks whether the server at this address serves.
+  /// If set, the program does not serve. It only checks whether the server at this address serves.
   std::optional<Address> health_check;
   HealthCheckSecurity health_check_security;
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
 };
 
-/// The process prints `text` and exits with `code`.
+/// Returned if the process must print `text` and exit with `code`.
 struct EarlyExit {
   int code = 0;      ///< 0 for --help and --version, 2 for a wrong command line.
   std::string text;  ///< For standard output if `code` is 0, otherwise one line for standard error.

@@ -33,14 +33,15 @@ namespace {
 // Size of one read from a connection.
 constexpr int kReadBytes = 32 << 10;
 
-// Time limit for the handshakes of HTTP/2 and TLS.
+// Time limit for the handshakes of HTTP/2 and TLS on a new connection.
 constexpr int kHandshakeTimeoutMs = 10'000;
 constexpr int kReflectionThreads = 16;
 
-// Descriptors for the gateway, files and threads.
+// Descriptors that are reserved for the gateway, files and threads; the rest is available for
+// gRPC's connections.
 constexpr std::uint64_t kOtherDescriptors = 512;
 
-// Streams of a connection that have ended but are not destroyed yet.
+// Allowance for streams of a connection that have ended but that gRPC has not destroyed yet.
 constexpr std::uint64_t kStreamsThatEnd = 64;
 
 constexpr std::chrono::milliseconds kTimeToCut(250);
@@ -73,9 +74,10 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
   return secrets;
 }
 
-// Limits for the process's memory: its memory at the start, the workers, and the budget, which
-// includes histories. Outside the budget: frames above it, and undelivered results of watchers, up
-// to a sixteenth of the budget.
+// The limits that IntakeGuard enforces for the memory of the process. The process may hold its
+// memory at the start, the workers, and the budget, which includes the histories. In addition it
+// may hold frames beyond the budget, and results that watchers have not received yet, up to a
+// sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const WatchRegistry& watchers) {
   const std::uint64_t outside =
@@ -119,8 +121,8 @@ ConnectionRules RulesOfConnections(const ServerOptions& options) {
                              : options.limits.CallsOfOneCaller() + kStreamsThatEnd};
 }
 
-// Keeps the newest result of another replica's stream whatever its size, because fetching it again
-// takes a moment.
+// The limits of the relay. kept_bytes is as large as a watcher's limit, so that the newest result
+// of another replica's stream is always kept: fetching it again takes time.
 Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
   return {.broadcaster = {.mailbox_bytes = limits.max_watcher_bytes,
                           .kept_bytes = limits.max_watcher_bytes},
@@ -129,7 +131,8 @@ Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
           .watches = limits.max_watchers};
 }
 
-// Time for watchers to receive the notice of the drain. A watcher that does not read is then cut.
+// Time for watchers to receive the notice of the drain. After it, watchers that do not read are
+// cut.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
 }  // namespace
@@ -330,30 +333,33 @@ absl::Status Server::Listen() {
   builder.RegisterService(service_.get());
   builder.RegisterService(health_.get());
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.MaxMessageBytes()));
-  // Disables gRPC's limit: ConnectionWatch counts PINGs with the other bytes. gRPC would need 64
-  // MiB for the errors of a flood of PINGs.
+  // Disables gRPC's own limit of PINGs: ConnectionWatch counts PINGs with all other bytes. If gRPC
+  // enforced its limit, a flood of PINGs would make it create error objects of up to 64 MiB.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  // Detects lost clients (a frozen program, a cut cable), which would hold their streams for hours.
+  // Detects lost clients, such as a frozen program or a cut cable. Without keepalive they would
+  // hold their streams for hours.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
                              static_cast<int>(options_.keepalive.interval.count()));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
                              static_cast<int>(options_.keepalive.timeout.count()));
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // No limit.
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
-  // Fixes the window of bytes that a client may send before they are read. gRPC's growing windows
-  // would let a hundred unread bodies hold 70 MiB. A pending read opens the window for its whole
-  // message, so large frames only lose one round trip.
+  // Fixes the flow-control window: the bytes that a client may send before the server reads them.
+  // If gRPC could enlarge the windows, a hundred unread bodies would hold 70 MiB. A pending read
+  // opens the window for the whole message, so a large frame loses only one round trip.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, static_cast<int>(kUnreadBytes));
-  // The limit of one connection equals a caller's default limit of calls. Further calls wait in the
-  // client or use another connection.
+  // The maximum number of HTTP/2 streams of a connection equals the default limit of a caller's
+  // calls. Further calls wait in the client or use another connection.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options_.limits.CallsOfOneCaller()));
-  // gRPC parses all of one read, whatever happens to the connection. 32 KiB can contain 4,000
-  // calls, which take 40 MiB; gRPC's default of 4 MiB would take more than 1 GiB.
+  // Limits the size of one read from a socket. gRPC parses all bytes of a read, even if the
+  // connection has been cut. A read of 32 KiB can contain 4,000 calls, which take 40 MiB. gRPC's
+  // default of 4 MiB could take more than 1 GiB.
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
-  // Bounds the threads of reflection, the only service that uses a thread for each call.
+  // Limits the threads of the reflection service, the only service that occupies a thread for each
+  // call.
   grpc::ResourceQuota quota;
   quota.SetMaxThreads(kReflectionThreads);
   builder.SetResourceQuota(quota);
@@ -394,9 +400,9 @@ std::optional<Address> Server::web_address() const {
 }
 
 Server::~Server() {
-  // Watches stop waiting for their streams.
+  // Drains the relay first: watch calls stop waiting for streams of other replicas.
   if (relay_ != nullptr) relay_->Drain();
-  // Ends all its calls while the objects they use exist.
+  // Ends the calls of the gateway while the objects that they use still exist.
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now());
   if (server_ == nullptr) return;
   acceptor_->StopListening();
@@ -406,8 +412,9 @@ Server::~Server() {
   acceptor_.reset();
 }
 
-// Waits until no new calls arrive. A call that arrives during gRPC's shutdown is cut without a
-// reason, so they are refused before, with a reason to try elsewhere.
+// Waits until no new calls arrive. gRPC's shutdown would cut a new call without a reason. Before
+// the shutdown, the server refuses new calls with a reason, so that their clients try another
+// server.
 void Server::WaitUntilNobodyComes(std::chrono::steady_clock::time_point deadline) const {
   std::uint64_t before = 0;
   do {
@@ -439,14 +446,14 @@ void Server::SendAway(std::chrono::milliseconds delay) {
 }
 
 void Server::Drain(std::chrono::milliseconds grace) {
-  // Reserves part of the grace time for cutting clients that do not read their responses.
+  // Reserves part of the grace time: in it, clients that do not read their responses are cut.
   const auto deadline = std::chrono::steady_clock::now() + grace - std::min(grace / 8, kTimeToCut);
   StopBeingReady();
   registry_.Drain();
   calls_.Drain();
-  // gRPC's Shutdown sends nothing to streams: it waits, then cuts. Streams therefore end first,
-  // including their status: closing a connection with unread requests discards the bytes just
-  // written.
+  // Streams must end before gRPC's Shutdown, which sends nothing to them: it waits, then cuts them.
+  // A stream must also have sent its status: closing a connection that has unread requests discards
+  // the bytes just written.
   registry_.WaitUntilEmpty(deadline);
   calls_.WaitForFrames(deadline);
   dispatcher_.Flush();  // Delivers the last results before the watches end.
@@ -459,7 +466,8 @@ void Server::Drain(std::chrono::milliseconds grace) {
   const auto closed = std::chrono::system_clock::now() + left;
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + left);
   acceptor_->StopListening();
-  // A client that does not respond would delay the end.
+  // Sets a deadline for connections, because a client that does not respond would delay the
+  // shutdown.
   watch_.EndAllAt(std::chrono::steady_clock::now() + left);
   server_->Shutdown(closed);
   server_->Wait();

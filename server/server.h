@@ -1,4 +1,5 @@
-// The running server: gRPC server with service, health and reflection, gateway, and drain.
+// The running server: serves the methods, health checks and reflection over gRPC, runs the gateway,
+// and drains.
 #pragma once
 
 #include <atomic>
@@ -50,57 +51,62 @@ class Methods;
 class Service;
 class WebGateway;
 
-/// How the server detects that a connection is dead without being closed. The name of a lost
-/// producer is free after the sum of both times.
+/// Settings for detecting a connection that is dead but was not closed. If a producer is lost, its
+/// stream's name becomes free after the sum of both times.
 struct Keepalive {
-  /// A connection that is silent for this time gets a ping.
+  /// The server sends a ping to a connection that is silent for this time.
   std::chrono::milliseconds interval{15'000};
-  /// It is closed if it stays silent for this time. Longer than 5 s, because an idle gRPC client
-  /// reads its connections only every 5 s.
+  /// The server closes the connection if it stays silent for this time after the ping. It must
+  /// exceed 5 s, because an idle gRPC client reads its connections only every 5 s.
   std::chrono::milliseconds timeout{10'000};
 };
 
 struct ServerOptions {
   Address address{.host = "127.0.0.1", .port = 50051, .unix_path = {}};
-  /// Allows an address that other machines can reach without TLS.
+  /// Permits to serve without TLS on an address that other machines can reach.
   bool insecure = false;
-  /// Requires TLS with this identity.
+  /// If set, connections use TLS with this certificate and key.
   std::optional<TlsFiles> tls;
-  /// Admits only callers with a token of this file (BearerTokens::Parse), except health checks.
+  /// If set, the server admits only callers with a token of this file (BearerTokens::Parse). Health
+  /// checks need no token.
   std::optional<std::string> token_file;
-  /// Signs checkpoints, and accepts only checkpoints signed with a key of this file
-  /// (CheckpointKeys::Parse).
+  /// If set, the server signs checkpoints, and accepts only checkpoints that were signed with a key
+  /// of this file (CheckpointKeys::Parse).
   std::optional<std::string> checkpoint_key_file;
-  /// Interval for checking those files for changes, which apply to later connections and calls.
+  /// Interval for checking the files above for changes. A change applies to later connections and
+  /// calls.
   std::chrono::milliseconds reload_interval{1000};
-  /// Address for metrics over HTTP. They contain no names and no data of streams.
+  /// If set, the server serves metrics over HTTP at this address. They contain no names and no data
+  /// of streams.
   std::optional<Address> metrics;
-  /// Options for the viewer's page and the methods over HTTP and WebSocket, with the same identity,
-  /// tokens and limits.
+  /// If set, the server runs the gateway, which serves the viewer's page and the methods over HTTP
+  /// and WebSocket. The gateway uses the same identity, tokens and limits.
   std::optional<WebOptions> web;
-  /// URL of the NATS server that connects replicas (ConnectToNats).
+  /// If set, the URL of the NATS server that connects the replicas (ConnectToNats).
   std::optional<std::string> nats;
-  /// Address to which draining replicas redirect clients; empty: none.
+  /// Address of this server for clients. Replicas that drain send their clients to it. Empty: none.
   std::string advertised_address;
-  /// Compute threads of all streams, at least 1.
+  /// Number of compute threads for all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
   /// Limits of the connections of `address`.
   ConnectionLimits connections;
-  /// Maximum received bytes of a connection that belong to no call and no message. A connection
-  /// that exceeds it is cut. 0 disables this limit and those for its streams and headers.
+  /// Maximum number of bytes that a connection has received and that belong to no call and no
+  /// message. The server cuts a connection that exceeds it. 0 disables this limit, and the limits
+  /// of a connection's streams and headers.
   std::uint64_t unaccounted_bytes = ConnectionRules{}.unaccounted_bytes;
   Keepalive keepalive;
 };
 
 class Server {
  public:
-  /// Listens and serves when it returns. Errors: INVALID_ARGUMENT for an address that other
-  /// machines can reach with neither `tls` nor `insecure`, and for invalid files of `tls`, tokens
-  /// or keys; UNAVAILABLE if it cannot listen. Each message is one line: problem, place, remedy.
+  /// Starts the server; it listens and serves when this returns. Errors: INVALID_ARGUMENT for an
+  /// address that other machines can reach if neither `tls` nor `insecure` is set, and for invalid
+  /// files of TLS, tokens or keys; UNAVAILABLE if it cannot listen. Each message is one line:
+  /// problem, place, remedy.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
-  /// Stops at once unless it was drained.
+  /// Stops at once, unless Drain has already stopped the server.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -112,17 +118,19 @@ class Server {
   /// Absent if the gateway is off.
   std::optional<Address> web_address() const;
 
-  /// A channel to this server without a socket, for tests and embedding.
+  /// Creates a channel to this server within the process, without a socket, for tests and
+  /// embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
-  /// Serves for `delay` more, while health checks report that it does not, so that proxies send no
-  /// new clients. In the second half, streams are redirected one after the other, so that they do
-  /// not reconnect at the same moment. Call Drain afterwards.
+  /// Serves for the time `delay`. Meanwhile health checks report that the server does not serve, so
+  /// that proxies send it no new clients. In the second half of the time, streams are redirected
+  /// one after the other, so that their clients do not reconnect at the same moment. Call Drain
+  /// afterwards.
   void SendAway(std::chrono::milliseconds delay);
 
-  /// Refuses new calls, notifies the streams, answers the frames they have sent, ends watches and
-  /// stops. Calls that remain shortly before the end of `grace` are cancelled. Connections without
-  /// a call are closed. Returns when all calls have ended.
+  /// Refuses new calls, notifies the streams, responds to the frames that they have sent, ends
+  /// watches and stops. Calls that still run shortly before `grace` has passed are cancelled.
+  /// Connections without a call are closed. Returns when all calls have ended.
   void Drain(std::chrono::milliseconds grace);
 
  private:
@@ -168,7 +176,8 @@ class Server {
   std::unique_ptr<Acceptor>
       acceptor_;  // Destroyed before the objects that receive its connections.
   std::unique_ptr<WebGateway> web_;
-  // The last two are destroyed before the objects they use.
+  // reloader_ and metrics_endpoint_ come last, so they are destroyed before the objects that they
+  // use.
   FileReloader reloader_;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };

@@ -22,23 +22,24 @@ constexpr LegalStates kLegalStates[] = {
     {{K::kStream, K::kUnary, K::kWatch}, P::kOpening, R::kFirst, C::kIdle, W::kIdle},
     {{K::kStream, K::kWatch}, P::kOpening, R::kIdle, C::kOpen, W::kIdle},
 
-    // Serves. A stream reads while it computes and writes; a unary call does one after the other.
+    // Serving. A stream reads, computes and writes at the same time; a unary call does one after
+    // the other.
     {K::kStream, P::kServing, {R::kIdle, R::kMemory, R::kPermit, R::kNext},
      {C::kIdle, C::kResult}, {W::kIdle, W::kOpened, W::kResult}},
     {K::kUnary, P::kServing, R::kIdle, C::kResult, W::kIdle},
     {K::kUnary, P::kServing, R::kIdle, C::kIdle, W::kResult},
     {K::kWatch, P::kServing, {R::kNext, R::kEnded}, C::kIdle, {W::kIdle, W::kOpened, W::kResult}},
 
-    // Ends before it has opened: what opens it still runs.
+    // The call ends before it is open: the computation that opens it still runs.
     {K::kStream, {P::kEnding, P::kClosing, P::kAbandoned}, R::kIdle, C::kOpen, W::kIdle},
     {K::kWatch, {P::kClosing, P::kAbandoned}, R::kIdle, C::kOpen, W::kIdle},
 
-    // Ends. Frames that wait for their parts are neither computed nor written.
+    // Ending. A frame whose parts are missing may still wait, neither computed nor written.
     {K::kStream, P::kEnding, {R::kIdle, R::kNext, R::kEnded},
      {C::kIdle, C::kResult}, {W::kIdle, W::kOpened, W::kResult}},
     {K::kWatch, P::kEnding, {R::kNext, R::kEnded}, C::kIdle, {W::kIdle, W::kOpened, W::kResult}},
 
-    // Closes. Finished as soon as nothing is computed or written.
+    // Closing. The call is finished as soon as no computation and no write is in progress.
     {K::kStream, P::kClosing, {R::kIdle, R::kNext, R::kEnded}, C::kResult, kAnyWriting},
     {K::kStream, P::kClosing, {R::kIdle, R::kNext, R::kEnded}, C::kIdle, kAnyBusyWriting},
     {K::kWatch, P::kClosing, {R::kNext, R::kEnded}, C::kIdle, W::kNotice},

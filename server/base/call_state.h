@@ -54,7 +54,7 @@ struct CallState {
 
 std::ostream& operator<<(std::ostream& out, const CallState& state);
 
-/// A set of values of an enum above.
+/// A set of values of one of the enums above.
 template <typename Enum>
 class SetOf {
  public:
@@ -82,8 +82,8 @@ struct LegalStates {
   }
 };
 
-/// The table of all states in which a call can be between two events. Each row allows the product
-/// of its sets.
+/// The table of all states that a call can have between two events. A row contains a set of values
+/// for each field of CallState; each combination of these values is legal.
 std::span<const LegalStates> AllLegalStates();
 
 bool IsLegal(const CallState& state);

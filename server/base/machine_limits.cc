@@ -11,14 +11,16 @@ namespace {
 
 constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 
-// The number at the beginning of a file; "max" and errors mean unlimited.
+// Reads the number at the beginning of a file. Returns kUnlimited for the text "max" and for
+// errors.
 std::uint64_t NumberIn(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
   return file >> number ? number : kUnlimited;
 }
 
-// Calls visit(folder) for a group and its parents up to the folder `top`.
+// Calls visit(folder) for the folder of a control group and the folders of its parents, up to
+// `top`.
 template <typename Visit>
 void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   for (;;) {
@@ -29,10 +31,11 @@ void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   }
 }
 
-// Calls visit(version, folder) for the groups of this process that a controller manages, and for
-// their parents. Lines of /proc/self/cgroup are "0::/a/b" for version 2, "4:memory:/a/b" or
-// "3:cpu,cpuacct:/" for version 1. Inside a container, version 1 names groups as seen from outside:
-// a missing folder sets no limit, and the top folder is always visited.
+// Calls visit(version, folder) for the control groups that limit this process by `controller`
+// ("memory", "cpu"), and for their parents. Lines of /proc/self/cgroup have the form "0::/a/b" for
+// version 2, and "4:memory:/a/b" or "3:cpu,cpuacct:/" for version 1. Inside a container, version 1
+// names the groups as the host sees them, so their folders may be missing. A missing folder sets no
+// limit, and the top folder is always visited.
 template <typename Visit>
 void ForEachGroup(const std::string& root, std::string_view controller, Visit visit) {
   std::ifstream groups(root + "/proc/self/cgroup");
@@ -53,11 +56,12 @@ void ForEachGroup(const std::string& root, std::string_view controller, Visit vi
   }
 }
 
-// The processor time of a group divided by its period; infinite without a limit.
+// The processor time of a group per period, divided by the period: the number of processors it may
+// use. Infinite without a limit.
 double QuotaOf(int version, const std::string& folder) {
   double quota = -1, period = 0;
   if (version == 2) {
-    // "150000 100000", or "max 100000".
+    // The file contains "QUOTA PERIOD" in microseconds: "150000 100000", or "max 100000".
     std::ifstream file(folder + "/cpu.max");
     if (!(file >> quota >> period)) return std::numeric_limits<double>::infinity();
   } else {

@@ -6,12 +6,12 @@
 
 namespace partiemc::server {
 
-/// Memory of the machine, or of this process's control group if that is less. `root` contains proc
-/// and sys. Missing or malformed files set no limit.
+/// Memory of the machine, or the limit of this process's control group if that is lower. `root` is
+/// the folder that contains proc and sys. Missing or malformed files set no limit.
 std::uint64_t AvailableMemory(const std::string& root = "");
 
-/// The lesser of `processors` and the control group's quota, rounded up; at least 1. `root` and
-/// files as above.
+/// The lower of `processors` and the control group's CPU quota, rounded up; at least 1. `root` and
+/// missing files: see AvailableMemory.
 unsigned AvailableProcessors(unsigned processors, const std::string& root = "");
 
 }  // namespace partiemc::server

@@ -5,8 +5,9 @@
 
 namespace partiemc::server {
 
-// Backtracks to the last `*` only. The text before it matches as early as possible, which leaves
-// the most for the rest.
+// Matches greedily from left to right and backtracks to the last `*` only. This suffices: the text
+// before the last `*` has matched as early as possible, which leaves the most characters for the
+// rest.
 bool MatchesPattern(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0;
   std::optional<std::size_t> after_star;

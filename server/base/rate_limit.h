@@ -16,8 +16,8 @@ class RateLimit {
 
   explicit RateLimit(std::uint32_t per_second) : per_second_(per_second) {}
 
-  /// Counts one event at `now`; true if it is within the limit. Each second begins with the first
-  /// event after the previous one.
+  /// Counts one event at `now`. Returns true if the event is within the limit of the current
+  /// second. A second begins with the first event after the previous second has passed.
   bool Allow(Clock::time_point now) {
     const MutexLock lock(mutex_);
     if (now - begin_ >= std::chrono::seconds(1)) {
@@ -33,7 +33,7 @@ class RateLimit {
     return false;
   }
 
-  /// Returns the number of events over the limit since the last call.
+  /// Returns the number of events that exceeded the limit since the last call of this function.
   std::uint64_t TakeHeldBack() {
     const MutexLock lock(mutex_);
     return std::exchange(held_back_, 0);

@@ -1,4 +1,4 @@
-// Runs the events of a call one at a time, and the actions that follow from them in order.
+// Runs the events of a call one at a time, and the actions that the events cause in order.
 #pragma once
 
 #include <memory>
@@ -10,13 +10,13 @@
 
 namespace partiemc::server {
 
-/// Base of the state machines of calls. An event changes the state under the mutex; `Decide` then
-/// adds the actions that follow, such as a call to the transport. The actions run without the
-/// mutex, in the order in which they were added, never two at once. If an action is running, its
-/// thread also runs the actions of later events, so no event waits for an action. An action may
-/// cause an event, whose actions run after it.
+/// Base class of the state machines of calls. An event changes the state while it holds the mutex.
+/// Then `Decide` adds the actions that follow from the new state, such as a call to the transport.
+/// Actions run without the mutex, in the order in which they were added, and never two at once. If
+/// an action is running on another thread, that thread also runs the new actions. So no event waits
+/// for an action. An action may cause an event; the actions of this event run later.
 ///
-/// Requires: held by shared_ptr only; actions do not throw. Thread-safe.
+/// Requires: the object is held by shared_ptr only; actions do not throw. Thread-safe.
 class SerializedCall : public std::enable_shared_from_this<SerializedCall> {
  public:
   using Action = absl::AnyInvocable<void()>;
@@ -30,7 +30,8 @@ class SerializedCall : public std::enable_shared_from_this<SerializedCall> {
  protected:
   explicit SerializedCall(MachineKind kind) : state_{.kind = kind} {}
 
-  /// The scope of an event: holds the mutex, then decides and runs actions. Keeps the call alive.
+  /// The scope of an event: holds the mutex. The destructor calls Decide, releases the mutex and
+  /// runs the actions. Keeps the call alive.
   class ABSL_SCOPED_LOCKABLE Event {
    public:
     explicit Event(SerializedCall& call) ABSL_EXCLUSIVE_LOCK_FUNCTION(call.mutex_);
@@ -42,7 +43,8 @@ class SerializedCall : public std::enable_shared_from_this<SerializedCall> {
     const std::shared_ptr<SerializedCall> call_;
   };
 
-  /// Adds the actions that follow from the state. Called at the end of each event.
+  /// Adds the actions that follow from the state. Called at the end of each event, with the mutex
+  /// held.
   virtual void Decide() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) = 0;
 
   void Do(Action action) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
