@@ -8,7 +8,8 @@
 namespace partiemc::server {
 namespace {
 
-// Number of voluntary context switches of this thread.
+// Returns the number of voluntary context switches of this thread, that is, how often it had to
+// wait.
 long Sleeps() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
@@ -61,12 +62,13 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
     return true;
   }
   mailbox_.Put(std::move(published));
-  // If the lock is taken, its holder or the next frame collects this one.
+  // If another thread holds the lock, that thread or the next call of Publish collects this frame.
   if (mutex_.TryLock()) {
     const MutexLock lock(mutex_, std::adopt_lock);
     Collect();
   }
-  // A watcher that joined in between may have found the mailbox empty.
+  // Reads the count again: a watcher that joined after the check above may have found the mailbox
+  // empty, so the caller must call Announce.
   return watcher_count_ != 0;
 }
 
@@ -93,7 +95,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
   Joined joined;
   {
     const MutexLock lock(mutex_);
-    // All results published from here on are offered.
+    // Counts the watcher first: from now on, all published results are offered to watchers.
     ++watcher_count_;
     watchers_.push_back(std::move(watcher));
     Collect();
@@ -194,7 +196,7 @@ void ResultBroadcaster::Serve() {
   if (end) DropHistoryOf(watchers);
 }
 
-// Drops the history of an ended stream unless a watcher still reads it.
+// Drops the history of an ended stream, unless a watcher still reads it.
 void ResultBroadcaster::DropHistoryOf(
     const std::vector<std::shared_ptr<WatchStateMachine>>& watchers) {
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {

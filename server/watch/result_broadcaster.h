@@ -16,43 +16,47 @@
 
 namespace partiemc::server {
 
-/// Publish and Announce never wait for watchers. Publish is called by one thread at a time; all
-/// other functions are thread-safe. Held by shared_ptr.
+/// Publishes the results of a stream and keeps its watchers. Publish and Announce never wait for
+/// watchers. Publish is called by one thread at a time; all other functions are thread-safe. Held
+/// by shared_ptr.
 class ResultBroadcaster final : public Dispatched {
  public:
   struct Limits {
-    /// Most bytes of frames that the dispatcher has not processed.
+    /// Maximum bytes of frames that the dispatcher has not processed yet.
     std::size_t mailbox_bytes = std::size_t{16} << 20;
-    /// Without watchers and history, the newest frame is kept for later watchers up to this size.
+    /// If there are no watchers and no history, the newest frame is kept for later watchers if it
+    /// is at most this large.
     std::size_t kept_bytes = std::size_t{1} << 20;
   };
 
   /// Requires: `dispatcher` outlives this.
   ResultBroadcaster(WatchDispatcher& dispatcher, const Limits& limits);
 
-  /// Starts a history within the limits of `room`. If the stream resumes from `former`, the history
-  /// takes its frames before `next_sequence`; later ones are computed again. Requires: one call,
-  /// before Publish and Join; `room` outlives this.
+  /// Starts a history within the limits of `room`. If the stream resumes the stream of `former`,
+  /// the history takes over the former frames before `next_sequence`; later frames will be computed
+  /// again. Requires: called once, before Publish and Join; `room` outlives this.
   void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Shrinks the history after other histories have started. Does not block.
+  /// Schedules the history to shrink, because other histories have started and share the memory.
+  /// Does not block.
   void ShareRoom() { dispatcher_.Wake(*this); }
 
-  /// Publishes the result of the frame `sequence`. Wait-free: takes a lock only if it is free.
-  /// Returns whether there are watchers; then the caller must call Announce. Requires: `sequence`
-  /// increases.
+  /// Publishes the result of the frame `sequence`. Wait-free: takes the lock only if it is free.
+  /// Returns whether there are watchers; if so, the caller must call Announce. Requires: `sequence`
+  /// increases from call to call.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Publishes and announces a result with the number of another server. Requires: numbers
-  /// increase; skipped numbers never follow.
+  /// Publishes and announces a result of a stream that another server owns, under that server's
+  /// result number. Requires: numbers increase; a skipped number never follows later.
   void PublishNumbered(Published published);
-  /// Sets the oldest sequence number in the history of the server that owns the stream. 0: none.
+  /// Sets the oldest sequence number in the history of the server that owns the stream. 0: it has
+  /// no history.
   void SetOldestElsewhere(std::uint64_t sequence) { oldest_elsewhere_ = sequence; }
-  /// Wakes the dispatcher to deliver published results. Does not block; thread-safe. Separate from
-  /// Publish, so that the producer's response is sent before the writes to watchers, which take the
-  /// same locks of gRPC.
+  /// Wakes the dispatcher, which delivers the published results. Does not block; thread-safe. A
+  /// separate function, so that the producer's response can be sent before this call: writes to
+  /// watchers take the same locks of gRPC as the response.
   void Announce();
-  /// Ends the stream. Watchers receive the published results, then `end`.
+  /// Ends the stream. Watchers receive the results published so far, then `end`.
   void End(WatchEnd end) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The start of a watch.
@@ -63,30 +67,35 @@ class ResultBroadcaster final : public Dispatched {
         0;  ///< Otherwise the first number to read with Held; 0: live results only.
     std::uint64_t last_number = 0;  ///< Number of the last published result.
   };
-  /// Adds a watcher that starts at sequence number `from` or the oldest frame after it; without
-  /// `from` at the newest frame. All results published after this call are offered to it.
+  /// Adds a watcher. It starts with the frame `from`, or with the oldest available frame after
+  /// `from`; without `from`, it starts with the newest frame. All results published after this call
+  /// are offered to the watcher.
   Joined Join(std::shared_ptr<WatchStateMachine> watcher, std::optional<std::uint64_t> from)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Leave(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// The first frame of the history with at least this number; empty if all are older.
+  /// Returns the first frame of the history whose result number is at least `number`; empty if all
+  /// are older.
   Published Held(std::uint64_t number) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The first frame of the history with at least this sequence number; empty if all are older.
+  /// Returns the first frame of the history whose sequence number is at least `sequence`; empty if
+  /// all are older.
   Published HeldFrom(std::uint64_t sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The newest frame, if it is kept.
   Published Newest() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The number of the last result.
+  /// Result number of the last published result.
   std::uint64_t LastNumber() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The oldest sequence number that watchers can request; 0: none.
+  /// The oldest sequence number that watchers can request, here or at the server that owns the
+  /// stream; 0: none.
   std::uint64_t oldest_sequence() const {
     const std::uint64_t elsewhere = oldest_elsewhere_, here = oldest_sequence_;
     return elsewhere != 0 && (here == 0 || elsewhere < here) ? elsewhere : here;
   }
-  /// The oldest sequence number in the history of this server; 0: none.
+  /// The oldest sequence number in the history of this server; 0: there is none.
   std::uint64_t oldest_here() const { return oldest_sequence_; }
 
   std::uint32_t watcher_count() const { return watcher_count_; }
-  /// Number of voluntary context switches of the producer's thread in Publish and Announce.
+  /// Number of voluntary context switches of the producer's thread in Publish and Announce: how
+  /// often it had to wait.
   std::uint64_t producer_waits() const { return producer_waits_; }
 
  private:
@@ -109,9 +118,9 @@ class ResultBroadcaster final : public Dispatched {
 
   Mutex mutex_;  // Publish never waits for it.
   std::vector<std::shared_ptr<WatchStateMachine>> watchers_ ABSL_GUARDED_BY(mutex_);
-  // Number of the last frame taken from the mailbox.
+  // Result number of the last frame taken from the mailbox.
   std::uint64_t collected_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Frames taken from the mailbox and not offered yet.
+  // Frames that were taken from the mailbox and have not been offered to watchers yet.
   std::vector<Published> news_ ABSL_GUARDED_BY(mutex_);
   std::optional<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
   Published newest_ ABSL_GUARDED_BY(mutex_);  // Kept if it is in the history, small, or watched.

@@ -35,7 +35,8 @@ void ResultHistory::Add(const Published& published) {
   while (size_ > 0 && at(size_ - 1).number + 1 != published.number) DropOldest();
   DropUntilFits(bytes);
   bool has_room = bytes <= room_.share();
-  // Other histories may exceed their new limit until they shrink.
+  // The memory of all histories may be used up: other histories may exceed their share until they
+  // shrink. Then drops further frames of this history.
   while (has_room && !room_.TryTake(bytes)) {
     has_room = size_ > 0;
     if (has_room) DropOldest();

@@ -1,5 +1,5 @@
-// The newest results of a stream, for watchers that start in the past. Shares the frames of the
-// watchers without copies.
+// Keeps the newest results of a stream, for watchers that start with an earlier result. Shares the
+// frames with the watchers without copies.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ struct HeldFrames {
   std::uint64_t oldest = 0, newest = 0;  ///< 0 without frames.
 };
 
-/// The memory limit of all histories, divided equally. Lock-free and thread-safe.
+/// The memory limit of all histories, which share it equally. Lock-free and thread-safe.
 class HistoryRoom {
  public:
   /// `bytes_of_one` limits each history, `bytes_of_all` their total.
@@ -29,7 +29,7 @@ class HistoryRoom {
   std::uint64_t share() const {
     return std::min(bytes_of_one_, bytes_of_all_ / std::max<std::uint64_t>(1, histories_));
   }
-  /// Whether another history reduces the limit of each.
+  /// Whether the number of histories reduces the share of each below `bytes_of_one`.
   bool is_scarce() const { return share() < bytes_of_one_; }
   /// Bytes of all histories.
   std::uint64_t held() const { return held_; }
@@ -44,8 +44,8 @@ class HistoryRoom {
   std::atomic<std::uint64_t> histories_ = 0, held_ = 0;
 };
 
-/// Consecutive frames: adding a frame beyond the limit clears the history. Not thread-safe.
-/// Allocates nothing once it has been full.
+/// The newest frames without gaps. If a frame cannot be added because it exceeds the limit, all
+/// frames are dropped. Not thread-safe. Allocates nothing once it has been full.
 class ResultHistory {
  public:
   /// Requires: `room` outlives this.
@@ -54,20 +54,21 @@ class ResultHistory {
   ResultHistory(const ResultHistory&) = delete;
   ResultHistory& operator=(const ResultHistory&) = delete;
 
-  /// Adds the newest frame. Drops the oldest frames until it fits; if it never fits, drops all
-  /// frames.
+  /// Adds the newest frame. Drops the oldest frames until the new frame fits. If it does not fit at
+  /// all, drops all frames.
   void Add(const Published& published);
-  /// Drops the oldest frames after the limit has become smaller.
+  /// Drops the oldest frames until the history fits into its share, which may have become smaller.
   void Shrink() { DropUntilFits(0); }
 
   bool empty() const { return size_ == 0; }
   std::size_t size() const { return size_; }
-  /// Bytes including the overhead of each frame.
+  /// Bytes of all frames, including the overhead of each frame.
   std::uint64_t bytes() const { return bytes_; }
   /// The k-th frame; 0 is the oldest.
   const Published& at(std::size_t k) const { return ring_[(first_ + k) % ring_.size()]; }
 
-  /// The first frame with at least this result number or sequence number; null if all are older.
+  /// The first frame with at least this result number or sequence number; null if all frames are
+  /// older.
   const Published* FromNumber(std::uint64_t number) const;
   const Published* FromSequence(std::uint64_t sequence) const;
 

@@ -7,8 +7,9 @@ namespace partiemc::server {
 void ResultMailbox::Put(Published published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
-  // Takes the list back before linking, so that no other thread accesses it. No post can be added
-  // between the two exchanges, because only one thread puts.
+  // Takes the list out of the mailbox before it links the new frame, so that no other thread
+  // accesses the list meanwhile. No other frame can be added between the two exchanges, because
+  // only one thread calls Put.
   Post* const older = posts_.exchange(nullptr);
   if (older != nullptr) {
     if (older->bytes + bytes <= max_bytes_) {

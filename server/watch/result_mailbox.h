@@ -11,7 +11,7 @@
 
 namespace partiemc::server {
 
-/// A result in the form of its transport. Immutable, shared by all watchers.
+/// A result, serialised for the transport. Immutable, shared by all watchers.
 class WatchFrame {
  public:
   explicit WatchFrame(std::size_t bytes) : WatchFrame(bytes, bytes) {}
@@ -20,35 +20,37 @@ class WatchFrame {
 
   /// Size of the message.
   std::size_t bytes() const { return bytes_; }
-  /// Bytes of memory that the frame keeps alive, including other parts of its response.
+  /// Bytes of memory that this frame keeps allocated, including other parts of the response that
+  /// contains it.
   std::size_t memory() const { return memory_; }
 
  private:
   const std::size_t bytes_, memory_;
 };
 
-/// A result of a stream with its number, which counts results from 1. Refused frames have sequence
-/// numbers, but no result numbers.
+/// A result of a stream and its result number, which counts results from 1. Refused frames have
+/// sequence numbers but no result numbers.
 struct Published {
   std::shared_ptr<const WatchFrame> frame;
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< Sequence number of the producer's frame.
 };
 
-/// Approximate overhead of a published frame, counted in addition to its bytes.
+/// Approximate memory overhead of a published frame, counted in addition to its bytes.
 inline constexpr std::size_t kPublishedBytes = 512;
 
-/// Put: one thread at a time. Take: any thread.
+/// A lock-free list of results that were published but not processed yet. Put is called by one
+/// thread at a time, Take by any thread.
 class ResultMailbox {
  public:
-  /// Holds at most `max_bytes`, or one frame.
+  /// Holds frames of at most `max_bytes` together; a single frame may be larger.
   explicit ResultMailbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
   ~ResultMailbox() { Delete(posts_.load()); }
   ResultMailbox(const ResultMailbox&) = delete;
   ResultMailbox& operator=(const ResultMailbox&) = delete;
 
-  /// Wait-free: two atomic exchanges. Keeps earlier frames that were not taken, unless they exceed
-  /// `max_bytes` together.
+  /// Adds a frame. Wait-free: two atomic exchanges. Frames that were not taken yet are dropped if
+  /// they exceed `max_bytes` together with the new frame.
   void Put(Published published);
 
   /// Passes the pending frames to `taker`, oldest first. Allocates nothing.

@@ -56,7 +56,7 @@ void WatchDispatcher::Run() {
     for (Dispatched* dispatched = TakeWaiting(); dispatched != nullptr;) {
       Dispatched* const next = dispatched->next_;
       const std::shared_ptr<Dispatched> held = std::move(dispatched->self_);
-      // `waiting_` is cleared before Serve, so that an event during Serve queues the object again.
+      // Clears `waiting_` before Serve, so that a Wake during Serve queues the object again.
       dispatched->waiting_.exchange(false);
       if (!stopping_) held->Serve();
       dispatched = next;
@@ -64,7 +64,7 @@ void WatchDispatcher::Run() {
   }
 }
 
-// Returns the list in the order of arrival.
+// Takes the list of waiting objects and returns it in the order of arrival.
 Dispatched* WatchDispatcher::TakeWaiting() {
   Dispatched* reversed = nullptr;
   for (Dispatched* newest = waiting_.exchange(nullptr); newest != nullptr;) {

@@ -1,5 +1,5 @@
-// The thread that delivers the results of all streams to their watchers, on behalf of the compute
-// threads.
+// Runs the thread that delivers the results of all streams to their watchers, so that compute
+// threads need not do it.
 #pragma once
 
 #include <semaphore.h>
@@ -10,7 +10,8 @@
 
 namespace partiemc::server {
 
-/// An object that the dispatcher serves. Wake may be called during Serve.
+/// An object that the dispatcher's thread serves after a call of Wake. Wake may also be called
+/// during Serve.
 class Dispatched : public std::enable_shared_from_this<Dispatched> {
  public:
   virtual ~Dispatched() = default;
@@ -30,14 +31,15 @@ class Dispatched : public std::enable_shared_from_this<Dispatched> {
 class WatchDispatcher {
  public:
   WatchDispatcher();
-  /// Joins the thread without serving the remaining objects.
+  /// Stops and joins the thread. Objects that still wait are not served.
   ~WatchDispatcher();
   WatchDispatcher(const WatchDispatcher&) = delete;
   WatchDispatcher& operator=(const WatchDispatcher&) = delete;
 
-  /// Schedules one more Serve of `dispatched` after this call. Wait-free and thread-safe.
+  /// Schedules one more call of Serve of `dispatched`, which begins after this call. Wait-free and
+  /// thread-safe.
   void Wake(Dispatched& dispatched);
-  /// Waits until all objects woken before this call have been served.
+  /// Waits until every object that was woken before this call has been served.
   void Flush();
 
  private:

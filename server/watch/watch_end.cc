@@ -47,7 +47,7 @@ WatchEnd WatchEnd::OfStream(const absl::Status& status) {
     return {std::string(kReasonProducerLost), "the producer's connection is gone", {}};
   }
   WatchEnd end = With(status);
-  // The producer broke a rule, not the watcher.
+  // The watcher's call ends with OK, because the producer broke a rule, not the watcher.
   if (!absl::IsUnavailable(status)) end.status = absl::OkStatus();
   return end;
 }

@@ -10,7 +10,8 @@
 
 namespace partiemc::server {
 
-/// Reasons of ended watches, in addition to the reasons of streams (proto/PROTOCOL.md).
+/// Reasons for which a watch ends, in addition to the reasons for which a stream ends
+/// (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonFellBehind = "FELL_BEHIND";
 inline constexpr std::string_view kReasonWatchedBytes = "WATCHED_BYTES";
 inline constexpr std::string_view kReasonFinished = "FINISHED";
@@ -22,16 +23,16 @@ struct WatchEnd {
   std::string reason;
   std::string message;  ///< For people.
   absl::Status status;  ///< Status of the call.
-  /// Number of the stream's last result, which may not have been offered to watchers.
+  /// Result number of the stream's last result, which may not have been offered to watchers.
   std::uint64_t last_number = 0;
 
-  /// The end of a stream with `status`.
+  /// The end of a watch whose stream has ended with `status`.
   static WatchEnd OfStream(const absl::Status& status);
-  /// The end with the reason and message of `status`.
+  /// The end of a watch with the reason and the message of `status`.
   static WatchEnd With(absl::Status status);
-  /// The end of a watch in mode `every` whose pending frames exceed `max_bytes`.
+  /// The end of a watch in mode `every` that is too slow: its pending frames exceed `max_bytes`.
   static WatchEnd FellBehind(std::size_t frames, std::size_t bytes, std::size_t max_bytes);
-  /// The end of a watch whose next frames have left the history.
+  /// The end of a watch that is too slow: the history has dropped its next `frames` frames.
   static WatchEnd NoLongerHeld(std::uint64_t frames);
   /// The end of a watch whose next frame exceeds `max_bytes`.
   static WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes);

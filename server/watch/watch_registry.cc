@@ -43,7 +43,8 @@ void WatchRegistry::Leave(const WatchStateMachine& watcher) {
   const MutexLock lock(mutex_);
   placed_.erase(&watcher);
   watchers_.erase(&watcher);
-  // Notifies with the lock held: the waiting thread may delete the registry afterwards.
+  // Notifies while it holds the lock. Otherwise the waiting thread could delete the registry before
+  // the notification.
   left_.NotifyAll();
 }
 
@@ -61,7 +62,7 @@ std::uint64_t WatchRegistry::held_bytes() const {
 std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock, because a watch may call Leave at once.
+  // Called without the lock, because a watch that ends may call Leave, which takes the lock.
   for (const auto& watcher : All()) {
     look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
   }
@@ -75,7 +76,8 @@ std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
   return all;
 }
 
-// Calls machines without the lock, because a watch may call Leave at once.
+// Ends the watches without holding the lock, because a watch that ends may call Leave, which takes
+// the lock.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   {
     const MutexLock lock(mutex_);

@@ -1,4 +1,4 @@
-// The watchers of this server: their limit and their drain.
+// The watchers of this server: limits their number and drains them.
 #pragma once
 
 #include <chrono>
@@ -22,32 +22,34 @@ class WatchRegistry {
  public:
   explicit WatchRegistry(std::uint32_t max_watchers) : max_watchers_(max_watchers) {}
 
-  /// Registers a watcher before its first request; OpeningCalls counts those. Errors, with a
-  /// Violation: UNAVAILABLE (DRAINING).
+  /// Registers a watcher that has not sent its first request yet. OpeningCalls limits the number of
+  /// such watchers.
+  /// Errors, with a Violation: UNAVAILABLE (DRAINING).
   absl::Status Enter(std::shared_ptr<WatchStateMachine> watcher) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes a slot for a watcher after its first request. Errors, with a Violation:
-  /// RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS, CALLER_WATCHERS).
+  /// Takes a slot for a watcher whose first request has arrived.
+  /// Errors, with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_WATCHERS, CALLER_WATCHERS).
   absl::Status Open(const WatchStateMachine& watcher, const Caller& caller = {})
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Frees the slot of a watcher whose end is about to be sent.
+  /// Frees the slot of a watcher. Called just before the end of its call is sent.
   void Close(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes a watcher whose end has been sent.
+  /// Removes a watcher. Called after the end of its call was sent.
   void Leave(const WatchStateMachine& watcher) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of watchers with a slot.
   std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Bytes of pending results, counted per watcher although watchers share them.
+  /// Bytes of the pending results of all watchers. A result that several watchers share is counted
+  /// for each of them.
   std::uint64_t held_bytes() const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends watchers without a first request for `limit`. Returns the earliest time at which another
-  /// one can reach the limit.
+  /// Ends the watchers that have not sent their first request within `limit`. Returns the earliest
+  /// time at which another watcher can reach the limit.
   std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
                                                   std::chrono::steady_clock::time_point now);
 
-  /// Refuses new watchers and ends every watch. Cuts watches that do not accept their end by
-  /// `patience`.
+  /// Refuses new watchers and ends every watch. At the time `patience`, cuts the watches whose
+  /// clients have not read the end.
   void Drain(std::chrono::steady_clock::time_point patience) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Waits until all watchers have left. Returns false at the deadline.
+  /// Waits until all watchers have left. Returns false if the deadline passes first.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:

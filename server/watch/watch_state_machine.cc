@@ -47,7 +47,8 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
   }
 }
 
-// Joins before `opened` is written, so that the watcher misses no result published afterwards.
+// Opens the watch. Joins the broadcaster before `opened` is written, so that the watcher misses no
+// result that is published afterwards.
 void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
   const Event event(*this);
   state_.computing = Computing::kIdle;
@@ -97,7 +98,8 @@ void WatchStateMachine::Offer(std::span<const Published> frames) {
   for (const Published& published : frames) {
     if (state_.phase != Phase::kServing) return;
     if (published.number <= offered_) continue;
-    // A frame that does not fit into the history is only offered.
+    // The watcher is about to read this frame from the history, but the frame was too large for the
+    // history. It exists only in this offer, so the watcher takes it from here.
     if (published.number == next_held_ && !IsHeld(next_held_)) CatchUp();
     if (next_held_ == 0) {
       Take(published);
@@ -133,7 +135,8 @@ bool WatchStateMachine::IsHeld(std::uint64_t number) const {
   return broadcaster_->Held(number).number == number;
 }
 
-// Drops the pending frames if the history has all of them, to read them there later.
+// If the history contains all pending frames, drops them; the watcher will read them from the
+// history later. Returns whether it does.
 bool WatchStateMachine::LeaveToHistory(const Published& published) {
   const std::uint64_t first = pending_.empty() ? published.number : pending_.front().number;
   if (!IsHeld(first)) return false;
@@ -143,12 +146,13 @@ bool WatchStateMachine::LeaveToHistory(const Published& published) {
   return true;
 }
 
-// Makes the next frame of the history pending if there is credit.
+// Makes the next frame of the history pending, if the client has given credit.
 void WatchStateMachine::TakeHeld() {
   Published held = broadcaster_->Held(next_held_);
   if (held.number != next_held_) {
     if (next_held_ > offered_) return CatchUp();  // It will be offered.
-    // Before its first frame a watcher starts with the oldest remaining frame.
+    // The history has dropped the frame. If the watcher has not received any frame yet, it starts
+    // with the oldest remaining frame.
     if (mode_ == WatchMode::kEvery && counts_.frames > 0) {
       return End(WatchEnd::NoLongerHeld(offered_ + 1 - next_held_));
     }
@@ -165,7 +169,7 @@ void WatchStateMachine::TakeHeld() {
   pending_.push_back(std::move(held));
 }
 
-// The watcher has read the whole history; the next frame will be offered.
+// The watcher has read the whole history. From now on it takes the frames that are offered.
 void WatchStateMachine::CatchUp() {
   offered_ = std::max(offered_, next_held_ - 1);
   next_held_ = 0;
@@ -247,7 +251,7 @@ void WatchStateMachine::DropPending() {
   CatchUp();
 }
 
-// Drops pending frames instead of waiting for credit.
+// Ends an open watch. Drops its pending frames instead of waiting for credit.
 void WatchStateMachine::End(WatchEnd end) {
   if (state_.phase != Phase::kServing && state_.phase != Phase::kEnding) return;
   state_.phase = Phase::kEnding;
@@ -255,7 +259,7 @@ void WatchStateMachine::End(WatchEnd end) {
   DropPending();
 }
 
-// Ends a watch that is not open yet by its status alone.
+// Ends a watch that is not open yet. The client receives only a status, no message.
 void WatchStateMachine::Refuse(absl::Status status) {
   if (state_.phase != Phase::kOpening) return;
   state_.phase = Phase::kClosing;

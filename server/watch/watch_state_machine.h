@@ -1,4 +1,5 @@
-// The flow of results to one watcher: credits, drops, ends. Independent of messages and transport.
+// Controls the flow of results to one watcher: credit, dropped frames, the end. Independent of
+// messages and transport.
 #pragma once
 
 #include <chrono>
@@ -30,9 +31,10 @@ struct WatchTerms {
   std::shared_ptr<ResultBroadcaster> broadcaster;  ///< The broadcaster of the stream.
   WatchMode mode = WatchMode::kLatest;
   std::uint64_t credit = 1;
-  /// Start with the history from this sequence number; absent: with the newest frame.
+  /// Start with this sequence number, from the history. Absent: start with the newest frame.
   std::optional<std::uint64_t> from_sequence = {};
-  /// Keep the history after the end of the stream, as long as the broadcaster exists.
+  /// Keep the history after the end of the stream, for other watchers, until the broadcaster is
+  /// destroyed.
   bool keeps_history = false;
 };
 
@@ -43,32 +45,33 @@ struct WatchRequest {
   std::uint64_t credit = 0;
 };
 
-/// The transport of a watch. WatchStateMachine has at most one read and one write in progress and
-/// never calls the transport with a lock held.
+/// Carries the messages of a watch. WatchStateMachine has at most one read and one write in
+/// progress. It never calls the transport while it holds a lock.
 class WatchTransport {
  public:
   virtual ~WatchTransport() = default;
 
   /// Starts to read the next request; completes by WatchStateMachine::ReadDone or ReadEnded.
   virtual void StartRead() = 0;
-  /// Starts to look up the stream of the `open` just read and prepares the message of WriteOpened;
-  /// completes by WatchStateMachine::Opened, from within or later.
+  /// Starts to look up the stream that the `open` just read names, and prepares the message of
+  /// WriteOpened; completes by WatchStateMachine::Opened, during this call or later.
   virtual void StartOpen() = 0;
 
   /// Each starts a write; completes by WatchStateMachine::WriteDone.
   virtual void WriteOpened(const HeldFrames& held) = 0;
-  /// `oldest_sequence`: the oldest frame that can be requested now.
+  /// `oldest_sequence`: the oldest frame that a watcher can request now.
   virtual void WriteFrame(const Published& published, std::uint64_t dropped,
                           std::uint64_t oldest_sequence) = 0;
   virtual void WriteEnded(const WatchEnd& end, std::uint64_t dropped) = 0;
 
   /// Makes the pending read and write fail soon.
   virtual void Cut() = 0;
-  /// The last call to the transport; only a read may still be in progress.
+  /// Ends the call with `status`. This is the last call to the transport; at most a read may still
+  /// be in progress.
   virtual void Finish(const absl::Status& status) = 0;
 };
 
-/// Counts from the first offered frame.
+/// Totals of a watch, counted from the first frame that was offered to it.
 struct WatchCounts {
   std::uint64_t frames = 0;         ///< Passed to the transport.
   std::uint64_t dropped = 0;        ///< Never sent.
@@ -83,30 +86,32 @@ struct WatchCounts {
 ///      |                 +------------ cancelled, write failed -------+----------+-> abandoned
 ///      +-- no open, or refused: closing
 ///
-/// A frame is written if there is credit and no other write. Until then `latest` holds only the
-/// newest frame; `every` holds all frames up to `max_bytes`, including the one being written.
-/// Further frames wait in the history; if the history lacks one, the watch ends. After the end of
-/// the stream, pending frames are still written as credit arrives. Thread-safe.
+/// A frame is written when the client has given credit and no other write is in progress. Until
+/// then a watch in mode `latest` holds only the newest frame. A watch in mode `every` holds all
+/// frames, up to `max_bytes` including the frame being written; it reads further frames from the
+/// history later. If the history lacks such a frame, the watch ends. After the end of the stream,
+/// pending frames are still written as credit arrives. Thread-safe.
 ///
 /// A watcher that starts in the history reads it frame by frame, in both modes, and holds only the
-/// frame being written. After the end of the history it continues with offered frames. If the
-/// history drops its next frame, `latest` skips it; `every` ends, unless it has not received a
-/// frame yet.
+/// frame being written. When it has read the whole history, it continues with the frames that are
+/// offered. If the history drops the frame that the watcher needs next, `latest` skips the frame.
+/// `every` ends, unless it has not received any frame yet.
 class WatchStateMachine final : public SerializedCall {
  public:
-  /// Requires: `transport` lives until its Finish returns; this is held by shared_ptr. A frame of
-  /// more than `max_bytes` ends the watch.
+  /// Requires: `transport` lives until its Finish returns; this object is held by shared_ptr. A
+  /// frame of more than `max_bytes` ends the watch.
   WatchStateMachine(WatchTransport& transport, std::size_t max_bytes)
       : SerializedCall(MachineKind::kWatch), transport_(transport), max_bytes_(max_bytes) {}
 
-  /// Starts the first read, or ends at once if `admission` is an error. Called once. Every watch,
-  /// refused ones included, ends through this machine, so WatchTransport::Finish is called exactly
+  /// Starts the first read, or ends at once if `admission` is an error. Called once. Every watch
+  /// ends through this machine, even a refused one. So WatchTransport::Finish is called exactly
   /// once.
   void Start(absl::Status admission = absl::OkStatus());
 
-  /// The pending read has returned this request.
+  /// The pending read has completed with this request.
   void ReadDone(const WatchRequest& request);
-  /// The pending read has found the end of requests. The remaining credit is still used.
+  /// The pending read has completed without a request: the client will send no more. Results are
+  /// still sent until the credit is used.
   void ReadEnded();
   /// The result of StartOpen; an error ends the watch.
   void Opened(const absl::StatusOr<WatchTerms>& terms);
@@ -114,20 +119,21 @@ class WatchStateMachine final : public SerializedCall {
   /// The client has disconnected.
   void Cancelled();
 
-  /// Offers new frames in the order of their numbers. Ignores frames that were offered before.
+  /// Offers new frames in the order of their result numbers. Ignores frames that were offered
+  /// before.
   void Offer(std::span<const Published> frames);
   /// The stream has ended.
   void StreamEnded(const WatchEnd& end);
-  /// Sends the drain end and finishes, with or without credit.
+  /// Sends the message `ended` with the reason of the drain and finishes. Does not wait for credit.
   void Drain();
-  /// Ends a watch without `open` for `limit` at `now`, with DEADLINE_EXCEEDED (IDLE); 0: no limit.
-  /// Returns the time of the next check.
+  /// Ends the watch with DEADLINE_EXCEEDED (IDLE) if it has received no `open` within `limit`, at
+  /// the time `now`. `limit` 0: no limit. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
                                                     std::chrono::steady_clock::time_point now);
-  /// Ends a watch without `open` with this error; other watches continue.
+  /// Ends this watch with this error if it has received no `open`. Has no effect on other watches.
   void GiveWay(const absl::Status& status);
-  /// Ends an open watch with this error at once, without pending frames and `ended`. Cuts a watch
-  /// with a pending write, which may never complete.
+  /// Ends an open watch with this error at once. Pending frames and the message `ended` are not
+  /// sent. A pending write is cut, because it may never complete.
   void GiveUp(const absl::Status& status);
   /// Ends at once, without a message.
   void Cut();
@@ -135,7 +141,7 @@ class WatchStateMachine final : public SerializedCall {
   WatchCounts counts() const;
   /// Bytes of pending frames.
   std::size_t held_bytes() const;
-  /// Whether it reads the history, or keeps it for other watchers.
+  /// Whether this watch reads the history, or keeps the history for other watchers.
   bool goes_back() const;
 
   std::shared_ptr<WatchStateMachine> shared_from_this() {
