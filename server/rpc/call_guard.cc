@@ -19,7 +19,7 @@ using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
 
-// Ends a refused call before its method has read anything.
+// Interceptor that ends a refused call before the call's method has read anything.
 class Guard final : public Interceptor {
  public:
   Guard(const Authentication& authentication, const ConnectionTable& connections,

@@ -1,4 +1,5 @@
-// Counts calls of services that are not ours for their connections, and admits or refuses them.
+// Admits or refuses calls of services that are not the server's own, and counts them for their
+// connections.
 #pragma once
 
 #include <grpcpp/support/server_interceptor.h>
@@ -10,9 +11,9 @@
 
 namespace partiemc::server {
 
-/// Guards services that are not ours (reflection): counts each call for its connection, and ends
-/// calls that Authentication refuses with UNAUTHENTICATED. Health checks need no token. The
-/// arguments outlive the server. Thread-safe.
+/// Guards services that come with gRPC (reflection). Counts each call for its connection, and ends
+/// a call with UNAUTHENTICATED if Authentication refuses its caller. Health checks need no token.
+/// The arguments outlive the server. Thread-safe.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
     const Authentication& authentication, const ConnectionTable& connections);
 

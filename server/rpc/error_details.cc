@@ -10,7 +10,8 @@ namespace partiemc::server {
 std::string ErrorDetails(const absl::Status& status) {
   const auto violation = FindViolation(status);
   if (status.ok() || !violation) return {};
-  // Strings of Protobuf must be UTF-8; the client's value may not be.
+  // Makes the value printable: Protobuf strings must be UTF-8, and a value that a client sent may
+  // not be.
   const std::string value = Printable(violation->value);
   google::rpc::Status details;
   details.set_code(static_cast<int>(status.code()));  // Abseil and gRPC number the codes alike.

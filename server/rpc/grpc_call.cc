@@ -19,8 +19,9 @@ void GrpcCall::StartRead(grpc::ByteBuffer* message) {
 }
 
 void GrpcCall::OnReadDone(bool ok) {
-  // A failed read may leave part of a message, or a message above the limit. It stays open in the
-  // tally, which allows those bytes.
+  // Only a successful read is reported as completed. A failed read may have received part of a
+  // message, or a message above the limit. The tally counts it as open until the call ends, so
+  // these bytes stay allowed.
   if (ok) tally_.OnReadDone(message_->Length());
   call_->OnReadDone(ok);
 }

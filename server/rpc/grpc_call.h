@@ -18,13 +18,15 @@
 
 namespace partiemc::server {
 
-/// Deletes itself and its call in OnDone, gRPC's last call.
+/// The CallChannel of a gRPC call. Deletes itself and its ByteCall in OnDone, which is the last
+/// call that gRPC makes.
 class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                        private CallChannel {
  public:
   using Make = std::function<std::unique_ptr<ByteCall>(CallChannel&, const CallOrigin&)>;
 
-  /// Reports the call and its messages to the ledger of its connection, found in `connections`.
+  /// Looks up the connection of the call in `connections`, and reports the call and its messages to
+  /// the ledger of this connection.
   GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections, CallKind kind,
            const Make& make);
 
@@ -46,12 +48,13 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
   grpc::CallbackServerContext& context_;
   CallTally tally_;
   grpc::ByteBuffer* message_ = nullptr;  // The read in progress.
-  // gRPC calls nothing before the constructor has returned.
+  // Created at the end of the constructor; gRPC calls no method before the constructor has
+  // returned.
   std::unique_ptr<ByteCall> call_;
 };
 
-/// The origin of a call of gRPC. Several headers `authorization` count as none, because the choice
-/// would depend on their order.
+/// The origin of a gRPC call. If the header `authorization` occurs several times, it counts as
+/// missing, because a choice would depend on the order of the headers.
 CallOrigin OriginOf(const grpc::ServerContextBase& context);
 
 }  // namespace partiemc::server

@@ -13,8 +13,9 @@ namespace partiemc::server {
 /// The trailing metadata that carries the stable reason of a status (proto/PROTOCOL.md).
 inline constexpr char kReasonMetadata[] = "partiemc-reason";
 
-/// The same code and message, with ErrorDetails; the reason of its Violation goes into the trailing
-/// metadata of `context`. Called once per call, before it is finished.
+/// Converts a status to gRPC: same code and message, with ErrorDetails. Adds the reason of its
+/// Violation to the trailing metadata of `context`. Called once per call, before the call is
+/// finished.
 inline grpc::Status ToGrpcStatus(const absl::Status& status, grpc::CallbackServerContext& context) {
   if (status.ok()) return grpc::Status::OK;
   if (const auto violation = FindViolation(status)) {

@@ -1,4 +1,4 @@
-// Checks whether a running server serves, for the health checks of containers.
+// Checks whether a running server is serving. Containers use it as their health check.
 #pragma once
 
 #include <chrono>
@@ -9,17 +9,18 @@
 
 namespace partiemc::server {
 
-/// Does not verify the server's certificate, so that any name of the server works. A check sends no
-/// secret, and uses nothing of the response except the state.
+/// Security settings of a health check. The check does not verify the server's certificate, so it
+/// works with any name of the server. This is safe: the check sends no secret, and uses only the
+/// serving state of the response.
 struct HealthCheckSecurity {
   bool tls = false;
   /// PEM files for a server that requires client certificates, or empty.
   std::string certificate_file, key_file;
 };
 
-/// OK if the server at `address` serves. Errors: UNAVAILABLE; INVALID_ARGUMENT if a file of
-/// `security` cannot be read. Each message is one line: problem, place, remedy. Blocks for at most
-/// `timeout`.
+/// Returns OK if the server at `address` is serving. Errors: UNAVAILABLE; INVALID_ARGUMENT if a
+/// file of `security` cannot be read. Each message is one line: problem, place, remedy. Blocks for
+/// at most `timeout`.
 absl::Status CheckHealth(const Address& address, std::chrono::milliseconds timeout,
                          const HealthCheckSecurity& security = {});
 

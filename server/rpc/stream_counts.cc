@@ -11,13 +11,14 @@
 namespace partiemc::server {
 namespace {
 
-// The list of peers is cleared, and read again, when it exceeds this number.
+// If the list of peers exceeds this number, it is cleared and read again.
 constexpr std::size_t kMostListed = 20'000;
 
 using Text = std::unique_ptr<char, decltype(&gpr_free)>;
 
-// The value after the next `"name":"` at or after `from`, which moves behind it; empty if there is
-// none. channelz writes numbers as strings, and no text of clients.
+// Finds the next `"name":"` at or after `from`, returns the value that follows, and moves `from`
+// behind the value. Empty if there is none. This simple search suffices, because channelz writes
+// numbers as strings and its output contains no text of clients.
 std::string_view NextValue(std::string_view text, std::string_view name, std::size_t& from) {
   const std::string key = "\"" + std::string(name) + "\":\"";
   const auto at = text.find(key, from);

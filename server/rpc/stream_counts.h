@@ -1,4 +1,4 @@
-// Reads gRPC's own counts of a connection: its streams and messages.
+// Reads the numbers of streams and messages that gRPC has counted for a connection.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace partiemc::server {
 
-/// Uses channelz, which gRPC keeps for every connection. For one thread.
+/// Reads channelz, the statistics that gRPC keeps for every connection. Used by one thread.
 class ChannelzStreams final : public StreamCounter {
  public:
-  /// Reads the server that was built last in this process.
+  /// Uses the server that was built last in this process.
   ChannelzStreams();
 
   bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) override;

@@ -10,7 +10,8 @@ class StageClock;
 
 namespace server {
 
-/// Called by compute threads: implementations are fast and thread-safe.
+/// Receives the events of frames. Compute threads call it, so implementations must be fast and
+/// thread-safe.
 class FrameObserver {
  public:
   virtual ~FrameObserver() = default;

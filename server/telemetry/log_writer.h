@@ -1,4 +1,4 @@
-// Writes log lines on a separate thread, so that callers never wait.
+// Writes log lines on a separate thread, so that the threads that log never wait.
 #pragma once
 
 #include <unistd.h>
@@ -17,8 +17,8 @@ class LogWriter {
  public:
   struct Options {
     int file = STDERR_FILENO;
-    /// Capacity of the buffer in bytes; another buffer of this size may be written at the same
-    /// time.
+    /// Capacity of the buffer in bytes. While one buffer is being written to the file, a second one
+    /// of this size may fill.
     std::size_t capacity = std::size_t{1} << 20;
     /// Called by the writer thread about once per second.
     std::function<void()> every_second = {};
@@ -29,18 +29,18 @@ class LogWriter {
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
 
-  /// Never waits for the file. Drops and counts a line if the buffer is full or the file fails (a
-  /// closed pipe). Thread-safe.
+  /// Queues a line; never waits for the file. If the buffer is full or the file fails (a closed
+  /// pipe), drops the line and counts it. Thread-safe.
   void Write(std::string_view line);
 
-  /// Waits up to `patience` until everything is written. Returns whether it is.
+  /// Waits until everything is written, at most `patience`. Returns whether everything was written.
   bool Flush(std::chrono::milliseconds patience) const;
 
-  /// Flush for a signal handler, without a lock.
+  /// Same as Flush, for a signal handler: takes no lock.
   void FlushInSignal(std::chrono::milliseconds patience) const;
 
-  /// Flushes for half a second and ends the thread. Later lines are dropped. A thread that blocks
-  /// on a full pipe is abandoned.
+  /// Flushes for at most half a second and ends the writer thread. Lines that follow are dropped.
+  /// If the thread blocks on a full pipe, it is abandoned.
   void Stop();
 
   std::uint64_t dropped() const;

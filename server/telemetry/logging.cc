@@ -23,7 +23,8 @@
 namespace partiemc::server {
 namespace {
 
-// First character of a payload whose fields are JSON; no other payload begins with it.
+// Marks a log payload whose fields are JSON: such a payload begins with this character, and no
+// other payload does.
 constexpr char kFieldsFollow = '\x1e';
 
 constexpr std::uint32_t kRefusalsPerSecond = 20;
@@ -31,10 +32,11 @@ constexpr std::chrono::milliseconds kPatienceOnAbort(500);
 
 std::atomic<LogFormat> log_format = LogFormat::kText;
 RateLimit refusals(kRefusalsPerSecond);
-// Set by SetUpLogging and never destroyed, because abandoned threads may log until the process
-// ends.
+// The writer of the log, set by SetUpLogging. Never destroyed, because abandoned threads may log
+// until the process ends.
 std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
-// Never destroyed; spdlog's own logger is destroyed at the end of main.
+// The logger. Never destroyed, unlike spdlog's default logger, which is destroyed at the end of
+// main.
 std::shared_ptr<spdlog::logger>& logger =
     *new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
 
@@ -79,8 +81,9 @@ class JsonFormatter final : public spdlog::formatter {
   }
 };
 
-// gRPC's errors concern its internals; the server logs errors for users itself. gRPC's messages
-// below level error may contain transferred data.
+// Logs gRPC's errors at level debug only: they concern gRPC's internals, and the server itself logs
+// errors for users. gRPC's messages below level error are dropped, because they may contain
+// transferred data.
 void LogFromGrpc(gpr_log_func_args* message) {
   if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
   LogEvent(spdlog::level::debug, "grpc", {{"says", std::string(message->message)}});
@@ -162,7 +165,8 @@ void SetUpLogging(const std::string& level, LogFormat format) {
   });
   static_cast<void>(registered);
   gpr_set_log_function(&LogFromGrpc);
-  // Protobuf would print a line on standard error for every malformed message.
+  // Disables Protobuf's log handler, which would print a line on standard error for every malformed
+  // message.
   google::protobuf::SetLogHandler(nullptr);
 }
 

@@ -1,5 +1,5 @@
-// The log: one line per event of the server or of a stream, on standard error. LogWriter writes it
-// on its own thread.
+// The log: one line on standard error for each event of the server or of a stream. LogWriter writes
+// the lines on its own thread.
 #pragma once
 
 #include <spdlog/common.h>
@@ -19,22 +19,22 @@ namespace partiemc::server {
 
 enum class LogFormat { kText, kJson };
 
-/// Sets up spdlog's default logger, and sends gRPC's own errors there at level debug. `level` is
+/// Sets up spdlog's default logger, and sends gRPC's own errors to it at level debug. `level` is
 /// trace, debug, info, warn, error or off. Requires: gRPC has not started.
 void SetUpLogging(const std::string& level, LogFormat format);
 
-/// Removes GRPC_TRACE from the environment and logs this. Every trace of gRPC could print bearer or
-/// stream tokens. Requires: SetUpLogging was called, gRPC has not started.
+/// Removes GRPC_TRACE from the environment and logs the removal, because gRPC's traces could print
+/// bearer tokens or stream tokens. Requires: SetUpLogging was called, gRPC has not started.
 void RefuseTraces();
 
-/// Flushes the log if the process aborts (an assertion, std::terminate).
+/// Installs a handler that flushes the log if the process aborts (an assertion, std::terminate).
 void FlushLogOnAbort();
 
-/// Logs the number of dropped lines and waits up to `patience` until everything is written.
+/// Logs the number of dropped lines, then waits at most `patience` until everything is written.
 void FlushLog(std::chrono::milliseconds patience = std::chrono::milliseconds(500));
 
-/// Totals since the start: lines dropped because standard error was too slow, and refusals above
-/// the rate of LogRefusal.
+/// Losses since the start: lines that were dropped because standard error was too slow, and
+/// refusals that LogRefusal did not log because of its rate limit.
 struct LogLosses {
   std::uint64_t dropped_lines = 0;
   std::uint64_t refusals_held_back = 0;
@@ -47,17 +47,18 @@ struct LogField {
   std::variant<std::string, std::uint64_t, double> value;
 };
 
-/// Logs one event of the server, a stream or a caller. As text: `stream opened id=7 name="two
-/// words"`; as JSON: {"time":...,"level":"info","message":"stream opened","id":7,"name":"two
-/// words"}. Values may come from clients: line breaks and control characters are escaped.
+/// Logs one event of the server, of a stream or of a caller. Text format: `stream opened id=7
+/// name="two words"`. JSON format: `{"time":...,"level":"info","message":"stream
+/// opened","id":7,"name":"two words"}`. Values may come from clients, so line breaks and control
+/// characters are escaped.
 void LogEvent(spdlog::level::level_enum level, std::string_view event,
               std::initializer_list<LogField> fields);
 
-/// Logs a refused caller or request with its reason. Writes at most twenty lines per second, then
-/// one line with the number of further refusals.
+/// Logs a refused caller or request with its reason. Writes at most twenty lines per second; then
+/// writes one line with the number of refusals that were not logged.
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status);
 
-/// The formatter of log lines, for other sinks.
+/// Creates the formatter of log lines, for other sinks of spdlog.
 std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format);
 
 }  // namespace partiemc::server

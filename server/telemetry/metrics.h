@@ -20,9 +20,10 @@
 
 namespace partiemc::server {
 
-/// Events update counters and histograms, for some hundred nanoseconds per frame. A reading calls
-/// the functions of gauges and of external counters. No label has a value that a client can choose,
-/// so the number of series is bounded. Thread-safe.
+/// The metrics of the server. Events update counters and histograms; this costs some hundred
+/// nanoseconds per frame. Each scrape calls the functions of gauges and of external counters. No
+/// label has a value that a client can choose, so the number of time series is bounded.
+/// Thread-safe.
 class Metrics final : public prometheus::Collectable, public FrameObserver {
  public:
   Metrics();
@@ -30,15 +31,15 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
   void FrameReconstructed(std::uint64_t particles, const StageClock& clock) override;
   void FrameRefused(std::string_view reason) override;
 
-  /// Adds a gauge; each reading calls the function. Requires: no reading has begun.
+  /// Adds a gauge; each scrape calls `value`. Requires: no scrape has begun.
   void AddGauge(std::string name, std::string help, std::function<double()> value);
-  /// Adds a counter; each reading calls the function.
+  /// Adds a counter; each scrape calls `value`.
   void AddCounter(std::string name, std::string help, std::function<double()> value);
 
-  /// Registry for the counters of other components.
+  /// The registry to which other components add their counters.
   prometheus::Registry& registry() { return registry_; }
 
-  /// All metrics, including memory, processor time and file descriptors of the process.
+  /// Returns all metrics, including memory, processor time and file descriptors of the process.
   std::vector<prometheus::MetricFamily> Collect() const override;
 
  private:
@@ -57,7 +58,7 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
   std::vector<Asked> asked_;
 };
 
-/// Buckets for times from a tenth of a millisecond to ten seconds.
+/// Histogram buckets for times from a tenth of a millisecond to ten seconds.
 const std::vector<double>& SecondsBuckets();
 
 }  // namespace partiemc::server

@@ -44,7 +44,8 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
         absl::StrCat("--metrics ", address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
   }
   try {
-    // Prometheus reads every few seconds. A connection without a request must not occupy a thread.
+    // Sets a short request timeout, because a connection without a request must not occupy one of
+    // the two threads. Prometheus itself reads every few seconds.
     const std::vector<std::string> options = {
         "listening_ports", address.ToString(), "num_threads", "2", "request_timeout_ms", "5000"};
     auto exposer = std::make_unique<prometheus::Exposer>(options);
@@ -63,8 +64,8 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Listen(
 MetricsEndpoint::MetricsEndpoint(Address address, std::unique_ptr<prometheus::Exposer> exposer)
     : address_(std::move(address)), exposer_(std::move(exposer)) {}
 
-// The web server checks its stop flag at each connection and every two seconds. A connection makes
-// it stop at once.
+// The HTTP server checks its stop flag at each new connection and every two seconds. Therefore the
+// destructor connects to it, so that it stops at once.
 MetricsEndpoint::~MetricsEndpoint() {
   std::atomic<bool> stopped = false;
   std::thread stop([this, &stopped] {

@@ -14,7 +14,7 @@ class Exposer;
 
 namespace partiemc::server {
 
-/// GET /metrics returns all metrics. Uses two threads until it is destroyed.
+/// Serves all metrics at GET /metrics. Uses two threads until it is destroyed.
 class MetricsEndpoint {
  public:
   /// Errors: INVALID_ARGUMENT for a Unix socket, UNAVAILABLE if it cannot listen.

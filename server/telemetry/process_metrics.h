@@ -1,4 +1,4 @@
-// Metrics of this process from /proc, with the usual names of Prometheus's libraries.
+// Metrics of this process, read from /proc, under the names that Prometheus's client libraries use.
 #pragma once
 
 #include <prometheus/metric_family.h>
@@ -8,10 +8,11 @@
 
 namespace partiemc::server {
 
-/// Memory, processor time, threads and file descriptors; without those that /proc lacks.
+/// Returns memory, processor time, threads and file descriptors. Omits metrics that /proc does not
+/// provide.
 std::vector<prometheus::MetricFamily> ProcessFamilies();
 
-/// A metric family with one gauge, without labels.
+/// Returns a metric family that contains one gauge without labels.
 prometheus::MetricFamily GaugeFamily(const std::string& name, const std::string& help,
                                      double value);
 
