@@ -9,7 +9,8 @@
 namespace partiemc::server {
 namespace {
 
-// Most bytes per fetch, so that a replica does not receive a whole history at once.
+// Maximum bytes of the response to one fetch, so that the relay does not send a replica a whole
+// history at once.
 constexpr std::size_t kMaxFetchedBytes = std::size_t{4} << 20;
 
 }  // namespace
@@ -87,7 +88,8 @@ void ExportedStream::End() {
 }
 
 bool ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
-  // The stream continues. Replicas fetch the results that they miss.
+  // The stream itself continues; only this watcher was too slow. Replicas fetch the results that
+  // they miss.
   if (end.reason == kReasonFellBehind) return true;
   relay::v1::StreamEnd& told = *end_.mutable_stream_end();
   told.set_stream_id(id_);

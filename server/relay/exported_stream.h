@@ -1,5 +1,5 @@
-// A stream of this replica that other replicas watch. Each result is published once for all of
-// them; a replica fetches the results that it has missed.
+// A stream of this replica that other replicas watch. The relay publishes each result once for all
+// of them. A replica that has missed results fetches them.
 #pragma once
 
 #include <atomic>
@@ -18,14 +18,15 @@
 
 namespace partiemc::server {
 
-/// A watcher of the stream in mode `every`, with the limits of a watcher. So a slow or disconnected
-/// bus does not delay the producer. Public functions: relay thread only.
+/// Watches the local stream in mode `every`, with the limits of an ordinary watcher. So a slow or
+/// disconnected bus does not delay the producer. The public functions are called by the relay
+/// thread only.
 class ExportedStream final : public std::enable_shared_from_this<ExportedStream>,
                              private WatchTransport {
  public:
   using TimePoint = Clock::TimePoint;
 
-  /// Requires: `port` and `clock` live until live() is false; held by shared_ptr.
+  /// Requires: `port` and `clock` live until live() is false; this object is held by shared_ptr.
   ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
                  std::size_t max_bytes, RelayPort& port, const Clock& clock);
 
@@ -33,21 +34,22 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   void Begin();
   /// Stops publishing.
   void End();
-  /// Retries a failed send. Newer results wait as for a slow watcher.
+  /// Repeats a send that has failed. Newer results wait meanwhile, as for a slow watcher.
   void Retry();
   /// True from Begin until the stream has ended or End has completed.
   bool live() const { return live_; }
 
-  /// Sets the time until which another replica has requested results.
+  /// Sets the time until which another replica has requested the stream's results.
   void WantedUntil(TimePoint until) { wanted_until_ = until; }
   TimePoint wanted_until() const { return wanted_until_; }
-  /// The time at which its end was published. The end is repeated for each later fetch.
+  /// The time at which the end of the stream was published; empty if it has not ended. The end is
+  /// sent again in response to each later fetch.
   std::optional<TimePoint> ended_at() const { return ended_at_; }
-  /// Responds to `fetch` of `replica`.
+  /// Sends the response to a `fetch` of `replica`.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
  private:
-  // The fetch to which a result responds; 0: a new result.
+  // The fetch in whose response a result is sent; 0: a new result, which no replica has fetched.
   struct Answering {
     std::uint64_t fetch = 0;
     bool first = false;

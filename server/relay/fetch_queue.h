@@ -1,4 +1,4 @@
-// Queues what other replicas fetch, so that one of them cannot keep the others waiting.
+// Queues the fetches of other replicas, so that one replica cannot keep the others waiting.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,14 @@
 
 namespace partiemc::server {
 
-/// Replicas take turns. If a replica has more fetches than fit, its oldest is dropped: a replica
-/// that misses an answer fetches again. Not thread-safe.
+/// Replicas take turns. If a replica has more fetches than fit, its oldest fetch is dropped. This
+/// is safe: a replica that receives no response fetches again. Not thread-safe.
 class FetchQueue {
  public:
   static constexpr std::size_t kReplicas = 1024;
   static constexpr std::size_t kFetchesOfReplica = 16;
-  /// The limit of one fetch with the name of its replica; a real one has less than 100 bytes.
+  /// Maximum size of a fetch, including the name of its replica. Real fetches have less than 100
+  /// bytes.
   static constexpr std::size_t kFetchBytes = 1024;
 
   struct Item {
@@ -26,9 +27,10 @@ class FetchQueue {
     relay::v1::Fetch fetch;
   };
 
-  /// Drops the fetch if it is too large, or of one replica too many.
+  /// Adds a fetch. Drops it if it is too large, or if its replica is new and the queue already has
+  /// fetches of kReplicas replicas.
   void Add(const std::string& replica, const relay::v1::Fetch& fetch);
-  /// The oldest fetch of the replica whose turn it is.
+  /// Removes and returns the oldest fetch of the replica whose turn it is.
   std::optional<Item> TakeNext();
 
   bool empty() const { return turns_.empty(); }

@@ -13,11 +13,12 @@ namespace {
 
 using std::chrono::seconds;
 
-// Interval between fetches that keep the owner publishing.
+// Interval between fetches. They renew the request for results at the replica that owns the stream,
+// so that it continues to publish.
 constexpr seconds kWantEvery(1);
 // Timeout of a fetch.
 constexpr seconds kFetchPatience(2);
-// How long an import without watchers is kept, for watchers that reconnect.
+// Time for which an import without watchers is kept, so that watchers can reconnect.
 constexpr seconds kLinger(5);
 
 constexpr char kNoAnswer[] =
@@ -53,7 +54,8 @@ bool ImportedStream::IsIdle(TimePoint now) const {
 bool ImportedStream::Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const {
   if (ended_) return false;
   if (!from_sequence || limits_.history == nullptr) return true;
-  // A second import could not hold the requested history either.
+  // This import began recently from the same frame or an earlier one. A second import could not get
+  // more history.
   if (from_sequence_ && *from_sequence_ <= *from_sequence && now - began_ < kLinger) return true;
   const std::uint64_t here = broadcaster_->oldest_here();
   return ready_ &&
@@ -65,7 +67,7 @@ void ImportedStream::Await(Ready ready) {
   await_.push_back(std::move(ready));
 }
 
-// Each fetch has its own number, which its responses repeat.
+// Sends a fetch. Each fetch has its own number, and its responses repeat the number.
 void ImportedStream::Fetch(TimePoint now) {
   fetching_ = true;
   heard_ = wanted_ = now;
@@ -98,7 +100,7 @@ void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
     return DeliverWaiting(now);
   }
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
-  // Without capacity the result counts as missing and is fetched later.
+  // If the result does not fit, it is dropped here, counts as missing and is fetched later.
   if (waiting_bytes_ + bytes <= limits_.waiting_bytes &&
       waiting_.emplace(published.number, published).second) {
     waiting_bytes_ += bytes;
@@ -129,7 +131,7 @@ void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, TimePoint now) {
   FetchFrom(end.next_number(), now);
 }
 
-// Missing results up to `number` cannot be fetched any more.
+// The fetches have ended: missing results up to `last_number` are no longer available.
 void ImportedStream::FetchEnded(std::uint64_t last_number, TimePoint now) {
   fetching_ = false;
   DeliverUpTo(last_number);
@@ -201,7 +203,8 @@ void ImportedStream::End(const WatchEnd& end) {
   AnswerWaiting(NoSuchStream(stream_.name()));
 }
 
-// Ends the import without waiting for pending fetches. The end may already be known.
+// Ends the import without waiting for pending fetches: with the end that the replica reported, if
+// any, otherwise with `otherwise`.
 void ImportedStream::Lost(const WatchEnd& otherwise, TimePoint now) {
   if (ended_) return;
   if (end_) FetchEnded(end_->last_number(), now);

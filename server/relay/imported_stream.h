@@ -1,4 +1,4 @@
-// A stream of another replica for the watchers of this replica.
+// A stream of another replica (the owner), imported for the watchers of this replica.
 #pragma once
 
 #include <chrono>
@@ -19,47 +19,50 @@
 
 namespace partiemc::server {
 
-/// Relay thread only. Results keep the numbers of their replica, so gaps are detected. Missing
-/// results are fetched; results that have left the history count as dropped.
+/// Used by the relay thread only. Results keep the result numbers of the owner, so gaps are
+/// detected. Missing results are fetched. Results that the owner's history no longer contains count
+/// as dropped.
 class ImportedStream {
  public:
   using TimePoint = Clock::TimePoint;
-  /// Called once, when the stream can be joined or with the error.
+  /// Callback for Await. Called once: with OK when watchers can join the stream, or with the error.
   using Ready = std::function<void(const absl::Status& status)>;
 
   struct Limits {
     ResultBroadcaster::Limits broadcaster;
-    /// Most bytes of results that wait for earlier ones.
+    /// Maximum bytes of results that arrived too early and wait for the results before them.
     std::size_t waiting_bytes = std::size_t{16} << 20;
     HistoryRoom* history = nullptr;  ///< Outlives this; null: no history for watchers.
   };
 
-  /// Fetches the history from `from_sequence`, or the newest result.
+  /// Begins the import: fetches the history from `from_sequence`, or the newest result if
+  /// `from_sequence` is absent.
   ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
                  WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port, TimePoint now);
 
   const RemoteStream& stream() const { return stream_; }
   const std::shared_ptr<ResultBroadcaster>& broadcaster() const { return broadcaster_; }
   bool ended() const { return ended_; }
-  /// True if the stream can be deleted: it has no watcher and no pending join, and it has ended or
-  /// has had no watcher for kLinger.
+  /// True if the stream can be deleted: it has no watcher and no pending join, and it has either
+  /// ended or had no watcher for kLinger.
   bool IsIdle(TimePoint now) const;
 
-  /// Whether a watcher from `from_sequence` gets the same results here as at the owner.
+  /// Whether a watcher that starts at `from_sequence` receives the same results from this import as
+  /// from the owner.
   bool Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const;
   void Await(Ready ready);
 
   void OnMessage(relay::v1::Result& result, TimePoint now);
   void OnMessage(const relay::v1::FetchEnd& end, TimePoint now);
   void OnMessage(const relay::v1::StreamEnd& end, TimePoint now);
-  /// Fetches results and the end that may have been lost.
+  /// Fetches the results and the end of the stream that may have been lost on the bus.
   void FetchAgain(TimePoint now);
-  /// The replica does not respond any more. Ends with the end that it reported, or with
-  /// `otherwise`.
+  /// The owner does not respond any more. Ends the stream with the end that the owner reported, or
+  /// with `otherwise` if it reported none.
   void Lost(const WatchEnd& otherwise, TimePoint now);
   /// Ends the stream.
   void End(const WatchEnd& end);
-  /// Fails all pending joins.
+  /// Ends all pending joins with `status`.
   void Refuse(const absl::Status& status) { AnswerWaiting(status); }
   /// Called periodically.
   void Tick(TimePoint now, bool connected);

@@ -1,5 +1,5 @@
-// A publish-subscribe bus between replicas. Messages can be lost; messages of one sender arrive in
-// order.
+// A publish-subscribe bus between replicas. Messages may be lost, but messages of one sender arrive
+// in order.
 #pragma once
 
 #include <functional>
@@ -14,8 +14,8 @@ class MessageBus {
  public:
   using Handler = std::function<void(std::string_view message)>;
 
-  /// Subscribed during its lifetime. The handler may still be called shortly afterwards, so it must
-  /// own everything that it uses.
+  /// A subscription lasts until this object is destroyed. The handler may still be called shortly
+  /// afterwards, so it must own everything that it uses.
   class Subscription {
    public:
     virtual ~Subscription() = default;
@@ -24,12 +24,14 @@ class MessageBus {
   virtual ~MessageBus() = default;
 
   virtual bool connected() const = 0;
-  /// May block briefly. Returns false if the message was certainly lost.
+  /// Sends a message; may block briefly. Returns false if the message was certainly lost. If it
+  /// returns true, the message may still be lost.
   virtual bool Publish(const std::string& subject, std::string_view message) = 0;
-  /// Calls `handler` from a thread of the bus; it must not block for long or end subscriptions. The
-  /// subscription survives reconnections. Returns null if memory is exhausted.
+  /// Subscribes to a subject. A thread of the bus calls `handler`, which must not block for long
+  /// and must not end subscriptions. The subscription survives reconnections. Returns null if
+  /// memory is exhausted.
   virtual std::unique_ptr<Subscription> Subscribe(const std::string& subject, Handler handler) = 0;
-  /// Waits until published messages are sent, at most one second.
+  /// Waits until all published messages are sent, at most one second.
   virtual void Flush() = 0;
 };
 

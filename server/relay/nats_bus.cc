@@ -18,12 +18,12 @@ constexpr std::int64_t kConnectTimeoutMs = 1000;
 constexpr std::int64_t kReconnectWaitMs = 100, kReconnectJitterMs = 50;
 // Write timeout of the connection to NATS.
 constexpr std::int64_t kWriteDeadlineMs = 2000;
-// Ping interval; the third ping without a reply ends the connection. A silent NATS server is thus
-// noticed before the other replicas count as lost (kReplicaPatience).
+// Ping interval. When the third ping is due and the first two have no reply, the connection ends.
+// So a silent NATS server is detected before the other replicas count as lost (kReplicaPatience).
 constexpr std::int64_t kPingIntervalMs = 500;
 constexpr int kMaxPingsOut = 2;
 constexpr std::int64_t kFlushMs = 1000;
-// Limits of the pending messages of a subscription. Further messages are lost.
+// Limits of the messages that wait for the handler of a subscription. Further messages are lost.
 constexpr int kPendingMessages = 65'536, kPendingBytes = 64 << 20;
 
 struct Deleter {
@@ -31,8 +31,8 @@ struct Deleter {
   void operator()(natsConnection* connection) const { natsConnection_Destroy(connection); }
 };
 
-// The library's delivery thread calls the handler and may still run it when the subscription ends.
-// The last user deletes it.
+// A subscription of the NATS library. The library's delivery thread calls the handler and may still
+// run it when the subscription ends. Therefore the handler is shared, and its last user deletes it.
 class NatsSubscription final : public MessageBus::Subscription {
  public:
   explicit NatsSubscription(MessageBus::Handler handler)
@@ -78,7 +78,8 @@ class NatsBus final : public MessageBus {
   bool connected() const override {
     return natsConnection_Status(connection_.get()) == NATS_CONN_STATUS_CONNECTED;
   }
-  // Without a connection the library would send the messages much later, all at once.
+  // Does not publish without a connection: the library would queue the messages and send them much
+  // later, all at once.
   bool Publish(const std::string& subject, std::string_view message) override {
     return connected() && natsConnection_Publish(connection_.get(), subject.c_str(), message.data(),
                                                  static_cast<int>(message.size())) == NATS_OK;
@@ -117,12 +118,14 @@ natsStatus SetOptions(natsOptions* options, const std::string& url) {
   if (status == NATS_OK) status = natsOptions_SetWriteDeadline(options, kWriteDeadlineMs);
   if (status == NATS_OK) status = natsOptions_SetPingInterval(options, kPingIntervalMs);
   if (status == NATS_OK) status = natsOptions_SetMaxPingsOut(options, kMaxPingsOut);
-  // Send every message at once instead of with the next one.
+  // Sends every message at once. By default, the library waits briefly to send several messages
+  // together.
   if (status == NATS_OK) status = natsOptions_SetSendAsap(options, true);
   if (status == NATS_OK) status = natsOptions_SetNoEcho(options, true);
-  // One thread for all subscriptions keeps the order of a replica's messages across subjects.
+  // Uses one delivery thread for all subscriptions. This keeps the order of a replica's messages
+  // even if they have different subjects.
   if (status == NATS_OK) status = natsOptions_UseGlobalMessageDelivery(options, true);
-  // Keeps the library from printing errors.
+  // Installs an empty error handler, because the library would otherwise print errors.
   if (status == NATS_OK) {
     status = natsOptions_SetErrorHandler(
         options, [](natsConnection*, natsSubscription*, natsStatus, void*) {}, nullptr);

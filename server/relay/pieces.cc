@@ -8,9 +8,9 @@
 namespace partiemc::server {
 namespace {
 
-// Most senders with incomplete messages.
+// Maximum number of senders with an incomplete message.
 constexpr std::size_t kMaxSenders = 1024;
-// Incomplete messages of the largest size that fit at a time.
+// The incomplete messages of all senders may have the size of this many messages of maximum size.
 constexpr std::size_t kMaxMessages = 4;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Splits messages into pieces of the size that the bus accepts, and joins them.
+// Splits messages into pieces that the bus accepts, and joins received pieces.
 #pragma once
 
 #include <cstddef>
@@ -12,23 +12,23 @@
 
 namespace partiemc::server {
 
-/// Size of a piece. NATS accepts messages of at most one megabyte by default.
+/// Size of a piece. By default NATS accepts messages of at most one megabyte.
 inline constexpr std::size_t kPieceBytes = std::size_t{512} << 10;
 
-/// Calls `send` with each serialised partiemc.relay.v1.Piece of `message`, in order, until it
-/// returns false. Returns whether all were sent.
+/// Calls `send` with each piece of `message` (a serialised partiemc.relay.v1.Piece), in order,
+/// until `send` returns false. Returns whether all pieces were sent.
 bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_view message,
                   absl::FunctionRef<bool(std::string_view piece)> send);
 
-/// Joins the pieces of several senders. The pieces of one sender arrive in order, one message after
-/// the other. Drops a message with a missing piece.
+/// Joins the pieces that several senders send. The pieces of one sender arrive in order, and a
+/// sender finishes a message before it begins the next. A message with a missing piece is dropped.
 class PieceJoiner {
  public:
-  /// Drops a message of more than `max_bytes`, and a message that would raise the total of
-  /// incomplete messages above four times `max_bytes`.
+  /// Drops a message of more than `max_bytes`. Also drops a message if the incomplete messages of
+  /// all senders would together exceed four times `max_bytes`.
   explicit PieceJoiner(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-  /// Adds a serialised Piece. Returns the message if it is complete.
+  /// Adds a serialised Piece. Returns the whole message if this piece completes it.
   std::optional<std::string> Add(std::string_view piece);
   /// Drops the incomplete message of this sender.
   void Forget(const std::string& replica);

@@ -21,33 +21,35 @@ using std::chrono::seconds;
 
 constexpr milliseconds kTickEvery(50);
 constexpr seconds kAnnounceEvery(1);
-// Three missing announcements.
+// A replica counts as lost after this time without an announcement: three announcements are
+// missing.
 constexpr seconds kReplicaPatience(3);
-// How long the known state is kept while the bus is disconnected.
+// Time for which the knowledge about other replicas is kept while the bus is disconnected.
 constexpr seconds kBusPatience(30);
 constexpr seconds kExportLease(3);
-// Interval of responses to fetches while results of this server's streams wait to be sent. A
-// response has up to 4 MiB.
+// Interval of the responses to fetches while new results of this server's streams wait to be sent,
+// which have priority. A response has up to 4 MiB.
 constexpr milliseconds kAnswerEvery(20);
-// How long the end of a stream is kept for replicas that were disconnected.
+// Time for which the end of a stream is kept, so that replicas that were disconnected can fetch it.
 constexpr seconds kEndKept(30);
-// How long a stream that is not announced any more may take to report its end.
+// If a replica no longer announces a stream, it gets this time to report the stream's end.
 constexpr seconds kLastWord(2);
-// Time for other replicas to connect and announce.
+// Time that other replicas get to connect to the bus and to send their announcements.
 constexpr milliseconds kSettle(300);
-// Timeout of a search for a stream, and the interval of its requests.
+// Timeout of a search for a stream, and the interval between the requests for announcements during
+// a search.
 constexpr milliseconds kSearchPatience(1500), kAskEvery(100);
-// Time for the first connection to the bus.
+// Time that this replica gets for its first connection to the bus.
 constexpr seconds kFirstConnection(2);
 constexpr milliseconds kDrainPatience(300);
-// Longest drain, even if the bus blocks.
+// Maximum time of a drain, even if the bus blocks.
 constexpr seconds kLongestDrain(2);
-// Queue sizes: for news, which contain results, and for fetches.
+// Capacities of the relay's queue in bytes: for news (which contain results), and for fetches.
 constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20};
-// Limits of an announcement.
+// Maximum size of an announcement in bytes.
 constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
-// The rule of NO_SUCH_STREAM while the streams of other replicas are unknown.
+// The text of the error NO_SUCH_STREAM while the streams of other replicas are unknown.
 constexpr char kOnlyHere[] =
     "must be the name of an open stream of this server: NATS cannot be reached, so that those of "
     "other replicas cannot be watched here; try again";
@@ -197,8 +199,9 @@ void Relay::LookAtLocalStreams() {
   local_.swap(streams);
 }
 
-// A producer that resumed its stream at another replica has abandoned the former stream, whose
-// replica may not have detected it yet. Ends its watches, so that the watchers find the new one.
+// Handles producers that have resumed their stream at another replica. Such a producer has
+// abandoned the former stream, but the replica of the former stream may not have detected this yet.
+// Ends the watches of the former stream, so that the watchers find the new one.
 void Relay::EndTakenOver() {
   const WatchEnd taken_over{
       std::string(kReasonTakenOver), "another replica has the stream now", {}};
@@ -244,11 +247,13 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
 void Relay::LookAtExports(TimePoint now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
-    // While the bus is disconnected, replicas cannot renew their requests: keep all exports.
+    // Keeps all exports while the bus is disconnected, because replicas cannot renew their requests
+    // for results.
     const bool may_be_wanted = !connected_ && now - disconnected_ < kBusPatience;
     const bool has_news = exported.ended_at() && now - *exported.ended_at() < kEndKept;
     const bool is_wanted = now < exported.wanted_until() || may_be_wanted || has_news;
-    // Other replicas reconnect at the same time: keep pending results until they have subscribed.
+    // Waits for kSettle after a reconnection: the other replicas reconnect at the same time, and
+    // pending results must not be sent before they have subscribed.
     if (connected_ && connected_since_ && now - *connected_since_ > kSettle) exported.Retry();
     if (!is_wanted && exported.live()) exported.End();
     if (is_wanted || exported.live()) {
@@ -326,14 +331,16 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   }
   const auto now = clock_.Now();
   if (directory_.Announced(replica, announcement, now)) changed_ = true;
-  // One announcement answers all pending requests. While this server drains, the next announcement
-  // reports that it leaves, after the ends of its streams.
+  // One announcement is the response to all pending requests for announcements. While this server
+  // drains, it does not respond: its next announcement, after the ends of its streams, reports that
+  // it leaves.
   if (!announcement.asks() || draining_since_) return;
   if (registry_.changes() != local_changes_) LookAtLocalStreams();
   was_asked_ = true;
 }
 
-// The export stays active from now on, independent of the response to the fetch.
+// Receives a piece of a fetch. The fetch renews the lease of the export at once, before the relay
+// responds to it.
 void Relay::OnAskedPiece(const std::string& piece) {
   const auto whole = asked_joiner_.Add(piece);
   relay::v1::RelayMessage message;
@@ -389,7 +396,8 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
                  .name = name, .from_sequence = from_sequence, .done = std::move(done)}]() mutable {
         if (draining_since_) return search.done(DrainingError());
         const auto now = clock_.Now();
-        // A replica that has just connected does not know the others yet.
+        // Waits longer if this replica has just connected, because it does not know the other
+        // replicas yet.
         const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
         search.began = now;
         search.settled = settled + kSettle;
@@ -406,7 +414,8 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
 
 bool Relay::TryFind(const Search& search, TimePoint now) {
   const auto remote = directory_.FindName(search.name);
-  // A stream that was resumed here is local.
+  // Whether this server has the stream: a producer has resumed it here, later than it opened the
+  // remote stream.
   const auto is_here = [&](const auto& item) {
     return item.second.lineage == remote->stream.lineage() &&
            item.second.opened_unix_ms > remote->stream.opened_unix_ms();
@@ -425,7 +434,8 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, TimePoint no
   if (begun != imports_.end()) {
     stream = begun->stream.get();
   } else {
-    // Subscribes before it fetches, so that no result is missed in between.
+    // Subscribes to the results before it fetches earlier ones, so that no result in between is
+    // missed.
     Import import;
     import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()), RelayQueue::kNews);
     import.stream = std::make_unique<ImportedStream>(
@@ -444,7 +454,7 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, TimePoint no
 }
 
 void Relay::LookAtSearches(TimePoint now) {
-  // The stream may have been announced just now.
+  // Requests announcements again, because the stream may have been opened just now.
   if (!searches_.empty() && connected_ && now - asked_ > kAskEvery) {
     asked_ = now;
     Announce(now, true, false);

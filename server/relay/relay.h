@@ -1,5 +1,5 @@
-// Lets every replica serve watchers of all streams: each replica announces its streams and
-// publishes the results of a stream while another replica watches it.
+// Lets every replica serve watchers of all streams. Each replica announces its streams to the
+// others. It publishes the results of a stream while another replica watches the stream.
 #pragma once
 
 #include <atomic>
@@ -32,10 +32,10 @@
 
 namespace partiemc::server {
 
-/// Public functions are thread-safe; the relay thread does everything else. Messages beyond the
-/// capacity of its queues are lost; the results in them are fetched again. Work of this server
-/// comes first, then messages, then one fetch at a time, so a flooding peer delays neither results
-/// nor a drain for long.
+/// The public functions are thread-safe; the relay thread does everything else. Messages that
+/// exceed the capacity of its queues are lost; lost results are fetched again. In each step the
+/// thread first does the work of this server, then handles messages, then responds to one fetch. So
+/// a flooding peer can delay neither results nor a drain for long.
 class Relay final : private RelayPort {
  public:
   using TimePoint = Clock::TimePoint;
@@ -47,8 +47,8 @@ class Relay final : private RelayPort {
     std::size_t watches = 64;        ///< Most concurrent searches for streams.
   };
 
-  /// Requires: all references outlive this. `address` is announced to the other replicas as the
-  /// address of this server for clients; empty: none.
+  /// Requires: all references outlive this object. The relay announces `address` to the other
+  /// replicas as the address of this server for clients; empty: no address.
   Relay(std::unique_ptr<MessageBus> bus, StreamRegistry& registry, WatchDispatcher& dispatcher,
         const Limits& limits, std::string address = {}, const TimeAndChance& surroundings = {});
   ~Relay() override;
@@ -62,32 +62,33 @@ class Relay final : private RelayPort {
   };
   using FindDone = std::function<void(const absl::StatusOr<Found>& found)>;
 
-  /// Searches the other replicas for the stream of this name, to watch it from `from_sequence`.
-  /// Calls `done` once, possibly from within or from another thread. Errors: NOT_FOUND
-  /// (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
+  /// Searches the other replicas for the stream of this name, to watch it from the sequence number
+  /// `from_sequence`. Calls `done` once, during this call or later from another thread. Errors:
+  /// NOT_FOUND (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
   void Find(const std::string& name, std::optional<std::uint64_t> from_sequence, FindDone done);
-  /// Whether another replica has opened the stream with this lineage later than `opened`.
+  /// Whether a producer has resumed the stream with this lineage (LineageOf the stream token) at
+  /// another replica, later than `opened`.
   bool WasResumedElsewhere(std::string_view lineage, TimePoint opened) const;
-  /// At most `count` streams of other replicas with ids above `after`, in the order of ids, that
-  /// `caller` may use. Without streams that were resumed here.
+  /// Returns at most `count` streams of other replicas that `caller` may use, with ids above
+  /// `after`, sorted by id. Omits streams that were resumed at this server.
   std::vector<relay::v1::LiveStream> List(const std::string& after, std::size_t count,
                                           const Caller& caller) const;
   std::size_t replicas() const { return directory_.replicas(); }
   std::size_t remote_streams() const { return directory_.streams(); }
 
-  /// Some addresses of other replicas that accept streams.
+  /// Returns the addresses of some other replicas that accept streams.
   std::vector<std::string> Addresses() const { return directory_.Addresses(kMaxAddresses); }
 
-  /// Announces that this replica accepts no more streams. Drain follows.
+  /// Announces that this replica accepts no further streams. The caller calls Drain later.
   void WillDrain();
-  /// Refuses pending searches, sends the last results and ends, and stops. Takes at most 300 ms
-  /// plus the time of the bus, two seconds in total.
+  /// Ends pending searches with an error, sends the last results and the ends of streams, and
+  /// stops. Takes at most 300 ms plus the time that the bus needs, but at most two seconds.
   void Drain();
 
   bool connected() const { return connected_; }
   std::size_t exported_streams() const { return exported_count_; }
   std::size_t imported_streams() const { return imported_count_; }
-  /// Number of messages lost because a queue was full or a send failed.
+  /// Number of messages that were lost because a queue was full or a send failed.
   std::uint64_t lost_messages() const {
     return unsent_ + dropped_fetches_ + queue_->lost_messages();
   }

@@ -1,4 +1,5 @@
-// The interface of the relay for its streams: run on its thread, send to other replicas.
+// The interface through which exported and imported streams use the relay: to run actions on its
+// thread, and to send messages to other replicas.
 #pragma once
 
 #include <functional>
@@ -14,13 +15,15 @@ class RelayPort {
 
   /// Runs `action` on the relay thread, in the order of the calls. Thread-safe; does not block.
   virtual void Post(std::function<void()> action) = 0;
-  /// Relay thread only. Returns false if the message was certainly lost.
+  /// Sends a message. Called by the relay thread only. Returns false if the message was certainly
+  /// lost.
   virtual bool Send(const std::string& subject, relay::v1::RelayMessage& message) = 0;
 };
 
 /// Announcements to all replicas.
 inline constexpr char kReplicasSubject[] = "partiemc.replicas";
-/// Fetches to a replica, and responses to its fetches.
+/// Two subjects of a replica: for the fetches that it receives, and for the responses to its own
+/// fetches.
 inline std::string SubjectOfAsking(const std::string& replica) { return "partiemc.ask." + replica; }
 inline std::string SubjectOfAnswers(const std::string& replica) {
   return "partiemc.for." + replica;

@@ -1,4 +1,5 @@
-// The queue of the relay thread: posted actions and messages from the bus.
+// The input queue of the relay thread: actions that other threads have posted, and messages from
+// the bus.
 #pragma once
 
 #include <array>
@@ -16,19 +17,19 @@
 
 namespace partiemc::server {
 
-/// Take returns all actions but only a few messages, so that a flood on the bus delays no stream
-/// and no drain. Thread-safe. Held by shared_ptr, because handlers of the bus may outlive the
-/// relay.
+/// Take returns all actions but only a few messages, so a flood of messages delays neither streams
+/// nor a drain. Thread-safe. Held by shared_ptr, because handlers of the bus may outlive the relay.
 class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
  public:
-  /// Each lane has its own limit of queued bytes, so a flood of fetches drops no results.
+  /// The kinds of messages. Each kind has its own limit of queued bytes, so a flood of fetches does
+  /// not displace results.
   enum Lane : std::size_t {
     kNews,   ///< Announcements, results and answers.
     kAsked,  ///< Fetches.
   };
   static constexpr std::size_t kLanes = 2;
 
-  /// Messages of one lane that Take takes at a time.
+  /// Maximum number of messages of one lane that a call of Take returns.
   static constexpr std::size_t kMostMessages = 64;
 
   struct Work {
@@ -36,17 +37,19 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
     std::array<std::deque<std::string>, kLanes> messages;
   };
 
-  /// Drops messages of a lane while it holds its `max_bytes`. Requires: `clock` lives during Take.
+  /// A message is dropped if its lane already holds its `max_bytes`. Requires: `clock` lives during
+  /// Take.
   explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes, const Clock& clock = SystemClock())
       : max_bytes_(max_bytes), clock_(clock) {}
 
   void Post(std::function<void()> action) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Queues the messages of `subject`. Returns null if memory is exhausted.
+  /// Subscribes to `subject` and queues its messages in `lane`. Returns null if memory is
+  /// exhausted.
   std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject,
                                                    Lane lane);
 
-  /// Moves all actions and the next messages to `work`, in order; waits for the first item up to
-  /// `patience`. Returns false after Stop if no action is left. Requires: `work` is empty.
+  /// Moves all actions and the next messages to `work`, in order. Waits at most `patience` for the
+  /// first item. Returns false if Stop was called and no action is left. Requires: `work` is empty.
   bool Take(std::chrono::milliseconds patience, Work& work);
   /// Drops all further messages.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);

@@ -25,35 +25,39 @@ struct RemoteStream {
   const std::string& name() const { return stream.summary().stream_name(); }
 };
 
-/// Thread-safe. A stream may be announced by two replicas: it was resumed, and the former replica
-/// still holds it. The directory then lists the one that was opened later by the clocks of both.
+/// The streams that other replicas have announced. Two replicas may announce the same stream: it
+/// was resumed at one of them, and the other one has not ended it yet. The directory then lists the
+/// stream that was opened later, according to the clocks of both replicas. Thread-safe.
 class StreamDirectory {
  public:
   using TimePoint = Clock::TimePoint;
 
-  /// Replaces the streams of a replica. Returns whether they have changed.
+  /// Replaces the streams of a replica by the announced ones. Returns whether the streams have
+  /// changed.
   bool Announced(const std::string& replica, const relay::v1::Announcement& announcement,
                  TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
   void Left(const std::string& replica) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes and returns the replicas without an announcement since `before`.
+  /// Removes and returns the replicas that have sent no announcement since `before`.
   std::vector<std::string> Expire(TimePoint before) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Treats all replicas as announced at `now`, after a disconnection of the bus.
+  /// Treats all replicas as if they had sent an announcement at `now`. Called after a disconnection
+  /// of the bus.
   void Refresh(TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// At most `count` distinct addresses. Draining replicas are left out.
+  /// Returns at most `count` distinct addresses of replicas. Omits draining replicas.
   std::vector<std::string> Addresses(std::size_t count) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Whether every known replica has announced its streams since `since`.
   bool HaveAllAnnouncedSince(TimePoint since) const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// The stream of that name that was opened last.
+  /// Returns the stream of this name; if there are several, the one that was opened last.
   std::optional<RemoteStream> FindName(std::string_view name) const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// The stream with this lineage that was opened last.
+  /// Returns the stream with this lineage; if there are several, the one that was opened last.
   std::optional<RemoteStream> FindLineage(std::string_view lineage) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   bool Has(const std::string& replica, std::string_view stream_id) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// At most `count` streams that fulfil `wants`, with ids above `after`, in the order of ids.
+  /// Returns at most `count` streams for which `wants` is true, with ids above `after`, sorted by
+  /// id.
   std::vector<relay::v1::LiveStream> List(
       const std::string& after, std::size_t count,
       absl::FunctionRef<bool(const relay::v1::LiveStream&)> wants) const

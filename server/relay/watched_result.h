@@ -1,4 +1,4 @@
-// A result for watchers, with bytes that all of them share.
+// A result for watchers, whose bytes all watchers share.
 #pragma once
 
 #include <utility>
