@@ -11,28 +11,30 @@
 
 namespace partiemc::server {
 
-/// The origin of a call, as its transport reports it.
+/// Describes where a call comes from, as reported by its transport.
 struct CallOrigin {
   std::string peer;                          ///< As CallChannel::peer.
   std::optional<std::string> authorization;  ///< "Bearer TOKEN".
 };
 
-/// An admitted call, and its place in the caller's quota until the call ends.
+/// An admitted call. `place` counts it against the caller's quota until the call ends.
 struct AdmittedCall {
   Caller caller;
   CallerAccount::Place place;
 };
 
-/// A check of the caller's permissions, such as Caller::CheckMayProduce. Null: none.
+/// A function that checks a permission of the caller, such as Caller::CheckMayProduce. Null: no
+/// check.
 using Permission = absl::Status (Caller::*)() const;
 
-/// Each call begins with this, before anything of a request is read. Thread-safe.
+/// Authenticates the caller of a new call and checks its permission and its quota. Called before
+/// anything of a request is read. Thread-safe.
 /// Errors: UNAUTHENTICATED, PERMISSION_DENIED (NOT_PERMITTED), RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
                                    Permission permission = nullptr);
 
-/// As Admit, for a health check, which needs no token. Its quota is separate, so other calls keep
-/// no probe out. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
+/// Admits a health check, which needs no token. Health checks have a separate quota, so other calls
+/// cannot block them. Errors: RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> AdmitProbe(const Authentication& authentication,
                                         const CallOrigin& origin);
 

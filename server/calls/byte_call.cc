@@ -19,7 +19,8 @@ void ByteCall::OnReadDone(bool ok) {
     if (meters_ != nullptr) meters_->Received();
     return OnRequest();
   }
-  // A read fails at a half-close and at a disconnect; the channel's OnCancel may come later.
+  // A read fails if the client half-closes or disconnects. After a disconnect, the channel may call
+  // OnCancel only later, so calls it here.
   if (channel_.IsCancelled()) OnCancel();
   OnRequestsEnded();
 }

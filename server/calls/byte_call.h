@@ -1,6 +1,6 @@
-// The server's end of a call, over any channel. Every method is served as a stream of bytes, unary
-// ones included. So the server authenticates the caller before it reads a request, and checks the
-// size of a message before it parses it.
+// The server's side of a call, over any channel. Every method is served as a stream of bytes,
+// including unary methods. So the server authenticates the caller before it reads a request, and it
+// checks the size of a message before it parses the message.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -28,8 +28,9 @@ struct ArrivedCall {
   absl::StatusOr<AdmittedCall> admission;
 };
 
-/// Translates between a CallChannel and a state machine (StreamStateMachine, WatchStateMachine,
-/// UnaryStateMachine), which keeps the channel's rules. Never blocks. Any thread may call.
+/// Connects a CallChannel to a state machine (StreamStateMachine, WatchStateMachine,
+/// UnaryStateMachine). The state machine ensures that the rules of the channel are kept. Never
+/// blocks. Any thread may call.
 class ByteCall {
  public:
   ByteCall(ArrivedCall call, const ServerContext& context);
@@ -39,13 +40,13 @@ class ByteCall {
 
   // Called by the channel:
 
-  /// The read has returned a message, or none will come.
+  /// A read has ended. `ok`: it has returned a message; otherwise no further message will arrive.
   void OnReadDone(bool ok);
-  /// The write has ended, and its message may be freed.
+  /// A write has ended, so its message may be freed.
   void OnWriteDone(bool ok);
-  /// The client has disconnected. At any time until OnDone.
+  /// The client has disconnected. May be called at any time before OnDone.
   virtual void OnCancel() = 0;
-  /// The last call; this may be deleted.
+  /// The last call of the channel; this object may be deleted afterwards.
   virtual void OnDone() = 0;
 
  protected:
@@ -56,22 +57,24 @@ class ByteCall {
   CallChannel& channel() { return channel_; }
   const CallChannel& channel() const { return channel_; }
   const ServerContext& context() const { return context_; }
-  /// Ends the call. A second end is a bug of a state machine: it is logged and has no effect.
+  /// Ends the call. A second call of End is a bug of the state machine: it is logged and has no
+  /// effect.
   void End(const absl::Status& status);
 
-  /// The error with which the caller was refused, or OK.
+  /// OK, or the error with which the caller was refused.
   const absl::Status& admission() const { return admission_; }
-  /// Anonymous if the caller was refused.
+  /// The caller; an anonymous one if the caller was refused.
   const Caller& caller() const { return call_.caller; }
 
-  /// Until the first request comes, the server may end the call by `machine->GiveWay`. Called
-  /// before the machine starts.
+  /// Lets the server evict this call by `machine->GiveWay` until the first request has arrived
+  /// (OpeningCalls). Called before the machine starts.
   template <typename Machine>
   void AllowEviction(const std::shared_ptr<Machine>& machine) {
     opening_ =
         context_.opening.Enter(*caller().account(), Evict<Machine>(machine, &Machine::GiveWay));
   }
-  /// Until the next request comes, the server may end this watcher by `machine->GiveUp`.
+  /// Lets the server evict this watcher by `machine->GiveUp` until the next request has arrived
+  /// (OpeningCalls).
   template <typename Machine>
   void AllowWatcherEviction(const std::shared_ptr<Machine>& machine) {
     opening_ = context_.opening.EnterWatcher(*caller().account(),

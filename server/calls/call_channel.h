@@ -1,4 +1,4 @@
-// Carries the messages of one call. The calls (ByteCall) interpret them.
+// The interface that carries the messages of one call. The calls (ByteCall) interpret the messages.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -9,7 +9,7 @@
 
 namespace partiemc::server {
 
-/// The connection of a call to its client: gRPC (server/rpc/grpc_call.h) or another transport. Each
+/// Connects a call to its client over gRPC (server/rpc/grpc_call.h) or another transport. Each
 /// message is a grpc::ByteBuffer, whose slices can be shared. No function blocks; any thread may
 /// call. The state machines of the calls keep these rules: at most one read and one write are in
 /// progress, and Finish is called once, after the last write.

@@ -7,7 +7,8 @@
 namespace partiemc::server {
 namespace {
 
-// The codes by number, spelled as in other languages' libraries.
+// Names of the status codes, indexed by number, spelled as in gRPC's metrics libraries for other
+// languages.
 constexpr std::array<const char*, MethodMeters::kCodes> kCodeNames = {
     "OK",       "Canceled",       "Unknown",          "InvalidArgument",   "DeadlineExceeded",
     "NotFound", "AlreadyExists",  "PermissionDenied", "ResourceExhausted", "FailedPrecondition",

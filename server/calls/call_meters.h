@@ -1,4 +1,5 @@
-// Counts the calls of our service, over any channel, under the conventional names grpc_server_*.
+// Counts the calls of partiemc's service, over any channel. The metrics have the conventional names
+// grpc_server_*.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -16,7 +17,8 @@
 
 namespace partiemc::server {
 
-/// Counts the calls of one method. Atomic counters, about ten nanoseconds each. Thread-safe.
+/// Counts the calls of one method. The counters are atomic; an increment takes about ten
+/// nanoseconds. Thread-safe.
 class MethodMeters {
  public:
   static constexpr std::size_t kCodes = 17;
@@ -38,10 +40,10 @@ class MethodMeters {
 
 class CallMeters {
  public:
-  /// All series exist from the start, at zero. `metrics` outlives this.
+  /// Creates all time series at once, with the value zero. `metrics` outlives this object.
   explicit CallMeters(Metrics& metrics);
 
-  /// Requires: `method` is the name of a method of our service in the .proto.
+  /// Requires: `method` is the name of a method of partiemc's service in the .proto file.
   const MethodMeters& Of(std::string_view method) const { return meters_.find(method)->second; }
 
  private:

@@ -86,7 +86,8 @@ absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits) 
 std::chrono::milliseconds FrameArrival::LookEvery() const {
   using std::chrono::milliseconds;
   if (assembler_ == nullptr) return milliseconds(0);
-  // Short compared to the timeout, so that a frame hardly waits longer.
+  // An interval that is short compared to the timeout, so that a frame waits hardly longer than its
+  // timeout.
   return std::clamp(assembler_->timeout() / 20, milliseconds(5), milliseconds(500));
 }
 
@@ -161,7 +162,8 @@ void OtherPart::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   auto status =
       assembler()->Offer(joined_.seat, *sequence, request.Length(),
                          std::make_shared<PartMessage>(request), FrameAssembler::Clock::now());
-  // A call that has left the assembler ends with the reason as its status.
+  // CANCELLED means that the assembler has removed this call. The call then ends with a status, so
+  // the frame needs no refusal.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 
@@ -170,7 +172,8 @@ bool OtherPart::MayAnswer(std::size_t slot) const {
          assembler()->IsOver(slots_[slot].sequence, FrameAssembler::Clock::now());
 }
 
-// A part may wait for others for a long time; a whole frame is computed in its turn.
+// Drops the part, because it may wait for the other parts for a long time. A whole frame is kept
+// instead: it waits only for its turn to be computed.
 bool OtherPart::DropFrame(std::size_t slot, const absl::Status& why) {
   Slot& part = slots_[slot];
   if (!part.refusal.ok()) return true;

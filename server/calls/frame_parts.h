@@ -1,4 +1,4 @@
-// The frames of a stream on their way to its session: whole, or in parts.
+// Prepares the frames of a stream for its session, whether they arrive whole or in parts.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -23,25 +23,25 @@
 
 namespace partiemc::server {
 
-/// Parses a request with a frame into `request`, whose buffers are reused; drops unknown fields.
-/// Errors: MALFORMED (names `field`), OUT_OF_MEMORY (always names "frame"). The frame in `request`
-/// then has its `sequence`, or 0 if that cannot be read.
+/// Parses a request with a frame into `request` and reuses its buffers; drops unknown fields.
+/// Errors: MALFORMED (names `field`), OUT_OF_MEMORY (always names "frame"). After an error, the
+/// frame in `request` contains its `sequence`, or 0 if the sequence cannot be read.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field = "frame");
 
-/// Checks the fields of `open` about parts. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
+/// Checks the fields of `open` that concern parts. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
 absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits);
 
-/// The steps that ReconstructCall adds for frames in parts. This class is for whole frames, each in
-/// one message, which need none. One slot for each frame in flight. Thread rules: as StreamHandler;
-/// OnFrame is called at the end of a read.
+/// The steps that ReconstructCall takes for frames in parts. This base class is for frames that
+/// arrive whole, each in one message; its steps do nothing. There is one slot for each frame in
+/// flight. The thread rules of StreamHandler apply. OnFrame is called at the end of a read.
 class FrameArrival {
  public:
   explicit FrameArrival(std::shared_ptr<FrameAssembler> assembler = nullptr)
       : assembler_(std::move(assembler)) {}
   virtual ~FrameArrival() = default;
 
-  /// Shared by the calls of all parts; null without parts.
+  /// The assembler that the calls of all parts share; null if frames arrive whole.
   const std::shared_ptr<FrameAssembler>& assembler() const { return assembler_; }
   /// As StreamHandler.
   std::chrono::milliseconds LookEvery() const;
@@ -53,8 +53,9 @@ class FrameArrival {
   virtual std::uint64_t ComputedBytes(std::uint64_t bytes) const { return bytes; }
   virtual bool DropFrame(std::size_t /*slot*/, const absl::Status& /*why*/) { return false; }
 
-  /// Completes the frame in `slot`, which was parsed into `request`, from `bytes`. With echo,
-  /// `bytes` becomes the message of the complete frame.
+  /// Completes the frame in `slot`: `request` is its parsed message, `bytes` its serialised
+  /// message. If the client has requested an echo, `bytes` becomes the message of the complete
+  /// frame.
   virtual absl::Status Complete(std::size_t /*slot*/, const wire::Outputs& /*outputs*/,
                                 v1::ReconstructRequest& /*request*/, grpc::ByteBuffer& /*bytes*/) {
     return absl::OkStatus();
@@ -63,22 +64,25 @@ class FrameArrival {
   virtual std::optional<v1::ReconstructResponse> RespondToPart(std::size_t /*slot*/) {
     return std::nullopt;
   }
-  /// The frames below `next_sequence` were answered, the last one with or without a checkpoint.
+  /// The server has responded to all frames below `next_sequence`. `with_checkpoint`: the last
+  /// response contained a checkpoint.
   virtual void OnAnswered(std::uint64_t /*next_sequence*/, bool /*with_checkpoint*/) {}
   /// The call has ended.
   virtual void End(const absl::Status& /*status*/) {}
 
-  /// The part that this call sends of another call's stream; null if there is none.
+  /// Describes the part of another call's stream that this call sends; null if this call has its
+  /// own stream.
   virtual const JoinedPart* joined() const { return nullptr; }
 
  private:
   const std::shared_ptr<FrameAssembler> assembler_;
 };
 
-/// The call of part 0, which has the session.
+/// The call of part 0, which also has the session of the stream.
 class PartZero final : public FrameArrival {
  public:
-  /// Requires: CheckParts, and parts > 0. The first frame has this number.
+  /// Requires: CheckParts was OK, and `open` has parts > 0. `next_sequence` is the number of the
+  /// first frame.
   PartZero(const v1::OpenStream& open, const ServerLimits& limits, std::uint64_t next_sequence);
 
   void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;

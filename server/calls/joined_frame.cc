@@ -41,7 +41,7 @@ absl::Status OfPart(std::size_t part, const absl::Status& status) {
 
 std::string Amount(std::size_t bytes) { return absl::StrCat(bytes, " bytes"); }
 
-// An array of particles must be in all parts or in none.
+// Returns an error unless an array of particles is present in all parts or in none.
 absl::Status CheckSame(std::size_t part, std::string_view field, std::size_t bytes,
                        bool first_has_it) {
   if ((bytes > 0) == first_has_it) return absl::OkStatus();
@@ -65,7 +65,7 @@ std::uint32_t ComponentsOf(const v1::ParticleFrame& part, std::string_view name)
   return 0;
 }
 
-// Compares part number `k` with `first`, the first part that has particles.
+// Returns an error unless part number `k` agrees with `first`, the first part that has particles.
 absl::Status CheckAgree(std::size_t k, const v1::ParticleFrame& part,
                         std::span<const std::string> attributes, const v1::ParticleFrame& first) {
   if (part.position_format() != first.position_format()) {
@@ -104,7 +104,8 @@ const v1::ParticleFrame& PartOf(std::size_t k, const v1::ParticleFrame& frame,
   return k == 0 ? frame : parts[k - 1];
 }
 
-// Sets `first` to the number of the first part with particles, or to parts.size() + 1 without one.
+// Checks all parts. Sets `first` to the number of the first part with particles, or to parts.size()
+// + 1 if no part has particles.
 absl::Status CheckParts(std::span<const v1::ParticleFrame> parts,
                         std::span<const std::string> attributes, const v1::ParticleFrame& frame,
                         std::size_t& first) {
@@ -123,7 +124,7 @@ absl::Status CheckParts(std::span<const v1::ParticleFrame> parts,
   return absl::OkStatus();
 }
 
-// Appends the bytes of each of `more` and frees them.
+// Appends each string of `more` to `bytes` and frees it.
 void Append(std::string& bytes, std::vector<std::string*>& more) {
   std::size_t size = bytes.size();
   for (const std::string* part : more) size += part->size();
@@ -148,7 +149,7 @@ std::string* ScalarBytes(v1::ParticleFrame& part, std::string_view name) {
   return scalar == nullptr ? nullptr : scalar->mutable_values();
 }
 
-// Moves row order[k] of `bytes` to row k.
+// Reorders the rows of `bytes`: row order[k] becomes row k.
 void Permute(std::span<const std::uint32_t> order, std::string& bytes) {
   if (bytes.empty()) return;
   const std::size_t row = bytes.size() / order.size();
@@ -161,7 +162,8 @@ void Permute(std::span<const std::uint32_t> order, std::string& bytes) {
   bytes.swap(sorted);
 }
 
-// The order of ascending ids, by a stable radix sort over the bytes in which they differ.
+// Returns the permutation that sorts `ids` in ascending order. Uses a stable radix sort over only
+// the bytes in which the ids differ.
 std::vector<std::uint32_t> OrderOf(std::span<const std::uint64_t> ids) {
   std::vector<std::uint32_t> order(ids.size()), sorted(ids.size());
   std::iota(order.begin(), order.end(), 0u);

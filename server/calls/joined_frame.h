@@ -1,4 +1,4 @@
-// Joins the parts of a frame, sent by several processes.
+// Joins the parts of a frame, which several processes have sent.
 #pragma once
 
 #include <span>
@@ -10,18 +10,19 @@
 
 namespace partiemc::server {
 
-/// The reason if parts do not fit together (proto/PROTOCOL.md).
+/// The reason of the error if the parts of a frame do not fit together (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonPartMismatch = "PART_MISMATCH";
 
-/// Appends the particles of `parts` to `frame`, which is part 0. With ids, the particles are sorted
-/// by id, so the result does not depend on their distribution over parts; otherwise they stay in
-/// the order of the parts. Keeps the scalars in `attributes` only. Consumes the parts'
-/// arrays. `frame` keeps its sequence and its time. Formats of parts without particles are ignored.
-/// Additional memory: at most the size of the arrays, and 8 bytes a particle.
+/// Appends the particles of `parts` to `frame`, which is part 0. If particles have ids, they are
+/// sorted by id, so the result does not depend on their distribution over the parts. Otherwise they
+/// stay in the order of the parts. Of the scalars, keeps only the ones in `attributes`. Consumes
+/// the arrays of the parts. `frame` keeps its sequence number and its time. Formats of parts
+/// without particles are ignored. Additional memory: at most the size of the arrays, and 8 bytes
+/// per particle.
 ///
-/// Errors, INVALID_ARGUMENT with a Violation of a field of parts[k], after which `frame` is
-/// invalid: BYTE_COUNT, UNSUPPORTED (wire::DecodeFrame); PART_MISMATCH if parts differ in position
-/// format, time (0: not set), optional arrays, or the components of a scalar.
+/// Errors: INVALID_ARGUMENT with a Violation that names a field of parts[k]; `frame` is invalid
+/// afterwards. BYTE_COUNT, UNSUPPORTED (see wire::DecodeFrame); PART_MISMATCH if parts differ in
+/// position format, time (0: not set), optional arrays, or the number of components of a scalar.
 absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::string> attributes,
                        v1::ParticleFrame& frame);
 

@@ -30,7 +30,7 @@ namespace {
 
 constexpr std::int32_t kMaxPageSize = 1000;
 
-// Prefix of the page tokens for streams of other replicas.
+// Prefix of page tokens of ListStreams that refer to streams of other replicas.
 constexpr std::string_view kRemotePage = "elsewhere:";
 
 absl::StatusOr<grpc::ByteBuffer> AnswerOrThrow(grpc::ByteBuffer& bytes, const ServerLimits& limits,
@@ -125,7 +125,7 @@ std::unique_ptr<ByteCall> Methods::Begin(Method method, CallChannel& channel,
 std::unique_ptr<ByteCall> Methods::ReconstructFrame(CallChannel& channel,
                                                     const CallOrigin& origin) const {
   ArrivedCall call = Arrive(Method::kReconstructFrame, channel, origin, &Caller::CheckMayProduce);
-  // After admission: only admitted callers count as refused by a drain.
+  // Checks this after admission, so that the drain counts only refusals of admitted callers.
   if (call.admission.ok()) {
     auto status = context_.streams.CheckServing();
     if (!status.ok()) call.admission = std::move(status);
@@ -162,7 +162,8 @@ absl::StatusOr<v1::ListStreamsResponse> Methods::ListStreams(const v1::ListStrea
     return BadPage(kReasonOutOfRange, "page_size", absl::StrCat(request.page_size()),
                    "must be at least 0");
   }
-  // A token holds the last listed stream: its number, or its id if another replica has it.
+  // A page token identifies the last stream of the previous page: by its number, or by its id if
+  // another replica has the stream.
   const std::string& token = request.page_token();
   const bool is_local = !token.starts_with(kRemotePage);
   std::uint64_t after = 0;
@@ -216,7 +217,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   EncodeLimits(context_.limits, *response.mutable_limits());
   response.set_frames_in_flight(context_.limits.frames_in_flight);
   response.set_compute_threads(context_.pool.threads());
-  // A build of the core may lack some placements and fills.
+  // Lists only the placements that work: a build of the core may lack some placements and fills.
   for (const Placement placement : AllPlacements()) {
     ReconstructionParameters parameters;
     parameters.placement = placement;

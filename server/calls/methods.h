@@ -27,11 +27,11 @@ class Methods {
   /// As in the .proto.
   static std::string_view Name(Method method);
 
-  /// `metrics` and `context` outlive this; this outlives its calls.
+  /// `metrics` and `context` outlive this object; this object outlives its calls.
   Methods(const ServerContext& context, Metrics& metrics);
 
-  /// Begins a call of `method`: admits its caller, then reads from `channel`, or ends the call if
-  /// it is refused. `channel` outlives the call.
+  /// Begins a call of `method`: admits its caller, then reads from `channel`. If the caller is
+  /// refused, ends the call instead. `channel` outlives the call.
   std::unique_ptr<ByteCall> Begin(Method method, CallChannel& channel,
                                   const CallOrigin& origin) const;
 
@@ -39,7 +39,8 @@ class Methods {
   ArrivedCall Arrive(Method method, CallChannel& channel, const CallOrigin& origin,
                      Permission permission) const;
   std::unique_ptr<ByteCall> ReconstructFrame(CallChannel& channel, const CallOrigin& origin) const;
-  // A call for information: `answer` makes its response on a thread of the channel.
+  // Begins a call that returns information. A thread of the channel calls `answer` to create the
+  // response.
   template <typename Request, typename Answer>
   std::unique_ptr<ByteCall> Information(Method method, CallChannel& channel,
                                         const CallOrigin& origin, Permission permission,

@@ -86,7 +86,8 @@ void ReconstructCall::StartWrite(Outgoing what, std::size_t slot) {
 }
 
 void ReconstructCall::Finish(const absl::Status& status) {
-  // First: a client that sees the end may open the same name again at once.
+  // Closes the stream before it sends the status, because a client that receives the status may
+  // open a stream with the same name at once.
   const auto stream = context().streams.Close(*machine_);
   frames_->End(status);
   if (const JoinedPart* const part = frames_->joined()) {
@@ -272,7 +273,8 @@ Answered ReconstructCall::AnswerWhole(std::size_t slot, Worker& worker,
           .afterwards = Afterwards(has_watchers)};
 }
 
-// Keeps the bytes of the request only if they are echoed.
+// Parses a frame and completes it from its parts. Keeps the bytes of the request only if the client
+// has requested an echo.
 absl::Status ReconstructCall::ParseWhole(std::size_t slot, v1::ReconstructRequest& request) {
   auto status = ParseFrame(requests_[slot], request);
   if (status.ok()) status = frames_->Complete(slot, outputs_, request, requests_[slot]);
@@ -280,7 +282,8 @@ absl::Status ReconstructCall::ParseWhole(std::size_t slot, v1::ReconstructReques
   return status;
 }
 
-// Frames are numbered from 1. A malformed frame without a number is neither a gap nor a duplicate.
+// Computes a frame. Sequence numbers begin with 1, so 0 means that the number of a malformed frame
+// could not be read; such a frame is neither a gap nor a duplicate.
 absl::Status ReconstructCall::Compute(const absl::Status& parsed, FrameMessages& messages,
                                       Worker& worker, const std::atomic<bool>& cancelled) {
   const v1::ParticleFrame& frame = messages.request.frame();
@@ -294,8 +297,8 @@ absl::Status ReconstructCall::Compute(const absl::Status& parsed, FrameMessages&
   return status;
 }
 
-// Returns whether there are watchers. They share the bytes of the response, and of the request if
-// it is echoed.
+// Publishes the response to watchers. Returns whether there are watchers. They share the bytes of
+// the response and, if the stream echoes particles, of the request.
 bool ReconstructCall::Publish(std::size_t slot, const v1::ParticleFrame& request) {
   wire::WatchedBytes bytes(answers_[slot]);
   if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);

@@ -1,4 +1,5 @@
-// A producer's stream, over any channel: its messages, and the session behind them.
+// The call of a producer, over any channel: interprets the messages of its stream and owns the
+// session.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -27,9 +28,9 @@
 
 namespace partiemc::server {
 
-/// Requests and responses are bytes, one of each per slot. A worker parses a frame when it computes
-/// it, into its own warm buffers, so an idle stream holds almost no memory. Thread rules: as
-/// StreamTransport and StreamHandler.
+/// Keeps requests and responses as bytes, one of each per slot. A worker parses a frame only when
+/// it computes the frame, into the worker's own buffers. So an idle stream holds almost no memory.
+/// The thread rules of StreamTransport and StreamHandler apply.
 class ReconstructCall final : public ByteCall, public StreamHandler, private StreamTransport {
  public:
   ReconstructCall(ArrivedCall call, const ServerContext& context);
@@ -37,7 +38,8 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
   void OnCancel() override { machine_->Cancelled(); }
   void OnDone() override;
 
-  // The steps of a frame. Public for the fuzz target, which replaces channel and state machine.
+  // The steps of a frame. Public for the fuzz target, which takes the place of the channel and the
+  // state machine.
 
   grpc::ByteBuffer& Request(std::size_t slot) { return requests_[slot]; }
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);

@@ -12,15 +12,15 @@
 
 namespace partiemc::server {
 
-/// Limit for requests for information and requests of watchers: far above their size, and too small
-/// to exhaust the memory.
+/// Size limit for requests for information and for requests of watchers. It is far above the size
+/// of real requests, and too small to exhaust the memory.
 inline constexpr std::size_t kMaxSmallRequestBytes = 4096;
 
 /// "partiemc.v1.ReconstructionService".
 const std::string& ServiceName();
 
-/// Parses a request and clears its bytes. Errors: INVALID_ARGUMENT (MALFORMED) for more than
-/// `max_bytes`, more than wire::kMaxFields fields, or another message.
+/// Parses a request and clears its bytes. Errors: INVALID_ARGUMENT (MALFORMED) if it has more than
+/// `max_bytes` or more than wire::kMaxFields fields, or if it is not a message of this type.
 absl::Status ParseRequest(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
                           google::protobuf::Message& request);
 

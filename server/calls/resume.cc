@@ -14,7 +14,8 @@ namespace partiemc::server {
 namespace {
 
 std::uint32_t NumberOf(const wire::Outputs& outputs) {
-  // Lists every member: a new one does not compile before it is bound as well.
+  // Lists every member. If a member is added, this statement does not compile until the author also
+  // adds the member to the number.
   const auto& [rings, mesh, normals, relative_float32, echo_particles, attributes] = outputs;
   std::uint32_t number = 0;
   for (const bool part : {rings, mesh, normals, relative_float32, echo_particles}) {

@@ -1,4 +1,4 @@
-// Writes the checkpoints of a stream, and resumes streams from them.
+// Creates the checkpoints of a stream, and resumes streams from checkpoints.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +14,24 @@
 
 namespace partiemc::server {
 
-/// The reason of RESOURCE_EXHAUSTED for a checkpoint that is too large (proto/PROTOCOL.md).
+/// The reason of RESOURCE_EXHAUSTED if a checkpoint is too large (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonCheckpointBytes = "CHECKPOINT_BYTES";
 
-/// The terms that a stream with this token keeps from `open`. The name may still be empty.
+/// Returns the properties in `open` that a later resume must not change, for a stream with this
+/// stream token. The name may still be empty.
 StreamTerms TermsOf(const v1::OpenStream& open, const wire::Outputs& outputs,
                     std::string_view token);
 
-/// Continues the new `session` from the checkpoint in `resume`, and sets the name in `terms` to the
-/// checkpoint's. Errors, each with a Violation: INVALID_ARGUMENT (STREAM_TOKEN), RESOURCE_EXHAUSTED
-/// (CHECKPOINT_BYTES, before the checkpoint is read), and the errors of ParseCheckpoint.
+/// Continues the stream of the checkpoint in `resume` with the new `session`, and sets the name in
+/// `terms` to the checkpoint's name. Errors, each with a Violation: INVALID_ARGUMENT
+/// (STREAM_TOKEN), RESOURCE_EXHAUSTED (CHECKPOINT_BYTES, before the checkpoint is read), and the
+/// errors of ParseCheckpoint.
 absl::Status Resume(const v1::ResumeStream& resume, const ServerContext& context, Session& session,
                     StreamTerms& terms);
 
-/// The checkpoint for the response to a frame, before which `session` expected number `sequence`.
-/// Empty if the stream's interval has none here, if the frame used no number, or if the checkpoint
-/// could exceed the limit.
+/// Returns the checkpoint for the response to a frame; `sequence` is the number that `session`
+/// expected before this frame. Empty if no checkpoint is due at this number, if the frame did not
+/// use up the number, or if the checkpoint could exceed its size limit.
 std::string CheckpointAfter(std::uint64_t sequence, const Session& session,
                             const StreamTerms& terms, const ServerContext& context);
 

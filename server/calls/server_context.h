@@ -1,4 +1,4 @@
-// The parts of the server that calls share.
+// References to the parts of the server that all calls share.
 #pragma once
 
 namespace partiemc::server {

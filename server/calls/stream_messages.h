@@ -1,4 +1,4 @@
-// Reads and writes the messages of streams and frames, for the calls that use them.
+// Reads and writes the messages of streams and frames. Several kinds of calls use these functions.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -25,35 +25,36 @@ inline constexpr std::string_view kReasonOpenBytes = "OPEN_BYTES";
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
 
-/// Parses a request with an `open` and clears its bytes. Errors: OPEN_BYTES, PROTOCOL.
+/// Parses a request that contains an `open`, and clears its bytes. Errors: OPEN_BYTES, PROTOCOL.
 absl::Status ParseOpen(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
                        v1::ReconstructRequest& request);
 
-/// As wire::DecodeFrame. Errors: as there; FRAME_BYTES for a frame above the limit.
+/// Decodes a frame (wire::DecodeFrame) after checking its size. Errors: the errors of
+/// wire::DecodeFrame; FRAME_BYTES for a frame above the limit.
 absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits,
                                         const wire::Outputs& outputs, wire::AttributeViews& views);
 
-/// Computes `frame` in `session` under this sequence number, and writes the result into `message`.
-/// Errors: as Session::Answer.
+/// Computes `frame` in `session` under the number `sequence`, and writes the result into `message`.
+/// Errors: the errors of Session::Answer.
 absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t sequence,
                          const wire::Outputs& outputs, Session& session, Worker& worker,
                          const std::atomic<bool>& cancelled, v1::ReconstructedFrame& message);
 
-/// Messages whose buffers a worker keeps from frame to frame.
+/// Messages that a worker keeps from frame to frame, so that their buffers are reused.
 struct FrameMessages final : MessageBuffers {
   v1::ReconstructRequest request;
   v1::ReconstructResponse result;   ///< Never an error, which would free its buffers.
   wire::AttributeViews attributes;  ///< Into `request`.
 
-  /// Takes the messages from the worker. A session without memory frees the buffers that the worker
-  /// still has.
+  /// Takes the messages out of the worker. So they remain if the session frees all buffers of the
+  /// worker because memory is short.
   static std::unique_ptr<FrameMessages> Take(Worker& worker);
-  /// Frees buffers that are far larger than the last request, of this size. Otherwise the buffers
-  /// of fields that are large in turn would add up.
+  /// Frees the buffers if they are far larger than the last request, which had `request_bytes`.
+  /// Otherwise the buffers would add up if different fields are large in different requests.
   void Shrink(std::uint64_t request_bytes);
 };
 
-/// A drain notice with the addresses of other replicas.
+/// Creates the drain notice, which contains the addresses of other replicas.
 grpc::ByteBuffer DrainNotice(const std::vector<std::string>& elsewhere);
 
 }  // namespace partiemc::server

@@ -42,7 +42,7 @@ absl::StatusOr<std::uint64_t> UnaryCall::Answer(Worker* worker) {
 
 void UnaryCall::Finish(const absl::Status& status) {
   answer_.Clear();  // It may not have been written.
-  // Before End: a client that sees the end may call again at once.
+  // Frees the slot before End, because a client that receives the end may call again at once.
   context().unary_calls.GiveBackPlace(*machine_);
   if (!status.ok() && !absl::IsCancelled(status))
     LogRefusal("call refused", channel().peer(), status);

@@ -1,4 +1,4 @@
-// A call of one request and one response, over any channel.
+// The call of a unary method (one request, one response), over any channel.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -18,12 +18,13 @@ namespace partiemc::server {
 
 class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
-  /// Turns a request into a response, unless `cancelled`. May clear the request. `worker` is null
-  /// except for UnaryKind::kFrame.
+  /// The method: computes the response to a request, unless `cancelled`. It may clear the request.
+  /// `worker` is null except for UnaryKind::kFrame.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
-  /// Frames are computed by a worker of the pool, other kinds on a thread of the channel.
+  /// A worker of the pool computes calls with a frame; a thread of the channel runs `method` for
+  /// other kinds.
   UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method);
 
   void OnCancel() override { machine_->Cancelled(); }

@@ -81,7 +81,8 @@ absl::StatusOr<WatchTerms> WatchCall::ReadTerms() const {
   return terms;
 }
 
-// Each path ends with `Opened`, after which the call may be deleted.
+// Looks up the stream. Each path ends with a call of `Opened`, after which this call may have been
+// deleted.
 void WatchCall::StartOpen() {
   auto terms = ReadTerms();
   if (!terms.ok()) return machine_->Opened(terms.status());
@@ -172,7 +173,8 @@ void WatchCall::Write(grpc::ByteBuffer response) {
 }
 
 void WatchCall::Finish(const absl::Status& status) {
-  // First: a client that sees the end may watch again at once.
+  // Frees the watcher's slot before it sends the status, because a client that receives the status
+  // may watch again at once.
   context().watchers.Close(*machine_);
   LogEnd(status);
   End(status);

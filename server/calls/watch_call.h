@@ -1,4 +1,4 @@
-// A watcher, over any channel. All watchers of a stream share the bytes of its frames.
+// The call of a watcher, over any channel. All watchers of a stream share the bytes of its results.
 #pragma once
 
 #include <chrono>
