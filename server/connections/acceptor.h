@@ -16,19 +16,20 @@
 
 namespace partiemc::server {
 
-/// Owns the listening sockets, and passes each connection to a ConnectionWatch and to gRPC.
+/// Owns the listening sockets, and passes each accepted connection to a ConnectionWatch and to
+/// gRPC.
 class Acceptor {
  public:
-  /// Takes the descriptor of a connection.
+  /// Function that takes over the descriptor of a connection.
   using HandOver = std::function<void(int descriptor)>;
 
   /// Opens the listening sockets. Accepts no connection before Start. `watch` outlives the
-  /// acceptor. A connection ends if its peer acknowledges nothing for `dead_after`. Errors:
-  /// UNAVAILABLE if it cannot listen.
+  /// acceptor. A connection ends if its peer does not acknowledge sent bytes for `dead_after`.
+  /// Errors: UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const Address& address,
                                                           std::chrono::milliseconds dead_after,
                                                           ConnectionWatch& watch);
-  /// Waits until every hand-over has returned.
+  /// Waits until every call of the hand-over function has returned.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;

@@ -7,30 +7,36 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// HTTP/2 frames and TLS records add up to an eighth to a message. Proxies use frames of 1 kB.
+// HTTP/2 frame headers and TLS records add up to an eighth (1/kOverheadPart) to the size of a
+// message: proxies use frames of only 1 kB.
 constexpr std::uint64_t kOverheadPart = 8;
-// Constant overhead of a message, in bytes.
+// Overhead of each message that does not depend on its size, in bytes.
 constexpr std::uint64_t kMessageOverhead = 256;
-// Overhead of a call: usual headers, the end of the stream, and window updates.
+// Overhead of a call in bytes: usual headers, the end of the stream, and window updates.
 constexpr std::uint64_t kCallOverhead = 1'024;
-// A client acknowledges received bytes by WINDOW_UPDATE. It usually sends a thousandth of them.
+// A client acknowledges the bytes that it receives by WINDOW_UPDATE frames. Usually these have a
+// thousandth of the received bytes; a sixteenth is allowed.
 constexpr std::uint64_t kReplyPart = 16;
-// Minimum allowance of a pending read. A message up to twice the limit is received completely, so
-// that its error can state the size. A larger message cuts the connection.
+// Minimum of the bytes that a pending read allows. A message of up to twice the maximum size is
+// received completely, so that the error can state its size. A still larger message cuts the
+// connection.
 constexpr std::uint64_t kLeastReadAllowance = std::uint64_t{64} << 20;
-// Allowance for PING and SETTINGS frames, which belong to no call.
+// Bytes that each second allows for PING and SETTINGS frames, which belong to no call.
 constexpr double kBytesPerSecond = 16 * 1'024;
-// Unread bytes that a call may have in flight: its own window and the connection's window.
+// Bytes that a call may have in flight before the server reads them: the flow-control windows of
+// the call and of its connection.
 constexpr std::uint64_t kWindowBytes = 320 << 10;
-// After a call has ended, its bytes may still arrive for this time.
+// After a call has ended, bytes of it may still arrive for this time.
 constexpr double kLingerSeconds = 5;
-// Maximum allowance of all ended calls: this number of windows, and one message.
+// Limits the allowance of all ended calls together: this number of windows plus one message.
 constexpr std::uint64_t kLingeringWindows = 64;
 
-// A header block arrives without pauses. If a stream has not become a call after this time, and
-// gRPC has read more bytes than headers may have, the block has no end.
+// A client sends a header block without pauses. If a stream has not become a call after this time,
+// and gRPC has read more bytes than headers may have, the ledger assumes that the header block has
+// no end.
 constexpr milliseconds kHeaderTime(100);
-// The same limit if gRPC has read fewer bytes. gRPC itself has no such limit.
+// If gRPC has read fewer bytes, the ledger assumes this after this longer time. gRPC itself has no
+// such limit.
 constexpr std::chrono::seconds kSlowHeaderTime(10);
 
 std::uint64_t OnTheWire(std::uint64_t bytes) {
@@ -103,8 +109,8 @@ std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
   return ExamineHeaders(counts, reading, now);
 }
 
-// Adds received bytes before it subtracts credits. In the other order credits would be lost,
-// because the debt does not become negative.
+// Updates the debt. Adds received bytes before it subtracts credits: the debt never becomes
+// negative, so the other order could lose credits.
 void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& reading,
                                double seconds) {
   debt_ += static_cast<double>(reading.bytes_received - last_.bytes_received);
@@ -120,8 +126,9 @@ void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& re
   debt_ = std::max(0.0, debt_);
 }
 
-// A stream that was reset is no longer open, but gRPC holds its memory until it has become a call.
-// Some streams never become calls, so the number decays.
+// Counts the streams that have not become calls. A stream that the client has reset is no longer
+// open, but gRPC holds memory for it until it becomes a call. Some streams never become calls, so
+// the count decays.
 void ConnectionLedger::CountStreams(const Counts& counts, const ConnectionReading& reading,
                                     double seconds) {
   const double forgiven = static_cast<double>(rules_.max_streams) * seconds / kLingerSeconds;
@@ -140,7 +147,8 @@ std::optional<Flood> ConnectionLedger::ExamineHeaders(const Counts& counts,
                                                       Clock::time_point now) {
   if (!reading.has_streams) return std::nullopt;
   headers_pending_ = reading.streams_open > counts.calls_open;
-  // Within a header block no other stream begins and no message ends, so either ends the suspicion.
+  // Within a header block no other stream begins and no message ends. So if either happens, the
+  // pending stream is no longer suspected of an endless header block, and the measurement restarts.
   if (!headers_pending_ || reading.streams_started != pending_stream_ ||
       reading.messages != pending_messages_) {
     pending_since_ = now;

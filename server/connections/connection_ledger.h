@@ -1,4 +1,5 @@
-// Detects a flood in one connection: compares received bytes with the bytes of its messages.
+// Detects a flood in a connection: compares the bytes that the connection received with the bytes
+// that its calls and messages need.
 #pragma once
 
 #include <atomic>
@@ -9,19 +10,21 @@
 
 namespace partiemc::server {
 
-/// Limits of one connection. Defaults are for a server without options.
+/// Limits of one connection. The defaults are the limits of a server without options.
 struct ConnectionRules {
-  /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 needs up to
-  /// 40 bytes of memory for each such byte (headers of four bytes). 0: no limit.
+  /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 uses up to
+  /// 40 bytes of memory for each such byte (if headers have four bytes). 0: no limit.
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
-  /// Maximum number of open HTTP/2 streams, and of streams that have not become calls, such as
-  /// streams that the client resets at once. Each needs 10 to 16 kB. 0: no limit.
+  /// Maximum number of HTTP/2 streams. The limit applies to open streams, and to streams that have
+  /// not become calls, such as streams that the client resets at once. Each stream needs 10 to 16
+  /// kB. 0: no limit.
   std::uint64_t max_streams = 1'000;
 };
 
-/// Measurements of a connection by the system and gRPC. All but `streams_open` only grow.
+/// Measurements of a connection by the operating system and gRPC. All values except `streams_open`
+/// only increase.
 struct ConnectionReading {
   std::uint64_t bytes_received = 0;
   std::uint64_t bytes_read = 0;  ///< Received bytes that gRPC has read from the socket.
@@ -42,17 +45,17 @@ enum class Flood {
 /// For the log: "unaccounted bytes".
 std::string_view FloodName(Flood flood);
 
-/// The account of one connection.
+/// Keeps account of the bytes of one connection.
 ///
-/// HTTP/2's flow control bounds DATA frames by the number of open calls, but no other frames.
-/// Therefore the ledger keeps a debt: received bytes minus the credits of calls, messages and
-/// replies, at least zero. The open calls allow some bytes in flight. A connection is a flood if
-/// its debt exceeds this allowance by more than `unaccounted_bytes`.
+/// The flow control of HTTP/2 limits DATA frames (by the number of open calls) but no other frames.
+/// Therefore the ledger keeps a debt: the received bytes minus credits for calls, messages and
+/// replies, at least zero. In addition, open calls allow some bytes in flight. A connection is a
+/// flood if its debt exceeds this allowance by more than `unaccounted_bytes`.
 ///
-/// A client with an open call could send a header block without an end within that allowance. gRPC
-/// shows such a block as an open stream that is not a call. While such a stream exists and no other
-/// stream begins and no message ends, every byte that gRPC reads counts as header, without credit
-/// or allowance.
+/// Within this allowance, a client with an open call could send a header block that never ends. In
+/// gRPC's counts, such a block appears as an open stream that is not a call. While such a stream
+/// exists, no other stream begins and no message ends, the ledger counts every byte that gRPC reads
+/// as part of the header. These bytes get no credit and no allowance.
 ///
 /// The methods `On...` are thread-safe. Examine is called by one thread.
 class ConnectionLedger {
@@ -63,9 +66,9 @@ class ConnectionLedger {
 
   void OnCallBegun();
   void OnReadBegun() { reads_open_.fetch_add(1, std::memory_order_relaxed); }
-  /// A read has completed with a message of `bytes`.
+  /// A read has completed: it has received a message of `bytes`.
   void OnReadDone(std::uint64_t bytes);
-  /// `reading`: whether a read is still pending.
+  /// A call has ended. `reading`: a read of the call was still pending.
   void OnCallEnded(bool reading);
 
   /// Counts of the connection's calls.
@@ -76,18 +79,21 @@ class ConnectionLedger {
   };
   Counts Take() const;
 
-  /// Returns the kind of flood, if any. Requires: `counts` was taken before `reading`, so that all
-  /// bytes in `counts` are included in `reading`.
+  /// Updates the account. Returns the kind of flood if the connection is a flood. Requires:
+  /// `counts` was taken before `reading` was measured, so `reading` includes all bytes of the
+  /// messages in `counts`.
   std::optional<Flood> Examine(const Counts& counts, const ConnectionReading& reading,
                                Clock::time_point now);
 
-  /// The debt beyond the allowance of open calls, in bytes, at the last Examine.
+  /// The debt in excess of the allowance of open calls, in bytes, at the last call of Examine.
   std::uint64_t excess() const { return excess_; }
-  /// Streams that are open or have not become calls, at the last reading with `has_streams`.
+  /// Number of streams that are open or have not become calls, at the last reading with
+  /// `has_streams`.
   std::uint64_t streams() const { return streams_; }
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }
-  /// Whether a stream has not become a call. The streams should then be counted again soon.
+  /// Whether some stream has not become a call. If so, the caller should read the counts of streams
+  /// again soon.
   bool headers_pending() const { return headers_pending_; }
 
  private:
@@ -109,7 +115,7 @@ class ConnectionLedger {
   double debt_ = 0;       // Bytes.
   double lingering_ = 0;  // Remaining allowance of ended calls, in bytes.
   std::uint64_t excess_ = 0, streams_ = 0;
-  // Streams that have not become calls, and the counts of the last update.
+  // Number of streams that have not become calls (it decays), and the counts at its last update.
   double waiting_streams_ = 0;
   std::uint64_t counted_started_ = 0, counted_begun_ = 0;
   bool headers_pending_ = false;

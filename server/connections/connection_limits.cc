@@ -5,11 +5,12 @@
 namespace partiemc::server {
 namespace {
 
-// Capacity of the token bucket: new connections of this many seconds. The ranks of a simulation
-// connect at the same time.
+// Capacity of the token bucket that limits new connections, in seconds of its rate. Bursts are
+// legitimate: the ranks of a simulation connect at the same time.
 constexpr double kBurstSeconds = 2;
 
-// An attacker reconnects at once, before gRPC has freed the memory of the flood.
+// Times for which OnFlood restricts or refuses an address. They are needed because an attacker
+// reconnects at once, before gRPC has freed the memory of the flood.
 constexpr std::chrono::seconds kBan(10), kRefusal(1);
 
 }  // namespace
@@ -52,8 +53,8 @@ void ConnectionCounts::Remove(const std::string& address, Admission admission) {
 void ConnectionCounts::OnFlood(const std::string& address, Admission admission,
                                Clock::time_point now) {
   const auto found = addresses_.find(address);
-  // Behind a proxy all clients have one address; then the operator sets no limit, and there is no
-  // ban.
+  // No ban if the number of new connections per address is unlimited: operators set this behind a
+  // proxy, where all clients have the same address.
   if (found == addresses_.end() || limits_.new_of_address == 0) return;
   found->second.banned_until = now + kBan;
   if (admission == Admission::kHealthOnly) found->second.refused_until = now + kRefusal;

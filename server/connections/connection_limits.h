@@ -1,4 +1,5 @@
-// Limits the connections: in total, per address, and new ones per second.
+// Limits the number of connections, in total and per address, and the rate of new connections per
+// address.
 #pragma once
 
 #include <chrono>
@@ -19,8 +20,8 @@ struct ConnectionLimits {
 /// The decision about an accepted connection.
 enum class Admission {
   kKept,
-  /// A limit is exceeded. The connection may only make health checks, so that a probe from a
-  /// flooding address does not report the server as dead.
+  /// A limit is exceeded, so the connection may only make health checks. It is not refused, because
+  /// a probe from the address of a flood must not report the server as dead.
   kHealthOnly,
   /// Closed at once.
   kRefused,
@@ -33,25 +34,26 @@ class ConnectionCounts {
 
   explicit ConnectionCounts(const ConnectionLimits& limits) : limits_(limits) {}
 
-  /// Counts a connection of `address` (HostOfPeer). Unless it is refused, Remove must follow with
-  /// the same admission when it has ended.
+  /// Counts a connection of `address` (HostOfPeer) and decides how it is admitted. Unless it is
+  /// refused, the caller must call Remove with the same admission when the connection has ended.
   Admission Add(const std::string& address, Clock::time_point now);
   void Remove(const std::string& address, Admission admission);
 
-  /// A connection of `address` was cut because of a flood. For ten seconds, new connections of the
-  /// address may only make health checks. If one of these floods too, new connections are refused
-  /// for a second, because over TLS the server must pay for a handshake before it can detect a
-  /// flood. Open connections of the address continue.
+  /// Called when a connection of `address` was cut because of a flood. For ten seconds, new
+  /// connections of this address may only make health checks. If one of these floods too, all new
+  /// connections of the address are refused for one second. Refusal is necessary because over TLS
+  /// the server must complete an expensive handshake before it can detect a flood. Open connections
+  /// of the address continue.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
-  /// Kept connections of all addresses.
+  /// Number of connections of all addresses that were admitted as kKept.
   std::size_t count() const { return kept_; }
-  /// Kept connections of `address`.
+  /// Number of connections of `address` that were admitted as kKept.
   std::size_t CountOf(const std::string& address) const;
-  /// Whether a connection must end before another one can be kept.
+  /// Whether a connection must end before another one can be admitted as kKept.
   bool IsFull() const { return limits_.connections > 0 && kept_ >= limits_.connections; }
 
-  /// Forgets addresses that have no connection and whose rate has recovered.
+  /// Removes the data of addresses that have no connection and whose token bucket is full again.
   void Forget(Clock::time_point now);
   std::size_t addresses() const { return addresses_.size(); }
 

@@ -1,4 +1,5 @@
-// Finds the connection of a call, so that the call can report its messages to the ledger.
+// Finds the connection of a call, so that the call can report its messages to the connection's
+// ledger.
 #pragma once
 
 #include <atomic>
@@ -13,7 +14,7 @@
 
 namespace partiemc::server {
 
-/// The part of a connection that its calls use. Thread-safe.
+/// The data of a connection that its calls use. Thread-safe.
 struct TrackedConnection {
   TrackedConnection(const ConnectionRules& rules, Admission as,
                     ConnectionLedger::Clock::time_point now)
@@ -21,15 +22,15 @@ struct TrackedConnection {
 
   ConnectionLedger ledger;
   const Admission admission;
-  /// Whether a connection for health checks only has made another call.
+  /// Whether a connection that may only make health checks has made another kind of call.
   std::atomic<bool> misused = false;
 };
 
 enum class CallKind { kHealthCheck, kOther };
 
-/// Reports one call to the ledger of its connection. Reports nothing if the connection is unknown:
-/// for calls within the process, and over Unix sockets, where all peers have the same name. Not
-/// thread-safe.
+/// Reports one call to the ledger of its connection. Reports nothing if the connection is unknown.
+/// This is the case for calls within the process, and for Unix sockets, where all peers have the
+/// same name. Not thread-safe.
 class CallTally {
  public:
   CallTally() = default;
@@ -39,8 +40,8 @@ class CallTally {
   CallTally& operator=(const CallTally&) = delete;
 
   void OnReadBegun();
-  /// The read has completed with a message of `bytes`. A failed read stays open until the call
-  /// ends.
+  /// The read has completed with a message of `bytes`. A failed read is not reported, and counts as
+  /// pending until the call ends.
   void OnReadDone(std::uint64_t bytes);
 
  private:
@@ -51,14 +52,15 @@ class CallTally {
 /// The open connections, by peer. Thread-safe.
 class ConnectionTable {
  public:
-  /// False if the peer has a connection already. A client may use one port for connections to two
-  /// addresses of the server; calls of these cannot be distinguished.
+  /// Adds a connection. Returns false if the peer (address and port) has a connection already: a
+  /// client may use the same port for connections to two addresses of the server. The calls of such
+  /// connections cannot be distinguished.
   bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Remove(const std::string& peer) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Finds the connection of a new call; null if it is unknown. Marks the connection as misused if
-  /// it may not make this call. `peer` has gRPC's format.
+  /// Finds the connection of a new call; returns null if it is unknown. If the connection may not
+  /// make this kind of call, marks it as misused. `peer` has gRPC's format.
   std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const
       ABSL_LOCKS_EXCLUDED(mutex_);
 

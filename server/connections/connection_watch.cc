@@ -18,34 +18,38 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// Interval of examinations. The shorter one applies while a few connections are new or have an
-// excess, because gRPC begins 50 calls in a millisecond.
+// Interval of examinations. The shorter interval applies while at most kMostInAlert connections are
+// new or have an excess. It is short because gRPC can begin 50 calls in a millisecond.
 constexpr milliseconds kPeriod(20), kAlertPeriod(5);
 constexpr std::size_t kMostInAlert = 64;
 constexpr seconds kNew(1);
-// Number of quiet connections (neither new nor with an excess) that are examined in one period.
+// Number of quiet connections that are examined in each period. A connection is quiet if it is
+// neither new nor has an excess.
 constexpr std::size_t kQuietInPeriod = 128;
-// gRPC renders the counts of streams as text, which takes 20 us. They are read again after this
-// number of bytes. A stream needs at least 22 bytes, so at most 750 streams are not yet counted.
+// Limits the reading of stream counts: gRPC returns them as text, which takes 20 us. The counts of
+// a connection are read again after it has received this number of bytes. A stream needs at least
+// 22 bytes, so at most 750 streams are not counted yet.
 constexpr std::uint64_t kBytesBetweenCounts = 16 << 10;
 constexpr std::size_t kCountsInPeriod = 64;
 constexpr milliseconds kPendingBetweenCounts(500);
 
-// Limits of connections for health checks only: per address, in total, and their duration.
+// Limits of connections that may only make health checks: number per address, total number, and
+// duration.
 constexpr std::size_t kHealthOnlyOfAddress = 8;
 constexpr std::size_t kHealthOnly = 64;
 constexpr seconds kHealthOnlyTime(5);
-// Limits of one such connection: unaccounted bytes and streams.
+// Limits of one such connection: unaccounted bytes, and number of streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
-// gRPC gets such a connection after this delay. The connection is ended instead if the peer has
-// sent more bytes than a health check sends before its first reply. So a flooding peer that
-// reconnects costs little.
+// Such a connection is passed to gRPC after this delay. If by then the peer has sent more than
+// kFirstBytes, which exceeds the bytes that a health check sends before its first reply, the
+// connection is ended instead. So a flooding peer that reconnects costs little.
 constexpr milliseconds kHealthOnlyDelay(20);
 constexpr std::uint64_t kFirstBytes = 4 << 10;
 
-// gRPC frees a flood's memory soon after its connection has ended. Returning the memory to the
-// system takes some milliseconds, during which no thread can allocate.
+// Delay after the end of a flood until freed memory is returned to the system. gRPC frees the
+// flood's memory soon after its connection has ended. The return takes some milliseconds, during
+// which no thread can allocate.
 constexpr milliseconds kBetweenGivingBack(500);
 
 constexpr seconds kBetweenForgetting(1);
@@ -158,7 +162,7 @@ void ConnectionWatch::Run() {
   }
 }
 
-// The timeout of epoll_wait in milliseconds; -1: none.
+// Returns the timeout for epoll_wait in milliseconds; -1: no timeout.
 int ConnectionWatch::TimeToWait(Clock::time_point now) {
   const MutexLock lock(mutex_);
   if (connections_.empty() && counts_.addresses() == 0) return -1;
@@ -180,8 +184,8 @@ void ConnectionWatch::HandleEvents(int timeout_ms) {
       eventfd_t ignored = 0;
       eventfd_read(wake_.get(), &ignored);
     } else if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
-      // gRPC or the peer has ended the connection. The kernel frees it when this descriptor is
-      // closed too.
+      // gRPC or the peer has ended the connection. Removes it here too, because the kernel frees
+      // the connection only when this duplicate descriptor is closed.
       const auto found = by_key_.find(key);
       if (found != by_key_.end()) Remove(found->second);
     }
@@ -212,8 +216,9 @@ bool ConnectionWatch::EvictIdleLocked() {
   return true;
 }
 
-// Ends the oldest connection for health checks only if their limit is reached, so that another one
-// fits: of this address if it is at its limit, otherwise of all.
+// If the number of connections for health checks has reached its limit, ends the oldest of them, so
+// that a new one fits. If `address` has reached its own limit, ends the oldest one of this address,
+// otherwise the oldest one of all addresses.
 void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   const auto is_health_only = [](const Connection& connection) {
     return connection.tracked->admission == Admission::kHealthOnly;
@@ -233,8 +238,8 @@ void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   Remove(oldest);
 }
 
-// Examines new connections and connections with an excess each time; of the quiet ones, up to
-// kQuietInPeriod in turn.
+// Examines the connections. Connections that are new or have an excess are examined each time. Of
+// the quiet connections, up to kQuietInPeriod are examined in each period, in turn.
 void ConnectionWatch::ExamineAll(Clock::time_point now) {
   counts_left_ = kCountsInPeriod;
   const bool is_period = now >= all_at_;

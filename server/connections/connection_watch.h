@@ -26,17 +26,19 @@ namespace partiemc::server {
 class StreamCounter {
  public:
   virtual ~StreamCounter() = default;
-  /// Sets the streams and messages in `reading`; false if gRPC does not list the peer's connection
-  /// yet. `socket`: memory of Read for this connection, 0 before the first call.
+  /// Sets the numbers of streams and messages in `reading`. Returns false if gRPC does not list the
+  /// peer's connection yet. `socket`: a value that Read stores for this connection; 0 before the
+  /// first call.
   virtual bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) = 0;
 };
 
-/// Holds a duplicate of each connection's descriptor, to count its bytes and to end it. It does not
-/// read the bytes itself. One thread examines the connections every 20 ms.
+/// Watches connections and cuts floods. Holds a duplicate of each connection's descriptor, to read
+/// its byte counts and to end it; does not read its bytes. One thread examines the connections
+/// every 20 ms.
 class ConnectionWatch {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Takes the descriptor of a connection, and does not block.
+  /// Function that takes over the descriptor of a connection. It must not block.
   using HandOver = std::function<void(Descriptor)>;
 
   /// Totals since the start.
@@ -53,16 +55,18 @@ class ConnectionWatch {
   ConnectionWatch(const ConnectionWatch&) = delete;
   ConnectionWatch& operator=(const ConnectionWatch&) = delete;
 
-  /// `streams` outlives the watch; null: streams are not counted. `give_back_memory` is called half
-  /// a second after a connection was cut.
+  /// Starts the thread. `streams` outlives the watch; if it is null, streams are not counted.
+  /// `give_back_memory` is called half a second after a connection was cut.
   void Start(StreamCounter* streams, std::function<void()> give_back_memory = nullptr);
 
-  /// Watches an accepted connection, or refuses it. Unless it is refused, calls `hand_over` with
-  /// its descriptor, at once or later from the watching thread.
+  /// Watches an accepted connection, or refuses it. Unless it is refused, `hand_over` is called
+  /// with its descriptor: at once, or later by the watching thread.
   void Add(Descriptor socket, const HandOver& hand_over) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Ends a connection without a call, to free its descriptors. False if all have calls.
+  /// Ends a connection that has no call, to free its descriptors. Returns false if all connections
+  /// have calls.
   bool EvictIdle() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Ends the remaining connections at `deadline`, so that a silent peer does not delay the drain.
+  /// Sets the time at which all remaining connections are ended, so that a silent peer does not
+  /// delay the drain.
   void EndAllAt(Clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Counters& counters() const { return counters_; }
@@ -81,7 +85,8 @@ class ConnectionWatch {
     std::int64_t grpc_socket = 0;
     std::uint64_t bytes_at_count = 0;  // `bytes_read` when the streams were last counted.
     Clock::time_point counted;
-    // Set while a connection for health checks only waits to be handed over (kHealthOnlyDelay).
+    // Set while a connection that may only make health checks waits to be passed to gRPC
+    // (kHealthOnlyDelay).
     Descriptor waiting;
     HandOver hand_over;
   };
@@ -121,9 +126,9 @@ class ConnectionWatch {
   Connections connections_ ABSL_GUARDED_BY(mutex_);  // In the order of arrival.
   std::unordered_map<std::uint64_t, Connections::iterator> by_key_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t next_key_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Index of the first quiet connection to examine next.
+  // Index of the first quiet connection that the next period examines.
   std::size_t turn_ ABSL_GUARDED_BY(mutex_) = 0;
-  // How often streams may still be counted in this period.
+  // Number of connections whose streams may still be counted in this period.
   std::size_t counts_left_ ABSL_GUARDED_BY(mutex_) = 0;
   Clock::time_point examine_at_ ABSL_GUARDED_BY(mutex_){};
   Clock::time_point all_at_ ABSL_GUARDED_BY(mutex_){};

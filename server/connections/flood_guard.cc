@@ -7,8 +7,9 @@ namespace {
 
 using Amount = std::uint64_t (*)(const TrackedConnection&);
 
-// If the sum of all amounts exceeds `most`: the connection with the largest amount of the address
-// with the largest sum.
+// Returns nothing if the sum of the amounts of all connections is at most `most`. Otherwise finds
+// the address with the largest sum, and returns the index of its connection with the largest
+// amount.
 std::optional<std::size_t> LargestOfLargest(const std::vector<ExaminedConnection>& connections,
                                             Amount amount, std::uint64_t most) {
   std::map<std::string_view, std::uint64_t> sums;

@@ -1,4 +1,5 @@
-// Examines all connections together and selects connections to end.
+// Examines all connections together, and selects the connection to end if they exceed a common
+// limit.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,8 @@
 
 namespace partiemc::server {
 
-/// All connections together may reach this multiple of the limit of one connection. Otherwise many
-/// connections, each below its own limit, would exhaust the memory.
+/// All connections together may reach this multiple of the limit of one connection. Without this
+/// limit, many connections that are each below their own limit could exhaust the memory.
 inline constexpr std::uint64_t kConnectionsAtLimit = 2;
 
 /// A connection and its address.
@@ -21,9 +22,8 @@ struct ExaminedConnection {
   const std::string* address = nullptr;
 };
 
-/// The connection to cut if all connections together exceed a limit: the one with the largest
-/// excess (or most streams) of the address with the largest sum. None if they are within the
-/// limits.
+/// The connection to cut if all connections together exceed a limit. It is the connection with the
+/// largest excess (or the most streams) of the address with the largest sum.
 struct Excess {
   std::size_t index = 0;
   Flood flood = Flood::kUnaccountedBytes;
@@ -31,8 +31,9 @@ struct Excess {
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules);
 
-/// The connection to evict for a new one: the oldest connection without a call, of the address with
-/// the most connections. None if all have calls. Requires: `connections` in the order of arrival.
+/// Returns the index of the connection to evict for a new one: the oldest connection without a
+/// call, of the address with the most connections. Returns nothing if all connections have calls.
+/// Requires: `connections` are in the order of arrival.
 std::optional<std::size_t> IdleOfLargestAddress(const std::vector<ExaminedConnection>& connections,
                                                 const ConnectionCounts& counts);
 

@@ -11,14 +11,15 @@
 
 namespace partiemc::server {
 
-/// gRPC may read a connection in the thread that passes it, for as long as bytes arrive without a
-/// pause. The next connection then needs another thread. Threads are started when needed, up to
-/// kMostThreads; then connections wait.
+/// Threads that pass connections to gRPC. gRPC may read a connection in the thread that passes it,
+/// as long as bytes arrive without a pause. Meanwhile the next connection needs another thread.
+/// Threads are started on demand, up to kMostThreads; if all are busy, connections wait.
 class HandOverThreads {
  public:
   explicit HandOverThreads(std::function<void(int descriptor)> hand_over)
       : hand_over_(std::move(hand_over)) {}
-  /// Waits until every hand-over has returned. Closes waiting connections.
+  /// Waits until every call of the hand-over function has returned. Closes the connections that
+  /// still wait.
   ~HandOverThreads();
   HandOverThreads(const HandOverThreads&) = delete;
   HandOverThreads& operator=(const HandOverThreads&) = delete;

@@ -28,7 +28,8 @@ namespace {
 
 constexpr int kBacklog = 4'096;
 
-// ALREADY_EXISTS if the address is in use, otherwise UNAVAILABLE, with the system's reason.
+// Converts an error of listening: ALREADY_EXISTS if the address is in use, otherwise UNAVAILABLE.
+// The message is the system's text.
 absl::Status ListenError(int error) {
   const std::string why = std::generic_category().message(error);
   return error == EADDRINUSE ? absl::AlreadyExistsError(why) : absl::UnavailableError(why);
@@ -113,7 +114,8 @@ absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
   return all;
 }
 
-// If the machine has IPv6, a socket on [::] also accepts IPv4.
+// If `address` means all addresses (0.0.0.0 or [::]), returns [::], whose socket also accepts IPv4.
+// Empty for other addresses.
 std::optional<SocketAddress> BothFamilies(SocketAddress address) {
   const bool any = address.family() == AF_INET ? address.v4().sin_addr.s_addr == htonl(INADDR_ANY)
                                                : IN6_IS_ADDR_UNSPECIFIED(&address.v6().sin6_addr);
@@ -151,7 +153,8 @@ absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::millisec
     if (listeners.port != 0) candidate.set_port(listeners.port);
     auto socket = Listen(candidate, dead_after);
     if (!socket.ok()) {
-      // With port 0, another program may have the port on the second address.
+      // With port 0 the system chooses the port for the first address. Another program may use this
+      // port on the second address; this is not an error.
       if (address.port != 0 && absl::IsAlreadyExists(socket.status())) return socket.status();
       error.Update(socket.status());
       continue;
@@ -194,7 +197,8 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
   }
   int waiting = 0;
   if (ioctl(socket, SIOCINQ, &waiting) != 0 || waiting < 0) waiting = 0;
-  // No count decreases: bytes arrive between the two calls, and Abort resets the kernel's counts.
+  // Takes the maximum with the previous values, so that no count decreases. It otherwise could:
+  // bytes may arrive between the two system calls, and Abort resets the kernel's counts.
   const std::uint64_t received = info.tcpi_bytes_received;
   const auto unread = static_cast<std::uint64_t>(waiting);
   reading.bytes_received = std::max(reading.bytes_received, received);
@@ -204,7 +208,8 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
 }
 
 void Abort(int socket) {
-  // Resets a TCP connection and drops its unread bytes, although gRPC also holds the socket.
+  // Resets a TCP connection and drops its unread bytes. Unlike close, this works although gRPC also
+  // holds the socket.
   const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
   if (connect(socket, &nobody, sizeof(nobody)) == 0) return;
   shutdown(socket, SHUT_RDWR);

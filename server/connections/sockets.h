@@ -1,4 +1,4 @@
-// System calls on sockets: listening, peers, byte counts, abort.
+// System calls on sockets: listening, names of peers, byte counts, aborting a connection.
 #pragma once
 
 #include <chrono>
@@ -38,10 +38,14 @@ struct Listeners {
   std::uint16_t port = 0;  ///< The port that was bound; 0 for a Unix socket.
 };
 
-/// Listens as gRPC does. A host name: every address of this name. 0.0.0.0 and [::]: all addresses
-/// of IPv4 and IPv6. A Unix socket: replaces the file of a server that has crashed. A connection
-/// ends if its peer does not acknowledge sent bytes for `dead_after`. Errors: ALREADY_EXISTS if
-/// another server listens on one of the addresses; UNAVAILABLE with the system's reason.
+/// Opens listening sockets for `address`, as gRPC itself would:
+/// - a host name: every address of this name;
+/// - 0.0.0.0 and [::]: all addresses of IPv4 and IPv6;
+/// - a Unix socket: replaces the socket file if a crashed server has left one.
+///
+/// A connection ends if its peer does not acknowledge sent bytes for `dead_after`. Errors:
+/// ALREADY_EXISTS if another server listens on one of the addresses; UNAVAILABLE with the system's
+/// text.
 absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::milliseconds dead_after);
 
 struct Peer {
@@ -52,11 +56,12 @@ struct Peer {
 /// None if the connection has ended.
 std::optional<Peer> PeerOf(int socket);
 
-/// Sets the bytes received, read and sent. False if the socket does not count them (Unix sockets).
+/// Sets the numbers of bytes received, read and sent. Returns false if the socket does not count
+/// them (Unix sockets).
 bool ReadByteCounts(int socket, ConnectionReading& reading);
 
 /// Ends a connection at once: the peer receives a reset, and unread bytes are dropped. After
-/// shutdown(2) alone gRPC would still read them.
+/// shutdown(2) alone, gRPC would still read the unread bytes.
 void Abort(int socket);
 
 }  // namespace partiemc::server
