@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view kScheme = "bearer ";
 
-// The name of a scheme is case-insensitive (RFC 9110).
+// Whether the header's scheme is "Bearer". The name of a scheme is case-insensitive (RFC 9110).
 bool IsBearer(std::string_view authorization) {
   return absl::AsciiStrToLower(std::string(authorization.substr(0, kScheme.size()))) == kScheme;
 }
@@ -21,7 +21,7 @@ absl::Status TurnedAway(std::string_view reason, std::string value) {
                          "must be \"Bearer \" and a token of this server's --token-file"});
 }
 
-// The terms' quota; values that it lacks are taken from `otherwise`.
+// Returns the quota `asked`; values that it does not set are taken from `otherwise`.
 CallerQuota Completed(const CallerQuota& asked, const CallerQuota& otherwise) {
   const auto either = [](const auto& one, const auto& other) { return one ? one : other; };
   return {.calls = either(asked.calls, otherwise.calls),

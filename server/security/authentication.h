@@ -24,20 +24,22 @@ inline constexpr std::string_view kReasonTokenUnknown = "TOKEN_UNKNOWN";
 /// Thread-safe.
 class Authentication {
  public:
-  /// `quota` applies to peers without a token, and to tokens whose terms set no value.
+  /// `quota` applies to callers without a token, and to each value that the terms of a token do not
+  /// set.
   explicit Authentication(CallerQuota quota = {}) : quota_(quota), peers_(quota) {}
 
-  /// Replaces the tokens. Before the first call no token is required. A token that stays keeps its
-  /// account: resources that it holds still count, and the new quota applies to further ones.
-  /// Called by one thread at a time.
+  /// Replaces the tokens. Before the first call of this function, callers need no token. A token
+  /// that is also in the new list keeps its account: the resources that it holds still count, and
+  /// its new quota applies to further resources. Called by one thread at a time.
   void Set(BearerTokens tokens) ABSL_LOCKS_EXCLUDED(mutex_);
   bool required() const { return Current() != nullptr; }
 
-  /// `authorization` is the header of this name, "Bearer TOKEN"; `peer` is the address in gRPC's
-  /// format. Errors: UNAUTHENTICATED with a Violation that does not contain the token.
+  /// Finds the caller of a request. `authorization` is the request header of this name, "Bearer
+  /// TOKEN"; `peer` is the client's address in gRPC's format. Errors: UNAUTHENTICATED with a
+  /// Violation that does not contain the token.
   absl::StatusOr<Caller> Authenticate(std::optional<std::string_view> authorization,
                                       std::string_view peer) const;
-  /// A caller without a token, identified by its address.
+  /// Returns a caller without a token, which is identified by its address.
   Caller Anybody(std::string_view peer) const { return Caller(everything_, peers_.Of(peer)); }
 
  private:

@@ -13,8 +13,8 @@
 
 namespace partiemc::server {
 
-/// Stores SHA-256 digests, so that no token stays in memory and the time of a comparison reveals
-/// nothing.
+/// The accepted tokens. Stores their SHA-256 digests, so that no token stays in memory and the time
+/// of a comparison reveals nothing about a token.
 class BearerTokens {
  public:
   using Digest = std::array<std::uint8_t, 32>;
@@ -23,14 +23,16 @@ class BearerTokens {
     std::shared_ptr<const CallerTerms> terms;
   };
 
-  /// Each line of `text` is a token (16 to 512 characters of [A-Za-z0-9-._~+/=]), followed by the
-  /// words of ParseCallerTerms, separated by blanks. The default name is "token-LINE", the default
-  /// terms permit everything. Empty lines and lines that begin with '#' are ignored. Errors:
-  /// INVALID_ARGUMENT with line, word number and rule, but without the word: an invalid word, a
-  /// repeated token, no token, more than 1,000 tokens.
+  /// Parses a token file. Each line of `text` is a token (16 to 512 characters of
+  /// [A-Za-z0-9-._~+/=]), followed by the words of ParseCallerTerms, separated by blanks. The
+  /// default name is "token-LINE"; the default terms permit everything. Empty lines and lines that
+  /// begin with '#' are ignored. Errors: INVALID_ARGUMENT for an invalid word, a repeated token, no
+  /// token, or more than 1,000 tokens. The message contains line, word number and rule, but not the
+  /// word.
   static absl::StatusOr<BearerTokens> Parse(std::string_view text);
 
-  /// The client of this token, or null. Compares all tokens in constant time.
+  /// Returns the client with this token, or null. Compares the token with all tokens in constant
+  /// time.
   const Client* Find(std::string_view token) const { return Find(DigestOf(token)); }
 
   const std::vector<Client>& clients() const { return clients_; }

@@ -41,7 +41,7 @@ std::uint32_t LimitOf(const CallerQuota& quota, CallerAccount::Kind kind) {
   return kNone;
 }
 
-// The rule of a quota: its owner, and when to retry.
+// End of the error text for an exceeded quota: states the owner of the quota and when to retry.
 constexpr char kOfOneCaller[] =
     " of one caller, which is a token or, without tokens, an address; try again when a call of it "
     "has ended";

@@ -1,4 +1,4 @@
-// A caller: its permissions, and the account of the resources that it holds.
+// A caller: its permissions, and the account that counts the resources it holds.
 #pragma once
 
 #include <array>
@@ -23,14 +23,14 @@ inline constexpr std::string_view kReasonCallerStreams = "CALLER_STREAMS";
 inline constexpr std::string_view kReasonCallerWatchers = "CALLER_WATCHERS";
 inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 
-/// The resources that a caller holds. All calls with one token share an account; without tokens,
-/// all calls of one peer (PeerAccounts). ComputePool and FairShare identify callers by the address
-/// of this object. Thread-safe.
+/// Counts the resources that a caller holds. All calls with the same token share an account.
+/// Without tokens, all calls of the same peer address share one (PeerAccounts). ComputePool and
+/// FairShare identify callers by the memory address of this object. Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
   enum class Kind { kCall, kStream, kWatcher, kProbe };
 
-  /// A counted resource; released at destruction. Keeps the account alive.
+  /// One counted resource. The destructor releases it. Keeps the account alive.
   class Place {
    public:
     Place() = default;
@@ -55,11 +55,12 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
 
   explicit CallerAccount(CallerQuota quota = {}) : quota_(quota) {}
 
-  /// Applies to further resources. Held resources stay, even above the quota.
+  /// Sets the quota for further resources. Resources that the caller already holds stay, even if
+  /// they exceed the quota.
   void SetQuota(CallerQuota quota) ABSL_LOCKS_EXCLUDED(mutex_);
   CallerQuota quota() const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Requires: this is held by shared_ptr.
+  /// Takes one resource of this kind. Requires: this object is held by shared_ptr.
   /// Errors: RESOURCE_EXHAUSTED (CALLER_CALLS, CALLER_STREAMS, CALLER_WATCHERS).
   absl::StatusOr<Place> Take(Kind kind) ABSL_LOCKS_EXCLUDED(mutex_);
   std::uint32_t held(Kind kind) const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -72,10 +73,11 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   std::array<std::uint32_t, kKinds> held_ ABSL_GUARDED_BY(mutex_){};
 };
 
-/// RESOURCE_EXHAUSTED (CALLER_BYTES) for a request of `bytes` beyond the caller's quota.
+/// RESOURCE_EXHAUSTED (CALLER_BYTES): a request of `bytes` exceeds the caller's quota.
 absl::Status TooManyBytesOfCaller(std::uint64_t bytes);
 
-/// An admitted caller. A call uses the terms of its start, and the current account.
+/// An admitted caller. A call keeps the terms with which it began, even if the token file changes;
+/// the account always has the current quota.
 class Caller {
  public:
   /// A caller with all permissions and a new account.
@@ -88,7 +90,8 @@ class Caller {
   const std::shared_ptr<CallerAccount>& account() const { return account_; }
   bool MayUse(std::string_view stream_name) const { return terms_->MayUse(stream_name); }
 
-  /// Errors: PERMISSION_DENIED (NOT_PERMITTED), without information about existing streams.
+  /// Check a permission. Errors: PERMISSION_DENIED (NOT_PERMITTED), which does not reveal whether a
+  /// stream exists.
   absl::Status CheckMayProduce() const;
   absl::Status CheckMayWatch() const;
   absl::Status CheckMayList() const;

@@ -15,7 +15,8 @@ namespace partiemc::server {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
-// Limits the time of ListStreams, which compares each open stream with all patterns.
+// Maximum number of name patterns of a token. It limits the time of ListStreams, which compares
+// each open stream with all patterns.
 constexpr std::size_t kMaxPatterns = 32;
 
 constexpr char kMayRule[] = "may= must have one or more of produce,watch,list, each once";
@@ -58,7 +59,7 @@ bool ReadNames(std::string_view text, CallerTerms& terms) {
          });
 }
 
-// Removes the number from the front of `text`.
+// Parses a positive number at the front of `text` and removes it. Returns false if there is none.
 template <typename Number>
 bool ReadNumber(std::string_view& text, std::optional<Number>& number) {
   number = ConsumeNumber<Number>(text);

@@ -12,7 +12,7 @@
 
 namespace partiemc::server {
 
-/// Limits; absent: only the limits of the server.
+/// Limits of one caller. If a value is absent, only the limits of the server apply.
 struct CallerQuota {
   std::optional<std::uint32_t> calls;     ///< Concurrent calls of all methods.
   std::optional<std::uint32_t> streams;   ///< Open streams.
@@ -31,16 +31,17 @@ struct CallerTerms {
   std::vector<std::string> names = {"*"};  ///< Patterns of stream names (MatchesPattern).
   CallerQuota quota;
 
-  /// Whether a pattern of `names` matches the name. Does not check may_produce, may_watch,
+  /// Whether a pattern of `names` matches the name. Does not check may_produce, may_watch or
   /// may_list.
   bool MayUse(std::string_view stream_name) const;
 };
 
-/// Parses the words after a token (OPERATIONS.md, "Certificates, tokens, keys"): [NAME]
-/// [may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] [bytes=N], where
-/// bytes takes units of 1024 (64MB). NAME has 1 to 64 characters of [A-Za-z0-9._-] and is first;
-/// the others come in any order, each once. Errors: INVALID_ARGUMENT, "word K: RULE"; the token is
-/// word 1. The message does not contain the word, which may be a misplaced token.
+/// Parses the words that follow a token in a token file (OPERATIONS.md, "Certificates, tokens,
+/// keys"): `[NAME] [may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N]
+/// [bytes=N]`. N of `bytes` may have a unit, a power of 1024 (64MB). NAME has 1 to 64 characters of
+/// [A-Za-z0-9._-] and must be first. The other words may have any order, each once. Errors:
+/// INVALID_ARGUMENT, "word K: RULE"; the token counts as word 1. The message does not contain the
+/// word, which may be a misplaced token.
 absl::StatusOr<CallerTerms> ParseCallerTerms(std::span<const std::string> words);
 
 }  // namespace partiemc::server

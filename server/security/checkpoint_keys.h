@@ -1,4 +1,4 @@
-// Keys that sign checkpoints, from a file that replicas share.
+// The keys that sign checkpoints. Replicas share the file with the keys.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +12,22 @@
 
 namespace partiemc::server {
 
-/// HMAC-SHA256. The first key signs, all keys verify, so that replicas can replace a key without
-/// refusing checkpoints.
+/// Signs checkpoints by HMAC-SHA256. The first key signs; all keys verify. So replicas can replace
+/// a key one after the other without refusing each other's checkpoints.
 class CheckpointKeys {
  public:
   static constexpr std::size_t kSignatureBytes = 32;
 
-  /// `text` has one or two lines with one key each; empty lines and lines that begin with '#' are
-  /// ignored. A key has 16 to 512 characters of [A-Za-z0-9-._~+/=]. Keys must be random, because a
-  /// signed checkpoint permits offline guessing. Errors: INVALID_ARGUMENT with line and rule, but
-  /// without the key: an invalid or repeated key, no key, more than two keys.
+  /// Parses a key file. `text` has one or two lines with one key each; empty lines and lines that
+  /// begin with '#' are ignored. A key has 16 to 512 characters of [A-Za-z0-9-._~+/=]. Keys must be
+  /// random, because an attacker can test guesses offline with a signed checkpoint. Errors:
+  /// INVALID_ARGUMENT for an invalid or repeated key, no key, or more than two keys. The message
+  /// contains line and rule, but not the key.
   static absl::StatusOr<CheckpointKeys> Parse(std::string_view text);
 
-  /// Returns kSignatureBytes bytes.
+  /// Returns the signature, which has kSignatureBytes bytes.
   std::string Sign(std::string_view bytes) const;
-  /// Whether one of the keys has signed `bytes`. Constant time for all signatures.
+  /// Whether one of the keys has signed `bytes`. The time does not depend on the signature.
   bool Verify(std::string_view bytes, std::string_view signature) const;
 
  private:
@@ -37,7 +38,7 @@ class CheckpointKeys {
 class CurrentCheckpointKeys {
  public:
   void Set(CheckpointKeys keys) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Null before the first Set: checkpoints are not signed.
+  /// Returns the current keys. Null before the first Set: checkpoints are then not signed.
   std::shared_ptr<const CheckpointKeys> Get() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:

@@ -10,8 +10,9 @@
 namespace partiemc::server {
 namespace {
 
-// Changes if a file is written, replaced (also behind a symbolic link, as in Kubernetes), removed,
-// or gets another owner or mode.
+// Returns a text that changes if one of the files is written, replaced or removed, or gets another
+// owner or mode. Follows symbolic links, so it also changes if a link's target is replaced, as in
+// Kubernetes.
 std::string StampOf(const std::vector<std::string>& files) {
   std::string stamp;
   for (const std::string& file : files) {
@@ -39,7 +40,8 @@ FileReloader::~FileReloader() {
 }
 
 absl::Status FileReloader::Add(std::string what, std::vector<std::string> files, Load load) {
-  // Takes the stamp before the load, so that a change during the load is detected.
+  // Takes the stamp before the load, so that a change of a file during the load is detected at the
+  // next poll.
   std::string stamp = StampOf(files);
   if (auto status = load(); !status.ok()) return status;
   watched_.push_back({std::move(what), std::move(files), std::move(load), std::move(stamp)});

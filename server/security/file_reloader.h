@@ -12,8 +12,8 @@
 
 namespace partiemc::server {
 
-/// Polls files and reloads them after a change. A failed load is logged, once per change, and
-/// leaves the previous content in force.
+/// Polls files and reloads them after a change. If a load fails, the failure is logged once per
+/// change, and the previous content stays in use.
 class FileReloader {
  public:
   using Load = std::function<absl::Status()>;
@@ -23,12 +23,12 @@ class FileReloader {
   FileReloader(const FileReloader&) = delete;
   FileReloader& operator=(const FileReloader&) = delete;
 
-  /// Calls `load` now and after each change of `files`. `what` is the name of the files in the log.
-  /// `load` is called by one thread at a time. Requires: Start was not called. Errors: the error of
+  /// Calls `load` now and after each change of `files`. `what` names the files in the log. `load`
+  /// is called by one thread at a time. Requires: Start was not called yet. Errors: the error of
   /// the first load; the files are then not watched.
   absl::Status Add(std::string what, std::vector<std::string> files, Load load);
 
-  /// Starts to poll every `interval`. Starts no thread without files.
+  /// Starts a thread that polls the files every `interval`. Starts no thread if there are no files.
   void Start(std::chrono::milliseconds interval);
 
  private:

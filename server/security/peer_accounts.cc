@@ -17,10 +17,10 @@ struct PeerAccounts::Known {
 
 namespace {
 
-// The /64 network of an IPv6 address, "[2001:db8::1]" -> "2001:db8::"; other addresses are
-// unchanged.
+// Returns the /64 network of an IPv6 address: "[2001:db8::1]" -> "2001:db8::". Returns other
+// addresses unchanged.
 std::string NetworkOf(std::string_view host) {
-  // gRPC writes brackets and zones as in a URI.
+  // Removes brackets and zone, because gRPC writes IPv6 addresses as in a URI.
   for (const std::string_view before : {"[", "%5B"}) {
     if (host.starts_with(before)) host.remove_prefix(before.size());
   }
@@ -52,7 +52,8 @@ std::shared_ptr<CallerAccount> PeerAccounts::Of(std::string_view peer) {
   const MutexLock lock(known_->mutex);
   std::weak_ptr<CallerAccount>& known = known_->accounts[key];
   if (auto account = known.lock()) return account;
-  // The last holder removes the account, unless the peer has a new one.
+  // The deleter of the account also removes its entry from the map, unless the entry already
+  // contains a new account of the peer.
   const auto forget = [all = known_, key = std::move(key)](CallerAccount* account) {
     delete account;
     const MutexLock forgetting(all->mutex);

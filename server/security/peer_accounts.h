@@ -1,4 +1,4 @@
-// The accounts of callers without a token, one per peer.
+// The accounts of callers without a token: one account for each peer address.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,10 @@
 
 namespace partiemc::server {
 
-/// "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Of IPv6 addresses only the first 64
-/// bits, because one host can use all addresses with this prefix: "ipv6:[2001:db8::1]:51234" ->
-/// "ipv6:2001:db8::". All peers of Unix sockets are "unix".
+/// Returns the host of a peer, without its port: "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Keeps
+/// only the first 64 bits of an IPv6 address, because one host can use all addresses with this
+/// prefix: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". Returns "unix" for all peers of Unix
+/// sockets.
 std::string HostOfPeer(std::string_view peer);
 
 /// Thread-safe.
@@ -20,7 +21,7 @@ class PeerAccounts {
  public:
   explicit PeerAccounts(CallerQuota quota) : quota_(quota) {}
 
-  /// The account of a peer, ignoring its port. It exists while a caller holds it.
+  /// Returns the account of a peer's host (HostOfPeer). An account exists while a caller holds it.
   std::shared_ptr<CallerAccount> Of(std::string_view peer);
 
   /// Number of held accounts.

@@ -12,7 +12,8 @@ inline constexpr std::size_t kMaxSecretBytes = 512;
 
 inline constexpr char kSecretRule[] = "of 16 to 512 characters of [A-Za-z0-9-._~+/=]";
 
-/// Whether `text` conforms to kSecretRule, the syntax of `authorization: Bearer` (RFC 6750, 2.1).
+/// Whether `text` conforms to kSecretRule, which is the syntax of a token in `authorization:
+/// Bearer` (RFC 6750, 2.1).
 bool IsSecret(std::string_view text);
 
 }  // namespace partiemc::server

@@ -9,9 +9,10 @@
 namespace partiemc::server {
 namespace {
 
-// gRPC requests the identity at every handshake (grpc_ssl_server_certificate_config_callback).
-// gRPC's FileWatcherCertificateProvider would accept a key that does not match the certificate, and
-// then refuse every client.
+// Credentials whose identity (certificate and key) can be replaced: gRPC requests it at every
+// handshake (grpc_ssl_server_certificate_config_callback). gRPC's own
+// FileWatcherCertificateProvider is not used, because it would accept a key that does not match the
+// certificate, and then refuse every client.
 class TlsCredentials final : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(const CurrentTlsIdentity& current) : current_(current) {
@@ -24,7 +25,8 @@ class TlsCredentials final : public grpc::ServerCredentials {
   }
   ~TlsCredentials() override { grpc_server_credentials_release(credentials_); }
 
-  // server/rpc/service.cc checks tokens, because its refusals can carry a reason.
+  // Not used: partiemc checks tokens itself at the start of each call, because its refusals can
+  // then carry a reason.
   void SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {}
 
  private:
@@ -32,7 +34,8 @@ class TlsCredentials final : public grpc::ServerCredentials {
     return grpc_server_add_http2_port(server, address.c_str(), credentials_);
   }
 
-  // gRPC calls this at every handshake, with a lock held.
+  // Returns the current identity to gRPC. gRPC calls this function at every handshake, while it
+  // holds a lock.
   static grpc_ssl_certificate_config_reload_status Fetch(
       void* self, grpc_ssl_server_certificate_config** config) {
     auto& credentials = *static_cast<TlsCredentials*>(self);
@@ -40,7 +43,8 @@ class TlsCredentials final : public grpc::ServerCredentials {
     if (version.number == credentials.fetched_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
     const TlsIdentity& identity = *version.identity;
     const grpc_ssl_pem_key_cert_pair pair{identity.key.c_str(), identity.certificate.c_str()};
-    // gRPC requires an authority even if no client certificate is required.
+    // gRPC requires a client authority even if no client certificate is required; the server's own
+    // certificate then takes its place.
     const std::string& authority =
         identity.client_ca.empty() ? identity.certificate : identity.client_ca;
     *config = grpc_ssl_server_certificate_config_create(authority.c_str(), &pair, 1);

@@ -1,4 +1,5 @@
-// TLS credentials for gRPC's server, with an identity that can change at run time.
+// TLS credentials for gRPC's server, whose identity (certificate and key) can be replaced at run
+// time.
 #pragma once
 
 #include <grpcpp/security/server_credentials.h>
@@ -9,9 +10,9 @@
 
 namespace partiemc::server {
 
-/// New connections use the current identity; open connections keep theirs. With a client authority,
-/// clients need a certificate signed by it. Requires: `current` has an identity and outlives the
-/// server.
+/// New connections use the current identity; open connections keep the identity with which they
+/// began. If the identity has a client authority, clients need a certificate that this authority
+/// has signed. Requires: `current` has an identity and outlives the server.
 std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const CurrentTlsIdentity& current);
 
 }  // namespace partiemc::server

@@ -28,7 +28,7 @@ using Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using File = std::unique_ptr<std::FILE, Free<std::fclose>>;
 
-// Far above the size of certificate chains and token lists.
+// Maximum size of a file of secrets or certificates, far above the size of real files.
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
 absl::Status Wrong(const std::string& flag, const std::string& path, const std::string& what) {
@@ -39,7 +39,8 @@ Bio Reading(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
-// Refuses keys with a passphrase; OpenSSL would prompt on the terminal.
+// Password callback of OpenSSL. It fails, so keys with a passphrase are refused; without it OpenSSL
+// would prompt on the terminal.
 int NoPassphrase(char*, int, int, void*) { return -1; }
 
 // Parses the first certificate of a PEM file.

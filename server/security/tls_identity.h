@@ -1,4 +1,4 @@
-// Reads and checks the certificate, key and client authority of a server.
+// Reads and checks the files of a server's TLS identity: certificate, key and client authority.
 #pragma once
 
 #include <chrono>
@@ -16,10 +16,11 @@ namespace partiemc::server {
 struct TlsFiles {
   std::string certificate;  ///< PEM: the certificate of the server, then the intermediate ones.
   std::string key;          ///< PEM, without a passphrase.
-  /// PEM: authorities that may sign client certificates. Empty: clients need no certificate.
+  /// PEM: certificate authorities that may sign client certificates. Empty: clients need no
+  /// certificate.
   std::string client_ca;
 
-  /// The non-empty paths.
+  /// Returns the paths that are not empty.
   std::vector<std::string> All() const;
 };
 
@@ -53,13 +54,13 @@ class CurrentTlsIdentity {
   Version version_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// Reads the files and checks that certificate and key match and that client_ca has an authority.
-/// An expired certificate is accepted: clients refuse it, and the operator can replace it at run
-/// time. Errors: INVALID_ARGUMENT with flag, file and problem, but without the content.
+/// Reads the files. Checks that certificate and key match, and that client_ca contains an
+/// authority. Accepts an expired certificate: clients refuse it, and the operator can replace it at
+/// run time. Errors: INVALID_ARGUMENT with flag, file and problem, but without content of the file.
 absl::StatusOr<TlsIdentity> ReadTlsIdentity(const TlsFiles& files);
 
 /// Reads a file of secrets or certificates.
-/// Errors: INVALID_ARGUMENT with `flag` and `path`: unreadable, or above 1 MiB.
+/// Errors: INVALID_ARGUMENT with `flag` and `path` if the file is unreadable or larger than 1 MiB.
 absl::StatusOr<std::string> ReadSmallFile(const std::string& flag, const std::string& path);
 
 }  // namespace partiemc::server
