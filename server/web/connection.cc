@@ -48,7 +48,7 @@ void WebConnection::CloseAfter(std::chrono::milliseconds time) {
   deadline_.expires_after(time);
   deadline_.async_wait([weak = weak_from_this()](error_code error) {
     const auto self = weak.lock();
-    // The deadline may have been moved since the timer fired.
+    // Ignores the timer if the deadline has been moved since the timer fired.
     if (error || self == nullptr || self->deadline_.expiry() > std::chrono::steady_clock::now()) {
       return;
     }
@@ -57,8 +57,8 @@ void WebConnection::CloseAfter(std::chrono::milliseconds time) {
   });
 }
 
-// A socket that is closed with unread bytes resets the connection, and the client may lose the
-// response.
+// Shuts down this side and waits for the client. If a socket is closed while it has unread bytes,
+// the kernel resets the connection, and the client may lose the response.
 void WebConnection::CloseGently() {
   error_code error;
   socket().shutdown(WebSocket::shutdown_send, error);
@@ -68,16 +68,16 @@ void WebConnection::CloseGently() {
     const auto self = weak.lock();
     if (!aborted && self != nullptr) self->Close();
   });
-  // Linux reports this once both directions are shut down, or after a reset.
+  // Linux completes this wait when both directions are shut down, or after a reset.
   socket().async_wait(WebSocket::wait_error, [weak = weak_from_this()](error_code aborted) {
     const auto self = weak.lock();
     if (!aborted && self != nullptr) self->CloseIfRead();
   });
 }
 
-// Both directions are shut down. Closing with unread bytes would reset the connection, so a few
-// last bytes, such as the close_notify of TLS, are read first. With more bytes, the deadline closes
-// the connection.
+// Called when both directions are shut down. Closing with unread bytes would reset the connection.
+// So a few last bytes, such as the close_notify of TLS, are read before the close. If there are
+// more bytes, the deadline closes the connection later.
 void WebConnection::CloseIfRead() {
   std::array<char, 1024> last;
   error_code error;

@@ -24,15 +24,16 @@ namespace partiemc::server {
 
 using boost::beast::error_code;
 
-/// All events of a connection run on its strand.
+/// The executor of a connection: a strand, on which all events of the connection run one at a time.
 using WebExecutor = boost::asio::strand<boost::asio::io_context::executor_type>;
 using WebSocket = boost::asio::basic_stream_socket<boost::asio::ip::tcp, WebExecutor>;
 using TlsWebSocket = boost::beast::ssl_stream<WebSocket>;
 
-/// The peer in gRPC's format: "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234".
+/// Returns the peer in gRPC's format: "ipv4:192.0.2.7:51234", "ipv6:%5B2001:db8::1%5D:51234".
 std::string PeerOf(const boost::asio::ip::tcp::endpoint& endpoint);
 
-/// The part that is independent of TLS. Held by shared_ptr. Use on the strand only, except Abort.
+/// The part of a connection that is independent of TLS. Held by shared_ptr. Used on its strand
+/// only, except Abort.
 class WebConnection : public std::enable_shared_from_this<WebConnection> {
  public:
   WebConnection(WebContext& context_in, WebExecutor executor, std::string peer_in)
@@ -41,22 +42,22 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebConnection(const WebConnection&) = delete;
   WebConnection& operator=(const WebConnection&) = delete;
 
-  /// Closes the connection; pending operations fail. From any thread.
+  /// Closes the connection, so pending operations fail. May be called from any thread.
   void Abort() {
     boost::asio::post(executor_, [self = shared_from_this()] { self->Close(); });
   }
-  /// Same as Abort, without posting to the strand.
+  /// Closes the connection at once. Called on the strand.
   void Close();
-  /// `closed` runs once when this side closes the connection. It ends operations that do not wait
-  /// for the socket.
+  /// Sets a function that runs once, when this side closes the connection. It ends operations that
+  /// wait for something other than the socket.
   void WhenClosed(std::function<void()> closed) { closed_ = std::move(closed); }
 
-  /// Closes the connection after `time`, unless called again before.
+  /// Closes the connection after `time`. A later call replaces the deadline.
   void CloseAfter(std::chrono::milliseconds time);
   void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
 
-  /// Closes the connection when the client has closed it, at the latest after kWebCloseTime, so
-  /// that written bytes can arrive. Ignores further bytes from the client.
+  /// Closes the connection after the client has closed its side, but at the latest after
+  /// kWebCloseTime. So the bytes that were written can arrive. Ignores further bytes of the client.
   void CloseGently();
 
   const WebExecutor& executor() const { return executor_; }

@@ -11,8 +11,8 @@ ConnectionSlots::Slot::~Slot() {
   const auto found = slots_->connections_.find(number_);
   if (!found->second.evicted) slots_->Uncount(found->second);
   slots_->connections_.erase(found);
-  // Notifies under the lock: a thread that waits for the last connection may destroy the slots
-  // afterwards.
+  // Notifies while it holds the lock. Otherwise a thread that waits for the last connection could
+  // destroy this object before the notification.
   slots_->left_.NotifyAll();
 }
 
@@ -49,7 +49,8 @@ ConnectionSlots::Slot ConnectionSlots::Enter(const std::string& address, End end
   return slot;
 }
 
-// Linear in the connections, but called only if no slot is free.
+// Selects the idle connection to evict. Takes linear time in the number of connections, but is
+// called only if no slot is free.
 ConnectionSlots::Connection* ConnectionSlots::NextToEvict(bool reserved,
                                                           const std::string* address) {
   const auto may_go = [&](const Connection& connection) {

@@ -1,4 +1,4 @@
-// Limits the connections of the gateway, and selects the one to close when there are too many.
+// Limits the connections of the gateway, and selects the connection to close if there are too many.
 #pragma once
 
 #include <chrono>
@@ -14,14 +14,16 @@
 
 namespace partiemc::server {
 
-/// A connection is idle unless it has a call whose first request has arrived and which has not
-/// ended. A handshake without a message, an incomplete body and a closing handshake are idle.
+/// A connection is busy while it has a call whose first request has arrived and that has not ended.
+/// Otherwise it is idle: for example, during a handshake, while a request body is incomplete, and
+/// while it closes.
 ///
-/// A new connection evicts an idle one if its address or the whole server is at the limit. In the
-/// first case it is the oldest of this address, in the second the oldest of the address with the
-/// most idle connections. If none is idle, the new connection gets a reserved slot, in which the
-/// gateway answers health checks only. Connections in reserved slots are always idle and are
-/// evicted by the same rule, so each new connection gets a slot. Thread-safe.
+/// If a new connection would exceed the limit of its address or of the server, an idle connection
+/// is evicted. At the limit of the address, it is the oldest idle connection of this address. At
+/// the limit of the server, it is the oldest one of the address with the most idle connections. If
+/// no connection is idle, the new connection gets a reserved slot, in which the gateway answers
+/// health checks only. Connections in reserved slots always count as idle and are evicted by the
+/// same rule, so each new connection gets a slot. Thread-safe.
 class ConnectionSlots {
  public:
   struct Limits {
@@ -36,11 +38,11 @@ class ConnectionSlots {
     kServed,   ///< Not idle.
   };
 
-  /// Closes the connection soon. Called from any thread, possibly after the connection was
-  /// destroyed.
+  /// Function that closes the connection soon. Called from any thread, possibly after the
+  /// connection was destroyed.
   using End = std::function<void()>;
 
-  /// The slot of one connection; its destructor frees the slot.
+  /// The slot of one connection. Its destructor frees the slot.
   class Slot {
    public:
     Slot() = default;
@@ -53,7 +55,7 @@ class ConnectionSlots {
     }
     ~Slot();
 
-    /// True if the connection may only make health checks.
+    /// Whether the slot is a reserved one, so that the connection may only make health checks.
     bool reserved() const { return reserved_; }
     void SetState(State state);
 
@@ -66,15 +68,15 @@ class ConnectionSlots {
 
   explicit ConnectionSlots(Limits limits) : limits_(limits) {}
 
-  /// Admits a connection from `address`. Sets `evicted` if another connection is closed for it. The
-  /// slots must outlive the Slot.
+  /// Admits a connection from `address`. Sets `evicted` to true if another connection is closed to
+  /// admit it. This object must outlive the returned Slot.
   Slot Enter(const std::string& address, End end, bool& evicted) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// EndUnused ends connections without a call, EndAll ends all.
+  /// EndUnused closes the connections that have no call; EndAll closes all connections.
   void EndUnused() { EndSome(false); }
   void EndAll() { EndSome(true); }
-  /// Waits until all connections are closed; false if the deadline passes first.
+  /// Waits until all connections are closed. Returns false if the deadline passes first.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline);
   void WaitUntilEmpty();
 

@@ -1,4 +1,4 @@
-// State that the connections of the gateway share.
+// The state that all connections of the gateway share.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -19,8 +19,8 @@
 
 namespace partiemc::server {
 
-/// A connection that is silent for `interval` gets a ping. It is closed if it stays silent for
-/// `timeout`.
+/// Timing of pings. The gateway sends a ping to a connection that is silent for `interval`, and
+/// closes the connection if it stays silent for `timeout` after that.
 struct WebPings {
   std::chrono::milliseconds interval, timeout;
 };
@@ -52,7 +52,7 @@ struct WebContext {
   void Refuse(WebRefusal refusal, const std::string& peer, const absl::Status& why);
 };
 
-/// Time limit for the handshakes and the header of a request.
+/// Time limit for the handshakes of a connection, and for receiving the header of a request.
 inline constexpr std::chrono::seconds kWebHeaderTime{10};
 /// Time limit for sending a response that does not belong to a call.
 inline constexpr std::chrono::seconds kWebResponseTime{30};

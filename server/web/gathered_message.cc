@@ -7,7 +7,8 @@ namespace {
 
 constexpr std::size_t kLeastChunk = 256;  // Well above the size that gRPC stores inside a slice.
 constexpr std::size_t kFirstChunk = 16 << 10;
-// Large enough to make pieces cheap, small enough that malloc reuses them.
+// Maximum size of a chunk: large enough that the number of chunks stays small, small enough that
+// malloc reuses freed chunks.
 constexpr std::size_t kMostChunk = 1 << 20;
 
 }  // namespace
@@ -18,7 +19,7 @@ std::span<std::uint8_t> GatheredMessage::Room(std::size_t expected) {
     const std::size_t most = std::clamp(size_, kFirstChunk, kMostChunk);
     chunk_ = grpc::Slice(std::clamp(expected, kLeastChunk, most));
   }
-  // The slice is not shared yet, so writing to it is safe.
+  // Writing to the slice is safe, because it is not shared with any buffer yet.
   return {const_cast<std::uint8_t*>(chunk_.begin()) + filled_, chunk_.size() - filled_};
 }
 

@@ -10,19 +10,20 @@
 
 namespace partiemc::server {
 
-/// Allocates memory as bytes arrive, not by the announced length: at most about the received bytes
-/// plus 16 KiB.
+/// Collects the bytes of a message as they arrive. Allocates memory for received bytes, not for the
+/// announced length: at most about the received bytes plus 16 KiB.
 class GatheredMessage {
  public:
   /// Received bytes.
   std::size_t size() const { return size_; }
 
-  /// Space for the next bytes; never empty. `expected`: estimate of the bytes to come.
+  /// Returns space for the next bytes; never empty. `expected`: an estimate of the bytes that will
+  /// follow.
   std::span<std::uint8_t> Room(std::size_t expected);
   /// Records that `bytes` were written to Room().
   void Filled(std::size_t bytes);
 
-  /// Moves out the message and starts the next one.
+  /// Returns the message and starts the next one.
   grpc::ByteBuffer Take();
   void Clear();
 

@@ -21,7 +21,8 @@ std::vector<std::string_view> All(const http::fields& fields, http::field name) 
 
 void SetUp(HttpParser& parser) {
   parser.header_limit(kMaxHeaderBytes);
-  // Boost 1.74 treats an absent limit as smaller than any length.
+  // Sets the largest possible limit instead of none: Boost 1.74 treats an absent limit as smaller
+  // than any length.
   parser.body_limit(std::numeric_limits<std::uint64_t>::max());
 }
 

@@ -10,16 +10,17 @@
 
 namespace partiemc::server {
 
-/// Limit of a whole request header; a longer one is refused.
+/// Maximum size of a request's header. A longer header is refused.
 inline constexpr std::uint32_t kMaxHeaderBytes = 16 << 10;
 
-/// Reads a header, then a body piece by piece into the caller's buffer.
+/// Parser that reads a header, and then a body piece by piece into the caller's buffer.
 using HttpParser = boost::beast::http::request_parser<boost::beast::http::buffer_body>;
 
 /// Limits the header of `parser` to kMaxHeaderBytes and removes the limit of the body.
 void SetUp(HttpParser& parser);
 
-/// The relevant fields of a request whose header was read; views into `parser`.
+/// Returns the relevant fields of a request after its header was read; they are views into
+/// `parser`.
 WebRequest ViewOf(const HttpParser& parser);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// Serves the requests of one connection, one after the other.
+// Serves the HTTP requests of one connection, one after the other.
 #pragma once
 
 #include <unistd.h>
@@ -29,7 +29,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   explicit HttpSession(std::shared_ptr<WebConnectionOver<Stream>> connection)
       : connection_(std::move(connection)) {}
 
-  /// Reads a request. Answers it, or passes the connection to the call it begins.
+  /// Reads a request. Sends the response, or passes the connection to the call that the request
+  /// begins.
   void ReadRequest() {
     allowed_origin_.clear();
     parser_ = std::make_unique<HttpParser>();
@@ -126,7 +127,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
         ->Begin(method, std::move(origin));
   }
 
-  // Only a request that was read completely can be followed by another.
+  // Sends a response. The connection stays open for another request only if this request was read
+  // completely.
   void Send(WebResponse response) {
     if (parser_->is_header_done()) {  // Otherwise the request was refused and has no fields.
       const auto request = ViewOf(*parser_);

@@ -21,7 +21,8 @@ struct FoundFile {
   struct stat status {};
 };
 
-// Opens name by name, so that no link on the path is followed.
+// Opens a file below `root`. Opens the folders of the path one by one, so that it follows no
+// symbolic link.
 std::optional<FoundFile> OpenBelow(const std::string& root, const std::string& path) {
   OpenFile at(open(root.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
   if (at.descriptor() < 0) return std::nullopt;
@@ -32,7 +33,7 @@ std::optional<FoundFile> OpenBelow(const std::string& root, const std::string& p
     if (next.descriptor() < 0) return std::nullopt;
     at = std::move(next);
   }
-  // Does not block if the file is a pipe.
+  // O_NONBLOCK: does not block if the file is a pipe.
   FoundFile found{.file = OpenFile(openat(at.descriptor(), names.back().c_str(),
                                           O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC))};
   if (found.file.descriptor() < 0 || fstat(found.file.descriptor(), &found.status) != 0 ||

@@ -1,4 +1,4 @@
-// Opens the files of the built page for the gateway.
+// Opens the files of the built web page for the gateway.
 #pragma once
 
 #include <cstdint>
@@ -42,18 +42,19 @@ class PageFiles {
 
   /// True if the page is installed.
   bool HasPage() const { return Find({.path = "index.html"}).has_value(); }
-  /// Opens a regular file of the folder. With takes_gzip, opens NAME.gz instead if it exists.
-  /// Never follows links.
+  /// Opens a regular file of the folder. If `wanted.takes_gzip` is set and NAME.gz exists, opens
+  /// NAME.gz instead. Follows no symbolic links.
   std::optional<PageFile> Find(const WebFile& wanted) const;
 
  private:
   const std::string root_;
 };
 
-/// PREFIX/share/partiemc/viewer for the program PREFIX/bin/...; empty if it does not exist.
+/// Returns the folder PREFIX/share/partiemc/viewer if this program is PREFIX/bin/...; empty if the
+/// folder does not exist.
 std::string DefaultPageRoot();
 
-/// By the suffix of the name: "text/html; charset=utf-8".
+/// Returns the media type for the suffix of the name, such as "text/html; charset=utf-8".
 std::string_view TypeOfFile(std::string_view path);
 
 }  // namespace partiemc::server

@@ -1,4 +1,4 @@
-// A call with one request and one response, as an HTTP POST.
+// A unary call (one request, one response) as an HTTP POST.
 #pragma once
 
 #include <boost/asio/buffer.hpp>
@@ -20,11 +20,11 @@
 
 namespace partiemc::server {
 
-/// Reads the body when the call requests it, that is, after its caller was admitted.
+/// Reads the body only when the call requests it, that is, after the caller was admitted.
 template <typename Stream>
 class PostCall final : public WebChannel {
  public:
-  /// `next` reads the next request of the connection.
+  /// `next`: function that reads the next HTTP request of the connection after this call.
   PostCall(std::shared_ptr<WebConnectionOver<Stream>> connection,
            std::unique_ptr<HttpParser> parser, std::string allowed_origin,
            std::function<void()> next)
@@ -92,7 +92,8 @@ class PostCall final : public WebChannel {
     WatchForEnd();
   }
 
-  // Reads while the response is computed, because only a read detects that the client disconnected.
+  // Reads from the connection while the response is computed, because only a read detects that the
+  // client has disconnected.
   void WatchForEnd() {
     if (connection_->buffer.size() > 0) return;
     watching_ = true;
@@ -143,7 +144,8 @@ class PostCall final : public WebChannel {
                              });
   }
 
-  // If the request was not read completely, the connection cannot serve another.
+  // Adds the headers of a call's response. If the request was not read completely, the connection
+  // must close, because the rest of the request would be read as the next request.
   void AddCallHeaders(WebResponse& response) {
     response.close = !parser_->is_done() || !parser_->keep_alive();
     if (!allowed_origin_.empty()) AllowOrigin(allowed_origin_, response);

@@ -36,7 +36,8 @@ WebAnswer RefusedAs(WebRefusal refusal, unsigned status, std::string rule, std::
   return {.what = WebRefused{refusal, status, std::move(rule), std::move(allow)}};
 }
 
-// Readers differ in which repeated header they use, so only a single one is accepted.
+// Returns the value of a header that occurs exactly once, otherwise nothing. Programs differ in
+// which occurrence of a repeated header they use, so a repeated header is not accepted.
 std::optional<std::string> OnlyOne(const std::vector<std::string_view>& values) {
   if (values.size() != 1) return std::nullopt;
   return std::string(values.front());
@@ -71,7 +72,8 @@ bool IsFileCharacter(char c) {
          std::string_view("-_.~+@").find(c) != std::string_view::npos;
 }
 
-// Normalizes "Host", or the part of an origin after "://", without the default port.
+// Normalises the value of "Host", or the part of an origin after "://". Removes the port if it is
+// the scheme's default port.
 std::optional<std::string> NormalHost(std::string_view text, std::string_view usual_port) {
   std::string host = Lower(text);
   if (host.empty() || host.size() > 300) return std::nullopt;
@@ -99,7 +101,7 @@ std::optional<std::string> NormalHost(std::string_view text, std::string_view us
 
 std::string_view UsualPort(std::string_view scheme) { return scheme == "https" ? "443" : "80"; }
 
-// The host without its port; an IPv6 address keeps its brackets.
+// Returns the host without its port. An IPv6 address keeps its brackets.
 std::string_view NameOf(std::string_view host) {
   return host.substr(0, host.front() == '[' ? host.find(']') + 1 : host.find(':'));
 }
@@ -258,7 +260,7 @@ std::optional<std::string> FilePathOf(std::string_view target) {
   if (target == "/") return "index.html";
   auto path = DecodePercent(target.substr(1));
   if (!path) return std::nullopt;
-  // Names are split after decoding, so an encoded '/' or '..' is treated like any other.
+  // Splits the path after decoding, so that the check below also applies to an encoded '/' or '..'.
   for (const std::string_view name : Split(*path, '/', /*blanks=*/"")) {
     if (name.empty() || name.front() == '.' || !std::ranges::all_of(name, IsFileCharacter)) {
       return std::nullopt;
@@ -285,7 +287,8 @@ std::optional<std::string> DecodeBase64Url(std::string_view text) {
   const std::string encoded(text);
   std::string decoded;
   if (!absl::WebSafeBase64Unescape(encoded, &decoded)) return std::nullopt;
-  // abseil accepts blanks, padding and superfluous bits as well.
+  // Compares with the canonical encoding, because abseil also accepts blanks, padding and
+  // superfluous bits.
   if (absl::WebSafeBase64Escape(decoded) != encoded) return std::nullopt;
   return decoded;
 }

@@ -1,4 +1,4 @@
-// Interprets requests to the gateway. Pure functions of untrusted bytes.
+// Interprets requests to the gateway. Contains pure functions of untrusted bytes.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +12,13 @@
 
 namespace partiemc::server {
 
-/// The subprotocol that the server supports, and the prefix of a browser's token.
+/// WebSocket subprotocol names: the protocol that the server supports, and the prefix of the name
+/// in which a browser sends its token.
 inline constexpr std::string_view kWebProtocol = "partiemc.v1";
 inline constexpr std::string_view kBearerProtocol = "bearer.";
 
-/// Relevant fields of a request, as views into it. A repeated header has one entry per occurrence,
-/// because readers differ in which one they use.
+/// The relevant fields of a request, as views into it. A repeated header has one entry for each
+/// occurrence, because programs differ in which occurrence they use.
 struct WebRequest {
   std::string_view method, target;
   std::vector<std::string_view> hosts, origins, authorizations, protocols, transfer_encodings;
@@ -32,7 +33,7 @@ struct WebRules {
   std::vector<std::string> origins = {};
   /// See WebOptions::hosts.
   std::vector<std::string> hosts = {};
-  /// The server listens on a loopback address only.
+  /// Whether the server listens on a loopback address only.
   bool is_local = true;
 };
 
@@ -52,14 +53,16 @@ std::string_view Name(WebRefusal refusal);
 
 enum class WebMethod { kInfo, kStreams, kFrame, kWatch, kReconstruct };
 
-/// A call of a method: WebMethod::kWatch and kReconstruct over a WebSocket, the others by POST.
+/// A call of a method. WebMethod::kWatch and kReconstruct are called over a WebSocket, the other
+/// methods by POST.
 struct WebCall {
   WebMethod method = WebMethod::kInfo;
   std::optional<std::string> authorization = {};  ///< See CallOrigin::authorization.
   bool from_page = false;  ///< From a browser, which does not read the body of a refusal.
 };
 
-/// A file under the root: names with '/' between them, none of which begins with a dot.
+/// A file of the page. `path` is relative to the root: names separated by '/', none of which begins
+/// with a dot.
 struct WebFile {
   std::string path;
   bool head_only = false, takes_gzip = false;
@@ -69,7 +72,8 @@ struct WebHealth {
   bool head_only = false;
 };
 
-/// A browser's request whether a page of another host may POST (CORS preflight).
+/// A CORS preflight: with this request a browser checks whether a page of another host may POST to
+/// this server.
 struct WebPreflight {};
 
 struct WebRefused {
@@ -81,26 +85,28 @@ struct WebRefused {
 
 struct WebAnswer {
   std::variant<WebRefused, WebHealth, WebFile, WebPreflight, WebCall> what;
-  /// Origin of a page on another host that may read the response.
+  /// If not empty, the origin of a page on another host that may read the response.
   std::string allowed_origin = {};
 };
 
 WebAnswer Understand(const WebRequest& request, const WebRules& rules);
 
-/// True if a request may name `host`. A server on a loopback address accepts names and addresses of
-/// this machine, the hosts of the rules, and the hosts of their origins. Otherwise a page whose
-/// name resolves to 127.0.0.1 could read the server's responses (DNS rebinding).
+/// Whether a request may name `host`. A server on a loopback address accepts only names and
+/// addresses of this machine, the hosts of `rules`, and the hosts of the origins in `rules`. This
+/// prevents DNS rebinding, in which a page whose name resolves to 127.0.0.1 reads the server's
+/// responses.
 bool IsHostAllowed(std::string_view host, const WebRules& rules);
 
-/// True if a page of `origin` may call the server under the name `host`: the same host and port, or
-/// one of the rules' origins. The host must be allowed (IsHostAllowed).
+/// Whether a page of `origin` may call the server under the name `host`. The origin must have the
+/// same host and port, or be one of the origins in `rules`. `host` must be allowed (IsHostAllowed).
 bool IsOriginAllowed(std::string_view origin, std::string_view host, const WebRules& rules);
 
-/// The decoded path of a file below a folder, without the query; "index.html" for "/". Empty for
-/// paths that could leave the folder, hidden names and unusual characters.
+/// Returns the decoded path of a file of the page, without the query; "index.html" for "/". Returns
+/// nothing for paths that could leave the folder, for hidden names and for unusual characters.
 std::optional<std::string> FilePathOf(std::string_view target);
 
-/// The parsed subprotocols of a WebSocket request: kWebProtocol and tokens.
+/// The subprotocols that a WebSocket request offers: whether kWebProtocol is one of them, and the
+/// tokens.
 struct OfferedProtocols {
   bool ours = false;
   std::vector<std::string> tokens = {};
@@ -108,18 +114,19 @@ struct OfferedProtocols {
 };
 OfferedProtocols ParseProtocols(const std::vector<std::string_view>& headers);
 
-/// Decodes base64url without padding (RFC 4648); unused bits must be 0. Empty for malformed text.
+/// Decodes base64url without padding (RFC 4648). Returns nothing for malformed text; unused bits
+/// must be 0.
 std::optional<std::string> DecodeBase64Url(std::string_view text);
 
-/// True if `accept_encoding` lists "gzip" with a weight other than 0.
+/// Whether `accept_encoding` lists "gzip" with a weight other than 0.
 bool AcceptsGzip(std::string_view accept_encoding);
 
-/// "https://host[:port]" in lower case, without the scheme's default port. Errors: INVALID_ARGUMENT
-/// unless `text` is an origin.
+/// Returns the origin in normal form: "https://host[:port]" in lower case, without the scheme's
+/// default port. Errors: INVALID_ARGUMENT unless `text` is an origin.
 absl::StatusOr<std::string> NormalOrigin(std::string_view text);
 
-/// A host name or address in lower case. Errors: INVALID_ARGUMENT for anything else, such as a name
-/// with a port.
+/// Returns a host name or address in lower case. Errors: INVALID_ARGUMENT for any other text, such
+/// as a name with a port.
 absl::StatusOr<std::string> NormalHostName(std::string_view text);
 
 }  // namespace partiemc::server

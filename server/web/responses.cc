@@ -28,7 +28,8 @@ std::string WebResponse::Text() const {
   for (const auto& [name, value] : headers) absl::StrAppend(&text, name, ": ", value, "\r\n");
   absl::StrAppend(&text, "X-Content-Type-Options: nosniff\r\n");
   if (close) absl::StrAppend(&text, "Connection: close\r\n");
-  // 304 has no body; a length would describe the file.
+  // Omits the length for status 304, which has no body: a length would describe the file that is
+  // not sent.
   if (status != 304) {
     absl::StrAppend(&text, "Content-Length: ", body_bytes > 0 ? body_bytes : body.size(), "\r\n");
   }

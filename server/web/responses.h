@@ -1,4 +1,4 @@
-// Responses of the gateway that do not come from a call.
+// Responses of the gateway that are not responses of a call, such as files and refusals.
 #pragma once
 
 #include <cstdint>
@@ -15,34 +15,36 @@ namespace partiemc::server {
 
 struct WebResponse {
   unsigned status = 200;
-  /// In addition to the headers of every response.
+  /// Headers in addition to the headers that every response has.
   std::vector<std::pair<std::string, std::string>> headers = {};
   std::string body = {};
   std::uint64_t body_bytes = 0;  ///< Length of a body that is sent separately; otherwise 0.
   bool close = false;            ///< The connection closes after the response.
   bool head_only = false;        ///< Omit the body.
 
-  /// Status line, headers and, unless it is omitted, `body`.
+  /// Returns the status line, the headers and, unless head_only is set, `body`.
   std::string Text() const;
 };
 
 WebResponse ResponseTo(const WebRefused& refused);
 WebResponse ResponseTo(const WebHealth& health, bool draining);
 WebResponse ResponseToPreflight();
-/// The Content-Security-Policy of the page. `frame_ancestors` are other origins that may show it in
-/// a frame.
+/// Returns the Content-Security-Policy of the page. `frame_ancestors` are other origins whose pages
+/// may show the page in a frame.
 std::string PagePolicy(const std::vector<std::string>& frame_ancestors);
-/// The head of a file, whose contents follow. 304 without contents if `if_none_match` contains its
-/// tag. `policy` is PagePolicy.
+/// Returns the head of the response with a file; the caller sends the file's contents afterwards.
+/// The status is 304, without contents, if `if_none_match` contains the file's tag. `policy` is the
+/// result of PagePolicy.
 WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match,
                        const std::string& policy);
-/// The response for a missing file. For the page itself it explains how to install it.
+/// Returns the response for a missing file. If the page itself is missing, the response explains
+/// how to install it.
 WebResponse ResponseWithoutFile(const WebFile& asked, bool has_page);
-/// JSON status of a call that ended without a response.
+/// Returns the response to a call that ended without a response message: its status as JSON.
 WebResponse ResponseTo(const absl::Status& status);
-/// The head of a call's response.
+/// Returns the head of the response with a call's response message of `bytes`.
 WebResponse ResponseOfCall(std::uint64_t bytes);
-/// Allows the page of another, allowed host to read the response.
+/// Permits the page of `origin`, an allowed origin on another host, to read the response.
 void AllowOrigin(const std::string& origin, WebResponse& response);
 
 }  // namespace partiemc::server

@@ -8,8 +8,9 @@
 
 namespace partiemc::server {
 
-/// Decides when to send a ping and when to give up. A sign of life is a received byte or an
-/// acknowledgement of sent bytes by the client's machine.
+/// Decides when the gateway sends a ping to a client and when it gives the client up. Two events
+/// are signs of life: a received byte, and an acknowledgement of sent bytes by the client's
+/// machine.
 class SignsOfLife {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -30,9 +31,10 @@ class SignsOfLife {
   }
   void WriteBegan(TimePoint now) { write_began_ = now; }
 
-  /// `unsent`: bytes that the client's machine has not acknowledged. The time does not run while
-  /// nothing is read, which hides signs of life, or while a message is being written, which delays
-  /// a ping.
+  /// Returns the next step. `unsent`: bytes that the client's machine has not acknowledged; a
+  /// change is a sign of life. The silence is not measured while the gateway reads nothing, because
+  /// it would miss signs of life. It is not measured while a message is being written either,
+  /// because a ping would have to wait.
   Next Check(TimePoint now, bool reading, bool writing, long unsent) {
     if (writing && write_.count() > 0 && now - write_began_ > write_) return Next::kGiveUp;
     if (unsent != unsent_ || !reading || writing) {

@@ -27,9 +27,9 @@
 
 namespace partiemc::server {
 
-/// Completes the WebSocket handshake when the call reads its first request, that is, after its
-/// caller was admitted. Refuses other callers by HTTP; a browser would hide this, so it gets the
-/// refusal in a WebSocket.
+/// Completes the WebSocket handshake when the call starts its first read, that is, after the caller
+/// was admitted. If the caller is refused, sends an HTTP error instead. Browsers hide such errors
+/// from the page, so a browser gets the refusal over the completed WebSocket.
 template <typename Stream>
 class SocketCall final : public WebChannel {
  public:
@@ -47,7 +47,8 @@ class SocketCall final : public WebChannel {
   using Now = std::chrono::steady_clock;
   enum Phase { kHttp, kUpgrading, kOpen };
 
-  // Bytes read ahead while the call reads nothing, to detect a disconnect and to answer pings.
+  // Maximum bytes that are read ahead while the call requests no message. Reading ahead detects a
+  // disconnect and answers pings.
   static constexpr std::size_t kReadAhead = 64 << 10;
   static constexpr std::size_t kLongestText = 3;  // The text message "end".
 
@@ -95,7 +96,8 @@ class SocketCall final : public WebChannel {
     Pump();
   }
 
-  // The client closed the WebSocket without `end`: closes it, too, and ends the call at once.
+  // The client has closed the WebSocket without the message "end". Closes this side too, and ends
+  // the call at once.
   void OnClientClose() {
     if (is_finished()) return;
     client_closed_ = true;
@@ -103,7 +105,8 @@ class SocketCall final : public WebChannel {
     CancelCall();
   }
 
-  // Reads while the call wants a message or little is read ahead.
+  // Delivers the message that was read ahead, if any and if the call waits for one. Then starts a
+  // read if the call waits for a message, or if fewer than kReadAhead bytes were read ahead.
   void Pump() {
     if (reading_ || is_gone() || is_finished() || is_broken()) return;
     if (half_closed_) {
@@ -183,7 +186,7 @@ class SocketCall final : public WebChannel {
     });
   }
 
-  // Checks for signs of life every few seconds.
+  // Checks for signs of life in intervals of SignsOfLife::interval.
   void CheckLiveness() {
     clock_.expires_after(signs_.interval());
     clock_.async_wait([weak = this->weak_from_this(), this](error_code error) {
@@ -243,7 +246,7 @@ class SocketCall final : public WebChannel {
     connection_->Close();
   }
 
-  // First buffer of a message of unknown length.
+  // Size of the first buffer for a message, whose length is unknown.
   static constexpr std::size_t kFirstGuess = 4096;
 
   boost::beast::websocket::stream<Stream&, false> socket_;

@@ -1,4 +1,4 @@
-// The end of a call in the formats of the gateway: JSON, HTTP status, close code.
+// Writes the end of a call in the formats of the gateway: JSON, HTTP status, WebSocket close code.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,21 @@
 
 namespace partiemc::server {
 
-/// One JSON object: `code` and `status`, and where they are known `reason`, `field`, `value`,
-/// `rule` and `message` (proto/PROTOCOL.md, "Over WebSocket").
+/// Returns a JSON object with `code` and `status`, and with `reason`, `field`, `value`, `rule` and
+/// `message` if they are known (proto/PROTOCOL.md, "Over WebSocket").
 std::string StatusJson(const absl::Status& status);
 
-/// The HTTP status of `status`: 200 for OK, or 400, 401, 403, 404, 409, 429, 499, 501, 503, 504,
-/// 500.
+/// Returns the HTTP status for `status`: 200 for OK, otherwise one of 400, 401, 403, 404, 409, 429,
+/// 499, 500, 501, 503, 504.
 unsigned HttpStatusOf(const absl::Status& status);
 /// "Not Found".
 std::string HttpReasonOf(unsigned http_status);
 
-/// The close code of a WebSocket: 1000 for OK, otherwise 4000 plus the gRPC code.
+/// Returns the close code of a WebSocket: 1000 for OK, otherwise 4000 plus the number of the gRPC
+/// code.
 std::uint16_t CloseCodeOf(const absl::Status& status);
-/// The reason of the Violation, or the name of the code; at most 120 bytes.
+/// Returns the reason of the status's Violation, or the name of the code if it has no Violation; at
+/// most 120 bytes.
 std::string CloseReasonOf(const absl::Status& status);
 
 }  // namespace partiemc::server

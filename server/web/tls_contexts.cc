@@ -12,7 +12,8 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-// Selects HTTP/1.1 if the client offers protocols: this gateway does not support HTTP/2.
+// ALPN callback of OpenSSL: selects HTTP/1.1 if the client offers protocols, because the gateway
+// does not support HTTP/2.
 int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_bytes,
                    const unsigned char* offered, unsigned int offered_bytes, void*) {
   static constexpr std::string_view kOurs = "\x08http/1.1";

@@ -1,4 +1,4 @@
-// TLS contexts of the gateway, with the same identity as gRPC.
+// The TLS contexts of the gateway, which use the same certificate and key as gRPC.
 #pragma once
 
 #include <boost/asio/ssl/context.hpp>
@@ -9,14 +9,16 @@
 
 namespace partiemc::server {
 
-/// Provides the TLS context for new connections. Open connections keep theirs.
+/// Provides the TLS context for new connections. Open connections keep the context with which they
+/// began.
 class TlsContexts {
  public:
   /// `current` must have an identity and outlive this object. Whether clients need a certificate is
-  /// decided here, as for gRPC.
+  /// decided once, in this constructor; gRPC's credentials do the same.
   explicit TlsContexts(const CurrentTlsIdentity& current);
 
-  /// The context of the current identity. If OpenSSL rejects it, the previous context, or null.
+  /// Returns the context of the current identity. If OpenSSL rejects this identity, returns the
+  /// previous context, or null if there is none.
   std::shared_ptr<boost::asio::ssl::context> Get();
 
  private:

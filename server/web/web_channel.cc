@@ -6,8 +6,8 @@
 namespace partiemc::server {
 namespace {
 
-// Limit for methods with small requests. It is generous, so that the call itself refuses a slightly
-// oversized request, with a reason.
+// Maximum message size for methods with small requests. It exceeds the limits of these methods, so
+// that the call itself refuses a slightly oversized request, with a reason.
 constexpr std::uint64_t kMostSmallMessage = 64 << 10;
 
 std::uint64_t LimitOf(Methods::Method method, const ServerLimits& limits) {
@@ -32,7 +32,8 @@ void WebChannel::StartRead(grpc::ByteBuffer* message) {
     wanted_ = message;
     if (cancelled_ || finished_) return ReadEnded();
     if (admitted_) return Read();
-    // A refused call may also start a read; it ends at once, so its end has been posted before.
+    // Posts the read, because a refused call may also start one. Such a call ends at once, so its
+    // end was posted earlier and runs before this action (wanted_ is then null).
     Post([this] {
       if (wanted_ == nullptr) return;
       admitted_ = true;

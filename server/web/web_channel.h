@@ -1,4 +1,4 @@
-// Common part of calls through the gateway, independent of the transport.
+// The common part of calls through the gateway, for all its transports (POST and WebSocket).
 #pragma once
 
 #include <atomic>
@@ -16,15 +16,16 @@
 
 namespace partiemc::server {
 
-/// Posts a state machine's requests to the connection's strand. Keeps the contract of CallChannel:
-/// each read and write is answered once, OnCancel is called at most once, OnDone last. Keeps itself
-/// alive until then. Held by shared_ptr.
+/// Runs the requests of a call's state machine on the connection's strand. Keeps the contract of
+/// CallChannel: each read and each write is answered once, OnCancel is called at most once, and
+/// OnDone is called last. Keeps itself alive until then. Held by shared_ptr.
 class WebChannel : public CallChannel, public std::enable_shared_from_this<WebChannel> {
  public:
   explicit WebChannel(std::shared_ptr<WebConnection> connection)
       : connection_(std::move(connection)) {}
 
-  /// On the strand. The call's requests are handled after this returns.
+  /// Begins the call. Called on the strand; reads and writes that the call starts run after Begin
+  /// has returned.
   void Begin(Methods::Method method, CallOrigin origin);
 
   void StartRead(grpc::ByteBuffer* message) final;
@@ -37,24 +38,25 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
  protected:
   // Implemented by the transport, on the strand:
 
-  /// Later delivers the next message by Deliver, or the end by ReadEnded.
+  /// Starts to read the next message. Completes by Deliver, or by ReadEnded if no message follows.
   virtual void Read() = 0;
   /// Ends with Written.
   virtual void Write(const grpc::ByteBuffer& message) = 0;
-  /// Sends the end of the call; ends with OnEndSent. The connection may already be closed.
+  /// Sends the end of the call; completes by OnEndSent. The connection may already be closed.
   virtual void SendEnd(const absl::Status& status) = 0;
 
   // For the transport, on the strand:
 
   bool wanted() const { return wanted_ != nullptr; }
   void Deliver(grpc::ByteBuffer message);
-  /// No message follows: after a half-close or Gone.
+  /// The client sends no further message, because it has half-closed or disconnected.
   void ReadEnded();
   void Written(bool ok);
-  /// The client has disconnected, or has stopped waiting while a status can still arrive.
+  /// The client has disconnected, or has stopped waiting although a status could still be sent to
+  /// it.
   void OnDisconnect();
   void CancelCall();
-  /// The client broke the protocol: cancels the call and sends `status`.
+  /// The client has broken the protocol: cancels the call and sends `status`.
   void Break(WebRefusal refusal, absl::Status status);
   /// The end was sent, or cannot be sent.
   void OnEndSent();
@@ -63,7 +65,7 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
   bool is_broken() const { return break_status_.has_value(); }
   bool is_finished() const { return finished_; }
   bool is_writing() const { return writing_; }
-  /// Size limit of one message of this method.
+  /// Maximum size of one message of this call's method.
   std::uint64_t message_limit() const { return message_limit_; }
   absl::Status TooLarge(std::uint64_t bytes) const;
 

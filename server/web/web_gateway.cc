@@ -27,7 +27,8 @@ namespace {
 using boost::asio::ip::tcp;
 
 constexpr int kThreads = 2;
-// Pause after a failed accept: without a free descriptor every attempt fails at once.
+// Pause after a failed accept. If there is no free descriptor, each further attempt would fail at
+// once.
 constexpr std::chrono::milliseconds kRestAfterFailure(100);
 constexpr int kBacklog = 1024;
 
@@ -48,7 +49,7 @@ struct CheckedOptions {
   std::vector<std::string> frame_ancestors;
 };
 
-// Replaces each of `values` by its normal form.
+// Returns the normal form of each of `values`.
 absl::StatusOr<std::vector<std::string>> Normal(
     std::string_view flag, const std::vector<std::string>& values,
     absl::StatusOr<std::string> (*normal_form)(std::string_view)) {
@@ -115,7 +116,7 @@ class WebGateway::Implementation {
 
   ~Implementation() { Stop(std::chrono::steady_clock::now()); }
 
-  // Listens on all addresses of a name, because browsers differ in which one they use.
+  // Listens on all addresses of a host name, because browsers differ in which of them they use.
   absl::Status Listen() {
     error_code error;
     tcp::resolver resolver(io_);
@@ -155,7 +156,8 @@ class WebGateway::Implementation {
     });
     context_.slots.EndUnused();
     if (!context_.slots.WaitUntilEmpty(deadline)) {
-      // Runs after the connections that were accepted during the wait; none follows.
+      // Posted to the accepting strand, so that it runs after all connections accepted during the
+      // wait have been added. No connection is accepted later.
       boost::asio::post(accepting_, [this] { context_.slots.EndAll(); });
       context_.slots.WaitUntilEmpty();
     }
@@ -217,7 +219,8 @@ class WebGateway::Implementation {
     if (!tls_) {
       return Enter<WebSocket>(executor, PeerOf(endpoint), std::move(socket));
     }
-    // The connection keeps a reference to the identity it needs; the context may be released.
+    // The connection keeps a reference to the part of the context that it needs, so the context may
+    // be released.
     const auto context = tls_->Get();
     if (context == nullptr) return context_.refusals.Count(WebRefusal::kMalformed);
     Enter<TlsWebSocket>(executor, PeerOf(endpoint), std::move(socket), *context);

@@ -1,4 +1,5 @@
-// HTTP gateway of a server: serves the page, and its methods over WebSocket and POST.
+// The HTTP gateway of a server: serves the web page, and the server's methods over WebSocket and
+// POST.
 #pragma once
 
 #include <chrono>
@@ -18,7 +19,8 @@ namespace partiemc::server {
 /// Runs in its own threads.
 class WebGateway {
  public:
-  /// References must outlive the gateway. Without `tls` connections are not encrypted.
+  /// The referenced objects must outlive the gateway. If `tls` is null, connections are not
+  /// encrypted.
   struct Setup {
     const Methods& methods;
     const ServerLimits& limits;
@@ -28,11 +30,11 @@ class WebGateway {
     std::chrono::milliseconds ping_interval, ping_timeout;
   };
 
-  /// Listens and serves when it returns. Errors: INVALID_ARGUMENT for a Unix socket or an invalid
-  /// origin, UNAVAILABLE if it cannot listen.
+  /// Starts the gateway; it listens and serves when this returns. Errors: INVALID_ARGUMENT for a
+  /// Unix socket or an invalid origin, UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<WebGateway>> Start(const WebOptions& options,
                                                            const Setup& setup);
-  /// Stops at once unless stopped before.
+  /// Stops at once, unless Stop was called before.
   ~WebGateway();
   WebGateway(const WebGateway&) = delete;
   WebGateway& operator=(const WebGateway&) = delete;
@@ -40,8 +42,8 @@ class WebGateway {
   /// With the actual port.
   const Address& address() const;
 
-  /// Stops accepting, waits until all calls have ended and all connections are closed, and cuts the
-  /// others at the deadline.
+  /// Stops accepting connections, then waits until all calls have ended and all connections are
+  /// closed. At the deadline, cuts the remaining connections.
   void Stop(std::chrono::steady_clock::time_point deadline);
 
  private:

@@ -11,16 +11,17 @@ namespace partiemc::server {
 
 struct WebOptions {
   Address address;
-  /// Folder of the built page; empty: DefaultPageRoot(), if it exists.
+  /// Folder of the built page. Empty: DefaultPageRoot(), if that folder exists.
   std::string root = {};
-  /// Origins of pages that may call, in addition to the server's own host: "https://host:port".
+  /// Origins of pages that may call the server, in addition to the server's own host:
+  /// "https://host:port".
   std::vector<std::string> origins = {};
-  /// Host names that requests may use in addition to this machine's, if the server listens on a
-  /// loopback address: "viewer.example".
+  /// Host names that requests may use if the server listens on a loopback address, in addition to
+  /// the names of this machine: "viewer.example".
   std::vector<std::string> hosts = {};
-  /// Other origins that may show the page in a frame.
+  /// Other origins whose pages may show the page in a frame.
   std::vector<std::string> frame_ancestors = {};
-  /// Limits of connections, including those without a call, in total and per address; at least 1.
+  /// Maximum number of connections, with and without a call, in total and per address; at least 1.
   std::uint32_t max_connections = 256;
   std::uint32_t max_per_address = 0;  ///< 0: half of max_connections.
 };
