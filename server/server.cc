@@ -45,10 +45,11 @@ constexpr std::uint64_t kOtherDescriptors = 512;
 constexpr std::uint64_t kStreamsThatEnd = 64;
 
 constexpr std::chrono::milliseconds kTimeToCut(250);
-// Time for the last statuses to arrive and for connections to close cleanly. gRPC itself waits for
-// each client's reply, and an idle client reads only every few seconds.
+// Time for the last statuses to arrive and for connections to close cleanly. Without this limit,
+// gRPC waits for a reply of each client, and an idle client reads only every few seconds.
 constexpr std::chrono::milliseconds kTimeToClose(500);
-// Several times as long as a new call takes to arrive.
+// The drain waits until no new call has arrived for this time. It is several times as long as a new
+// call takes to arrive.
 constexpr std::chrono::milliseconds kQuiet(50);
 
 absl::Status CheckSecurity(const ServerOptions& options, const Address& address) {

@@ -122,10 +122,10 @@ class Server {
   /// embedding.
   std::shared_ptr<grpc::Channel> InProcessChannel();
 
-  /// Serves for the time `delay`. Meanwhile health checks report that the server does not serve, so
-  /// that proxies send it no new clients. In the second half of the time, streams are redirected
-  /// one after the other, so that their clients do not reconnect at the same moment. Call Drain
-  /// afterwards.
+  /// Serves for the time `delay`. During this time, health checks report that the server does not
+  /// serve, so that proxies send it no new clients. In the second half of the time, streams are
+  /// redirected one after the other, so that their clients do not reconnect at the same moment.
+  /// Call Drain afterwards.
   void SendAway(std::chrono::milliseconds delay);
 
   /// Refuses new calls, notifies the streams, responds to the frames that they have sent, ends

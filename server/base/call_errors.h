@@ -1,4 +1,4 @@
-// Reasons and errors that end calls of every kind.
+// Reasons and errors that can end a call of any method.
 #pragma once
 
 #include <chrono>
@@ -17,7 +17,8 @@ inline constexpr std::string_view kReasonIdle = "IDLE";
 /// Reason for ending a call or refusing a frame whose bytes are not the expected message.
 inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 
-/// INVALID_ARGUMENT (PROTOCOL) for a request that is not allowed in the call's state.
+/// INVALID_ARGUMENT (PROTOCOL): the client has sent a request that is not allowed in the current
+/// state of the call.
 absl::Status ProtocolError(std::string found, std::string rule);
 /// UNAVAILABLE with a Violation (DRAINING): the server is draining.
 absl::Status DrainingError();

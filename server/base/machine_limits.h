@@ -1,4 +1,4 @@
-// Memory and processors that this process may use.
+// Determines the memory and the number of processors that this process may use.
 #pragma once
 
 #include <cstdint>

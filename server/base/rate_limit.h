@@ -1,4 +1,4 @@
-// Allows a number of events per second and counts the others.
+// Permits a limited number of events per second, and counts the events that exceed the limit.
 #pragma once
 
 #include <chrono>

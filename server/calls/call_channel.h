@@ -26,7 +26,8 @@ class CallChannel {
   /// Sends the status of the call to the client.
   virtual void Finish(const absl::Status& status) = 0;
 
-  /// After a failed read: true if the client has disconnected, false if it has half-closed.
+  /// Called after a failed read. Returns true if the client has disconnected, false if it has
+  /// half-closed.
   virtual bool IsCancelled() const = 0;
   /// Address of the client in gRPC's format: "ipv4:192.0.2.7:51234".
   virtual std::string peer() const = 0;

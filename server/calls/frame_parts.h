@@ -60,7 +60,8 @@ class FrameArrival {
                                 v1::ReconstructRequest& /*request*/, grpc::ByteBuffer& /*bytes*/) {
     return absl::OkStatus();
   }
-  /// The response to the part in `slot`, if this call sends parts of another call's stream.
+  /// Returns the response to the part in `slot` if this call sends parts of another call's stream,
+  /// otherwise nothing.
   virtual std::optional<v1::ReconstructResponse> RespondToPart(std::size_t /*slot*/) {
     return std::nullopt;
   }

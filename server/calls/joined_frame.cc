@@ -98,7 +98,7 @@ absl::Status CheckTime(std::size_t k, double time, double frame_time) {
                   absl::StrCat("must be 0 or that of part 0, ", frame_time));
 }
 
-// Part number `k`; part 0 is the frame itself.
+// Returns part number `k`. Part 0 is `frame` itself; `parts` starts with part 1.
 const v1::ParticleFrame& PartOf(std::size_t k, const v1::ParticleFrame& frame,
                                 std::span<const v1::ParticleFrame> parts) {
   return k == 0 ? frame : parts[k - 1];

@@ -1,4 +1,4 @@
-// Decides which streams the server reads from while memory is short.
+// Decides from which streams the server reads while memory is short.
 #pragma once
 
 #include <atomic>

@@ -36,7 +36,7 @@ class WarmSize {
   /// none.
   std::size_t TakeLast() { return std::exchange(last_, 0); }
 
-  /// The smallest frame for which buffers of size `largest` are not oversized.
+  /// The smallest frame size that prevents buffers of size `largest` from being oversized.
   static std::size_t LeastFor(std::size_t largest) { return largest / 4; }
 
  private:
@@ -52,7 +52,8 @@ class MessageBuffers {
   virtual ~MessageBuffers() = default;
 };
 
-/// Buffers that are reused from frame to frame, for any stream.
+/// The buffers of a compute thread. They are reused from frame to frame, also for frames of
+/// different streams.
 struct Worker {
   WorkerMemory memory;  ///< Counts the bytes of all buffers below.
   Workspace workspace;

@@ -32,8 +32,8 @@ constexpr double kLingerSeconds = 5;
 constexpr std::uint64_t kLingeringWindows = 64;
 
 // A client sends a header block without pauses. If a stream has not become a call after this time,
-// and gRPC has read more bytes than headers may have, the ledger assumes that the header block has
-// no end.
+// the ledger assumes that its header block has no end. Exception: gRPC has read fewer bytes than
+// headers may have.
 constexpr milliseconds kHeaderTime(100);
 // If gRPC has read fewer bytes, the ledger assumes this after this longer time. gRPC itself has no
 // such limit.
@@ -116,8 +116,8 @@ void ConnectionLedger::PayDebt(const Counts& counts, const ConnectionReading& re
   debt_ += static_cast<double>(reading.bytes_received - last_.bytes_received);
   const double most = static_cast<double>(ReadAllowance() + kLingeringWindows * kWindowBytes);
   lingering_ = std::min(most, lingering_ + static_cast<double>(counts.ended - last_counts_.ended));
-  // The allowance of ended calls decays. The decayed part is subtracted from the debt, because
-  // bytes that used it have arrived.
+  // The allowance of ended calls decays. The decayed part is also subtracted from the debt, because
+  // the late bytes of these calls have raised the debt when they arrived.
   const double forgiven = lingering_ * std::min(1.0, seconds / kLingerSeconds);
   lingering_ -= forgiven;
   debt_ -= static_cast<double>(counts.credit - last_counts_.credit) + forgiven +

@@ -34,7 +34,8 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   void Begin();
   /// Stops publishing.
   void End();
-  /// Repeats a send that has failed. Newer results wait meanwhile, as for a slow watcher.
+  /// Repeats a send that has failed. Until the send succeeds, newer results wait, as for a slow
+  /// watcher.
   void Retry();
   /// True from Begin until the stream has ended or End has completed.
   bool live() const { return live_; }

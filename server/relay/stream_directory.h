@@ -46,7 +46,7 @@ class StreamDirectory {
   /// Returns at most `count` distinct addresses of replicas. Omits draining replicas.
   std::vector<std::string> Addresses(std::size_t count) const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Whether every known replica has announced its streams since `since`.
+  /// Whether every known replica has sent an announcement since `since`.
   bool HaveAllAnnouncedSince(TimePoint since) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Returns the stream of this name; if there are several, the one that was opened last.

@@ -14,7 +14,8 @@ namespace partiemc::server {
 /// serving state of the response.
 struct HealthCheckSecurity {
   bool tls = false;
-  /// PEM files for a server that requires client certificates, or empty.
+  /// Paths of PEM files, for a server that requires client certificates. Empty: no client
+  /// certificate.
   std::string certificate_file, key_file;
 };
 

@@ -21,7 +21,7 @@ absl::StatusOr<grpc::ByteBuffer> Check(grpc::ByteBuffer& bytes, bool serving) {
   health::HealthCheckRequest request;
   if (auto status = ParseRequest(bytes, kMaxSmallRequestBytes, request); !status.ok())
     return status;
-  // An empty name stands for the whole server.
+  // An empty service name in the request means the whole server.
   if (!request.service().empty() && request.service() != ServiceName()) {
     return absl::NotFoundError("unknown service");
   }

@@ -114,8 +114,8 @@ class FrameAssembler {
   /// Drops a stored part, unless Take has returned it.
   void Withdraw(const Seat& seat, std::uint64_t sequence);
   /// Whether the server can respond to the parts of frame `sequence`: the frame was answered or has
-  /// failed. If part 0 is missing when the timeout after the first part has passed, this call
-  /// closes the frame: it drops the parts, and part 0 is refused when it arrives.
+  /// failed. If part 0 has not arrived within the timeout after the first part, this function
+  /// closes the frame. It drops the parts, and part 0 will be refused.
   bool IsOver(std::uint64_t sequence, Clock::time_point now);
   /// The outcome of a frame for the sender of a part; OK if the frame was answered.
   /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) if part 0 arrived too late, PART_LATE if the call of

@@ -39,11 +39,13 @@ struct ServerLimits {
   /// tiles and particles would permit states larger than any message.
   std::uint64_t MaxCheckpointBytes() const { return max_frame_bytes; }
 
-  /// Maximum number of open streams. The same number limits calls of ReconstructFrame separately.
+  /// Maximum number of open streams. A separate limit of the same size applies to concurrent calls
+  /// of ReconstructFrame.
   std::uint32_t max_streams = 32;
 
-  /// Maximum number of a stream's frames between the server's read and the end of the response's
-  /// write. Two suffice for large frames, four for small ones; more only costs memory.
+  /// Maximum number of frames of one stream that the server holds. A frame counts from the start of
+  /// its read to the end of its response's write. Two suffice for large frames, four for small
+  /// ones; more only costs memory.
   std::uint32_t frames_in_flight = 4;
 
   /// Bytes that requests, responses, workers and histories may hold together. While the budget is
@@ -108,7 +110,8 @@ struct ServerLimits {
   /// the maximum number of streams.
   std::uint64_t KeptResultBytes() const { return (std::uint64_t{64} << 20) / max_streams; }
 
-  /// Maximum number of calls of all methods that have not sent their first request.
+  /// Maximum number of opening calls, which have not sent their first request; for all methods
+  /// together.
   std::uint32_t MaxOpeningCalls() const { return std::max(64u, max_streams + max_watchers); }
 
   /// Quota of concurrent calls of one caller, unless its token sets another quota. It exceeds the

@@ -21,7 +21,7 @@ struct MemoryPlan {
   MemoryPlan(const ServerLimits& limits, unsigned threads);
 
   std::uint64_t bytes() const;
-  /// A readable table. The last line is the sum.
+  /// Returns the plan as a readable table, whose last line is the sum.
   std::string ToString() const;
 
   std::vector<Part> parts;

@@ -10,7 +10,8 @@
 namespace partiemc::server {
 namespace {
 
-// Passes the core's memory requests for one frame to the worker's account.
+// Passes the core's requests for memory, made while it computes one frame, to the memory account of
+// the worker.
 class FrameMemory final : public MemoryGuard {
  public:
   FrameMemory(WorkerMemory& account, std::size_t particles)

@@ -22,11 +22,12 @@
 
 namespace partiemc::server {
 
-/// Reasons of a session's violations, in addition to the core's (proto/PROTOCOL.md).
+/// Reasons for which a session refuses a frame, in addition to the core's reasons
+/// (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonSequenceGap = "SEQUENCE_GAP";
 inline constexpr std::string_view kReasonSequenceDuplicate = "SEQUENCE_DUPLICATE";
 
-/// RESOURCE_EXHAUSTED (OUT_OF_MEMORY): there is no memory for a frame of size `value`.
+/// RESOURCE_EXHAUSTED (OUT_OF_MEMORY): there is no memory for a frame. `value` states its size.
 absl::Status OutOfMemory(std::string value);
 
 /// Computes the frames of a stream, one at a time. Not thread-safe.

@@ -22,7 +22,7 @@
 
 namespace partiemc::server {
 
-/// Reasons of a refused stream, in addition to the core's (proto/PROTOCOL.md).
+/// Reasons for which a stream is refused, in addition to the core's reasons (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonName = "NAME";
 inline constexpr std::string_view kReasonNameInUse = "NAME_IN_USE";
 inline constexpr std::string_view kReasonLabels = "LABELS";
@@ -177,7 +177,8 @@ class StreamRegistry {
   // is about to be replaced.
   absl::Status CheckPlace(const Entry* former, const std::string& name) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Moves the slot of `former` to `entry`, or else takes a new slot for the caller of `entry`.
+  // Moves the slot of `former` to `entry` if both have the same caller account. Otherwise takes a
+  // new slot for the caller of `entry`.
   static absl::Status TakePlace(Entry& entry, Entry* former);
   std::vector<std::shared_ptr<StreamStateMachine>> Machines() const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

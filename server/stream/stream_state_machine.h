@@ -163,10 +163,10 @@ class StreamStateMachine final : public SerializedCall,
   /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read, and
   /// ends the stream with UNAVAILABLE.
   void Drain();
-  /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`: it
-  /// has not sent a request, or it has not received a response (then the call is cut). The time in
-  /// which the stream waits for a worker or for memory does not count. Returns the time of the next
-  /// check.
+  /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`. The
+  /// client has either not sent a request, or not received a response; in the second case the call
+  /// is cut. The time in which the stream waits for a worker or for memory does not count. Returns
+  /// the time of the next check.
   std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 
@@ -224,7 +224,7 @@ class StreamStateMachine final : public SerializedCall,
   std::uint64_t read_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t computed_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t written_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Bytes that each slot holds in the budget.
+  // Bytes that each slot holds in the memory budget.
   std::vector<std::uint64_t> slot_bytes_ ABSL_GUARDED_BY(mutex_);
   // Bytes that the next ReturnMemory gives back to the budget.
   std::uint64_t surplus_ ABSL_GUARDED_BY(mutex_) = 0;

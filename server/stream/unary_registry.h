@@ -27,8 +27,8 @@ class UnaryRegistry {
   /// calls take little time.
   static constexpr std::uint32_t kInformationCalls = 64;
 
-  /// `max_frame_calls`: maximum number of calls with a frame of one caller. The server has twice as
-  /// much capacity for each kind, because FairShare gives one caller at most half of the capacity.
+  /// `max_frame_calls`: maximum number of calls with a frame of one caller. Each kind has twice
+  /// this number of slots, because FairShare gives one caller at most half of them.
   explicit UnaryRegistry(std::uint32_t max_frame_calls)
       : places_{FairShare(2 * std::uint64_t{max_frame_calls}), FairShare(2 * kInformationCalls),
                 FairShare(2 * kInformationCalls)} {}

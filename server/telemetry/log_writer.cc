@@ -17,7 +17,8 @@ namespace {
 constexpr std::chrono::milliseconds kLastPatience(500);
 constexpr std::chrono::seconds kTick(1);
 
-// Writes as much as possible. Returns the bytes that were not written.
+// Writes the bytes until all are written or an error occurs. Returns the bytes that were not
+// written.
 std::string_view WriteAll(int file, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(file, bytes.data(), bytes.size());

@@ -20,7 +20,7 @@ class LogWriter {
     /// Capacity of the buffer in bytes. While one buffer is being written to the file, a second one
     /// of this size may fill.
     std::size_t capacity = std::size_t{1} << 20;
-    /// Called by the writer thread about once per second.
+    /// The writer thread calls this function about once per second.
     std::function<void()> every_second = {};
   };
 

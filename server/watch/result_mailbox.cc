@@ -8,8 +8,8 @@ void ResultMailbox::Put(Published published) {
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
   auto* const post = new Post{std::move(published), nullptr, bytes};
   // Takes the list out of the mailbox before it links the new frame, so that no other thread
-  // accesses the list meanwhile. No other frame can be added between the two exchanges, because
-  // only one thread calls Put.
+  // accesses the list at the same time. No other frame can be added between the two exchanges,
+  // because only one thread calls Put.
   Post* const older = posts_.exchange(nullptr);
   if (older != nullptr) {
     if (older->bytes + bytes <= max_bytes_) {

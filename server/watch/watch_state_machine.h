@@ -113,7 +113,7 @@ class WatchStateMachine final : public SerializedCall {
   /// The pending read has completed without a request: the client will send no more. Results are
   /// still sent until the credit is used.
   void ReadEnded();
-  /// The result of StartOpen; an error ends the watch.
+  /// Completes StartOpen. If `terms` is an error, the watch ends.
   void Opened(const absl::StatusOr<WatchTerms>& terms);
   void WriteDone(bool ok);
   /// The client has disconnected.

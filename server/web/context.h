@@ -56,7 +56,7 @@ struct WebContext {
 inline constexpr std::chrono::seconds kWebHeaderTime{10};
 /// Time limit for sending a response that does not belong to a call.
 inline constexpr std::chrono::seconds kWebResponseTime{30};
-/// Time limit for sending the end of a call and closing.
+/// Time limit for sending the end of a call and for closing the connection afterwards.
 inline constexpr std::chrono::seconds kWebCloseTime{5};
 
 }  // namespace partiemc::server
