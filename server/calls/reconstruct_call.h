@@ -43,7 +43,7 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
 
   grpc::ByteBuffer& Request(std::size_t slot) { return requests_[slot]; }
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);
-  /// The kind of the request that was read into `slot`.
+  /// Examines the request that was read into `slot` and returns its kind.
   RequestKind OnRequestRead(std::size_t slot);
   absl::Status Open(std::size_t slot, const StreamStateMachine& stream) override;
   Answered Answer(std::size_t slot, Worker& worker, const std::atomic<bool>& cancelled) override;

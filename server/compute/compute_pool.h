@@ -45,10 +45,10 @@ inline constexpr std::chrono::seconds kBetweenShortages(1);
 /// a thread wakes. If two callers run long jobs, a third caller may wait for one job.
 ///
 /// Memory: a job gets the worker that was used last, so a single stream always uses the same
-/// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: at least
-/// as many streams as there are workers sent frames of that size recently; then all workers may be
-/// needed at any time, so none is dropped. Freed memory returns to the system when a worker is
-/// dropped, and every `warm_time` while jobs run. If the budget lacks memory, idle workers whose
+/// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: at
+/// least as many streams as there are workers sent frames of that size recently; then all workers
+/// may be needed at any time, so none is dropped. Freed memory returns to the system when a worker
+/// is dropped, and every `warm_time` while jobs run. If the budget lacks memory, idle workers whose
 /// bytes count in the budget are dropped at once.
 class ComputePool {
  public:

@@ -35,8 +35,8 @@ constexpr std::uint64_t kLingeringWindows = 64;
 // the ledger assumes that its header block has no end. Exception: gRPC has read fewer bytes than
 // headers may have.
 constexpr milliseconds kHeaderTime(100);
-// If gRPC has read fewer bytes, the ledger assumes this after this longer time. gRPC itself has no
-// such limit.
+// Longer time that applies if gRPC has read fewer bytes. gRPC itself has no time limit for header
+// blocks.
 constexpr std::chrono::seconds kSlowHeaderTime(10);
 
 std::uint64_t OnTheWire(std::uint64_t bytes) {
