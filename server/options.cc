@@ -64,9 +64,9 @@ struct Raw {
 // times this value and must fit into an int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
 
-// By default a frame may have 1/kFramesInBudget of the memory budget, because a frame is in memory
-// before it is counted; but at least kLeastFrameBytes. If the budget is very small, streams still
-// progress, one frame at a time.
+// By default a frame may have at most 1/kFramesInBudget of the memory budget, or kLeastFrameBytes
+// if that is more. The reason: a frame is in memory before it is counted. If the budget is very
+// small, streams still progress, one frame at a time.
 constexpr std::uint64_t kFramesInBudget = 8;
 constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
