@@ -56,8 +56,8 @@ void ForEachGroup(const std::string& root, std::string_view controller, Visit vi
   }
 }
 
-// The processor time of a group per period, divided by the period: the number of processors it may
-// use. Infinite without a limit.
+// The processor time of a group per period, divided by the period: the number of processors that
+// the group may use. Infinite without a limit.
 double QuotaOf(int version, const std::string& folder) {
   double quota = -1, period = 0;
   if (version == 2) {

@@ -40,9 +40,9 @@ inline constexpr std::chrono::seconds kBetweenShortages(1);
 /// Threads: a caller without competitors uses all threads, and its jobs run their parallel parts in
 /// one shared arena. A caller has competitors if another caller had a job within kSharingTime and
 /// the pool has at least two threads. A caller with competitors runs at most `threads - 1` jobs at
-/// once, so one thread stays free for the others. Each of these jobs has its own arena of `threads
-/// - 1` slots, so that it never waits for a part of another job. So a job of a second caller starts
-/// as soon as a thread wakes. If two callers run long jobs, a third caller may wait for one job.
+/// once, so one thread stays free for the others. Each such job has its own arena of `threads - 1`
+/// slots, so that it never waits for a part of another job. So a job of a second caller starts as
+/// soon as a thread wakes. If two callers run long jobs, a third caller may wait for one job.
 ///
 /// Memory: a job gets the worker that was used last, so a single stream always uses the same
 /// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: at

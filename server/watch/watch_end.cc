@@ -47,7 +47,8 @@ WatchEnd WatchEnd::OfStream(const absl::Status& status) {
     return {std::string(kReasonProducerLost), "the producer's connection is gone", {}};
   }
   WatchEnd end = With(status);
-  // The watcher's call ends with OK, because the producer broke a rule, not the watcher.
+  // If the producer broke a rule, the calls of its watchers end with OK. They end with UNAVAILABLE
+  // only if the server could not continue the stream.
   if (!absl::IsUnavailable(status)) end.status = absl::OkStatus();
   return end;
 }
