@@ -44,7 +44,8 @@ export class App {
       chosen: () => this.chosenChanged(),
       moved: () => this.writeAddress(),
     });
-    this.settings = new SettingsPanel((settings) => this.settingsChanged(settings));
+    this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
+      (cells) => this.cellSizeFor(cells));
     this.time = new TimePanel(() => this.track, () => {
       this.linkedFrame = null;
       this.writeAddress();
@@ -87,7 +88,8 @@ export class App {
   }
 
   private isOwn(streamId: string): boolean {
-    return this.stage.tracks.some((track) => track instanceof FileTrack && track.streamId === streamId);
+    return this.stage.tracks.some((track) => track instanceof FileTrack && track.streamId === streamId) ||
+      this.stage.panes.some(({ variantStream }) => variantStream?.streamId === streamId);
   }
 
   private useToken(token: string): void {
@@ -158,6 +160,13 @@ export class App {
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);
     this.writeAddress();
+  }
+
+  /** By the chosen picture, or another one of its stream if it is empty. */
+  private cellSizeFor(cells: number): number | null {
+    const { chosen } = this.stage;
+    const siblings = this.stage.panes.filter(({ track }) => track === chosen?.track);
+    return (chosen?.frame ? chosen : siblings.find(({ frame }) => frame))?.cellSizeFor(cells) ?? null;
   }
 
   private chosenChanged(): void {
@@ -266,13 +275,15 @@ export class App {
 
   private refreshPanels(now: number): void {
     const pane: Pane | null = this.stage.chosen;
+    const isVariant = (pane?.variantStream ?? null) !== null;
     this.look.setAttributes(pane?.scene.channels ?? [], this.track);
-    this.look.offer(pane?.frame ?? null, this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
+    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
     this.exports.offer(pane?.scene.hasWebgl ?? true);
     this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.scene.legend() ?? null);
     this.time.refresh();
-    this.curves.refresh(this.track, pane?.summary ?? null, pane?.isStreamed ?? true, now);
+    this.curves.refresh(pane?.curves ?? null, isVariant ? this.track : null, pane?.summary ?? null,
+      pane?.isStreamed ?? true, now);
     this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,
       this.track, now);
   }

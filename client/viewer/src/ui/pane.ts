@@ -4,11 +4,12 @@ import type { Frame } from '../protocol/frame';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
 import type { Entry, Summary } from '../stream/history';
 import {
-  FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
+  cellSizeOf, FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
 } from '../stream/settings';
-import type { Method, Track } from '../stream/track';
+import type { CurveSource, Method, Track } from '../stream/track';
 import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
+import type { VariantStream } from '../stream/variant_stream';
 import { make, setText } from './dom';
 import { count, number } from './format';
 import { Numbers } from './numbers';
@@ -21,6 +22,12 @@ export interface PaneEvents {
   closed(pane: Pane): void;
   /** The view changed, by the user or because the picture has grown. */
   moved(pane: Pane): void;
+}
+
+/** Makes the computations of a pane with other settings than those of its track. */
+export interface Variants {
+  frame(changed: () => void): Variant;
+  stream(track: Track, settings: Settings): VariantStream;
 }
 
 /** One picture: the current frame of a track, as streamed or with other settings. */
@@ -50,6 +57,7 @@ export class Pane {
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
   private readonly variant: Variant | null;
+  private stream: VariantStream | null = null;
   private readonly detach: () => void;
   private readonly observer: ResizeObserver;
   private shown: Entry | Frame | null = null;
@@ -65,14 +73,14 @@ export class Pane {
   private picked: Picked | null = null;
   private selected: bigint | null = null;
 
-  /** `newVariant`: for other settings than those of the track; null if they are not offered. */
+  /** `variants`: for other settings than those of the track; null if they are not offered. */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
-              newVariant: ((changed: () => void) => Variant) | null) {
+              private readonly variants: Variants | null) {
     this.element = make('section', { class: 'pane' },
       make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
       make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout, this.notice),
       this.numbers.element);
-    this.variant = newVariant?.(() => { this.dirty = true; }) ?? null;
+    this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
     this.switchButton.addEventListener('click', () => this.track.switchRun?.());
     this.element.addEventListener('pointerdown', () => events.chosen(this));
@@ -102,13 +110,13 @@ export class Pane {
     this.track = track;
     this.clear();
     this.isFree = true;
-    this.variant?.reset();
+    this.resetVariant();
     this.select(null);
   }
 
   setSettings(settings: Settings): void {
     this.settings = settings;
-    this.variant?.reset();
+    this.resetVariant();
     this.refusal = '';
     this.isPending = true;
     this.shown = null;
@@ -136,6 +144,26 @@ export class Pane {
     this.scene.view = { ...view };
     this.isFree = false;
     this.dirty = true;
+  }
+
+  /** The cell size for a number of cells across the longer side of the outline; null without an outline. */
+  cellSizeFor(cells: number): number | null {
+    const bounds = this.frame && boundsOf(this.frame.rings.points, this.frame.origin);
+    const spacing = this.frame?.statistics.spacing ?? 0;
+    if (!bounds || !(spacing > 0)) return null;
+    return cellSizeOf(cells, Math.max(bounds.right - bounds.left, bounds.top - bounds.bottom), spacing);
+  }
+
+  /** The variant's stream, if the pane has other settings than its track. */
+  get variantStream(): VariantStream | null { return this.stream; }
+
+  /** The frames of the curves. */
+  get curves(): CurveSource { return this.stream ?? this.track; }
+
+  private resetVariant(): void {
+    this.variant?.reset();
+    this.stream?.close();
+    this.stream = null;
   }
 
   /** Figures of the frame shown; null without one. */
@@ -173,7 +201,8 @@ export class Pane {
     const sequence = this.track.player.sequence;
     // A new run or new settings empty the history. The pane then clears its frame.
     const isStreamed = this.shown !== null && 'summary' in this.shown;
-    if (this.frame && isStreamed && this.track.history.size === 0) this.clear();
+    if (this.stream && !this.stream.isValid) this.resetVariant();
+    if (this.frame && isStreamed && this.curves.history.size === 0 && !this.isPending) this.clear();
     if (sequence !== null) this.update(sequence, now);
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');
@@ -188,6 +217,7 @@ export class Pane {
 
   destroy(): void {
     this.detach();
+    this.resetVariant();
     this.observer.disconnect();
     this.scene.destroy();
     this.element.remove();
@@ -224,14 +254,38 @@ export class Pane {
         settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
   }
 
+  /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
+  private updateVariant(stream: VariantStream, sequence: number, now: number): void {
+    stream.refresh(sequence, now);
+    this.refusal = stream.refusalOf(sequence);
+    if (this.refusal) {
+      const { refusal } = this;
+      if (this.frame) this.clear();
+      this.refusal = refusal;
+      return;
+    }
+    const entry = stream.entryAt(sequence);
+    const isLate = this.track.player.mode === 'paused' && entry?.sequence !== stream.frameAt(sequence);
+    this.isPending = !entry || isLate;
+    if (!entry || isLate || entry === this.shown) return;
+    stream.drawn(entry, now);
+    this.show(entry, entry.frame());
+  }
+
   private update(sequence: number, now: number): void {
-    const refusal = this.isVariant ? '' : this.track.refusalOf?.(sequence) ?? '';
+    if (this.isVariant && this.variants) {
+      this.stream ??= this.variants.stream(this.track, this.settings);
+      this.updateVariant(this.stream, sequence, now);
+      return;
+    }
+    if (this.stream) this.resetVariant();
+    const refusal = this.track.refusalOf?.(sequence) ?? '';
     if (refusal) {
       if (this.frame) this.clear();
       this.refusal = refusal;
       return;
     }
-    const entry = this.isVariant ? null : this.track.entryAt(sequence);
+    const entry = this.track.entryAt(sequence);
     if (entry) {
       this.refusal = '';
       if (entry === this.shown) return;
@@ -243,7 +297,7 @@ export class Pane {
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
-    if (!this.variant || (!this.isVariant && (this.track.kind === 'watch' || isFailed))) return;
+    if (!this.variant || this.track.kind === 'watch' || isFailed) return;
     this.variant.request(this.track, sequence, this.settings);
     const { result, problem } = this.variant;
     if (problem && this.frame) this.clear();
@@ -287,9 +341,10 @@ export class Pane {
   }
 
   private async addParticles(frame: Frame): Promise<void> {
-    if (frame.particles || !this.track.drawnParticles) return;
-    const particles = await this.track.drawnParticles(Number(frame.sequence), frame.origin);
-    if (frame !== this.frame) return;
+    const source = this.stream ?? this.track;
+    if (frame.particles || !source.drawnParticles) return;
+    const particles = await source.drawnParticles(Number(frame.sequence), frame.origin);
+    if (frame !== this.frame || !particles) return;
     frame.particles = particles.points;
     frame.particleAttributes = particles.attributes;
     this.scene.show(frame);
