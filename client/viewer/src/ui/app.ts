@@ -9,6 +9,7 @@ import { button } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
 import { FilesPanel } from './files_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
+import { Layout } from './layout';
 import { LookPanel } from './look_panel';
 import type { Pane } from './pane';
 import { SettingsPanel } from './settings_panel';
@@ -23,6 +24,7 @@ const TOKEN_KEY = 'partiemc-token';
 /** The page: connects the controls with the tracks on the stage. */
 export class App {
   private readonly gateway = new Gateway(new URL(location.origin));
+  private readonly layout = new Layout();
   private readonly status = new StatusLine();
   private readonly look: LookPanel;
   private readonly settings: SettingsPanel;
@@ -76,8 +78,14 @@ export class App {
 
   private openStreams(): StreamsPanel {
     return new StreamsPanel(this.gateway, (id) => this.isOwn(id), {
-      watch: (stream) => this.watch(stream),
-      beside: (stream) => this.watchBeside(stream),
+      watch: (stream) => {
+        this.watch(stream);
+        this.layout.chosen();
+      },
+      beside: (stream) => {
+        this.watchBeside(stream);
+        this.layout.chosen();
+      },
       first: (streams) => {
         const only = streams.length === 1 ? streams[0].streamName : null;
         if (only !== null && this.stage.panes.length === 0) this.watch(only);
@@ -242,7 +250,7 @@ export class App {
     };
     this.ownAddress = addressText(address);
     if (location.hash !== this.ownAddress) {
-      history.replaceState(null, '', this.ownAddress || location.pathname);
+      history.replaceState(null, '', this.ownAddress || location.pathname + location.search);
     }
   }
 

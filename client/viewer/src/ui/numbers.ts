@@ -50,7 +50,7 @@ const ROWS: Row[] = [
 
 /** The figures of a pane's frame. */
 export class Numbers {
-  readonly element = make('dl', { class: 'numbers' });
+  readonly element = make('dl', { class: 'numbers', tabindex: '0' });
   private readonly values = ROWS.map((row) => {
     const value = make('dd', { 'data-key': row.key }, '–');
     const kind = [row.isWide && 'wide', row.isAlert && 'alert'].filter(Boolean).join(' ');
