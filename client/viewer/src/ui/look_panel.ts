@@ -12,12 +12,12 @@ import { number } from './format';
 
 const SWITCHES = {
   outline: 'outline', fill: 'fill-look', edges: 'edges', particles: 'particles', normals: 'normals',
-  sections: 'sections',
+  sections: 'sections', axes: 'axes',
 } as const;
 const TITLES: Record<keyof typeof SWITCHES, string> = {
   outline: 'Draws the outline as a line.', fill: 'Fills the inside of the outline.',
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
-  normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.',
+  normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
 export type Switch = keyof typeof SWITCHES;
 const NAMES = Object.keys(SWITCHES) as Switch[];

@@ -1,6 +1,8 @@
 import { attachNavigation, Scene, type Look, type Picked } from '../draw';
+import { valuesAt } from '../draw/values';
 import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
+import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
 import type { Entry, Summary } from '../stream/history';
 import {
@@ -10,11 +12,16 @@ import type { CurveSource, Method, Track } from '../stream/track';
 import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
 import type { VariantStream } from '../stream/variant_stream';
-import { make, setText } from './dom';
+import { make, select, setText } from './dom';
 import { count, number } from './format';
+import { Measurement, type MeasureMode } from './measure';
 import { Numbers } from './numbers';
+import { Overlay } from './overlay';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
+
+/** Distance of the readout from the pointer, in CSS pixels. */
+const POINTER_GAP = 14;
 
 export interface PaneEvents {
   /** The user chose the pane: settings and time apply to it. */
@@ -56,6 +63,8 @@ export class Pane {
   private readonly closeButton = make('button', { type: 'button', class: 'icon', title: 'Closes this picture.' }, '✕');
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
+  private readonly overlay = new Overlay();
+  private readonly measurement = new Measurement();
   private readonly variant: Variant | null;
   private stream: VariantStream | null = null;
   private readonly detach: () => void;
@@ -78,7 +87,7 @@ export class Pane {
               private readonly variants: Variants | null) {
     this.element = make('section', { class: 'pane' },
       make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout, this.notice),
+      make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.readout, this.notice),
       this.numbers.element);
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
@@ -212,6 +221,8 @@ export class Pane {
     this.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
+    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement,
+      this.measurement.text((identity) => this.areaText(identity)));
     this.updateReadout();
   }
 
@@ -388,7 +399,10 @@ export class Pane {
       this.selectAtPointer();
     });
     this.canvas.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') this.select(null);
+      if (event.key === 'Escape') {
+        this.measurement.clear();
+        this.select(null);
+      }
       if (event.key !== 'Enter') return;
       this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
       this.selectAtPointer();
@@ -402,9 +416,15 @@ export class Pane {
 
   private selectAtPointer(): void {
     if (!this.pointer) return;
-    const { ring } = this.scene.pick(...this.pointer);
+    const { x, y, ring } = this.scene.pick(...this.pointer);
     const identity = ring === null ? null : this.frame?.rings.identities[ring] ?? null;
-    this.select(identity);
+    const mode = select('measure').value as MeasureMode;
+    if (mode === 'off') {
+      this.select(identity);
+    } else {
+      this.measurement.add(mode, [x, y], identity);
+      this.dirty = true;
+    }
   }
 
   private select(identity: bigint | null): void {
@@ -424,6 +444,7 @@ export class Pane {
       const { x, y, ring } = this.picked;
       lines.push(`x ${number(x)}, y ${number(y)}`);
       if (ring !== null) lines.push(this.ringText(ring));
+      lines.push(...this.valueTexts(x, y));
     }
     if (this.selected !== null) {
       const rings = this.scene.selectedRings;
@@ -431,6 +452,43 @@ export class Pane {
         : rings.map((ring) => this.ringText(ring)).join('\n')}`);
     }
     setText(this.readout, lines.join('\n'));
+    this.placeReadout();
+  }
+
+  /** Puts the readout beside the pointer, within the picture. Without a pointer it is in the corner. */
+  private placeReadout(): void {
+    const { style, classList, offsetWidth, offsetHeight } = this.readout;
+    const { width, height } = this.scene.size;
+    classList.toggle('at-pointer', this.pointer !== null);
+    if (!this.pointer) {
+      style.left = style.top = '';
+      return;
+    }
+    const [x, y] = this.pointer;
+    const beside = (at: number, length: number, room: number) =>
+      (at + POINTER_GAP + length <= room ? at + POINTER_GAP : Math.max(0, at - POINTER_GAP - length));
+    style.left = `${Math.min(beside(x, offsetWidth, width), Math.max(0, width - offsetWidth))}px`;
+    style.top = `${beside(y, offsetHeight, height)}px`;
+  }
+
+  /** Attribute values at a world position. */
+  private valueTexts(x: number, y: number): string[] {
+    const { frame } = this;
+    if (!frame) return [];
+    const names = this.scene.channels;
+    const tolerance = Math.max(frame.statistics.spacing, POINTER_GAP / this.scene.view.scale / 2);
+    return valuesAt(frame, names, x - frame.origin[0], y - frame.origin[1], tolerance)
+      .map(({ name, value }) => `${channelLabel(name, names)} ${number(value)}`);
+  }
+
+  /** Area of a measured ring in the frame shown. */
+  private areaText(identity: bigint | null): string {
+    if (identity === null) return 'no ring here';
+    if (identity === 0n) return 'ring without identity';
+    const ring = this.frame?.rings.identities.indexOf(identity) ?? -1;
+    if (!this.frame || ring < 0) return `ring ${identity} is not in this frame`;
+    const { area, perimeter } = this.frame.rings;
+    return `area ${number(Math.abs(area[ring]))}, perimeter ${number(perimeter[ring])}`;
   }
 
   private ringText(ring: number): string {
