@@ -1,4 +1,5 @@
 import { Gateway } from '../stream/gateway';
+import type { FrameSource } from '../input/source';
 import { FileTrack } from '../stream/file_track';
 import { AS_STREAMED, type Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
@@ -38,6 +39,8 @@ export class App {
   private isReady = false;
   /** Frame of the link, until it is shown. */
   private linkedFrame: number | null = null;
+  /** The link to a file that the user has not opened yet. */
+  private linkedFile: Address | null = null;
 
   constructor() {
     this.gateway.token = sessionStorage.getItem(TOKEN_KEY) ?? '';
@@ -59,7 +62,7 @@ export class App {
     });
     this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
-    new FilesPanel((source) => this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED })),
+    new FilesPanel((source) => this.openFile(source),
                    (text, isError) => this.status.report(text, isError));
     button('side-by-side').addEventListener('click', () => this.addBeside());
     button('fit').addEventListener('click', () => this.fit());
@@ -146,6 +149,19 @@ export class App {
     this.writeAddress();
   }
 
+  /** Shows files; those of the link as the link says. */
+  private openFile(source: FrameSource): void {
+    const address = this.linkedFile;
+    this.layout.chosen();
+    if (!address || address.file !== source.title) {
+      this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED }));
+      return;
+    }
+    this.linkedFile = null;
+    this.showPanes(address, new FileTrack(this.gateway, source, { ...address.panes[0].settings }));
+    this.writeAddress();
+  }
+
   private reportFull(): void {
     this.status.report('The page shows at most four pictures. Close one of them.', true, () => !this.stage.isFull);
   }
@@ -222,30 +238,47 @@ export class App {
   private readAddress(): void {
     const address = parseAddress(location.hash);
     this.look.text = address.look;
-    if (address.panes.length === 0) return;
+    this.linkedFile = address.file ? address : null;
+    if (address.file) {
+      this.status.report(`This link shows the file ${address.file}. Open it here.`, true, () => !this.linkedFile);
+      return;
+    }
+    if (address.panes.length > 0) this.showPanes(address, null);
+  }
+
+  /** Shows the panes of a link. `file`: the track of panes without a stream. */
+  private showPanes(address: Address, file: FileTrack | null): void {
     while (this.stage.panes.length > 0) this.stage.close(this.stage.panes[0]);
     for (const { stream, settings } of address.panes) {
-      const pane = this.stage.add(this.watchTrack(stream || address.panes[0].stream), settings);
+      const track = file && !stream ? file : this.watchTrack(stream || address.panes[0].stream);
+      const pane = this.stage.add(track, settings);
       if (address.view) pane.setView(address.view);
     }
     this.stage.choose(this.stage.panes[0]);
+    if (file) {
+      if (address.frame !== null) file.player.seek(file.sequenceOf(address.frame));
+      return;
+    }
     this.linkedFrame = address.frame;
     const track = this.stage.panes[0].track;
     if (address.frame !== null && track instanceof WatchTrack) track.request(address.frame);
   }
 
   private writeAddress(): void {
-    if (!this.isReady || this.linkedFrame !== null) return;
-    const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch');
-    const first = panes[0];
+    if (!this.isReady || this.linkedFrame !== null || this.linkedFile) return;
+    const first = this.stage.panes[0];
+    const file = first?.track.kind === 'file' ? first.track : null;
+    // A link opens one file only.
+    const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch' || track === file);
     const player = first?.track.player;
     const isPaused = player?.mode === 'paused';
     const address: Address = {
       panes: panes.map(({ track, settings }, k) => ({
-        stream: k > 0 && track === first.track ? '' : track.title, settings,
+        stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
       })),
-      frame: isPaused ? player.sequence : null,
-      view: first?.frame && (isPaused || !first.isFree) ? first.scene.view : null,
+      file: file?.title ?? '',
+      frame: isPaused && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
+      view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,
     };
     this.ownAddress = addressText(address);

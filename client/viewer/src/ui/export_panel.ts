@@ -103,7 +103,7 @@ export class ExportPanel {
   }
 
   private name(pane: Pane, suffix: string): string {
-    return `${fileName(pane.track.title)}_${pane.frame?.sequence ?? 0}.${suffix}`;
+    return `${fileName(pane.track.title)}_${pane.track.labelOf(Number(pane.frame?.sequence ?? 0))}.${suffix}`;
   }
 }
 
