@@ -65,9 +65,9 @@ test('an axis has at least three round ticks', () => {
 
 test('the curves are saved as CSV, with empty cells for unknown numbers', () => {
   const [head, first, second, ...rest] = curvesCsv(track([1, 2])).trimEnd().split('\n');
-  assert.equal(head, `frame,time,area,rings,holes,triangles,triangles_unmerged,milliseconds,${
+  assert.equal(head, `frame,time,area,rings,holes,triangles,triangles_unmerged,reduction_percent,milliseconds,${
     STAGES.map((name) => `${name}_ms`).join()},received,drawn,dropped,latency_ms`);
-  assert.match(first, /^1,0\.25,2\.5,3,1,10,20,1\.5,0,0\.125,/);
+  assert.match(first, /^1,0\.25,2\.5,3,1,10,20,50,1\.5,0,0\.125,/);
   assert.match(second, /^2,0\.5,,3,1/);
   assert.match(second, /,2,0,0,$/);
   assert.deepEqual(rest, []);

@@ -12,6 +12,8 @@ export interface Look {
   normals: boolean;
   /** Sections and isolines, as lines. */
   sections: boolean;
+  /** Coordinates along the edges of the picture. */
+  axes: boolean;
   /** Outlines without a line: 0 is the stream's own, k is section k - 1. */
   hidden: readonly number[];
   /** The outline to show as the picture. */
@@ -35,6 +37,7 @@ export const DEFAULT_LOOK: Readonly<Look> = {
   particles: false,
   normals: false,
   sections: true,
+  axes: false,
   hidden: [],
   outlineShown: 0,
   colour: 'plain',

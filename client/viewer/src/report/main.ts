@@ -87,7 +87,7 @@ class Report {
     };
     button('zoom-in').addEventListener('click', () => zoom('+'));
     button('zoom-out').addEventListener('click', () => zoom('-'));
-    button('export-csv').addEventListener('click', () => downloadCurves(this.track));
+    button('export-csv').addEventListener('click', () => downloadCurves(this.track, this.track.title));
     button('fit').addEventListener('click', () => this.pane.fit());
     addEventListener('beforeprint', () => this.pane.scene.draw());
     const actions: Record<string, () => void> = {
@@ -140,7 +140,7 @@ class Report {
     const { player } = this.track;
     if (!this.isReady || player.mode !== 'paused' || player.sequence === null) return;
     this.ownAddress = addressText({
-      panes: [], frame: Number(this.track.labelOf(player.sequence)),
+      panes: [], file: '', frame: Number(this.track.labelOf(player.sequence)),
       view: this.pane.isFree ? null : this.pane.scene.view, look: this.look.text,
     });
     try {
@@ -155,7 +155,7 @@ class Report {
     player.tick(now);
     this.pane.refresh(now);
     this.time.refresh();
-    this.curves.refresh(this.track, this.pane.summary, this.pane.isStreamed, now);
+    this.curves.refresh(this.track, null, this.pane.summary, this.pane.isStreamed, now);
     this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl);
     this.look.setOutlines(this.track.outlines);
     this.look.setLegend(this.pane.scene.legend());

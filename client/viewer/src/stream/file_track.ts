@@ -21,7 +21,10 @@ const RATE = 30;
 /** Frames kept before the player's position if the history is full. */
 const KEPT_BEHIND = 8;
 
-/** Dropped files, sent to the server as a stream. Frame k of the source has the sequence k + 1. */
+/**
+ * Dropped files, sent to the server as a stream. Frame k of the source has the sequence k + 1. Users see
+ * k, as in the results of `partiemc replay`.
+ */
 export class FileTrack implements Track {
   readonly kind = 'file';
   readonly history = new History(HISTORY_BYTES);
@@ -57,8 +60,8 @@ export class FileTrack implements Track {
   livePosition(): null { return null; }
 
   entryAt(sequence: number): Entry | null { return this.history.get(sequence); }
-  labelOf(sequence: number): string { return String(sequence); }
-  sequenceOf(label: number): number { return label; }
+  labelOf(sequence: number): string { return String(sequence - 1); }
+  sequenceOf(label: number): number { return label + 1; }
   refusalOf(sequence: number): string { return this.refusals.get(sequence) ?? ''; }
   doubtText(doubt: number): string { return this.gateway.doubtText(doubt); }
 
@@ -121,8 +124,9 @@ export class FileTrack implements Track {
       next: (sequence) => this.next(sequence, producer),
       frame: (frame, message) => this.frame(frame, message),
       error: (error) => {
-        this.refusals.set(Number(error.sequence), `Frame ${error.sequence} is refused: ${sentence(error.message)}`);
-        this.answered(Number(error.sequence));
+        const sequence = Number(error.sequence);
+        this.refusals.set(sequence, `Frame ${this.labelOf(sequence)} is refused: ${sentence(error.message)}`);
+        this.answered(sequence);
       },
       ended: (status) => this.ended(status),
     });

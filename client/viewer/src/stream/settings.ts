@@ -24,6 +24,15 @@ export const AS_STREAMED: Readonly<Settings> = {
 
 export const SHARES = [100, 80, 50, 30];
 
+/** Limits of the cell size, in spacings. */
+const CELL_SIZES = [0.25, 4] as const;
+
+/** The cell size with which `cells` cells span a length, as far as the limits allow. */
+export function cellSizeOf(cells: number, length: number, spacing: number): number {
+  const size = Number((length / cells / spacing).toPrecision(4));
+  return Math.min(CELL_SIZES[1], Math.max(CELL_SIZES[0], size));
+}
+
 export const PLACEMENTS: Record<string, Placement> = {
   'marching-squares': Placement.MARCHING_SQUARES,
   qef: Placement.QEF,

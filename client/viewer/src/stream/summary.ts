@@ -10,6 +10,11 @@ export const STAGES = [
 /** Frames since the start of a track. */
 export interface Counts { received: number; drawn: number; dropped: number }
 
+/** Triangles that merging saves, in percent of the unmerged ones. NaN without triangles. */
+export function reductionOf({ triangles, trianglesGrid }: Pick<Summary, 'triangles' | 'trianglesGrid'>): number {
+  return trianglesGrid > 0 ? 100 * (1 - triangles / trianglesGrid) : NaN;
+}
+
 /** Rings and holes, by the sign of their areas. */
 export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
   const holes = areas.filter((area) => area < 0).length;

@@ -24,6 +24,9 @@ export interface Method { placement: string; fill: string }
 /** Particles to draw: x, y of each, and their numbers. */
 export interface DrawnParticles { points: Float32Array; attributes: Channels }
 
+/** The frames of curves: of a track, or of a variant of it. */
+export type CurveSource = Pick<Track, 'history' | 'player' | 'labelOf' | 'sequenceOf'>;
+
 /** A sequence of results: a watched stream, dropped files, or the frames of a report. */
 export interface Track extends Playable {
   readonly kind: 'watch' | 'file' | 'report';

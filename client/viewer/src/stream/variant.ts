@@ -6,8 +6,9 @@ import { particleChannels } from '../protocol/particles';
 import type { Gateway } from './gateway';
 import { outputsFor, parametersOf, settingsText, type Settings } from './settings';
 import type { Track } from './track';
+import { NO_PARTICLES } from './variant_stream';
 
-/** One frame of a track with other settings. Sends one request at a time, for the newest frame. */
+/** One frame of files whose stream lacks its result. Sends one request at a time, for the newest frame. */
 export class Variant {
   result: Frame | null = null;
   /** The last error, or empty. */
@@ -51,8 +52,7 @@ export class Variant {
   private async fetch(track: Track, sequence: number, settings: Settings): Promise<Frame> {
     const particles = await track.particlesOf(sequence);
     if (!particles) {
-      throw new Error('Other settings need the particles, which this stream does not send. ' +
-                      'Start its producer with --echo-particles.');
+      throw new Error(NO_PARTICLES);
     }
     const chosen = shareOf(particles, settings.share);
     const spacing = track.entryAt(sequence)?.frame().statistics.spacing ?? null;

@@ -7,13 +7,15 @@ export interface PaneAddress { stream: string; settings: Settings }
 /** The state in the page's address. */
 export interface Address {
   panes: PaneAddress[];
+  /** Name of the file in the panes without a stream, or empty. The user has to open it. */
+  file: string;
   /** Null: the newest frame. */
   frame: number | null;
   view: View | null;
   look: string;
 }
 
-/** `#stream=dam&frame=12&view=1,2,300&set=placement:qef&beside=~fill:none&look=...` */
+/** `#file=dam.csv` or `#stream=dam&frame=12&view=1,2,300&set=placement:qef&beside=~fill:none&look=...` */
 export function addressText(address: Address): string {
   const parts: string[] = [];
   const add = (name: string, value: string) => {
@@ -21,6 +23,7 @@ export function addressText(address: Address): string {
   };
   const [first, ...others] = address.panes;
   add('stream', first?.stream ?? '');
+  add('file', address.file);
   add('frame', address.frame === null ? '' : String(address.frame));
   const view = address.view;
   add('view', view ? [view.x, view.y, view.scale].map((v) => Number(v.toPrecision(6))).join(',') : '');
@@ -45,12 +48,14 @@ export function parseAddress(hash: string): Address {
   const values = new URLSearchParams(hash.replace(/^#/, ''));
   const frame = Number(values.get('frame') || NaN);
   const stream = values.get('stream') ?? '';
-  const first = stream ? [{ stream, settings: parseSettings(values.get('set') ?? '') }] : [];
+  const file = stream ? '' : values.get('file') ?? '';
+  const first = stream || file ? [{ stream, settings: parseSettings(values.get('set') ?? '') }] : [];
   const others = values.getAll('beside').map((text) => {
     const at = text.indexOf('~');
     return { stream: text.slice(0, at), settings: parseSettings(text.slice(at + 1)) };
   });
   return {
+    file,
     panes: [...first, ...first.length > 0 ? others : []],
     frame: Number.isInteger(frame) ? frame : null,
     view: parseView(values.get('view')),

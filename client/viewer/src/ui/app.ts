@@ -1,4 +1,5 @@
 import { Gateway } from '../stream/gateway';
+import type { FrameSource } from '../input/source';
 import { FileTrack } from '../stream/file_track';
 import { AS_STREAMED, type Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
@@ -9,6 +10,7 @@ import { button } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
 import { FilesPanel } from './files_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
+import { Layout } from './layout';
 import { LookPanel } from './look_panel';
 import type { Pane } from './pane';
 import { SettingsPanel } from './settings_panel';
@@ -23,6 +25,7 @@ const TOKEN_KEY = 'partiemc-token';
 /** The page: connects the controls with the tracks on the stage. */
 export class App {
   private readonly gateway = new Gateway(new URL(location.origin));
+  private readonly layout = new Layout();
   private readonly status = new StatusLine();
   private readonly look: LookPanel;
   private readonly settings: SettingsPanel;
@@ -36,6 +39,8 @@ export class App {
   private isReady = false;
   /** Frame of the link, until it is shown. */
   private linkedFrame: number | null = null;
+  /** The link to a file that the user has not opened yet. */
+  private linkedFile: Address | null = null;
 
   constructor() {
     this.gateway.token = sessionStorage.getItem(TOKEN_KEY) ?? '';
@@ -44,7 +49,8 @@ export class App {
       chosen: () => this.chosenChanged(),
       moved: () => this.writeAddress(),
     });
-    this.settings = new SettingsPanel((settings) => this.settingsChanged(settings));
+    this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
+      (cells) => this.cellSizeFor(cells));
     this.time = new TimePanel(() => this.track, () => {
       this.linkedFrame = null;
       this.writeAddress();
@@ -56,7 +62,7 @@ export class App {
     });
     this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
-    new FilesPanel((source) => this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED })),
+    new FilesPanel((source) => this.openFile(source),
                    (text, isError) => this.status.report(text, isError));
     button('side-by-side').addEventListener('click', () => this.addBeside());
     button('fit').addEventListener('click', () => this.fit());
@@ -75,8 +81,14 @@ export class App {
 
   private openStreams(): StreamsPanel {
     return new StreamsPanel(this.gateway, (id) => this.isOwn(id), {
-      watch: (stream) => this.watch(stream),
-      beside: (stream) => this.watchBeside(stream),
+      watch: (stream) => {
+        this.watch(stream);
+        this.layout.chosen();
+      },
+      beside: (stream) => {
+        this.watchBeside(stream);
+        this.layout.chosen();
+      },
       first: (streams) => {
         const only = streams.length === 1 ? streams[0].streamName : null;
         if (only !== null && this.stage.panes.length === 0) this.watch(only);
@@ -87,7 +99,8 @@ export class App {
   }
 
   private isOwn(streamId: string): boolean {
-    return this.stage.tracks.some((track) => track instanceof FileTrack && track.streamId === streamId);
+    return this.stage.tracks.some((track) => track instanceof FileTrack && track.streamId === streamId) ||
+      this.stage.panes.some(({ variantStream }) => variantStream?.streamId === streamId);
   }
 
   private useToken(token: string): void {
@@ -136,6 +149,19 @@ export class App {
     this.writeAddress();
   }
 
+  /** Shows files; those of the link as the link says. */
+  private openFile(source: FrameSource): void {
+    const address = this.linkedFile;
+    this.layout.chosen();
+    if (!address || address.file !== source.title) {
+      this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED }));
+      return;
+    }
+    this.linkedFile = null;
+    this.showPanes(address, new FileTrack(this.gateway, source, { ...address.panes[0].settings }));
+    this.writeAddress();
+  }
+
   private reportFull(): void {
     this.status.report('The page shows at most four pictures. Close one of them.', true, () => !this.stage.isFull);
   }
@@ -158,6 +184,13 @@ export class App {
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);
     this.writeAddress();
+  }
+
+  /** By the chosen picture, or another one of its stream if it is empty. */
+  private cellSizeFor(cells: number): number | null {
+    const { chosen } = this.stage;
+    const siblings = this.stage.panes.filter(({ track }) => track === chosen?.track);
+    return (chosen?.frame ? chosen : siblings.find(({ frame }) => frame))?.cellSizeFor(cells) ?? null;
   }
 
   private chosenChanged(): void {
@@ -205,35 +238,52 @@ export class App {
   private readAddress(): void {
     const address = parseAddress(location.hash);
     this.look.text = address.look;
-    if (address.panes.length === 0) return;
+    this.linkedFile = address.file ? address : null;
+    if (address.file) {
+      this.status.report(`This link shows the file ${address.file}. Open it here.`, true, () => !this.linkedFile);
+      return;
+    }
+    if (address.panes.length > 0) this.showPanes(address, null);
+  }
+
+  /** Shows the panes of a link. `file`: the track of panes without a stream. */
+  private showPanes(address: Address, file: FileTrack | null): void {
     while (this.stage.panes.length > 0) this.stage.close(this.stage.panes[0]);
     for (const { stream, settings } of address.panes) {
-      const pane = this.stage.add(this.watchTrack(stream || address.panes[0].stream), settings);
+      const track = file && !stream ? file : this.watchTrack(stream || address.panes[0].stream);
+      const pane = this.stage.add(track, settings);
       if (address.view) pane.setView(address.view);
     }
     this.stage.choose(this.stage.panes[0]);
+    if (file) {
+      if (address.frame !== null) file.player.seek(file.sequenceOf(address.frame));
+      return;
+    }
     this.linkedFrame = address.frame;
     const track = this.stage.panes[0].track;
     if (address.frame !== null && track instanceof WatchTrack) track.request(address.frame);
   }
 
   private writeAddress(): void {
-    if (!this.isReady || this.linkedFrame !== null) return;
-    const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch');
-    const first = panes[0];
+    if (!this.isReady || this.linkedFrame !== null || this.linkedFile) return;
+    const first = this.stage.panes[0];
+    const file = first?.track.kind === 'file' ? first.track : null;
+    // A link opens one file only.
+    const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch' || track === file);
     const player = first?.track.player;
     const isPaused = player?.mode === 'paused';
     const address: Address = {
       panes: panes.map(({ track, settings }, k) => ({
-        stream: k > 0 && track === first.track ? '' : track.title, settings,
+        stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
       })),
-      frame: isPaused ? player.sequence : null,
-      view: first?.frame && (isPaused || !first.isFree) ? first.scene.view : null,
+      file: file?.title ?? '',
+      frame: isPaused && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
+      view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,
     };
     this.ownAddress = addressText(address);
     if (location.hash !== this.ownAddress) {
-      history.replaceState(null, '', this.ownAddress || location.pathname);
+      history.replaceState(null, '', this.ownAddress || location.pathname + location.search);
     }
   }
 
@@ -266,13 +316,15 @@ export class App {
 
   private refreshPanels(now: number): void {
     const pane: Pane | null = this.stage.chosen;
+    const isVariant = (pane?.variantStream ?? null) !== null;
     this.look.setAttributes(pane?.scene.channels ?? [], this.track);
-    this.look.offer(pane?.frame ?? null, this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
+    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
     this.exports.offer(pane?.scene.hasWebgl ?? true);
     this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.scene.legend() ?? null);
     this.time.refresh();
-    this.curves.refresh(this.track, pane?.summary ?? null, pane?.isStreamed ?? true, now);
+    this.curves.refresh(pane?.curves ?? null, isVariant ? this.track : null, pane?.summary ?? null,
+      pane?.isStreamed ?? true, now);
     this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,
       this.track, now);
   }

@@ -1,6 +1,6 @@
 import type { Entry, Summary } from '../stream/history';
-import { STAGES } from '../stream/summary';
-import type { Track } from '../stream/track';
+import { reductionOf, STAGES } from '../stream/summary';
+import type { CurveSource, Track } from '../stream/track';
 
 /** About one point per pixel. */
 const MOST_POINTS = 600;
@@ -30,6 +30,11 @@ export function curvePoints(track: Pick<Track, 'history' | 'labelOf'>): CurvePoi
   return points;
 }
 
+/** The frames of `other` with the sequences of `entries`; null where it has none. */
+export function entriesOf(other: Pick<CurveSource, 'history'>, entries: readonly (Entry | null)[]): (Entry | null)[] {
+  return entries.map((entry) => entry && other.history.get(entry.sequence));
+}
+
 /** Columns of the file of curves. */
 const COLUMNS: [string, (summary: Summary) => number][] = [
   ['area', (s) => s.area],
@@ -37,6 +42,7 @@ const COLUMNS: [string, (summary: Summary) => number][] = [
   ['holes', (s) => s.holes],
   ['triangles', (s) => s.triangles],
   ['triangles_unmerged', (s) => s.trianglesGrid],
+  ['reduction_percent', reductionOf],
   ['milliseconds', (s) => s.milliseconds],
   ...STAGES.map((name, k): [string, (summary: Summary) => number] => [`${name}_ms`, (s) => s.stages[k]]),
   ['received', (s) => s.received],

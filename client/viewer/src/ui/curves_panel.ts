@@ -1,8 +1,8 @@
 import uPlot from 'uplot';
 import type { Entry, Summary } from '../stream/history';
-import { STAGES } from '../stream/summary';
-import type { Track } from '../stream/track';
-import { curvePoints } from './curve_data';
+import { reductionOf, STAGES } from '../stream/summary';
+import type { CurveSource } from '../stream/track';
+import { curvePoints, entriesOf } from './curve_data';
 import { byId, make } from './dom';
 import { count, number } from './format';
 import { tickDigits, ticks } from './ticks';
@@ -31,6 +31,7 @@ export const RESULT_CURVES: Curve[] = [
     { name: 'merged', value: (s) => s.triangles, text: count },
     { name: 'unmerged', value: (s) => s.trianglesGrid, text: count },
   ] },
+  { title: 'Reduction, %', lines: [{ name: 'reduction', value: reductionOf, text: (value) => number(value, 3) }] },
   {
     title: 'Milliseconds',
     lines: STAGES.map((name, k) => ({ name, value: (s: Summary) => s.stages[k], text: milliseconds })),
@@ -88,7 +89,9 @@ export class CurvesPanel {
   private readonly captions: HTMLElement[] = [];
   private readonly holders: HTMLElement[] = [];
   private entries: readonly (Entry | null)[] = [];
-  private track: Track | null = null;
+  private track: CurveSource | null = null;
+  /** Whether the dashed lines have data. */
+  private isCompared = false;
   private lastRefresh = -Infinity;
   private position = NaN;
   /** Figures under the picture, and their text when the captions were written. */
@@ -120,13 +123,19 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  /** `shown`: the figures under the picture. `isStreamed`: whether they are points of the curves. */
-  refresh(track: Track | null, shown: Summary | null, isStreamed: boolean, now: number): void {
-    const frame = JSON.stringify([shown, isStreamed]);
+  /**
+   * `other`: frames to compare with, drawn as dashed lines. `shown`: the figures under the picture.
+   * `isStreamed`: whether they are points of the curves.
+   */
+  refresh(track: CurveSource | null, other: CurveSource | null, shown: Summary | null, isStreamed: boolean,
+          now: number): void {
+    if (track !== this.track || (other !== null) !== this.isCompared) this.lastRefresh = -Infinity;
+    this.isCompared = other !== null;
+    const frame = JSON.stringify([shown, isStreamed, this.isCompared]);
     if (frame !== this.captioned && this.hovered === null) {
       this.captioned = frame;
       this.shown = shown;
-      this.note = isStreamed ? '' : ' (line: as streamed)';
+      this.note = !isStreamed ? ' (line: as streamed)' : this.isCompared ? ' (dashed: as streamed)' : '';
       this.showCaptions();
     }
     if (now - this.lastRefresh < REFRESH_MS) return;
@@ -135,7 +144,9 @@ export class CurvesPanel {
     this.position = track?.player.sequence ?? NaN;
     const { x, entries } = track ? curvePoints(track) : { x: [], entries: [] };
     this.entries = entries;
-    this.curves.forEach((curve, k) => this.plots[k]?.setData([x, ...valuesOf(curve, this.entries)]));
+    const others = other ? entriesOf(other, entries) : entries.map(() => null);
+    this.curves.forEach((curve, k) =>
+      this.plots[k]?.setData([x, ...valuesOf(curve, entries), ...curve.total ? [] : valuesOf(curve, others)]));
     this.showCaptions();
   }
 
@@ -143,13 +154,15 @@ export class CurvesPanel {
   private showCaptions(): void {
     const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     this.curves.forEach(({ title, lines, isWide, total }, k) => {
-      const parts: (Node | string)[] = [title + (this.hovered === null ? this.note : '')];
+      const note = total && this.isCompared ? '' : this.note;
+      const parts: (Node | string)[] = [title];
       if (total && summary) parts.push(' ', make('b', {}, milliseconds(total(summary))));
       lines.forEach((line, i) => {
         const value = summary && (!total || this.isDetailed) ? line.text(line.value(summary)) : '';
         const text = isWide ? `${line.name} ${value}` : value;
         parts.push(' ', make('b', { style: `color: ${this.colours[i]}`, title: line.name }, text));
       });
+      if (this.hovered === null && note) parts.push(note);
       this.captions[k].replaceChildren(...parts);
     });
   }
@@ -165,6 +178,9 @@ export class CurvesPanel {
       label: name, stroke: this.colours[k], width: 1.25, spanGaps: false,
       points: { show: true, size: 3, filter: (self, index) => isolated(self.data[index]) },
       ...curve.total && { fill: this.colours[k], width: 0 },
+    }));
+    const dashed = curve.total ? [] : curve.lines.map((_, k): uPlot.Series => ({
+      stroke: this.colours[k], width: 1, dash: [5, 4], spanGaps: false, points: { show: false },
     }));
     const plot = new uPlot({
       width: Math.max(60, holder.clientWidth),
@@ -191,9 +207,9 @@ export class CurvesPanel {
           values: (_, all) => all.map((tick) => number(tick, tickDigits(all))),
         },
       ],
-      series: [{}, ...curve.total ? series.reverse() : series],
+      series: [{}, ...curve.total ? series.reverse() : series, ...dashed],
       hooks: { draw: [(self) => this.drawPosition(self)], setCursor: [(self) => this.hover(self.cursor.idx)] },
-    }, [[], ...curve.lines.map(() => [])], holder);
+    }, [[], ...[...series, ...dashed].map(() => [])], holder);
     plot.over.addEventListener('click', (event) => {
       const label = plot.posToVal(event.offsetX, 'x');
       if (this.track && Number.isFinite(label)) this.goTo(this.track.sequenceOf(label));
@@ -216,6 +232,7 @@ export class CurvesPanel {
     ctx.save();
     ctx.strokeStyle = this.colours[0];
     ctx.globalAlpha = 0.6;
+    ctx.setLineDash([]);
     ctx.beginPath();
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);

@@ -1,7 +1,7 @@
 import type { Look } from '../draw';
 import { clip, download, geojson, marksOf, png, svg } from '../export';
 import { NO_WEBGL } from '../draw';
-import type { Track } from '../stream/track';
+import type { CurveSource } from '../stream/track';
 import { curvesCsv } from './curve_data';
 import { button, input, setText } from './dom';
 import type { Pane } from './pane';
@@ -32,7 +32,7 @@ export class ExportPanel {
       const blob = new Blob([geojson(shown.frame)], { type: 'application/geo+json' });
       download(this.name(shown, 'geojson'), blob);
     });
-    this.on('export-csv', async ({ track }) => downloadCurves(track));
+    this.on('export-csv', async ({ track, curves }) => downloadCurves(curves, track.title));
     this.on('export-clip', (shown) => this.toggleClip(shown));
     this.on('copy-link', async () => {
       await this.copyLink();
@@ -103,13 +103,13 @@ export class ExportPanel {
   }
 
   private name(pane: Pane, suffix: string): string {
-    return `${fileName(pane.track.title)}_${pane.frame?.sequence ?? 0}.${suffix}`;
+    return `${fileName(pane.track.title)}_${pane.track.labelOf(Number(pane.frame?.sequence ?? 0))}.${suffix}`;
   }
 }
 
 /** Saves the numbers of all frames of a track. */
-export function downloadCurves(track: Track): void {
-  download(`${fileName(track.title)}_curves.csv`, new Blob([curvesCsv(track)], { type: 'text/csv' }));
+export function downloadCurves(track: CurveSource, title: string): void {
+  download(`${fileName(title)}_curves.csv`, new Blob([curvesCsv(track)], { type: 'text/csv' }));
 }
 
 function fileName(title: string): string {

@@ -12,12 +12,12 @@ import { number } from './format';
 
 const SWITCHES = {
   outline: 'outline', fill: 'fill-look', edges: 'edges', particles: 'particles', normals: 'normals',
-  sections: 'sections',
+  sections: 'sections', axes: 'axes',
 } as const;
 const TITLES: Record<keyof typeof SWITCHES, string> = {
   outline: 'Draws the outline as a line.', fill: 'Fills the inside of the outline.',
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
-  normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.',
+  normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
 export type Switch = keyof typeof SWITCHES;
 const NAMES = Object.keys(SWITCHES) as Switch[];
@@ -67,8 +67,7 @@ export class LookPanel {
     this.offeredOf = track;
     for (const name of ofFrame) this.offered.add(name);
     const { colour: chosen } = this.chosen;
-    const names = [...this.offered];
-    if (!['plain', 'identity', ...names].includes(chosen)) names.push(chosen);
+    const names = offeredChannels(this.offered, chosen);
     const colour = select('colour');
     const values = ['plain', 'identity', ...names];
     const current = [...colour.options].map((option) => option.value);
@@ -173,7 +172,7 @@ export class LookPanel {
       map: MAP_NAMES.find((name) => name === value('map')) ?? DEFAULT_LOOK.map,
       hidden: (value('hidden') ?? '').split('.').filter(Boolean).map(Number).filter(Number.isInteger),
       outlineShown: Math.max(0, Math.trunc(number('of') ?? 0)),
-      from: number('from'), to: number('to'),
+      ...rangeOf(number('from'), number('to')),
       lineWidth: lineWidth > 0 ? lineWidth : DEFAULT_LOOK.lineWidth,
     });
   }
@@ -184,7 +183,7 @@ export class LookPanel {
     const value = Number.isNaN(control.valueAsNumber) ? null : control.valueAsNumber;
     const from = name === 'from' ? value : this.chosen.from;
     const to = name === 'to' ? value : this.chosen.to;
-    const isEmpty = from !== null && to !== null && from >= to;
+    const isEmpty = from !== null && to !== null && rangeOf(from, to).from === null;
     for (const end of ['from', 'to']) input(end).setCustomValidity('');
     control.setCustomValidity(isEmpty ? 'The range must begin below its end.' : '');
     if (control.reportValidity()) this.set({ [name]: value });
@@ -208,6 +207,17 @@ export class LookPanel {
     }
     input('line-width').valueAsNumber = this.chosen.lineWidth;
   }
+}
+
+/** A range of a link. One that does not begin below its end is ignored. */
+export function rangeOf(from: number | null, to: number | null): Pick<Look, 'from' | 'to'> {
+  return from !== null && to !== null && from >= to ? { from: null, to: null } : { from, to };
+}
+
+/** The channels to offer: those of the frame, of earlier frames, and the chosen one. */
+export function offeredChannels(known: Iterable<string>, chosen: string): string[] {
+  const names = [...known];
+  return ['plain', 'identity', ...names].includes(chosen) ? names : [...names, chosen];
 }
 
 /** `outline,fill,colour:p,from:0,width:2`: switches that are on, and values. */

@@ -1,5 +1,6 @@
 import { digestText } from '../protocol/digest';
 import { NO_RING, type Frame, type Statistics } from '../protocol/frame';
+import { reductionOf } from '../stream/summary';
 import type { Method } from '../stream/track';
 import { make, setText } from './dom';
 import { count, number } from './format';
@@ -13,8 +14,9 @@ function ringCounts({ rings: { outerOf } }: Frame): string {
   return `${count(outer)}, ${count(outerOf.length - outer)}`;
 }
 
-function reduction({ triangles, trianglesGrid }: Statistics): string {
-  return trianglesGrid > 0 ? `${(100 * (1 - triangles / trianglesGrid)).toFixed(1)} %` : '–';
+function reduction(statistics: Statistics): string {
+  const percent = reductionOf(statistics);
+  return Number.isFinite(percent) ? `${percent.toFixed(1)} %` : '–';
 }
 
 const unlessZero = (value: number) => (value > 0 ? count(value) : '');
@@ -48,7 +50,7 @@ const ROWS: Row[] = [
 
 /** The figures of a pane's frame. */
 export class Numbers {
-  readonly element = make('dl', { class: 'numbers' });
+  readonly element = make('dl', { class: 'numbers', tabindex: '0' });
   private readonly values = ROWS.map((row) => {
     const value = make('dd', { 'data-key': row.key }, '–');
     const kind = [row.isWide && 'wide', row.isAlert && 'alert'].filter(Boolean).join(' ');

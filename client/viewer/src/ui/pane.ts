@@ -1,19 +1,27 @@
 import { attachNavigation, Scene, type Look, type Picked } from '../draw';
+import { valuesAt } from '../draw/values';
 import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
+import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
 import type { Entry, Summary } from '../stream/history';
 import {
-  FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
+  cellSizeOf, FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
 } from '../stream/settings';
-import type { Method, Track } from '../stream/track';
+import type { CurveSource, Method, Track } from '../stream/track';
 import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
-import { make, setText } from './dom';
+import type { VariantStream } from '../stream/variant_stream';
+import { make, select, setText } from './dom';
 import { count, number } from './format';
+import { Measurement, type MeasureMode } from './measure';
 import { Numbers } from './numbers';
+import { Overlay } from './overlay';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
+
+/** Distance of the readout from the pointer, in CSS pixels. */
+const POINTER_GAP = 14;
 
 export interface PaneEvents {
   /** The user chose the pane: settings and time apply to it. */
@@ -21,6 +29,12 @@ export interface PaneEvents {
   closed(pane: Pane): void;
   /** The view changed, by the user or because the picture has grown. */
   moved(pane: Pane): void;
+}
+
+/** Makes the computations of a pane with other settings than those of its track. */
+export interface Variants {
+  frame(changed: () => void): Variant;
+  stream(track: Track, settings: Settings): VariantStream;
 }
 
 /** One picture: the current frame of a track, as streamed or with other settings. */
@@ -49,7 +63,10 @@ export class Pane {
   private readonly closeButton = make('button', { type: 'button', class: 'icon', title: 'Closes this picture.' }, '✕');
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
+  private readonly overlay = new Overlay();
+  private readonly measurement = new Measurement();
   private readonly variant: Variant | null;
+  private stream: VariantStream | null = null;
   private readonly detach: () => void;
   private readonly observer: ResizeObserver;
   private shown: Entry | Frame | null = null;
@@ -65,14 +82,14 @@ export class Pane {
   private picked: Picked | null = null;
   private selected: bigint | null = null;
 
-  /** `newVariant`: for other settings than those of the track; null if they are not offered. */
+  /** `variants`: for other settings than those of the track; null if they are not offered. */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
-              newVariant: ((changed: () => void) => Variant) | null) {
+              private readonly variants: Variants | null) {
     this.element = make('section', { class: 'pane' },
       make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.scaleBar.element, this.readout, this.notice),
+      make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.readout, this.notice),
       this.numbers.element);
-    this.variant = newVariant?.(() => { this.dirty = true; }) ?? null;
+    this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
     this.switchButton.addEventListener('click', () => this.track.switchRun?.());
     this.element.addEventListener('pointerdown', () => events.chosen(this));
@@ -102,13 +119,13 @@ export class Pane {
     this.track = track;
     this.clear();
     this.isFree = true;
-    this.variant?.reset();
+    this.resetVariant();
     this.select(null);
   }
 
   setSettings(settings: Settings): void {
     this.settings = settings;
-    this.variant?.reset();
+    this.resetVariant();
     this.refusal = '';
     this.isPending = true;
     this.shown = null;
@@ -136,6 +153,26 @@ export class Pane {
     this.scene.view = { ...view };
     this.isFree = false;
     this.dirty = true;
+  }
+
+  /** The cell size for a number of cells across the longer side of the outline; null without an outline. */
+  cellSizeFor(cells: number): number | null {
+    const bounds = this.frame && boundsOf(this.frame.rings.points, this.frame.origin);
+    const spacing = this.frame?.statistics.spacing ?? 0;
+    if (!bounds || !(spacing > 0)) return null;
+    return cellSizeOf(cells, Math.max(bounds.right - bounds.left, bounds.top - bounds.bottom), spacing);
+  }
+
+  /** The variant's stream, if the pane has other settings than its track. */
+  get variantStream(): VariantStream | null { return this.stream; }
+
+  /** The frames of the curves. */
+  get curves(): CurveSource { return this.stream ?? this.track; }
+
+  private resetVariant(): void {
+    this.variant?.reset();
+    this.stream?.close();
+    this.stream = null;
   }
 
   /** Figures of the frame shown; null without one. */
@@ -173,7 +210,8 @@ export class Pane {
     const sequence = this.track.player.sequence;
     // A new run or new settings empty the history. The pane then clears its frame.
     const isStreamed = this.shown !== null && 'summary' in this.shown;
-    if (this.frame && isStreamed && this.track.history.size === 0) this.clear();
+    if (this.stream && !this.stream.isValid) this.resetVariant();
+    if (this.frame && isStreamed && this.curves.history.size === 0 && !this.isPending) this.clear();
     if (sequence !== null) this.update(sequence, now);
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');
@@ -183,11 +221,14 @@ export class Pane {
     this.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
+    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement,
+      this.measurement.text((identity) => this.areaText(identity)));
     this.updateReadout();
   }
 
   destroy(): void {
     this.detach();
+    this.resetVariant();
     this.observer.disconnect();
     this.scene.destroy();
     this.element.remove();
@@ -224,14 +265,38 @@ export class Pane {
         settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
   }
 
+  /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
+  private updateVariant(stream: VariantStream, sequence: number, now: number): void {
+    stream.refresh(sequence, now);
+    this.refusal = stream.refusalOf(sequence);
+    if (this.refusal) {
+      const { refusal } = this;
+      if (this.frame) this.clear();
+      this.refusal = refusal;
+      return;
+    }
+    const entry = stream.entryAt(sequence);
+    const isLate = this.track.player.mode === 'paused' && entry?.sequence !== stream.frameAt(sequence);
+    this.isPending = !entry || isLate;
+    if (!entry || isLate || entry === this.shown) return;
+    stream.drawn(entry, now);
+    this.show(entry, entry.frame());
+  }
+
   private update(sequence: number, now: number): void {
-    const refusal = this.isVariant ? '' : this.track.refusalOf?.(sequence) ?? '';
+    if (this.isVariant && this.variants) {
+      this.stream ??= this.variants.stream(this.track, this.settings);
+      this.updateVariant(this.stream, sequence, now);
+      return;
+    }
+    if (this.stream) this.resetVariant();
+    const refusal = this.track.refusalOf?.(sequence) ?? '';
     if (refusal) {
       if (this.frame) this.clear();
       this.refusal = refusal;
       return;
     }
-    const entry = this.isVariant ? null : this.track.entryAt(sequence);
+    const entry = this.track.entryAt(sequence);
     if (entry) {
       this.refusal = '';
       if (entry === this.shown) return;
@@ -243,7 +308,7 @@ export class Pane {
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
-    if (!this.variant || (!this.isVariant && (this.track.kind === 'watch' || isFailed))) return;
+    if (!this.variant || this.track.kind === 'watch' || isFailed) return;
     this.variant.request(this.track, sequence, this.settings);
     const { result, problem } = this.variant;
     if (problem && this.frame) this.clear();
@@ -287,9 +352,10 @@ export class Pane {
   }
 
   private async addParticles(frame: Frame): Promise<void> {
-    if (frame.particles || !this.track.drawnParticles) return;
-    const particles = await this.track.drawnParticles(Number(frame.sequence), frame.origin);
-    if (frame !== this.frame) return;
+    const source = this.stream ?? this.track;
+    if (frame.particles || !source.drawnParticles) return;
+    const particles = await source.drawnParticles(Number(frame.sequence), frame.origin);
+    if (frame !== this.frame || !particles) return;
     frame.particles = particles.points;
     frame.particleAttributes = particles.attributes;
     this.scene.show(frame);
@@ -333,7 +399,10 @@ export class Pane {
       this.selectAtPointer();
     });
     this.canvas.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') this.select(null);
+      if (event.key === 'Escape') {
+        this.measurement.clear();
+        this.select(null);
+      }
       if (event.key !== 'Enter') return;
       this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
       this.selectAtPointer();
@@ -347,9 +416,15 @@ export class Pane {
 
   private selectAtPointer(): void {
     if (!this.pointer) return;
-    const { ring } = this.scene.pick(...this.pointer);
+    const { x, y, ring } = this.scene.pick(...this.pointer);
     const identity = ring === null ? null : this.frame?.rings.identities[ring] ?? null;
-    this.select(identity);
+    const mode = select('measure').value as MeasureMode;
+    if (mode === 'off') {
+      this.select(identity);
+    } else {
+      this.measurement.add(mode, [x, y], identity);
+      this.dirty = true;
+    }
   }
 
   private select(identity: bigint | null): void {
@@ -369,6 +444,7 @@ export class Pane {
       const { x, y, ring } = this.picked;
       lines.push(`x ${number(x)}, y ${number(y)}`);
       if (ring !== null) lines.push(this.ringText(ring));
+      lines.push(...this.valueTexts(x, y));
     }
     if (this.selected !== null) {
       const rings = this.scene.selectedRings;
@@ -376,6 +452,43 @@ export class Pane {
         : rings.map((ring) => this.ringText(ring)).join('\n')}`);
     }
     setText(this.readout, lines.join('\n'));
+    this.placeReadout();
+  }
+
+  /** Puts the readout beside the pointer, within the picture. Without a pointer it is in the corner. */
+  private placeReadout(): void {
+    const { style, classList, offsetWidth, offsetHeight } = this.readout;
+    const { width, height } = this.scene.size;
+    classList.toggle('at-pointer', this.pointer !== null);
+    if (!this.pointer) {
+      style.left = style.top = '';
+      return;
+    }
+    const [x, y] = this.pointer;
+    const beside = (at: number, length: number, room: number) =>
+      (at + POINTER_GAP + length <= room ? at + POINTER_GAP : Math.max(0, at - POINTER_GAP - length));
+    style.left = `${Math.min(beside(x, offsetWidth, width), Math.max(0, width - offsetWidth))}px`;
+    style.top = `${beside(y, offsetHeight, height)}px`;
+  }
+
+  /** Attribute values at a world position. */
+  private valueTexts(x: number, y: number): string[] {
+    const { frame } = this;
+    if (!frame) return [];
+    const names = this.scene.channels;
+    const tolerance = Math.max(frame.statistics.spacing, POINTER_GAP / this.scene.view.scale / 2);
+    return valuesAt(frame, names, x - frame.origin[0], y - frame.origin[1], tolerance)
+      .map(({ name, value }) => `${channelLabel(name, names)} ${number(value)}`);
+  }
+
+  /** Area of a measured ring in the frame shown. */
+  private areaText(identity: bigint | null): string {
+    if (identity === null) return 'no ring here';
+    if (identity === 0n) return 'ring without identity';
+    const ring = this.frame?.rings.identities.indexOf(identity) ?? -1;
+    if (!this.frame || ring < 0) return `ring ${identity} is not in this frame`;
+    const { area, perimeter } = this.frame.rings;
+    return `area ${number(Math.abs(area[ring]))}, perimeter ${number(perimeter[ring])}`;
   }
 
   private ringText(ring: number): string {

@@ -5,6 +5,8 @@ import { byId, button, input, select, setText } from './dom';
 const NUMBERS = {
   kernelRadius: 'kernel', referenceRadius: 'reference', cellSize: 'cell', surfaceOffset: 'offset',
 } as const;
+/** Cells across the outline in the paper's comparisons. */
+const GRIDS = [32, 64];
 type NumberName = keyof typeof NUMBERS;
 
 /** Settings of the chosen pane. */
@@ -12,13 +14,16 @@ export class SettingsPanel {
   /** The last valid settings. */
   private valid: Settings = AS_STREAMED;
 
-  constructor(private readonly changed: (settings: Settings) => void) {
+  /** `cellSize`: for a number of cells across the outline; null without an outline. */
+  constructor(private readonly changed: (settings: Settings) => void,
+              private readonly cellSize: (cells: number) => number | null) {
     for (const name of Object.keys(PLACEMENTS)) select('placement').add(new Option(name, name));
     for (const name of Object.keys(FILLS)) select('fill').add(new Option(name, name));
     for (const share of SHARES) select('share').add(new Option(`${share} %`, String(share)));
     const form = byId('settings', HTMLFormElement);
     form.addEventListener('submit', (event) => event.preventDefault());
     form.addEventListener('change', () => this.read());
+    for (const cells of GRIDS) button(`grid-${cells}`).addEventListener('click', () => this.setGrid(cells));
     button('reset-settings').addEventListener('click', () => {
       this.show(AS_STREAMED, '');
       this.changed({ ...AS_STREAMED });
@@ -35,6 +40,13 @@ export class SettingsPanel {
     select('share').value = String(settings.share);
     setText(byId('settings-of', HTMLElement), pane);
     this.offerOffset();
+  }
+
+  private setGrid(cells: number): void {
+    const size = this.cellSize(cells);
+    if (size === null) return;
+    input('cell').value = String(size);
+    this.read();
   }
 
   private read(): void {

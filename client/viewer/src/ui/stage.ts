@@ -3,6 +3,7 @@ import type { Gateway } from '../stream/gateway';
 import type { Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
 import { Variant } from '../stream/variant';
+import { VariantStream } from '../stream/variant_stream';
 import { byId } from './dom';
 import { Pane } from './pane';
 
@@ -29,7 +30,10 @@ export class Stage {
       chosen: (chosen) => this.choose(chosen),
       closed: (closed) => this.close(closed),
       moved: (moved) => this.linkViews(moved),
-    }, (changed) => new Variant(this.gateway, changed));
+    }, {
+      frame: (changed) => new Variant(this.gateway, changed),
+      stream: (of, other) => new VariantStream(this.gateway, of, other),
+    });
     pane.setLook(this.look);
     this.panes.push(pane);
     this.element.append(pane.element);

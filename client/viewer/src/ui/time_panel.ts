@@ -81,7 +81,8 @@ export class TimePanel {
     }
     select('speed').value = String(player.speed);
     input('loop').checked = player.loop;
-    setText(byId('position', HTMLElement), `${at ?? '–'} of ${range.last}`);
+    const label = (sequence: number) => track?.labelOf(sequence) ?? '';
+    setText(byId('position', HTMLElement), `${at === null ? '–' : label(at)} of ${label(range.last)}`);
   }
 
   private visible(track: Track): number | null {

@@ -66,7 +66,7 @@ test('a CSV folder has the numbers of the command line', async () => {
   await viewer.shows();
   await isAll();
   for (const sequence of [1, 6, FRAMES]) {
-    await viewer.scrubTo(sequence);
+    await viewer.scrubTo(sequence, sequence - 1);
     const row = truth[sequence - 1];
     const numbers = await viewer.numbers();
     assert.equal(numbers['rings-digest'], row.rings_digest);
@@ -81,9 +81,10 @@ test('a CSV folder has the numbers of the command line', async () => {
 test('files play to the end, and again on request', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
-  await until('the end', async () => await viewer.frame() === FRAMES && await viewer.button('Play').count() === 1);
+  await until('the end', async () => await viewer.frame() === FRAMES - 1 && await viewer.button('Play').count() === 1);
+  await viewer.page.locator('#speed').selectOption('0.1');
   await viewer.button('Play').click();
-  await until('anew', async () => await viewer.frame() < FRAMES);
+  await until('anew', async () => await viewer.frame() < FRAMES - 1);
 });
 
 test('another placement streams the files again', async () => {
@@ -91,20 +92,20 @@ test('another placement streams the files again', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
   await isAll();
-  await viewer.scrubTo(7);
+  await viewer.scrubTo(7, 6);
   await viewer.page.getByLabel('Placement', { exact: true }).selectOption('qef');
   await viewer.page.getByLabel('Fill', { exact: true }).selectOption('conforming');
   await until('the numbers are those of qef', async () =>
     await viewer.value('rings-digest') === truth[6].rings_digest &&
     await viewer.value('mesh-digest') === truth[6].mesh_digest);
-  assert.equal(await viewer.frame(), 7);
+  assert.equal(await viewer.frame(), 6);
 });
 
 test('two settings of files are compared side by side', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(folder);
   await isAll();
-  await viewer.scrubTo(3);
+  await viewer.scrubTo(3, 2);
   await viewer.button('Side by side').click();
   await viewer.page.getByLabel('Particles used').selectOption('50');
   await until('half of the particles', async () => {
@@ -119,7 +120,7 @@ test('a recording plays, and its particles are drawn', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(recording);
   await isAll();
-  await viewer.scrubTo(75);
+  await viewer.scrubTo(75, 74);
   assert.equal(await viewer.value('rings-digest'), truth[74].rings_digest);
   const before = await viewer.picture();
   await viewer.page.getByLabel('Particles', { exact: true }).check();
@@ -138,8 +139,44 @@ test('a LAMMPS dump plays', async () => {
   viewer = await Viewer.open(browser, world.url);
   await drop(dump);
   await isAll();
-  await viewer.scrubTo(3);
+  await viewer.scrubTo(3, 2);
   assert.equal(await viewer.value('rings-digest'), truth[2].rings_digest);
+});
+
+test('a frame has the number of the command line, at the slider too', async () => {
+  const truth = await world.statistics(folder);
+  viewer = await Viewer.open(browser, world.url);
+  await drop(folder);
+  await isAll();
+  await viewer.scrubTo(5, 4);
+  assert.equal(truth[4].frame, 4);
+  assert.equal(await viewer.value('rings-digest'), truth[4].rings_digest);
+  assert.equal(await viewer.page.locator('#position').textContent(), `4 of ${FRAMES - 1}`);
+});
+
+test('a link to a file shows it once it is opened', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  await drop(recording);
+  await isAll();
+  await viewer.scrubTo(31, 30);
+  await viewer.page.getByLabel('Placement', { exact: true }).selectOption('qef');
+  await until('qef', async () => await viewer.value('placement') === 'qef' && await viewer.frame() === 30);
+  const { hash } = new URL(viewer.page.url());
+  const digest = await until('its digest', async () => {
+    const text = await viewer.value('rings-digest');
+    return text !== '–' && text;
+  });
+  assert.match(hash, /^#file=.*&frame=30&.*set=placement:qef/);
+  const other = await Viewer.open(browser, world.url, { hash });
+  await until('the page asks for the file', async () => /This link shows the file .*Open it here/.test(await other.status()));
+  assert.equal(new URL(other.page.url()).hash, hash);
+  const first = viewer;
+  viewer = other;
+  await drop(recording);
+  await until('the same frame', async () => await other.value('rings-digest') === digest);
+  assert.equal(await other.frame(), 30);
+  assert.equal(new URL(other.page.url()).hash, hash);
+  await first.close();
 });
 
 test('unreadable files are reported', async () => {

@@ -186,7 +186,7 @@ test('two placements are compared side by side', async () => {
   // differ.
   const caption = viewer.page.locator('#curves figcaption').first();
   await until('the caption has the area of picture 2', async () =>
-    await caption.textContent() === `Area (line: as streamed) ${right.area}`);
+    await caption.textContent() === `Area ${right.area} (dashed: as streamed)`);
   await viewer.pane(0).locator('canvas').focus();
   await until('the caption has the area of picture 1', async () => await caption.textContent() === `Area ${left.area}`);
   await viewer.button('Close picture 2').click();

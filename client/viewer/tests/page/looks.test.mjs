@@ -80,7 +80,7 @@ test('every control can be reached and has a name', async () => {
     assert.deepEqual(unnamed, []);
     assert.deepEqual(await withoutTooltip(viewer.page), []);
     const seen = new Set();
-    for (let k = 0; k < 60; ++k) {
+    for (let k = 0; k < 90; ++k) {
       await viewer.page.keyboard.press('Tab');
       seen.add(await viewer.page.evaluate(() => document.activeElement?.id || document.activeElement?.tagName));
     }

@@ -68,6 +68,7 @@ test('buttons, keys, slider and curves go to a frame', () => inReport('dam.html'
   const { page } = report;
   await page.keyboard.press('ArrowRight');
   await shows(report, 1);
+  assert.equal(await page.locator('#position').textContent(), '1 of 74', 'the number under the picture');
   await page.keyboard.press('End');
   await shows(report, 74);
   await report.button('Previous frame').click();

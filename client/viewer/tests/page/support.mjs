@@ -205,12 +205,13 @@ export class Viewer {
     });
   }
 
-  async scrubTo(sequence) {
+  /** `number`: of the frame for the user. Files count from 0, as the command line does. */
+  async scrubTo(sequence, number = sequence) {
     await this.page.getByLabel('Frame', { exact: true }).evaluate((slider, value) => {
       slider.value = String(value);
       slider.dispatchEvent(new Event('input', { bubbles: true }));
     }, sequence);
-    await until(`frame ${sequence} is shown`, async () => await this.frame() === sequence);
+    await until(`frame ${number} is shown`, async () => await this.value('frame') === String(number));
   }
 
   async close() { await this.page.context().close(); }

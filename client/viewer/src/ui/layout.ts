@@ -1,0 +1,57 @@
+import { button } from './dom';
+
+const KEY = 'partiemc-side';
+/** Widest screen of the layout for phones, as in page.css. */
+const PHONE = '(max-width: 600px)';
+
+/** Whether an address asks for the picture and its time alone. */
+export function isEmbedded(search: string): boolean {
+  return new URLSearchParams(search).has('embed');
+}
+
+/** Whether the side panel is folded at first. `stored`: the user's choice on a wide screen, or null. */
+export function foldsAtFirst(isPhone: boolean, stored: string | null): boolean {
+  return isPhone || stored === 'folded';
+}
+
+/** The side panel, which can be folded. On a phone it covers the picture until a stream is chosen. */
+export class Layout {
+  private readonly phone = matchMedia(PHONE);
+
+  constructor() {
+    document.body.classList.toggle('embed', isEmbedded(location.search));
+    button('fold').addEventListener('click', () => {
+      this.fold(!document.body.classList.contains('folded'));
+      if (!this.phone.matches) store(document.body.classList.contains('folded') ? 'folded' : 'open');
+    });
+    this.phone.addEventListener('change', () => this.fold(foldsAtFirst(this.phone.matches, stored())));
+    this.fold(foldsAtFirst(this.phone.matches, stored()));
+  }
+
+  /** Called after the user has chosen a picture in the side panel. */
+  chosen(): void {
+    if (this.phone.matches) this.fold(true);
+  }
+
+  private fold(isFolded: boolean): void {
+    document.body.classList.toggle('folded', isFolded);
+    button('fold').setAttribute('aria-expanded', String(!isFolded));
+  }
+}
+
+/** Browsers may refuse storage. */
+function stored(): string | null {
+  try {
+    return localStorage.getItem(KEY);
+  } catch {
+    return null;
+  }
+}
+
+function store(text: string): void {
+  try {
+    localStorage.setItem(KEY, text);
+  } catch {
+    // The choice lasts until the page closes.
+  }
+}

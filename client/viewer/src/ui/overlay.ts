@@ -1,0 +1,66 @@
+import { toCss, toWorld, type Size, type View } from '../draw/view';
+import { number } from './format';
+import type { Measurement } from './measure';
+import { tickDigits, ticks } from './ticks';
+
+/** A coordinate on an axis, at a CSS position. */
+export interface AxisMark { at: number; text: string }
+
+/** Coordinates along the lower and the left edge of a picture. */
+export function axisMarks(view: View, size: Size): { x: AxisMark[]; y: AxisMark[] } {
+  const [left, top] = toWorld(view, size, 0, 0);
+  const [right, bottom] = toWorld(view, size, size.width, size.height);
+  const marks = (low: number, high: number, at: (value: number) => number) => {
+    const all = ticks(low, high);
+    return all.map((value) => ({ at: at(value), text: number(value, tickDigits(all)) }));
+  };
+  return {
+    x: marks(left, right, (value) => toCss(view, size, value, 0)[0]),
+    y: marks(bottom, top, (value) => toCss(view, size, 0, value)[1]),
+  };
+}
+
+const SPACE = 'http://www.w3.org/2000/svg';
+
+function element(name: string, attributes: Record<string, string | number>, text = ''): SVGElement {
+  const one = document.createElementNS(SPACE, name);
+  for (const [key, value] of Object.entries(attributes)) one.setAttribute(key, String(value));
+  one.textContent = text;
+  return one;
+}
+
+/** Axes and measurements over the picture. */
+export class Overlay {
+  readonly element = element('svg', { class: 'overlay', 'aria-hidden': 'true' });
+
+  draw(view: View, size: Size, hasAxes: boolean, measurement: Measurement, text: string): void {
+    this.element.replaceChildren(...hasAxes ? axes(view, size) : [], ...measured(view, size, measurement, text));
+  }
+}
+
+function axes(view: View, size: Size): SVGElement[] {
+  if (size.width === 0 || size.height === 0) return [];
+  const { x, y } = axisMarks(view, size);
+  const bottom = size.height;
+  return [
+    ...x.flatMap(({ at, text }) => [
+      element('line', { class: 'axis', x1: at, y1: bottom, x2: at, y2: bottom - 7 }),
+      element('text', { x: at, y: bottom - 11, 'text-anchor': 'middle' }, text),
+    ]),
+    ...y.flatMap(({ at, text }) => [
+      element('line', { class: 'axis', x1: 0, y1: at, x2: 7, y2: at }),
+      element('text', { x: 11, y: at + 4 }, text),
+    ]),
+  ];
+}
+
+function measured(view: View, size: Size, { points }: Measurement, text: string): SVGElement[] {
+  const places = points.map(([x, y]) => toCss(view, size, x, y));
+  if (places.length === 0) return [];
+  const [x, y] = places[places.length - 1];
+  return [
+    element('polyline', { class: 'measure', points: places.map((place) => place.join()).join(' ') }),
+    ...places.map(([cx, cy]) => element('circle', { class: 'measure', cx, cy, r: 3 })),
+    element('text', { class: 'result', x: x + 8, y: y - 8 }, text),
+  ];
+}

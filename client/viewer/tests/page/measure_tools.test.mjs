@@ -1,0 +1,77 @@
+// Values at the pointer, measurements and axes. Leaves a screenshot in build/screenshots.
+import assert from 'node:assert/strict';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { launch, screenshots, until, Viewer, World } from './support.mjs';
+
+let world, browser, viewer, box;
+
+/** A square from 0 to 1 with a column p = x. */
+function square() {
+  const lines = ['id,x,y,p'];
+  for (let i = 0; i < 21; ++i) {
+    for (let j = 0; j < 21; ++j) lines.push([21 * i + j + 1, i / 20, j / 20, i / 20].join());
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+before(async () => {
+  mkdirSync(screenshots, { recursive: true });
+  world = await World.start();
+  browser = await launch();
+  const file = path.join(world.folder, 'square.csv');
+  writeFileSync(file, square());
+  world.replayOf(file, 'square', '--attributes', 'p', '--loop', '--rate', '8', '--spacing', '.05');
+  // One unit has 200 pixels, and the centre of the picture is at (0.5, 0.5).
+  viewer = await Viewer.open(browser, world.url, { hash: '#stream=square&view=0.5,0.5,200' });
+  await viewer.shows(2);
+  await viewer.button('Pause').click();
+  box = await viewer.pane().locator('canvas').boundingBox();
+});
+after(async () => {
+  const errors = viewer?.errors;
+  await viewer?.close();
+  await browser?.close();
+  await world?.close();
+  assert.deepEqual(errors, []);
+});
+
+const at = (x, y) => [box.x + box.width / 2 + 200 * (x - 0.5), box.y + box.height / 2 - 200 * (y - 0.5)];
+const readout = () => viewer.pane().locator('.readout').textContent();
+const result = () => viewer.pane().locator('.overlay .result').textContent();
+const measure = (mode) => viewer.page.getByLabel('Measure', { exact: true }).selectOption(mode);
+
+test('the tooltip at the pointer has identity, values and coordinates', async () => {
+  await viewer.page.mouse.move(...at(0.75, 0.5));
+  await until('it has the values', async () => /ring \d+: area[^]*p 0\.7/.test(await readout()));
+  const [, x, y] = (await readout()).match(/x ([\d.]+), y ([\d.]+)/);
+  assert.ok(Math.abs(x - 0.75) < 0.01 && Math.abs(y - 0.5) < 0.01, `${x}, ${y}`);
+  const value = Number((await readout()).match(/p ([\d.]+)/)[1]);
+  assert.ok(Math.abs(value - 0.75) < 0.03, `p ${value}`);
+  const tip = await viewer.pane().locator('.readout').boundingBox();
+  const [left, top] = at(0.75, 0.5);
+  assert.ok(tip.x > left && tip.x < left + 30 && tip.y > top && tip.y < top + 30, 'beside the pointer');
+});
+
+test('clicks measure a distance, an angle and a ring', async () => {
+  await measure('distance');
+  await viewer.page.mouse.click(...at(0, 0));
+  await viewer.page.mouse.click(...at(0.6, 0.8));
+  await until('the distance', async () => /^distance (1|0\.99|1\.00)/.test(await result()));
+  await measure('ring');
+  await viewer.page.mouse.click(...at(0.5, 0.5));
+  await until('the area', async () => (await result()).startsWith(`area ${Number(await viewer.value('area')).toPrecision(5).replace(/0+$/, '')}`));
+  await measure('angle');
+  for (const [x, y] of [[1, 0], [0, 0], [0, 1]]) await viewer.page.mouse.click(...at(x, y));
+  await until('the angle', async () => Math.abs(Number((await result()).match(/angle ([\d.]+)°/)?.[1]) - 90) < 1.5);
+  assert.ok(!(await readout()).includes('Selected'), 'a click that measures selects nothing');
+  await viewer.page.getByLabel('Axes', { exact: true }).check();
+  await until('coordinates', async () => await viewer.pane().locator('.overlay .axis').count() >= 6);
+  await viewer.page.mouse.move(...at(0.3, 0.7));
+  await viewer.page.screenshot({ path: path.join(screenshots, 'measure.png') });
+  await viewer.pane().locator('canvas').focus();
+  await viewer.page.keyboard.press('Escape');
+  await until('it is gone', async () => await viewer.pane().locator('.overlay .measure').count() === 0);
+  assert.match(decodeURIComponent(new URL(viewer.page.url()).hash), /look=.*axes/);
+});
