@@ -15,9 +15,10 @@
 namespace partiemc::client::input {
 namespace {
 
-constexpr std::size_t kMaxListed = 12;                                  // Datasets in a message.
-constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256} << 20;  // Names of all frames.
-constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;         // Of all frames.
+constexpr std::size_t kMaxListed = 12;  // Datasets in a message.
+constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256}
+                                             << 20;              // Names in the list of frames.
+constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;  // In all frames.
 constexpr std::size_t kMaxVisited = 10000;  // Objects that are searched for them.
 constexpr std::ptrdiff_t kMostLevels = 8;   // Groups in groups.
 
@@ -386,7 +387,7 @@ class Hdf5Reader final : public FrameReader {
     return static_cast<std::size_t>(rows);
   }
 
-  // A constant has any number of rows in no bytes, so an array must have as many in the file.
+  // A constant takes no bytes in the file, so another array must confirm the number of rows.
   absl::Status CheckConstants(const std::vector<Candidate>& candidates, std::uint64_t rows,
                               const std::string& source) const {
     if (std::none_of(candidates.begin(), candidates.end(),
