@@ -20,10 +20,12 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
     }
   }
   return app
-      .add_option("--gauge", gauges,
-                  "Measurement of the outline, in columns of --stats: NAME=KIND:NUMBERS, such as "
-                  "level=height:0.5. Repeat for more. Kinds: " +
-                      kinds)
+      .add_option(
+          "--gauge", gauges,
+          "Measurement of the outline, in columns of --stats: NAME=KIND:NUMBERS, such as "
+          "level=height:0.5. Repeat for more. packing uses the attribute radius or diameter "
+          "of the particles, else their volumes. Kinds: " +
+              kinds)
       ->type_name("NAME=KIND:...")
       ->allow_extra_args(false);
 }

@@ -35,6 +35,7 @@ FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sec
           .time = frame.time,
           .result = frame.frame.result,
           .particles = frame.particles,
+          .particle_areas = frame.particle_volumes,
           .stages_ms = frame.frame.times.stages_ms,
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,

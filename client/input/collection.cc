@@ -47,9 +47,12 @@ std::string WithoutXmlComments(std::string_view text) {
 
 // Takes NAME="VALUE" from the front of an element. Returns false at its end.
 bool TakeXmlAttribute(std::string_view& element, std::string_view& name, std::string& value) {
-  const std::size_t equals = element.find('=');
-  const std::size_t open = element.find_first_of("\"'", std::min(equals, element.size()));
-  if (open == std::string_view::npos || element.substr(0, open).find('>') < open) return false;
+  // Stops at the next element, so that the cost is linear in the text.
+  const std::size_t equals = element.find_first_of("=<>");
+  if (equals == std::string_view::npos || element[equals] != '=') return false;
+  const std::size_t open = element.find_first_not_of(" \t\r\n", equals + 1);
+  if (open == std::string_view::npos || (element[open] != '"' && element[open] != '\''))
+    return false;
   const std::size_t close = element.find(element[open], open + 1);
   if (close == std::string_view::npos) return false;
   name = Strip(element.substr(0, equals));

@@ -109,6 +109,9 @@ class FileSequence final : public Sequence {
       selected_ += rows_.count;
       unselected_ += rows_.unselected;
       if (absl::Status status = TakeTime(frame); !status.ok()) return status;
+      if (!std::isfinite(frame.time.value_or(0)) || !std::isfinite(frame.step.value_or(0))) {
+        return absl::DataLossError(Concat(frame.source, ": its time is not finite; give --times"));
+      }
       return true;
     }
     return false;
@@ -128,6 +131,12 @@ class FileSequence final : public Sequence {
     const std::string& path = recording_.files[file_++];
     const auto format = RecogniseFormat(path);
     if (!format.ok()) return format.status();
+    // The indices and times of the frames count the files.
+    if (recording_.format->one_frame_per_file && !(*format)->one_frame_per_file) {
+      return absl::FailedPreconditionError(Concat(path, ": is a ", (*format)->name,
+                                                  " file, which can hold several frames; ",
+                                                  recording_.files.front(), " holds one"));
+    }
     auto reader = (*format)->open(path, recording_.request);
     if (!reader.ok()) return reader.status();
     reader_ = *std::move(reader);
@@ -143,13 +152,14 @@ class FileSequence final : public Sequence {
       frame.time = *frame.step * *recording_.time_step;
     }
     if (!recording_.times) return absl::OkStatus();
+    // A time of another source, such as the number of the step, can have another unit.
     const auto found = recording_.times->find(frame.index);
-    if (found != recording_.times->end()) {
-      frame.time = found->second;
-    } else if (!std::exchange(told_missing_time_, true)) {
-      recording_.notices.push_back(
-          Concat(recording_.times_path, ": has no time for frame ", frame.index));
+    if (found == recording_.times->end()) {
+      return absl::FailedPreconditionError(
+          Concat(recording_.times_path, ": has no time for frame ", frame.index, " (", frame.source,
+                 "); add its time, or choose other frames with --frames"));
     }
+    frame.time = found->second;
     return absl::OkStatus();
   }
 
@@ -180,7 +190,6 @@ class FileSequence final : public Sequence {
   absl::Status failure_;
   std::uint64_t selected_ = 0;    // Particles of all frames.
   std::uint64_t unselected_ = 0;  // Particles that --select left out.
-  bool told_missing_time_ = false;
   bool counted_ = false;
   std::optional<std::size_t> count_;
 };

@@ -67,7 +67,8 @@ struct SequenceOptions {
   bool in_space = false;
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
-  /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present.
+  /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present. A
+  /// frame without a time in it is refused.
   std::string times = {};
 
   /// Duration of a time step, for formats that state a step number for each frame (LAMMPS, GSD). A

@@ -23,6 +23,7 @@ struct FrameRecord {
   double time = 0;          ///< Simulation time, in the simulation's own unit.
   const Result& result;
   std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
+  std::span<const float> particle_areas = {};      ///< Of each of them; empty: not known.
   std::array<double, kStageCount> stages_ms = {};  ///< Wall time by stage.
   double total_ms = 0;                             ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;

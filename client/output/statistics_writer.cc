@@ -91,8 +91,9 @@ class Row {
     Number(frame.time);
     Words(DoubtsText(statistics.doubts));
     Number(frame.section);
+    const Discs discs{frame.particles, frame.particle_areas};
     for (const Gauge& gauge : gauges) {
-      for (const double value : Measure(gauge, frame.result)) Number(value);
+      for (const double value : Measure(gauge, frame.result, discs)) Number(value);
     }
   }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 #include <string_view>
@@ -52,7 +53,41 @@ py::array RingPoints(const RingsView& rings, py::ssize_t index) {
                       {2 * sizeof(double), sizeof(double)}, rings.owner);
 }
 
-// Makes a gauge of the kind `kind` from keyword arguments, in the order that the kind defines.
+// The discs of the gauge "packing", from keyword arguments.
+struct OwnedDiscs {
+  std::vector<double> centres;
+  std::vector<float> areas;
+};
+
+bool IsDiscArgument(std::string_view name) {
+  return name == "positions" || name == "radii" || name == "volumes";
+}
+
+template <typename T>
+using Numbers = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+OwnedDiscs DiscsOf(const py::kwargs& given) {
+  const bool by_radius = given.contains("radii");
+  if (!given.contains("positions") || by_radius == given.contains("volumes")) {
+    Raise(Invalid(kReasonCount, "gauge packing", "wrong arguments",
+                  "takes positions, and either radii or volumes"));
+  }
+  const auto centres = given["positions"].cast<Numbers<double>>();
+  const auto sizes = given[by_radius ? "radii" : "volumes"].cast<Numbers<double>>();
+  if (centres.ndim() != 2 || centres.shape(1) != 2 || sizes.ndim() != 1 ||
+      sizes.shape(0) != centres.shape(0)) {
+    Raise(Invalid(kReasonCount, "gauge packing", "arrays of other shapes",
+                  "positions must have the shape (N, 2), and radii or volumes (N,)"));
+  }
+  OwnedDiscs discs{.centres = {centres.data(), centres.data() + centres.size()}};
+  for (py::ssize_t k = 0; k < sizes.shape(0); ++k) {
+    const double size = sizes.at(k);
+    discs.areas.push_back(static_cast<float>(by_radius ? std::numbers::pi * size * size : size));
+  }
+  return discs;
+}
+
+// The arguments of a gauge by name, in the order of its kind.
 Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
   const std::span<const GaugeTraits> all = AllGauges();
   const auto traits = std::ranges::find(all, kind, &GaugeTraits::name);
@@ -68,6 +103,7 @@ Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
     rule.append(name == traits->numbers.front() ? " " : ", ").append(name);
   }
   for (const auto& [name, number] : numbers) {
+    if (gauge.kind == GaugeKind::kPacking && IsDiscArgument(name.cast<std::string>())) continue;
     if (std::ranges::count(traits->numbers, name.cast<std::string>()) == 0) {
       Raise(Invalid(kReasonOutOfRange, "gauge " + kind, name.cast<std::string>(), rule));
     }
@@ -85,8 +121,9 @@ Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
 py::dict Measured(const RingsView& rings, const std::string& kind, const py::kwargs& numbers) {
   const Gauge gauge = GaugeOf(kind, numbers);
   RaiseUnlessOk(Check(gauge));
-  const std::vector<double> values =
-      Measure(gauge, rings.owner.cast<const PythonResult&>().frame.result);
+  const OwnedDiscs discs = gauge.kind == GaugeKind::kPacking ? DiscsOf(numbers) : OwnedDiscs();
+  const std::vector<double> values = Measure(
+      gauge, rings.owner.cast<const PythonResult&>().frame.result, {discs.centres, discs.areas});
   py::dict named;
   for (std::size_t k = 0; k < values.size(); ++k) {
     named[py::str(std::string(TraitsOf(gauge.kind).values[k]))] = values[k];
@@ -167,7 +204,9 @@ void DefineRings(py::module_& module) {
           "min_y=, max_x=, max_y=): area and centroid x, y inside the box. gauge('contact', x=, "
           "y=, dx=, dy=, reach=): start_angle, end_angle, start, end of the largest body on a "
           "wall. "
-          "gauge('repose'): left_angle, right_angle of the largest body.")
+          "gauge('repose'): left_angle, right_angle of the largest body. gauge('packing', min_x=, "
+          "min_y=, max_x=, max_y=, positions=, radii= or volumes=): fraction, discs, area in the "
+          "box.")
       .def("heights_at", &Heights, py::arg("x"),
            "(C,) float64: heights at which the outline crosses the vertical line at x, ascending; "
            "the inside is between heights 0 and 1, 2 and 3, and so on.");

@@ -118,6 +118,87 @@ TEST(GaugesTest, AreasOfBoxesAddUp) {
   }
 }
 
+// Discs that touch, in a square or hexagonal lattice, with a diameter of 1.
+Particles DiscLattice(bool hexagonal) {
+  const double height = hexagonal ? std::sqrt(3) / 2 : 1;
+  Particles discs;
+  for (int j = 0; j < 24; ++j) {
+    for (int i = 0; i < 24; ++i) discs.Add(i + (hexagonal && j % 2 == 1 ? 0.5 : 0), j * height);
+  }
+  return discs;
+}
+
+std::vector<double> Packing(const Result& result, const Particles& particles, double radius,
+                            const std::vector<double>& box) {
+  const Frame frame = particles.AsFrame();
+  const auto& given = std::get<std::span<const double>>(frame.positions);
+  const std::vector<float> areas(given.size() / 2,
+                                 static_cast<float>(std::numbers::pi * radius * radius));
+  return Measure({.name = "p", .kind = GaugeKind::kPacking, .numbers = box}, result,
+                 {given, areas});
+}
+
+TEST(GaugesTest, PackingOfLatticesIsThatOfTheirCells) {
+  for (const bool hexagonal : {false, true}) {
+    const Particles discs = DiscLattice(hexagonal);
+    const Result result = ResultOf(discs, 1);
+    const double height = hexagonal ? std::sqrt(3) / 2 : 1;
+    const double expected = std::numbers::pi / (hexagonal ? 2 * std::sqrt(3) : 4);
+    // Boxes of whole cells, at any place.
+    for (double shift = 0; shift < 1; shift += 0.13) {
+      const std::vector<double> packing =
+          Packing(result, discs, 0.5,
+                  {4 + shift, (4 + 2 * shift) * height, 12 + shift, (12 + 2 * shift) * height});
+      EXPECT_NEAR(packing[0], expected, 1e-6) << hexagonal << " " << shift;
+      EXPECT_NEAR(packing[2], 64 * height, 1e-9);
+    }
+  }
+}
+
+// The parts of a disc in the cells of a grid add up to the disc.
+TEST(GaugesTest, DiscsAreDividedExactlyBetweenBoxes) {
+  Random random(9);
+  for (int n = 0; n < 200; ++n) {
+    Particles disc;
+    disc.Add(random.Uniform(-1, 1), random.Uniform(-1, 1));
+    const double radius = random.Uniform(0.01, 2);
+    double sum = 0;
+    for (int i = -8; i < 8; ++i) {
+      for (int j = -8; j < 8; ++j) {
+        sum += Packing(Result(), disc, radius, {i / 2.0, j / 2.0, (i + 1) / 2.0, (j + 1) / 2.0})[1];
+      }
+    }
+    const double area = std::numbers::pi * radius * radius;
+    EXPECT_NEAR(sum, area, 1e-6 * area);
+  }
+}
+
+TEST(GaugesTest, DiscsInBoxesHaveKnownAreas) {
+  Particles disc;
+  disc.Add(0, 0);
+  const double pi = std::numbers::pi;
+  const auto area_in = [&](const std::vector<double>& box) {
+    return Packing(Result(), disc, 1, box)[1];
+  };
+  EXPECT_NEAR(area_in({-2, -2, 2, 2}), pi, 1e-6);
+  EXPECT_NEAR(area_in({0, -2, 2, 2}), pi / 2, 1e-6);
+  EXPECT_NEAR(area_in({0, 0, 5, 5}), pi / 4, 1e-6);
+  EXPECT_NEAR(area_in({-0.5, -0.5, 0.5, 0.5}), 1, 1e-6);
+  EXPECT_NEAR(area_in({0.5, -2, 2, 2}), pi / 3 - std::sqrt(3) / 4, 1e-6);
+  EXPECT_EQ(area_in({1, 1, 2, 2}), 0);
+  EXPECT_EQ(area_in({0.8, 0.8, 2, 2}), 0);
+  EXPECT_EQ(area_in({-3, 1.5, 3, 2}), 0);
+}
+
+TEST(GaugesTest, PackingIsUnknownWithoutDiscsOrOutline) {
+  const Result shapes = Shapes();
+  EXPECT_THAT(Reading("p=packing:0,0,4,4", shapes), ElementsAre(IsNan(), IsNan(), 14));
+  Particles disc;
+  disc.Add(5, 5);
+  EXPECT_THAT(Packing(shapes, disc, 0.1, {4.5, 4.5, 5.5, 5.5}),
+              ElementsAre(IsNan(), DoubleNear(0.01 * std::numbers::pi, 1e-8), 0));
+}
+
 // The true boundary of a body is half a spacing outside its outermost particles.
 TEST(GaugesTest, SurfaceHeightOfAPoolIsWithinATwentiethOfASpacing) {
   Random random(5);

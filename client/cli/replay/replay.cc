@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <numbers>
 #include <utility>
+#include <vector>
 
 #include "client/cli/console.h"
 #include "client/cli/input_source.h"
@@ -123,10 +125,12 @@ class Receiver {
       // A loop has no outputs.
       if (!flags_.loop) {
         const AttributeValues color = ParticleColor(*frame);
+        const std::vector<float> areas = ParticleAreas(*frame);
         status = outputs_.Write({.index = frame->index,
                                  .time = event_.time,
                                  .result = event_.frame.result,
                                  .particles = PlaneParticles(*frame),
+                                 .particle_areas = areas,
                                  .stages_ms = event_.frame.times.stages_ms,
                                  .total_ms = event_.frame.times.total_ms,
                                  .rings_digest = event_.frame.rings_digest,
@@ -148,8 +152,24 @@ class Receiver {
     return frame.positions;
   }
 
-  /// The values of the attribute --color-by at the particles, for the report. Empty without a
-  /// report or without such an attribute.
+  /// The areas of the particles in the plane: of discs with the attribute `radius` or `diameter`,
+  /// else their volumes; empty if no gauge needs them.
+  std::vector<float> ParticleAreas(const RecordedFrame& frame) const {
+    if (flags_.gauges.empty() || frame.components != 2) return {};
+    for (const ParticleAttribute& attribute : frame.attributes) {
+      const bool is_diameter = attribute.name == "diameter";
+      if (attribute.components != 1 || !(is_diameter || attribute.name == "radius")) continue;
+      std::vector<float> areas;
+      for (const float size : attribute.values) {
+        const double radius = double{size} / (is_diameter ? 2 : 1);
+        areas.push_back(static_cast<float>(std::numbers::pi * radius * radius));
+      }
+      return areas;
+    }
+    return frame.volumes;
+  }
+
+  /// The attribute of --color-by at the particles, for the report; empty without one.
   AttributeValues ParticleColor(const RecordedFrame& frame) const {
     if (flags_.color_by.empty() || flags_.report.empty()) return {};
     for (const ParticleAttribute& attribute : frame.attributes) {

@@ -57,7 +57,9 @@ absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request) {
   const ArrayTable table = NamesOf(arrays);
-  const auto plan = PlanNamedColumns(table.names, WithComponents(request, table));
+  // Attributes and conditions can name arrays that the caller adds later.
+  const ColumnRequest columns{.columns = request.columns};
+  const auto plan = PlanNamedColumns(table.names, WithComponents(columns, table));
   if (!plan.ok()) return plan.status();
   std::size_t column = 0;
   for (const auto& position : plan->positions) {

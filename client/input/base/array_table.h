@@ -43,8 +43,8 @@ struct StoredArray {
 absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count,
                       const ColumnRequest& request, const std::string& source, ParticleRows& rows);
 
-/// Returns the index of the array that holds the first position column. Errors: as
-/// PlanNamedColumns.
+/// The index of the array with the first position. Uses only the `columns` of the request.
+/// Errors: as PlanNamedColumns.
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request);
 

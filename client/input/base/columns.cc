@@ -276,8 +276,9 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
   ColumnPlan plan;
   plan.column_count = names.size();
   plan.velocities = FindVelocities(canonical);
-  plan.id = FindFirst(canonical, {"id", "ids", "idp", "particleid", "particleids", "originalid",
-                                  "pid", "gid", "tag"});
+  plan.id = FindFirst(
+      canonical, {"id", "ids", "idp", "particleid", "particleids", "originalid", "pid", "gid"});
+  if (!plan.id && request.tag_is_id) plan.id = FindFirst(canonical, {"tag"});
   plan.volume = FindFirst(canonical, {"volume", "volumes", "vol", "area", "areas", "particlevolume",
                                       "particlearea", "volumetricmeasure"});
   const absl::Status positions = request.columns.empty()

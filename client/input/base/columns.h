@@ -33,6 +33,7 @@ struct ColumnRequest {
   std::vector<std::string> attributes;   ///< SequenceOptions::attributes.
   std::vector<std::string> columns;      ///< SequenceOptions::columns, split; empty: by names.
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
+  bool tag_is_id = true;                 ///< Whether a column "tag" can hold the ids.
 };
 
 /// Parses the options --select and --columns. kInvalidArgument if an expression is not

@@ -7,9 +7,10 @@ namespace {
 
 [[maybe_unused]] absl::Status BuiltWithout(const std::string& path, std::string_view library,
                                            std::string_view package, std::string_view option) {
-  return absl::UnimplementedError(Concat(path, ": this partiemc was built without ", library,
-                                         "; install ", package, " and configure with -D", option,
-                                         "=ON"));
+  return absl::UnimplementedError(
+      Concat(path, ": this partiemc was built without ", library, "; install ", package,
+             ", configure with -D", option,
+             "=ON and build it again, or write the particles as NPZ or CSV"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "client/input/base/number_text.h"
 #include "client/input/base/text.h"
 #include "client/input/base/text_table.h"
+#include "client/input/formats/npy.h"
 
 namespace partiemc::client::input {
 namespace {
@@ -19,6 +20,7 @@ constexpr std::size_t kHeadBytes = 4096;
 // The properties of a file that recognition uses. The extension is in lower case, without the dot
 // and without the extension of the compression (.gz, .zst).
 struct FileHead {
+  const std::string& path;
   std::string name;
   std::string extension;
   std::string_view bytes;
@@ -36,17 +38,14 @@ struct FileHead {
   }
 };
 
-// Whether a file is an NPY array of several frames. Such an array has one extent more than an array
-// of one frame.
+// Whether an NPY array has an extent more than one frame needs. Its header can be longer than the
+// head of the file.
 bool HasFramesInNpy(const FileHead& head) {
-  constexpr std::string_view kShape = "'shape': (";
-  const std::size_t at = head.bytes.find(kShape);
-  if (!head.Begins("\x93NUMPY") || at == std::string_view::npos) return false;
-  const std::string_view shape = head.bytes.substr(at + kShape.size());
-  const auto extents = Split(shape.substr(0, shape.find(')')), ',');
-  const auto count = std::count_if(extents.begin(), extents.end(),
-                                   [](std::string_view extent) { return !extent.empty(); });
-  return count == (head.Holds("'descr': [") ? 2 : 3);
+  if (!head.Begins("\x93NUMPY")) return false;
+  const auto stream = InputStream::Open(head.path);
+  if (!stream.ok()) return false;
+  const auto header = ReadNpyHeader(**stream, head.path);
+  return header.ok() && header->holds_frames();
 }
 
 bool IsXyz(const FileHead& head) {
@@ -176,7 +175,7 @@ absl::StatusOr<const Format*> RecogniseFormat(const std::string& path) {
     return absl::DataLossError(
         Concat(path, ": is empty; a frame without particles is a header without rows"));
   }
-  FileHead head;
+  FileHead head{.path = path};
   head.name = absl::AsciiStrToLower(std::filesystem::path(path).filename().string());
   for (const std::string_view packing : {".gz", ".zst"}) {
     if (head.name.ends_with(packing)) head.name.resize(head.name.size() - packing.size());

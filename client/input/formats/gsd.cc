@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -196,21 +197,19 @@ class GsdReader final : public FrameReader {
   // Returns the arrays with one row per particle: those of the GSD schema and logged quantities.
   std::vector<StoredArray> Arrays(std::uint64_t frame, std::uint64_t particles) const {
     std::vector<StoredArray> arrays;
+    // Frame 0 does not replace a broken chunk.
+    std::set<std::string_view> seen;
     const auto add = [&](const GsdChunk& chunk) {
       constexpr std::string_view kPrefix = "particles/";
       const std::size_t at = chunk.name.find(kPrefix);
       if (at == std::string::npos || chunk.name == "particles/N" ||
-          chunk.name == "particles/types" || chunk.rows != particles || chunk.components == 0 ||
+          chunk.name == "particles/types" || !seen.insert(chunk.name).second ||
+          chunk.rows != particles || chunk.components == 0 ||
           chunk.components > kMaxArrayComponents) {
         return;
       }
-      const std::string name = chunk.name.substr(at + kPrefix.size());
-      if (std::any_of(arrays.begin(), arrays.end(),
-                      [&](const StoredArray& array) { return array.name == name; })) {
-        return;
-      }
-      arrays.push_back({name, static_cast<std::size_t>(chunk.components), chunk.type,
-                        kBigEndianMachine,
+      arrays.push_back({chunk.name.substr(at + kPrefix.size()),
+                        static_cast<std::size_t>(chunk.components), chunk.type, kBigEndianMachine,
                         [this, &chunk](std::vector<char>& bytes) { return Load(chunk, bytes); }});
     };
     for (const std::uint64_t from : {frame, std::uint64_t{0}}) {

@@ -23,6 +23,9 @@ constexpr std::size_t kMaxHdf5Members = std::size_t{1} << 20;
 // does not overflow.
 constexpr std::uint64_t kMaxRows = std::uint64_t{1} << 48;
 
+// A long double. libhdf5 allocates memory for an element of any declared size.
+constexpr std::size_t kMaxFloatBytes = 16;
+
 Mutex& LibraryMutex() {
   static Mutex mutex;
   return mutex;
@@ -75,6 +78,7 @@ std::optional<H5O_type_t> KindOf(hid_t file, const std::string& path) {
 std::optional<ElementType> TypeOfHdf5(hid_t type) {
   const std::size_t size = H5Tget_size(type);
   if (H5Tget_class(type) == H5T_FLOAT) {
+    if (size > kMaxFloatBytes) return std::nullopt;
     return size > 4 ? ElementType::kFloat64 : ElementType::kFloat32;
   }
   if (H5Tget_class(type) != H5T_INTEGER) return std::nullopt;
@@ -133,6 +137,62 @@ std::optional<Hdf5Array> DescribeOpen(hid_t dataset) {
   return Hdf5Array{*element, extents[0], static_cast<std::size_t>(extents[1])};
 }
 
+// Refuses filters that allocate what their parameters declare, and stacked compression, whose
+// ratios multiply. Deflate makes at most 1,032 bytes of one.
+absl::Status CheckFilters(hid_t creation, const std::string& place) {
+  int compressions = 0;
+  for (int k = 0; k < H5Pget_nfilters(creation); ++k) {
+    unsigned flags = 0, config = 0;
+    std::size_t values = 0;
+    char name[32] = {};
+    const H5Z_filter_t filter = H5Pget_filter2(creation, static_cast<unsigned>(k), &flags, &values,
+                                               nullptr, sizeof(name), name, &config);
+    compressions += filter == H5Z_FILTER_DEFLATE ? 1 : 0;
+    const bool known = filter == H5Z_FILTER_DEFLATE || filter == H5Z_FILTER_SHUFFLE ||
+                       filter == H5Z_FILTER_FLETCHER32;
+    if (known && compressions < 2) continue;
+    return absl::UnimplementedError(Concat(place, ": is packed by the filter ", filter,
+                                           known ? " twice" : "",
+                                           ", which is not read; write it with gzip once"));
+  }
+  return absl::OkStatus();
+}
+
+// As Hdf5File::CheckStored.
+absl::Status CheckStoredNumbers(hid_t dataset, const Hdf5Array& array, const std::string& path,
+                                const std::string& place, double max_expansion) {
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose);
+  const H5D_layout_t layout = H5Pget_layout(creation.id());
+  if (layout == H5D_VIRTUAL || H5Pget_external_count(creation.id()) != 0) {
+    return absl::UnimplementedError(
+        Concat(place, ": its numbers are in another file, which is not read"));
+  }
+  if (absl::Status status = CheckFilters(creation.id(), place); !status.ok()) return status;
+  std::error_code no_size;
+  std::uint64_t stored = std::filesystem::file_size(path, no_size);
+  const std::uint64_t bytes = array.rows * array.components * ElementBytes(array.type);
+  // The library searches the whole index of chunks for the size, so the bytes of the file come
+  // first. The size of contiguous numbers is a claim of the header.
+  if (!ExpandsTooMuch(bytes, stored, max_expansion)) {
+    stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset), stored);
+  }
+  if (array.rows > 0 && (stored == 0 || ExpandsTooMuch(bytes, stored, max_expansion))) {
+    return absl::DataLossError(Concat(place, ": declares ", array.rows,
+                                      " rows, but the file holds ", stored,
+                                      " bytes; the file is truncated or damaged"));
+  }
+  hsize_t extents[2] = {1, 1};
+  if (layout != H5D_CHUNKED || H5Pget_chunk(creation.id(), 2, extents) < 1) {
+    return absl::OkStatus();
+  }
+  // At most 4 GiB in this format, so the product does not overflow. A chunk is unpacked as a whole.
+  const std::uint64_t chunk_bytes = extents[0] * extents[1] * ElementBytes(array.type);
+  if (!ExpandsTooMuch(chunk_bytes, stored, max_expansion)) return absl::OkStatus();
+  return absl::DataLossError(Concat(place, ": has chunks of ", chunk_bytes,
+                                    " bytes, but the file holds ", stored,
+                                    "; write smaller chunks"));
+}
+
 herr_t AddMember(hid_t /*group*/, const char* name, const H5L_info_t* /*info*/, void* members) {
   auto& names = *static_cast<std::vector<std::string>*>(members);
   names.emplace_back(name);
@@ -186,6 +246,16 @@ std::optional<Hdf5Array> Hdf5File::Describe(const std::string& dataset) const {
   return opened.ok() ? DescribeOpen(opened.id()) : std::nullopt;
 }
 
+absl::Status Hdf5File::CheckStored(const std::string& dataset) const {
+  const MutexLock lock(LibraryMutex());
+  Silence();
+  const Handle opened(H5Dopen2(id_, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const auto array = opened.ok() ? DescribeOpen(opened.id()) : std::nullopt;
+  const std::string place = Concat(path_, ": ", dataset);
+  if (!array) return absl::DataLossError(Concat(place, ": is no dataset of numbers"));
+  return CheckStoredNumbers(opened.id(), *array, path_, place, max_expansion_);
+}
+
 absl::Status Hdf5File::Read(const std::string& dataset, std::uint64_t begin, std::uint64_t count,
                             std::vector<char>& bytes) const {
   const auto damaged = [&](std::string_view what) {
@@ -198,28 +268,17 @@ absl::Status Hdf5File::Read(const std::string& dataset, std::uint64_t begin, std
   if (!array || count > array->rows || begin > array->rows - count) {
     return damaged(Concat("has no rows ", begin, " to ", begin + count));
   }
-  const Handle creation(H5Dget_create_plist(opened.id()), H5Pclose);
-  const H5D_layout_t layout = H5Pget_layout(creation.id());
-  if (layout == H5D_VIRTUAL || H5Pget_external_count(creation.id()) != 0) {
-    return absl::UnimplementedError(
-        Concat(path_, ": ", dataset, ": its numbers are in another file, which is not read"));
-  }
   bytes.clear();
   if (count == 0) return absl::OkStatus();
   if (count > kMaxParticles) {
     return damaged(Concat("declares ", count, " rows; at most ", kMaxParticles));
   }
-  const std::uint64_t row_bytes = array->components * ElementBytes(array->type);
-  // For contiguous numbers the storage size is only declared by the header, so the size of the file
-  // bounds it.
-  std::error_code no_size;
-  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(opened.id()),
-                                                       std::filesystem::file_size(path_, no_size));
-  if (stored == 0 || ExpandsTooMuch(array->rows * row_bytes, stored, max_expansion_)) {
-    return damaged(Concat("declares ", array->rows, " rows, but the file holds ", stored,
-                          " bytes; the file is truncated or damaged"));
+  if (absl::Status status = CheckStoredNumbers(opened.id(), *array, path_,
+                                               Concat(path_, ": ", dataset), max_expansion_);
+      !status.ok()) {
+    return status;
   }
-  bytes.resize(static_cast<std::size_t>(count * row_bytes));
+  bytes.resize(static_cast<std::size_t>(count * array->components * ElementBytes(array->type)));
   const Handle file_space(H5Dget_space(opened.id()), H5Sclose);
   const hsize_t start[2] = {begin, 0};
   const hsize_t extents[2] = {count, array->components};

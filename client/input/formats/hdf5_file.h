@@ -40,7 +40,11 @@ class Hdf5File {
   /// The description of a dataset. Empty if there is no dataset of numbers.
   std::optional<Hdf5Array> Describe(const std::string& dataset) const;
 
-  /// Reads rows [begin, begin + count). Errors: kDataLoss if the file holds fewer bytes.
+  /// Whether the file can hold the numbers of a dataset: they are in it, in chunks of a sensible
+  /// size, and do not unpack to too much. Errors: kDataLoss, kUnimplemented.
+  absl::Status CheckStored(const std::string& dataset) const;
+
+  /// Reads rows [begin, begin + count). Errors: kDataLoss if the file holds fewer; as CheckStored.
   absl::Status Read(const std::string& dataset, std::uint64_t begin, std::uint64_t count,
                     std::vector<char>& bytes) const;
 

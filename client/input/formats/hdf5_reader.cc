@@ -16,7 +16,9 @@ namespace partiemc::client::input {
 namespace {
 
 constexpr std::size_t kMaxListed = 12;  // Datasets in a message.
-constexpr std::size_t kMaxVtkArrays = std::size_t{1} << 20;
+constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256}
+                                             << 20;              // Names in the list of frames.
+constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;  // In all frames.
 constexpr std::size_t kMaxVisited = 10000;  // Objects that are searched for them.
 constexpr std::ptrdiff_t kMostLevels = 8;   // Groups in groups.
 
@@ -154,10 +156,17 @@ class Hdf5Survey {
     std::vector<std::string> groups = {""};
     for (const std::string_view part : Split(pattern, '/')) {
       std::vector<std::string> next;
+      std::size_t bytes = 0;
       for (const std::string& group : groups) {
         if (part != "*") next.push_back(JoinPath(group, part));
         if (part != "*") continue;
-        for (const std::string& name : file_.Members(group)) next.push_back(JoinPath(group, name));
+        // Hard links can repeat a group any number of times.
+        for (const std::string& name : file_.Members(group)) {
+          next.push_back(JoinPath(group, name));
+          bytes += sizeof(std::string) + next.back().size();
+          if (bytes > kMaxFrameListBytes)
+            return Refuse("has too many groups; choose fewer by --columns");
+        }
       }
       groups = std::move(next);
     }
@@ -235,18 +244,28 @@ class Hdf5Survey {
       return absl::DataLossError(
           Concat(file_.path(), ": the arrays of VTKHDF/Steps have fewer values than steps"));
     }
-    if (*count * columns.size() > kMaxVtkArrays) {
+    // Every frame has its own copy of the columns.
+    std::uint64_t frame_bytes = 0;
+    for (const Hdf5Column& column : columns) {
+      frame_bytes += sizeof(column) + column.name.size() + column.dataset.size();
+    }
+    if (*count > kMaxFrameListBytes / frame_bytes) {
       return absl::DataLossError(Concat(file_.path(), ": has ", *count, " steps of ",
-                                        columns.size(), " arrays; at most ", kMaxVtkArrays,
-                                        " together"));
+                                        columns.size(), " arrays; their names take over 256 MiB"));
+    }
+    // Sums of the first parts. Every count is below 2^48, so a sum beyond that is no frame.
+    std::vector<std::uint64_t> sums = {0};
+    for (const std::uint64_t points_of_part : counts) {
+      sums.push_back(sums.back() + points_of_part);
+      if (sums.back() <= kMaxVtkPoints) continue;
+      return absl::DataLossError(Concat(file_.path(), ": declares too many points"));
     }
     for (std::size_t step = 0; step < *count; ++step) {
       if (first_parts[step] > counts.size() || parts[step] > counts.size() - first_parts[step]) {
         return absl::DataLossError(
             Concat(file_.path(), ": step ", step, " has parts beyond NumberOfPoints"));
       }
-      std::uint64_t rows = 0;
-      for (std::uint64_t k = 0; k < parts[step]; ++k) rows += counts[first_parts[step] + k];
+      const std::uint64_t rows = sums[first_parts[step] + parts[step]] - sums[first_parts[step]];
       Hdf5Frame frame{.place = Concat("step ", step), .columns = columns, .time = times[step]};
       for (std::size_t k = 0; k < columns.size(); ++k) {
         frame.columns[k].begin = offsets[k][step];
@@ -360,17 +379,29 @@ class Hdf5Reader final : public FrameReader {
     const auto positions = PositionArray(all, content_.request);
     if (!positions.ok()) return WithPrefix(source, positions.status());
     const std::uint64_t rows = candidates[*positions].array.rows;
-    // A constant of openPMD can declare any number of rows without storing them. At least one
-    // stored array must therefore have this number of rows.
-    if (std::none_of(candidates.begin(), candidates.end(), [&](const Candidate& candidate) {
-          return !candidate.constant && candidate.array.rows == rows;
-        })) {
-      return absl::DataLossError(Concat(source, ": has no array of ", rows, " particles"));
+    std::erase_if(candidates, [&](const auto& candidate) { return candidate.array.rows != rows; });
+    if (absl::Status status = CheckConstants(candidates, rows, source); !status.ok()) {
+      return status;
     }
-    for (const Candidate& candidate : candidates) {
-      if (candidate.array.rows == rows) arrays.push_back(Stored(candidate, rows));
-    }
+    for (const Candidate& candidate : candidates) arrays.push_back(Stored(candidate, rows));
     return static_cast<std::size_t>(rows);
+  }
+
+  // A constant takes no bytes in the file, so another array must confirm the number of rows.
+  absl::Status CheckConstants(const std::vector<Candidate>& candidates, std::uint64_t rows,
+                              const std::string& source) const {
+    if (std::none_of(candidates.begin(), candidates.end(),
+                     [](const Candidate& candidate) { return candidate.constant.has_value(); })) {
+      return absl::OkStatus();
+    }
+    absl::Status status =
+        absl::DataLossError(Concat(source, ": has no array of ", rows, " particles"));
+    for (const Candidate& candidate : candidates) {
+      if (candidate.constant) continue;
+      status = file_->CheckStored(candidate.column.dataset);
+      if (status.ok()) break;
+    }
+    return status;
   }
 
   void AddDataset(const Hdf5Column& column, std::vector<Candidate>& candidates) const {
@@ -450,6 +481,10 @@ class Hdf5Reader final : public FrameReader {
     std::vector<char> near, far;
     if (absl::Status status = stored.load(near); !status.ok()) return status;
     const auto array = file_->Describe(path);
+    if (stored.components != 1 || (array && (array->components != 1 || array->rows != rows))) {
+      return absl::DataLossError(
+          Concat(file_->path(), ": ", path, " must have one number for each position"));
+    }
     if (array) {
       if (absl::Status status = file_->Read(path, 0, rows, far); !status.ok()) return status;
     }

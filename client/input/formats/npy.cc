@@ -21,13 +21,39 @@ absl::Status DamagedNpy(const std::string& name, std::string_view what) {
   return absl::DataLossError(Concat(name, ": ", what));
 }
 
-// The text after "'key':" in the header, a Python dict with three known keys.
+// Takes a Python string behind its opening quote. Returns false if it does not end.
+bool TakePythonString(std::string_view& rest, char quote, std::string& text) {
+  text.clear();
+  while (!rest.empty()) {
+    if (rest.front() == '\\' && rest.size() > 1)
+      rest.remove_prefix(1);
+    else if (rest.front() == quote)
+      break;
+    text.push_back(rest.front());
+    rest.remove_prefix(1);
+  }
+  if (rest.empty()) return false;
+  rest.remove_prefix(1);
+  return true;
+}
+
+// The text after "'key':" in the header, a Python dict with three known keys. Fields of a
+// structured array, which are inside a value, can have the name of a key.
 std::optional<std::string_view> ValueOf(std::string_view header, std::string_view key) {
-  const std::size_t at = header.find(Concat("'", key, "'"));
-  if (at == std::string_view::npos) return std::nullopt;
-  const std::size_t colon = header.find(':', at + key.size() + 2);
-  if (colon == std::string_view::npos) return std::nullopt;
-  return Strip(header.substr(colon + 1));
+  std::string_view rest = header;
+  std::string text;
+  int depth = 0;
+  while (!rest.empty()) {
+    const char c = rest.front();
+    rest.remove_prefix(1);
+    if (std::string_view("{[(").find(c) != std::string_view::npos) ++depth;
+    if (std::string_view("}])").find(c) != std::string_view::npos) --depth;
+    if (c != '\'' && c != '"') continue;
+    if (!TakePythonString(rest, c, text)) return std::nullopt;
+    const std::string_view next = Strip(rest);
+    if (depth == 1 && text == key && next.starts_with(':')) return Strip(next.substr(1));
+  }
+  return std::nullopt;
 }
 
 absl::Status NotPlain(const std::string& name, std::string_view what, std::string_view advice) {
@@ -67,12 +93,8 @@ class TypeParser {
   }
 
   bool Quoted(std::string& text) {
-    if (!Skip('\'')) return false;
-    const std::size_t end = rest_.find('\'');
-    if (end == std::string_view::npos) return false;
-    text = std::string(rest_.substr(0, end));
-    rest_.remove_prefix(end + 1);
-    return true;
+    const char quote = Skip('\'') ? '\'' : '"';
+    return (quote == '\'' || Skip(quote)) && TakePythonString(rest_, quote, text);
   }
 
   // Reads ", (2, 3)" or ", 2" behind a type. Returns the number of elements, 0 if it is too large.
@@ -162,8 +184,7 @@ absl::Status ParseShape(std::string_view value, const std::string& name, NpyHead
     bytes *= std::max<std::size_t>(*extent, 1);
     header.shape.push_back(*extent);
   }
-  const bool frames = header.shape.size() > (header.structured ? 1 : 2);
-  const std::size_t parts = frames ? std::max<std::size_t>(header.shape[0], 1) : 1;
+  const std::size_t parts = header.holds_frames() ? std::max<std::size_t>(header.shape[0], 1) : 1;
   if (bytes / parts > kMaxFrameBytes) return DamagedNpy(name, "the array is over 4 GiB");
   return absl::OkStatus();
 }

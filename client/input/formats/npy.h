@@ -29,6 +29,9 @@ struct NpyHeader {
   std::vector<std::size_t> shape;
 
   std::size_t element_count() const;  ///< Does not overflow: ReadNpyHeader has checked.
+
+  /// Whether the first extent counts frames: one extent more than a row per particle needs.
+  bool holds_frames() const { return shape.size() == (structured ? 2 : 3); }
 };
 
 /// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a size

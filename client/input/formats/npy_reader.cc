@@ -62,7 +62,7 @@ class NpyReader final : public FrameReader {
 // this number.
 absl::StatusOr<std::optional<std::size_t>> TakeFrameCount(NpyHeader& header,
                                                           const std::string& path) {
-  if (header.shape.size() != (header.structured ? 2 : 3)) return std::nullopt;
+  if (!header.holds_frames()) return std::nullopt;
   if (header.column_major) {
     return absl::UnimplementedError(
         Concat(path,

@@ -13,8 +13,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// The new name of PySPH's column "tag". FillRows would take a column named "tag" for ids.
-constexpr std::string_view kTagColumn = "particle tag";
+// Kind of a particle: 0 real, 1 of another process, 2 ghost.
+constexpr std::string_view kTagColumn = "tag";
 
 const StoredArray* FindArray(const std::vector<StoredArray>& arrays, std::string_view name) {
   const auto found = std::find_if(arrays.begin(), arrays.end(),
@@ -163,18 +163,18 @@ void CompletePysphArrays(std::size_t rows, std::vector<StoredArray>& arrays,
                          ColumnRequest& request) {
   const StoredArray* const mass = FindArray(arrays, "m");
   const StoredArray* const density = FindArray(arrays, "rho");
-  if (mass != nullptr && density != nullptr) {
+  const bool has_quotient =
+      mass != nullptr && mass->components == 1 && density != nullptr && density->components == 1;
+  if (has_quotient && FindArray(arrays, "volume") == nullptr) {
     StoredArray volume = Quotient("volume", rows, *mass, *density);
     arrays.insert(arrays.begin(), std::move(volume));
   }
-  for (StoredArray& array : arrays) {
-    if (array.name != "tag") continue;
-    array.name = kTagColumn;
-    const bool known =
-        std::any_of(request.conditions.begin(), request.conditions.end(),
-                    [](const Condition& condition) { return condition.column == kTagColumn; });
-    if (!known) request.conditions.push_back({std::string(kTagColumn), "0", 0.0});
-  }
+  request.tag_is_id = false;
+  if (FindArray(arrays, kTagColumn) == nullptr) return;
+  const bool selected =
+      std::any_of(request.conditions.begin(), request.conditions.end(),
+                  [](const Condition& condition) { return condition.column == kTagColumn; });
+  if (!selected) request.conditions.push_back({std::string(kTagColumn), "0", 0.0});
 }
 
 bool IsPysphArchive(const ZipArchive& archive) {

@@ -17,9 +17,9 @@ namespace partiemc::client::input {
 absl::StatusOr<std::string> ChoosePysphArray(const std::vector<std::string>& names,
                                              ColumnRequest& request, const std::string& path);
 
-/// Completes the arrays like partiemc.read_pysph of the Python package: keeps only real particles
-/// (tag 0), and adds volumes m / rho. Requires: all arrays have `rows` rows. The arrays must
-/// outlive the result.
+/// Does the same as partiemc.read_pysph of the Python package. Keeps real particles only (tag 0),
+/// unless the request selects by tag. Adds an array "volume" of m / rho if there is none. Requires:
+/// all arrays have `rows` rows. The arrays must outlive the result.
 void CompletePysphArrays(std::size_t rows, std::vector<StoredArray>& arrays,
                          ColumnRequest& request);
 

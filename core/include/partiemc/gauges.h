@@ -38,6 +38,10 @@ enum class GaugeKind {
   /// fitted to its upper surface left and right of the peak, between 20 and 80 % of its height.
   /// Numbers: none.
   kRepose,
+  /// Packing of particles that are discs in a box: `fraction`, the `discs` area in the box (the sum
+  /// of the discs, so overlaps count twice) divided by the `area` of the inside of the outline in
+  /// the box. Requires Discs. Numbers: min_x, min_y, max_x, max_y.
+  kPacking,
 };
 
 /// A measurement of an outline. Lengths are in world units, heights and upwards along y (in a
@@ -46,6 +50,12 @@ struct Gauge {
   std::string name;  ///< Letters, digits and "_", at most 40.
   GaugeKind kind = GaugeKind::kHeight;
   std::vector<double> numbers;  ///< As the kind requires.
+};
+
+/// The particles of the frame as discs. Empty: not known.
+struct Discs {
+  std::span<const double> centres;  ///< x0, y0, x1, y1, ...
+  std::span<const float> areas;     ///< Of each disc, 0 or more; as Frame::volumes.
 };
 
 /// Description of a kind: its name, the names of its numbers, and the names of its values.
@@ -67,11 +77,12 @@ absl::Status Check(const Gauge& gauge);
 /// Errors: as Check; INVALID_ARGUMENT for any other text.
 absl::StatusOr<Gauge> ParseGauge(std::string_view text);
 
-/// The values of a gauge, in the order of its traits; NaN where the outline has no such point.
+/// The values of a gauge, in the order of its traits; NaN where the outline has no such point, or
+/// where a gauge requires discs and `discs` has not one area for each centre.
 /// Intersections are computed for each segment, so the only error is that of the outline itself.
 /// Requires: Check(gauge).ok(). Cost: linear in the points, times log n for `height` and `wetted`;
-/// 200 times for `repose`.
-std::vector<double> Measure(const Gauge& gauge, const Result& result);
+/// 200 times for `repose`; also linear in the discs for `packing`.
+std::vector<double> Measure(const Gauge& gauge, const Result& result, const Discs& discs = {});
 
 /// The heights y at which the outline crosses the vertical line at `x`, ascending. The inside is
 /// between heights 0 and 1, 2 and 3, and so on.

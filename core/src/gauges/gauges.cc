@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -12,6 +13,7 @@
 #include "base/point.h"
 #include "gauges/angles.h"
 #include "gauges/box_area.h"
+#include "gauges/disc_area.h"
 #include "gauges/line_crossings.h"
 #include "partiemc/status.h"
 
@@ -22,7 +24,7 @@ constexpr std::size_t kMaxName = 40;
 // Products of four coordinates stay finite.
 constexpr double kMaxNumber = 1e69, kMinLength = 1e-60;
 
-using Traits = std::array<GaugeTraits, 6>;
+using Traits = std::array<GaugeTraits, 7>;
 
 const Traits& Table() {
   static const Traits table = {{
@@ -35,6 +37,10 @@ const Traits& Table() {
        {"x", "y", "dx", "dy", "reach"},
        {"start_angle", "end_angle", "start", "end"}},
       {GaugeKind::kRepose, "repose", {}, {"left_angle", "right_angle"}},
+      {GaugeKind::kPacking,
+       "packing",
+       {"min_x", "min_y", "max_x", "max_y"},
+       {"fraction", "discs", "area"}},
   }};
   return table;
 }
@@ -77,6 +83,7 @@ absl::Status CheckShape(const Gauge& gauge) {
     case GaugeKind::kWetted:
       return CheckDirection(gauge, n[2] - n[0], n[3] - n[1], "ends must differ");
     case GaugeKind::kBox:
+    case GaugeKind::kPacking:
       for (const int k : {0, 1}) {
         if (!(n[k] < n[k + 2])) {
           return Bad(kReasonOutOfRange, FieldOf(gauge, TraitsOf(gauge.kind).numbers[k + 2]),
@@ -119,6 +126,20 @@ double MeasureWetted(const Rings& rings, const Point& from, const Point& to) {
     inside += std::clamp(crossings[k + 1], 0.0, 1.0) - std::clamp(crossings[k], 0.0, 1.0);
   }
   return inside * std::hypot(line.x, line.y);
+}
+
+std::vector<double> MeasurePacking(const Rings& rings, const Point& min, const Point& max,
+                                   const Discs& discs) {
+  const double area = AreaInBox(rings, min, max).area;
+  if (discs.areas.empty() || discs.centres.size() != 2 * discs.areas.size()) {
+    return {NAN, NAN, area};
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k < discs.areas.size(); ++k) {
+    const double radius = std::sqrt(double{discs.areas[k]} / std::numbers::pi);
+    sum += DiscAreaInBox(PointAt(discs.centres, k), radius, min, max);
+  }
+  return {area > 0 ? sum / area : NAN, sum, area};
 }
 
 }  // namespace
@@ -183,7 +204,7 @@ absl::StatusOr<Gauge> ParseGauge(std::string_view text) {
   return gauge;
 }
 
-std::vector<double> Measure(const Gauge& gauge, const Result& result) {
+std::vector<double> Measure(const Gauge& gauge, const Result& result, const Discs& discs) {
   const std::vector<double>& n = gauge.numbers;
   switch (gauge.kind) {
     case GaugeKind::kHeight:
@@ -200,6 +221,8 @@ std::vector<double> Measure(const Gauge& gauge, const Result& result) {
       return ContactAngles(result, {{n[0], n[1]}, {n[2], n[3]}, n[4]});
     case GaugeKind::kRepose:
       return AnglesOfRepose(result);
+    case GaugeKind::kPacking:
+      return MeasurePacking(result.rings, {n[0], n[1]}, {n[2], n[3]}, discs);
   }
   return {};
 }

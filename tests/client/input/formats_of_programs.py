@@ -8,11 +8,13 @@ import argparse
 import csv
 import json
 import pathlib
+import resource
 import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 try:
     import gsd.hoomd
@@ -50,11 +52,25 @@ VELOCITIES = numpy.tile([0.1, -0.4, 0], (len(FRAMES[0]), 1))
 VOLUMES = numpy.full(len(FRAMES[0]), SPACING ** 2)
 
 
+def limit_memory():
+    """Hostile files must be refused before memory is allocated for them."""
+    resource.setrlimit(resource.RLIMIT_DATA, (700 << 20, 700 << 20))
+
+
 class Formats(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
+
+    def attribute_ranges(self):
+        """The least and the greatest value of each attribute in the last frame that was replayed."""
+        ranges = {}
+        for name, value in self.properties.items():
+            for k, suffix in enumerate(("_min", "_max")):
+                if name.endswith(suffix):
+                    ranges.setdefault(name.removesuffix(suffix), [None, None])[k] = value
+        return ranges
 
     def replay(self, source, *flags):
         """The rows of --stats, and the times of the frames."""
@@ -62,7 +78,9 @@ class Formats(unittest.TestCase):
         with tempfile.TemporaryDirectory() as out:
             subprocess.run([PROGRAM, "replay", str(source), "--local", "--quiet", "--spacing", str(SPACING), "--stats",
                             str(table), "--output-dir", out, "--format", "geojson", *flags], check=True)
-            times = [json.loads(path.read_text())["time"] for path in sorted(pathlib.Path(out).glob("*.geojson"))]
+            written = [json.loads(path.read_text()) for path in sorted(pathlib.Path(out).glob("*.geojson"))]
+        times = [one["time"] for one in written]
+        self.properties = written[-1]["features"][0]["properties"] if written[-1]["features"] else {}
         with open(table, newline="") as rows:
             return [{**row, "time": time} for row, time in zip(csv.DictReader(rows), times)]
 
@@ -164,6 +182,33 @@ class Formats(unittest.TestCase):
                 self.assertEqual(refused.returncode, 3)
                 self.assertIn("choose one of", refused.stderr)
 
+    def pysph_with_ghosts(self, suffix):
+        """The particles of the first frame; every third is a ghost."""
+        x, y = FRAMES[0][:, :2].T
+        array = get_particle_array(name="fluid", x=x, y=y, m=VOLUMES * 1000, rho=1000.0, gid=IDS)
+        array.add_property("volume", data=VOLUMES * 3)
+        array.add_property("tag", type="int", data=(IDS % 3 == 0) * 2)
+        array.set_output_arrays(["x", "y", "m", "rho", "gid", "tag", "volume"])
+        dump_pysph(str(self.folder / f"ghosts_{1}.{suffix}"), [array], {"t": 0.5, "dt": 0.1, "count": 1})
+        return self.folder / f"ghosts_1.{suffix}"
+
+    def test_pysph_arrays_named_tag_and_volume(self):
+        for suffix in ("hdf5", "npz"):
+            with self.subTest(suffix=suffix):
+                source = self.pysph_with_ghosts(suffix)
+                ghosts = int((IDS % 3 == 0).sum())
+                for flags, count in (([], len(IDS) - ghosts), (["--select", "tag=2"], ghosts),
+                                     (["--select", "tag=0"], len(IDS) - ghosts)):
+                    row, = self.replay(source, "--attributes", "tag", "--attributes", "volume", *flags)
+                    self.assertEqual(int(row["particles"]), count)
+                    ranges = self.attribute_ranges()
+                    expected = 2 if flags == ["--select", "tag=2"] else 0
+                    self.assertEqual(ranges["tag"], [expected, expected])
+                    numpy.testing.assert_allclose(ranges["volume"], [3 * VOLUMES[0]] * 2, rtol=1e-5)
+                self.dump_pysph(suffix)
+                self.replay(self.folder / f"run_*.{suffix}", "--attributes", "volume")
+                numpy.testing.assert_allclose(self.attribute_ranges()["volume"], [VOLUMES[0]] * 2, rtol=1e-5)
+
     # HDF5.
 
     def test_h5part(self):
@@ -226,6 +271,33 @@ class Formats(unittest.TestCase):
         self.setUpTruth()
         self.assert_same(self.folder / "a.h5", "--columns", "data/*/particles/fluid/position", columns=("x", "y", "id"))
 
+    def test_openpmd_offsets_must_match_the_positions(self):
+        for shape in ((3,), (2, 2)):
+            with h5py.File(self.folder / "a.h5", "w") as file:
+                species = file.create_group("data/1/particles/fluid")
+                for name in "xy":
+                    species[f"position/{name}"] = [1.0, 2.0]
+                    species[f"positionOffset/{name}"] = numpy.ones(shape)
+            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local"], capture_output=True,
+                                 text=True)
+            self.assertEqual(ran.returncode, 3, ran.stderr)
+            self.assertIn("positionOffset/x must have one number", ran.stderr)
+
+    def test_vtkhdf_steps_that_repeat_long_names_are_refused(self):
+        with h5py.File(self.folder / "a.vtkhdf", "w") as file:
+            count = 100_000
+            file["VTKHDF/Points"] = numpy.zeros((1, 3))
+            file["VTKHDF/NumberOfPoints"] = [1]
+            file["VTKHDF/PointData/" + "n" * 5000] = [1.0]
+            steps = file["VTKHDF"].create_group("Steps")
+            steps.attrs["NSteps"] = count
+            for name in ("Values", "PartOffsets", "PointOffsets"):
+                steps.create_dataset(name, data=numpy.zeros(count, "i8"), compression="gzip")
+        ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.vtkhdf"), "--local"], capture_output=True,
+                             text=True, preexec_fn=limit_memory)
+        self.assertEqual(ran.returncode, 3, ran.stderr)
+        self.assertIn("256 MiB", ran.stderr)
+
     def test_gadget(self):
         for k, (time, positions) in enumerate(zip(TIMES, FRAMES)):
             with h5py.File(self.folder / f"snapshot_{k:03}.hdf5", "w") as file:
@@ -251,7 +323,7 @@ class Formats(unittest.TestCase):
             with h5py.File(self.folder / "a.h5", "w") as file:
                 write(file)
             ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local", "--columns", "g/x,g/y"],
-                                 capture_output=True, text=True)
+                                 capture_output=True, text=True, preexec_fn=limit_memory)
             self.assertEqual(ran.returncode, 3, ran.stderr)
             return ran.stderr.splitlines()[-1]
 
@@ -276,6 +348,48 @@ class Formats(unittest.TestCase):
             for name in ("x", "y"):
                 file.create_dataset(f"g/{name}", (60_000_000,), "f8", chunks=(1000,))[:1] = 1
 
+        def huge_chunk(file):
+            # Filtered chunks are unpacked as a whole; these hold a row of an extensible dataset.
+            for name in ("x", "y"):
+                data = file.create_dataset(f"g/{name}", (10,), "f8", maxshape=(None,), chunks=(2 ** 28,),
+                                           compression="gzip")
+                data.id.write_direct_chunk((0,), zlib.compress(bytes(80)))
+
+        def never_written(file):
+            for name in ("x", "y"):
+                file.create_dataset(f"g/{name}", (10 ** 12,), "f8", fillvalue=1, chunks=(2 ** 20,))
+
+        def never_written_contiguous(file):
+            for name in ("x", "y"):
+                file.create_dataset(f"g/{name}", (10 ** 12,), "f8", fillvalue=1)
+
+        def constants(file):
+            for name in ("x", "y"):
+                group = file.create_group(f"g/{name}")
+                group.attrs["value"], group.attrs["shape"] = 1.0, 60_000_000
+            file.create_dataset("g/id", (60_000_000,), "i8", chunks=(1000,))
+
+        def stacked_compression(file):
+            creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+            creation.set_chunk((1024,))
+            creation.set_filter(1, 0, (9,))
+            creation.set_filter(1, 0, (9,))
+            space = h5py.h5s.create_simple((1024,))
+            file.create_group("g")
+            for name in (b"x", b"y"):
+                h5py.h5d.create(file["g"].id, name, h5py.h5t.IEEE_F64LE, space, creation).write(
+                    h5py.h5s.ALL, h5py.h5s.ALL, numpy.zeros(1024))
+
+        def unsafe_filter(file):
+            for name in ("x", "y"):
+                file.create_dataset(f"g/{name}", data=numpy.arange(1024), chunks=(1024,), scaleoffset=0)
+
+        self.assertIn("chunks of 2147483648 bytes", refusal(huge_chunk))
+        for write in (never_written, never_written_contiguous):
+            self.assertIn("1000000000000 particles; at most 67108864", refusal(write))
+        self.assertIn("declares 60000000 rows", refusal(constants))
+        self.assertIn("filter 1 twice", refusal(stacked_compression))
+        self.assertIn("filter 6", refusal(unsafe_filter))
         self.assertIn("no group g", refusal(external_link))
         self.assertIn("in another file", refusal(virtual))
         self.assertIn("in another file", refusal(external_data))

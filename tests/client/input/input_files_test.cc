@@ -74,12 +74,12 @@ TEST(InputFiles, TimesBesideTheFramesAreTheirTimes) {
   directory.Write("times.csv", "frame,t\n0,0.5\n1,0.75\n");
   for (const std::string& input : {directory.path().string(), directory.Path("frame_*.csv")}) {
     const ReadSequence read = ReadAll(input);
-    ASSERT_EQ(read.frames.size(), 3u) << read.status;
+    ASSERT_EQ(read.frames.size(), 2u) << read.status;
     EXPECT_EQ(read.frames[0].time, 0.5);
     EXPECT_EQ(read.frames[1].time, 0.75);
-    EXPECT_FALSE(read.frames[2].time.has_value());
     EXPECT_THAT(read.notices, Contains(HasSubstr("times of the frames from")));
-    EXPECT_THAT(read.notices, Contains(HasSubstr("no time for frame 2")));
+    ExpectRefused(read.status, absl::StatusCode::kFailedPrecondition,
+                  {"times.csv", "no time for frame 2", "frame_2.csv"});
   }
 }
 
@@ -97,6 +97,23 @@ TEST(InputFiles, ATimesFileMayBeASingleColumn) {
   directory.Write("t.txt", "a,b\n1,2\n");
   ExpectRefused(ReadAll(directory.Path("frame_*.csv"), {.times = times}).status,
                 absl::StatusCode::kFailedPrecondition, {"t.txt", "frame,t"});
+}
+
+TEST(InputFiles, FramesWithoutATimeInTheTimesFileAreRefused) {
+  support::TemporaryFolder directory;
+  const std::string times = directory.Write("t.csv", "frame,t\n0,0.5\n2,0.75\n");
+  std::string dump;
+  for (int k = 0; k < 3; ++k) {
+    dump += "ITEM: TIMESTEP\n" + std::to_string(1000 * k) +
+            "\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS pp pp pp\n0 1\n0 1\n0 1\n"
+            "ITEM: ATOMS x y\n0 0\n";
+  }
+  const std::string path = directory.Write("dump.txt", dump);
+  ExpectRefused(ReadAll(path, {.times = times}).status, absl::StatusCode::kFailedPrecondition,
+                {"t.csv", "no time for frame 1", "timestep 1000", "--frames"});
+  const ReadSequence read = ReadAll(path, {.times = times, .frames = "0:3:2"});
+  ASSERT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.frames[1].time, 0.75);
 }
 
 TEST(InputFiles, ARangeKeepsTheIndicesOfTheInput) {

@@ -137,6 +137,32 @@ TEST(Npy, FieldsOfAStructuredArrayAreColumns) {
   EXPECT_THAT(frames.frames[1].ids, ElementsAre(9));
 }
 
+TEST(Npy, FieldsCanHaveTheNamesOfKeysOfTheHeader) {
+  const support::TemporaryFolder directory;
+  const std::string type =
+      "[('shape', '<i4'), ('descr', '<i4'), ('fortran_order', 'S4'), (\"it's\", '<i4'), ('x', "
+      "'<f8'), ('y', '<f8')]";
+  const std::string row(16, '\1');
+  const std::string one = row + Bytes<double>({1, 2}), two = row + Bytes<double>({3, 4});
+  const std::string table = directory.Write("a.npy", Npy(type, "(2,)", one + two));
+  EXPECT_THAT(ReadOne(table).positions, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(ReadOne(table, {.attributes = {"it's"}}).attributes[0].values,
+              ElementsAre(0x1010101, 0x1010101));
+  EXPECT_EQ(ReadAll(directory.Write("a.npy", Npy(type, "(2, 1)", one + two))).frames.size(), 2u);
+}
+
+TEST(Npy, FramesAreCountedBehindALongHeader) {
+  const support::TemporaryFolder directory;
+  std::string type = "[('x', '<f8'), ('y', '<f8')";
+  for (int k = 0; k < 500; ++k)
+    type += ", ('a_long_name_of_a_field_" + std::to_string(k) + "', 'S0')";
+  const ReadSequence read =
+      ReadAll(directory.Write("a.npy", Npy(type + "]", "(2, 1)", Bytes<double>({1, 2, 3, 4}))));
+  ASSERT_EQ(read.frames.size(), 2u) << read.status;
+  EXPECT_EQ(read.frame_count, 2u);
+  EXPECT_THAT(read.frames[1].positions, ElementsAre(3, 4));
+}
+
 TEST(Npy, AnArrayOfThreeExtentsHoldsFrames) {
   const support::TemporaryFolder directory;
   const std::vector<double> planes = {1, 2, 0, 3, 4, 0, 5, 6, 0, 7, 8, 0};

@@ -106,6 +106,27 @@ TEST(Gsd, EntriesThatLeaveTheFileAreRefused) {
                 absl::StatusCode::kFailedPrecondition, {"particles/N"});
 }
 
+// Frame 1 has positions of two particles, but declares one, as frame 0.
+TEST(Gsd, BrokenArraysAreNotTakenFromTheFirstFrame) {
+  const support::TemporaryFolder directory;
+  std::string names = std::string("particles/N") + '\0' + "particles/position" + '\0';
+  const auto file = [&](std::uint64_t rows) {
+    std::string content = Gsd(names,
+                              {GsdEntry(0, 1, 448, 1, 0, 3), GsdEntry(0, 1, 452, 3, 1, 9),
+                               GsdEntry(1, 1, 448, 1, 0, 3), GsdEntry(1, rows, 452, 3, 1, 9)},
+                              4);
+    EXPECT_EQ(content.size(), 448u);
+    content += Little(1, 4);
+    for (int k = 0; k < 6; ++k) content += Little(0x3f800000, 4);
+    return directory.Write("a.gsd", content);
+  };
+  const ReadSequence good = ReadAll(file(1));
+  EXPECT_EQ(good.frames.size(), 2u) << good.status;
+  const ReadSequence broken = ReadAll(file(2));
+  EXPECT_EQ(broken.frames.size(), 1u);
+  ExpectRefused(broken.status, absl::StatusCode::kFailedPrecondition, {"frame 1", "position"});
+}
+
 absl::StatusOr<std::unique_ptr<Pickle>> Parse(const std::string& bytes) {
   return Pickle::Parse({bytes.begin(), bytes.end()}, "a.npz");
 }
@@ -206,6 +227,26 @@ TEST(Collection, WrongEntriesAreRefused) {
   const std::string dump = directory.Write("dump.txt", "ITEM: TIMESTEP\n0\n");
   ExpectRefused(refusal("<DataSet timestep=\"1\" file=\"dump.txt\"/>"),
                 absl::StatusCode::kFailedPrecondition, {"LAMMPS dump", "several frames"});
+}
+
+TEST(Collection, LaterFilesWithSeveralFramesAreRefused) {
+  const support::TemporaryFolder directory;
+  directory.Write("b.csv", "x,y\n1,2\n");
+  directory.Write("c.xyz", "1\n\n1 3 4 0\n1\n\n1 5 6 0\n");
+  const std::string path = directory.Write("a.pvd",
+                                           "<VTKFile type=\"Collection\">"
+                                           "<DataSet timestep=\"1\" file=\"b.csv\"/>"
+                                           "<DataSet timestep=\"2\" file=\"c.xyz\"/>");
+  ExpectRefused(ReadAll(path).status, absl::StatusCode::kFailedPrecondition,
+                {"c.xyz", "several frames"});
+}
+
+TEST(Collection, ElementsWithoutAttributesTakeLinearTime) {
+  const support::TemporaryFolder directory;
+  std::string text;
+  for (int k = 0; k < 500000; ++k) text += "<DataSet ";
+  ExpectRefused(ReadAll(directory.Write("a.pvd", text)).status, absl::StatusCode::kDataLoss,
+                {"a file and a time"});
 }
 
 }  // namespace

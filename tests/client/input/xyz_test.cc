@@ -84,5 +84,17 @@ TEST(Xyz, PointsWithoutACountAreATable) {
               ElementsAre(1, 2, 3, 4));
 }
 
+TEST(Xyz, RefusesTimesThatAreNotFinite) {
+  const support::TemporaryFolder directory;
+  for (const char* time : {"nan", "inf", "-inf"}) {
+    const std::string path =
+        directory.Write("a.xyz", std::string("1\nTime=") + time + "\n1 0 0 0\n");
+    ExpectRefused(ReadAll(path).status, absl::StatusCode::kDataLoss,
+                  {"a.xyz", "frame 0", "not finite", "--times"});
+    const std::string times = directory.Write("t.csv", "frame,t\n0,2\n");
+    EXPECT_EQ(ReadOne(path, {.times = times}).time, 2);
+  }
+}
+
 }  // namespace
 }  // namespace partiemc::client

@@ -71,6 +71,26 @@ TEST(Statistics, GaugesAddColumns) {
   EXPECT_GT(row["wet"], 0);
 }
 
+TEST(Statistics, PackingUsesTheParticlesOfTheFrame) {
+  support::TemporaryFolder directory;
+  const Result result = SquareWithHoleAndIsland();
+  const std::vector<double> particles = {1, 1};
+  const std::vector<float> areas = {0.25};
+  const auto row_of = [&](const FrameRecord& record) {
+    auto writer = StatisticsWriter::Create(directory / "stats.json",
+                                           ParseGauges({"p=packing:0,0,4,4"}).value());
+    EXPECT_TRUE(writer.ok() && writer->Add(record).ok() && writer->Finish().ok());
+    return ordered_json::parse(ReadFile(directory / "stats.json"))[0];
+  };
+  FrameRecord record = Record(result);
+  EXPECT_TRUE(row_of(record)["p_fraction"].is_null());
+  record.particles = particles;
+  record.particle_areas = areas;
+  const auto row = row_of(record);
+  EXPECT_NEAR(row["p_discs"], 0.25, 1e-12);
+  EXPECT_NEAR(row["p_fraction"], 0.25 / row["p_area"].get<double>(), 1e-12);
+}
+
 TEST(Statistics, RefusesGaugesWithColumnsThatExist) {
   for (const auto& texts : std::vector<std::vector<std::string>>{
            {"area=wetted:0,0,1,1"}, {"a=repose", "a=repose"}, {"a=depth:1"}}) {

@@ -346,6 +346,21 @@ class Results(unittest.TestCase):
         wetted = rings.gauge("wetted", x0=middle, y0=bottom - 1, x1=middle, y1=top + 1)
         self.assertAlmostEqual(wetted["length"], (heights[1::2] - heights[::2]).sum())
 
+    def test_packing_of_touching_discs(self):
+        box = {"min_x": 2.5, "min_y": 2.5, "max_x": 6.5, "max_y": 6.5}
+        positions = numpy.stack(numpy.meshgrid(numpy.arange(12.0), numpy.arange(12.0)), axis=-1).reshape(-1, 2)
+        rings = partiemc.reconstruct(positions, spacing=1).rings
+        radii = numpy.full(len(positions), 0.5)
+        for sizes in ({"radii": radii}, {"volumes": numpy.pi * radii ** 2}):
+            packing = rings.gauge("packing", positions=positions, **sizes, **box)
+            self.assertAlmostEqual(packing["fraction"], numpy.pi / 4, 6)
+        for wrong in ({}, {"positions": positions}, {"positions": positions, "radii": radii, "volumes": radii},
+                      {"positions": positions, "radii": radii[1:]}, {"positions": radii, "radii": radii}):
+            with self.assertRaises(partiemc.Error):
+                rings.gauge("packing", **wrong, **box)
+        with self.assertRaises(partiemc.Error):
+            rings.gauge("box", positions=positions, **box)
+
     def test_gauges_refuse_wrong_arguments(self):
         rings = self.result.rings
         for kind, numbers, field in (("depth", {}, "kind"), ("height", {}, "gauge height"),
