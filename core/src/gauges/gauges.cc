@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -19,6 +18,8 @@
 
 namespace partiemc {
 namespace {
+
+constexpr double kPi = 3.141592653589793;
 
 constexpr std::size_t kMaxName = 40;
 // Products of four coordinates stay finite.
@@ -136,7 +137,7 @@ std::vector<double> MeasurePacking(const Rings& rings, const Point& min, const P
   }
   double sum = 0;
   for (std::size_t k = 0; k < discs.areas.size(); ++k) {
-    const double radius = std::sqrt(double{discs.areas[k]} / std::numbers::pi);
+    const double radius = std::sqrt(double{discs.areas[k]} / kPi);
     sum += DiscAreaInBox(PointAt(discs.centres, k), radius, min, max);
   }
   return {area > 0 ? sum / area : NAN, sum, area};
