@@ -41,7 +41,9 @@ constexpr milliseconds kSettle(300);
 constexpr milliseconds kSearchPatience(1500), kAskEvery(100);
 // Time that this replica gets for its first connection to the bus.
 constexpr seconds kFirstConnection(2);
-constexpr milliseconds kDrainPatience(300);
+// A drain waits until the results of this server's streams are sent: at most kDrainPatience since
+// the last one, and at most kSendPatience in total.
+constexpr milliseconds kDrainPatience(300), kSendPatience(900);
 // Maximum time of a drain, even if the bus blocks.
 constexpr seconds kLongestDrain(2);
 // Capacities of the relay's queue in bytes: for news (which contain results), and for fetches.
@@ -106,7 +108,10 @@ void Relay::Run() {
     for (const std::string& piece : work.messages[Queue::kNews]) Take(piece);
     for (const std::string& piece : work.messages[Queue::kAsked]) OnAskedPiece(piece);
     const auto now = clock_.Now();
-    if (work.actions.empty() || now - answered_ >= kAnswerEvery) AnswerNextFetch(now);
+    if (!work.actions.empty()) acted_ = now;
+    // A drain sends all results before it responds to a fetch.
+    const bool is_due = !draining_since_ && now - answered_ >= kAnswerEvery;
+    if (work.actions.empty() || is_due) AnswerNextFetch(now);
     if (std::exchange(was_asked_, false)) Announce(now, false, false);
     if (changed_ || now - ticked_ >= kTickEvery || draining_since_) Tick(now);
   }
@@ -493,9 +498,10 @@ void Relay::GoOnDraining(TimePoint now) {
   const bool has_more = !fetches_.empty() || std::ranges::any_of(exports_, [](const auto& item) {
     return item.second->live();
   });
-  if (has_more && now - *draining_since_ < kDrainPatience) {
+  const auto idle = now - std::max(*draining_since_, acted_);
+  if (has_more && idle < kDrainPatience && now - *draining_since_ < kSendPatience) {
     // Remaining streams end with this server.
-    if (now - *draining_since_ > kDrainPatience / 2) {
+    if (idle > kDrainPatience / 2) {
       for (auto& [id, exported] : exports_) exported->End();
     }
     return;

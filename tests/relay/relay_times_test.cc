@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "partiemc/status.h"
 #include "relay/memory_replica.h"
@@ -99,6 +100,27 @@ TEST_F(RelayTimes, ADrainedReplicaAnnouncesNothing) {
   Pass(milliseconds(1200));  // Longer than the interval of announcements.
   EXPECT_EQ(shows_.relay().replicas(), 1u);
   EXPECT_EQ(shows_.relay().remote_streams(), 1u);
+}
+
+TEST_F(RelayTimes, ADrainOverASlowBusSendsAllResults) {
+  Publish(1, 1);
+  const auto watcher = shows_.Watch("dam");
+  ASSERT_NE(watcher, nullptr);
+  std::atomic<bool> drains = false;
+  hub_.SetLoses([&](const std::string& subject, std::string_view) {
+    if (!subject.starts_with("partiemc.results.")) return false;
+    while (!drains) std::this_thread::yield();
+    // A tenth of the time for which a drain waits for the next result.
+    clock_.Advance(milliseconds(30));
+    return false;
+  });
+  Publish(2, 21);
+  has_.Close("dam");
+  drains = true;
+  has_.relay().Drain();
+  EXPECT_TRUE(watcher->status().ok());
+  EXPECT_EQ(watcher->end_reason(), kReasonFinished);
+  EXPECT_EQ(watcher->seen().size(), 21u);
 }
 
 TEST_F(RelayTimes, PublishesNothingWithoutWatchersElsewhere) {
