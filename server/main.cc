@@ -109,6 +109,7 @@ int Serve(const CommandLine& line) {
   SetUpLogging(line.log_level, line.log_format);
   FlushLogOnAbort();
   RefuseTraces();
+  LimitReadsOfGrpc();
   auto server = Server::Start(line.server);
   if (!server.ok()) return Fail(server.status());
   const auto web = (*server)->web_address();

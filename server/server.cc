@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <string>
 #include <thread>
 #include <utility>
@@ -357,7 +358,7 @@ absl::Status Server::Listen() {
                              static_cast<int>(options_.limits.CallsOfOneCaller()));
   // Limits the size of one read from a socket. gRPC parses all bytes of a read, even if the
   // connection has been cut. A read of 32 KiB can contain 4,000 calls, which take 40 MiB. gRPC's
-  // default of 4 MiB could take more than 1 GiB.
+  // default of 4 MiB could take more than 1 GiB. The limit needs LimitReadsOfGrpc.
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   // Limits the threads of the reflection service, the only service that occupies a thread for each
   // call.
@@ -380,6 +381,13 @@ absl::Status Server::Listen() {
   });
   health_->SetServing(true);
   return absl::OkStatus();
+}
+
+void LimitReadsOfGrpc() {
+  constexpr char kName[] = "GRPC_EXPERIMENTS", kOff[] = "-tcp_read_chunks";
+  const char* const others = std::getenv(kName);
+  // gRPC applies the last one of two contradicting entries.
+  setenv(kName, others == nullptr ? kOff : absl::StrCat(others, ",", kOff).c_str(), 1);
 }
 
 absl::Status Server::OpenGateway() {
