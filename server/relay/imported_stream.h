@@ -87,6 +87,7 @@ class ImportedStream {
   bool ready_ = false, ended_ = false;
   std::vector<Ready> await_;
   std::uint64_t next_number_ = 0;  // Next number to deliver; 0: unknown.
+  std::uint64_t delivered_ = 0;    // The last number delivered; 0: none.
   std::map<std::uint64_t, Published> waiting_;
   std::size_t waiting_bytes_ = 0;
   relay::v1::Fetch fetch_;  // The latest fetch.

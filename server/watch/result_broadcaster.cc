@@ -56,7 +56,11 @@ std::vector<Published> ResultBroadcaster::HandOver() {
 }
 
 bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence) {
-  Published published{std::move(frame), ++published_, sequence};
+  return Post({std::move(frame), published_ + 1, sequence});
+}
+
+bool ResultBroadcaster::Post(Published published) {
+  published_ = published.number;
   if (watcher_count_ != 0) {
     CountWaits([&] { mailbox_.Put(std::move(published)); });
     return true;
@@ -73,9 +77,7 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
 }
 
 void ResultBroadcaster::PublishNumbered(Published published) {
-  published_ = published.number - 1;
-  const std::uint64_t sequence = published.sequence;
-  if (Publish(std::move(published.frame), sequence)) Announce();
+  if (Post(std::move(published))) Announce();
 }
 
 void ResultBroadcaster::Announce() {

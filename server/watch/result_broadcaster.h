@@ -101,6 +101,8 @@ class ResultBroadcaster final : public Dispatched {
  private:
   void Serve() override ABSL_LOCKS_EXCLUDED(mutex_);
   std::vector<Published> HandOver() ABSL_LOCKS_EXCLUDED(mutex_);
+  // As Publish.
+  [[nodiscard]] bool Post(Published published) ABSL_LOCKS_EXCLUDED(mutex_);
   void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Collect() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -34,6 +34,7 @@ struct Published {
   std::shared_ptr<const WatchFrame> frame;
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< Sequence number of the producer's frame.
+  bool follows_loss = false;   ///< Results before it were lost on their way between servers.
 };
 
 /// Approximate memory overhead of a published frame, counted in addition to its bytes.

@@ -41,6 +41,12 @@ WatchEnd WatchEnd::NoLongerHeld(std::uint64_t frames) {
        "sooner, watch in mode `latest`, or start the server with larger --history-bytes"}));
 }
 
+WatchEnd WatchEnd::ResultsLost(std::uint64_t results) {
+  return {.reason = std::string(kReasonProducerLost),
+          .message = absl::StrCat(results, " results were lost on their way between servers"),
+          .status = {}};
+}
+
 WatchEnd WatchEnd::OfStream(const absl::Status& status) {
   if (status.ok()) return {std::string(kReasonFinished), "the producer has finished", {}};
   if (absl::IsCancelled(status)) {

@@ -34,6 +34,9 @@ struct WatchEnd {
   static WatchEnd FellBehind(std::size_t frames, std::size_t bytes, std::size_t max_bytes);
   /// The end of a watch that is too slow: the history has dropped its next `frames` frames.
   static WatchEnd NoLongerHeld(std::uint64_t frames);
+  /// The end of a watch in mode `every`: `results` results before its next one were lost between
+  /// servers. The watcher may watch again, as after the loss of the producer.
+  static WatchEnd ResultsLost(std::uint64_t results);
   /// The end of a watch whose next frame exceeds `max_bytes`.
   static WatchEnd TooLarge(std::size_t bytes, std::size_t max_bytes);
 };

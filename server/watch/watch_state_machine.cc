@@ -124,6 +124,11 @@ void WatchStateMachine::Take(const Published& published) {
   } else if (missed > 0 || held_bytes_ + bytes > max_bytes_) {
     if (missed == 0 && LeaveToHistory(published)) return;
     ++counts_.dropped;
+    if (missed > 0 && published.follows_loss) {
+      state_.phase = Phase::kEnding;
+      end_ = WatchEnd::ResultsLost(missed);
+      return;
+    }
     return End(WatchEnd::FellBehind(pending_.size() + missed + 1, held_bytes_ + bytes, max_bytes_));
   }
   pending_.push_back(published);

@@ -93,6 +93,24 @@ TEST_F(WatchTest, EveryHoldsAsMuchAsItMayAndEndsWithTheFirstFrameBeyond) {
   EXPECT_EQ(watcher->end_dropped(), watcher->machine().counts().dropped);
 }
 
+TEST_F(WatchTest, ResultsLostBetweenServersLoseTheProducerInModeEvery) {
+  const auto every = Join(WatchMode::kEvery, 9), latest = Join(WatchMode::kLatest, 9);
+  while (broadcaster_->watcher_count() < 2) std::this_thread::yield();
+  const auto publish = [&](std::uint64_t number, bool follows_loss) {
+    broadcaster_->PublishNumbered(
+        {std::make_shared<NumberedFrame>(number, kFrameBytes), number, number, follows_loss});
+  };
+  publish(1, false);
+  every->WaitForFrames(1);
+  latest->WaitForFrames(1);
+  publish(4, true);
+  EXPECT_TRUE(every->status().ok());
+  EXPECT_EQ(every->end_reason(), kReasonProducerLost);
+  EXPECT_EQ(every->end_dropped(), 3u);
+  latest->WaitForFrames(2);
+  EXPECT_EQ(latest->seen().back(), (SeenFrame{4, 2}));
+}
+
 TEST_F(WatchTest, OneThatTakesNothingHoldsUpNobody) {
   const auto stuck = Join(WatchMode::kLatest, 1000);
   stuck->StopReading();
