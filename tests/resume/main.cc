@@ -25,7 +25,7 @@ bool Parse(int argc, char** argv) {
     for (const auto& [name, value] :
          {std::pair("--kills", &options.kills), std::pair("--terminations", &options.terminations),
           std::pair("--faults", &options.faults), std::pair("--updates", &options.updates),
-          std::pair("--seed", &options.seed)}) {
+          std::pair("--seed", &options.seed), std::pair("--time-limits", &options.time_limits)}) {
       if (name != std::string(argv[k]) || k + 1 >= argc) continue;
       *value = std::strtoull(argv[k + 1], nullptr, 10);
       known = true;
@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   if (partiemc::resume::Parse(argc, argv)) return RUN_ALL_TESTS();
   std::fputs(
       "usage: resume_test [--kills N] [--terminations N] [--faults N] [--updates N] "
-      "[--seed N] [--other-server PROGRAM]\n",
+      "[--seed N] [--time-limits N] [--other-server PROGRAM]\n",
       stderr);
   return 2;
 }

@@ -12,6 +12,9 @@ struct Options {
   std::uint64_t faults = 12;       ///< --faults: faults of the network.
   std::uint64_t updates = 3;       ///< --updates: rolling updates of all servers.
   std::uint64_t seed = 1;          ///< --seed: seed of random choices.
+  /// --time-limits: other than 0 also fails tests whose times exceed their limits. For a machine
+  /// that does nothing else: a busy one delays replicas and clients by seconds.
+  std::uint64_t time_limits = 0;
   /// --other-server: every second start of a server uses this program, of another commit.
   std::string other_server = {};
 };

@@ -162,10 +162,11 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
         Percentile(producers, .5), Percentile(producers, .99), Percentile(producers, 1), n(frames),
         n(dropped), n(gaps), watchers.size(), Percentile(watchers, .5), Percentile(watchers, .99),
         Percentile(watchers, 1), pause);
-    EXPECT_LE(Percentile(producers, .99), kMaxProducerGapMs + pause);
-    EXPECT_LE(Percentile(watchers, .99), kMaxWatcherGapMs + pause);
     EXPECT_FALSE(producers.empty());
     EXPECT_FALSE(watchers.empty());
+    if (GetOptions().time_limits == 0) return;
+    EXPECT_LE(Percentile(producers, .99), kMaxProducerGapMs + pause);
+    EXPECT_LE(Percentile(watchers, .99), kMaxWatcherGapMs + pause);
   }
 
   server::NatsProcess nats_;
