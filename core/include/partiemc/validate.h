@@ -9,9 +9,9 @@
 
 namespace partiemc {
 
-/// Checks R1-R4 and M1-M3 of result.h with exact arithmetic. M2 is checked by areas (1e-9 relative)
-/// and by sides: the sides of the triangles cancel except for the segments of the rings. With M1
-/// and R2 this excludes gaps and overlaps.
+/// Checks R1-R4 and M1-M3 of result.h with exact arithmetic. M2 is checked in two ways: the areas
+/// of rings and triangles agree (to 1e-9 relative), and opposite sides of the triangles cancel,
+/// except along the segments of the rings. With M1 and R2 this excludes gaps and overlaps.
 /// Errors: INTERNAL with the guarantee, the ring or triangle, and the values. Cost: n log n in the
 /// points.
 absl::Status Validate(const Result& result);
