@@ -92,10 +92,10 @@ absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& para
                                             const VirtualPlaneVariant& variant,
                                             const FrameLimits& limits = {});
 
-/// Returns `variant` without the steps that `parameters` rule out. Slices and isolines have no area
-/// to match and no support: the outermost layer of a body leans where a plane cuts it. A ring does
-/// not show how a body bends across the plane, so curvature is off, too. For an isovalue smoothing
-/// is also off, so that the vertices stay on the isoline.
+/// Returns `variant` without the steps that `parameters` rule out. A slice has no known area, its
+/// rings do not show how the body bends across the plane, and the outermost layer leans there. The
+/// steps area, curvature and support are therefore off. For an isovalue, smoothing is off, too, so
+/// that the vertices stay on the isoline.
 VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
                                VirtualPlaneVariant variant);
 
