@@ -5,7 +5,7 @@
 namespace partiemc {
 namespace {
 
-// Windows compare distances in floats and may include a vertex that is farther by this factor.
+// Windows compare distances in floats and may include a vertex beyond the reach by this factor.
 constexpr double kReachTolerance = 1e-6;
 
 }  // namespace

@@ -7,8 +7,8 @@
 
 namespace partiemc {
 
-/// Distance between clamped vertices and the sides of their cells, in cells. It keeps neighbouring
-/// vertices apart, and on their sides, when they are rounded to world coordinates.
+/// Distance between clamped vertices and the sides of their cells, in cells. With this distance,
+/// rounding to world coordinates neither joins neighbouring vertices nor moves one across a side.
 inline constexpr double kCellMargin = 1.0 / 1024;
 
 /// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates

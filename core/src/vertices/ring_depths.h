@@ -16,8 +16,9 @@ namespace partiemc {
 ///
 /// Method: one sweep from bottom to top in the order of SweepsBefore. The sweep line crosses
 /// chains, the rising pieces of rings. Chains begin in pairs at the local minima of a ring and end
-/// in pairs at its local maxima. Their order on the line is fixed in between, as nothing crosses.
-/// Each chain stores the winding number of the region directly left of it.
+/// in pairs at its local maxima. In between, the order of the chains on the line stays the same,
+/// because rings do not cross. Each chain stores the winding number of the region directly left of
+/// it.
 ///
 /// Keeps its memory warm. Use one object per thread.
 class RingDepths {

@@ -23,7 +23,7 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-// The target of the offset for this frame, in spacings; nullopt without large components.
+// The target of the offset for this frame, in spacings; empty if no component is long enough.
 std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
