@@ -23,11 +23,11 @@ struct SpaceField {
   }
 };
 
-/// Finds the sides of all nodes: by the density where it decides, else by F. Parallel over bricks.
-/// Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
+/// Finds the sides of all nodes, by F where the density does not decide the side. Parallel over
+/// bricks. Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
 void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field);
 
-/// Evaluates F at `nodes` of each brick, where it is not exact yet. Sides do not change.
+/// Evaluates F at `nodes` of each brick, unless F is exact there. Sides do not change.
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field);
 
