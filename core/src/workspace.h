@@ -1,4 +1,4 @@
-// The buffers of all stages. They are reused from frame to frame.
+// The buffers of all stages, reused from frame to frame.
 #pragma once
 
 #include <cstdint>

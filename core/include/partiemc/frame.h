@@ -13,7 +13,7 @@
 
 namespace partiemc {
 
-/// A quantity that particles carry, such as pressure.
+/// A quantity of the particles, such as pressure.
 struct Attribute {
   std::string_view name;          ///< Unique in the frame; 1 to 64 bytes of printable ASCII.
   int components = 1;             ///< 1 to 3.
@@ -42,8 +42,8 @@ struct Frame {
   /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty: none.
   std::span<const float> velocities = {};
 
-  /// Quantities to interpolate to the vertices (Result::attributes). They change no ring, only the
-  /// mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
+  /// Quantities to interpolate to the vertices (Result::attributes). Attributes change no ring,
+  /// only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
   /// Simulation time. Velocities are used only if it increases from frame to frame.

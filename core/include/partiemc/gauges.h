@@ -73,8 +73,8 @@ const GaugeTraits& TraitsOf(GaugeKind kind);
 /// that is not finite or out of range.
 absl::Status Check(const Gauge& gauge);
 
-/// Parses "NAME=KIND:NUMBER,NUMBER,...", such as "level=height:0.5" or "slope=repose". Errors:
-/// those of Check; INVALID_ARGUMENT for a text of another form.
+/// Parses "NAME=KIND:NUMBER,NUMBER,...", such as "level=height:0.5" or "slope=repose". Errors: as
+/// Check; INVALID_ARGUMENT for a text of another form.
 absl::StatusOr<Gauge> ParseGauge(std::string_view text);
 
 /// The values of a gauge, in the order of GaugeTraits::values. A value is NaN if the outline has no

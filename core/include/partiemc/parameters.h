@@ -46,7 +46,7 @@ enum class Plane : std::uint8_t { kXy, kXz, kYz };
 struct SlicePlane {
   /// A point of the plane, in world units: the origin of the coordinates in results.
   std::array<double, 3> origin{};
-  /// Normal of the plane, of any length except 0. It determines the axes of results:
+  /// Normal of the plane, of any length except 0. The normal determines the axes of results:
   ///   normal along z: x and y; along -y: x and z; along x: y and z.
   /// For any other normal, the first axis is the projection of the x axis onto the plane, or of the
   /// y axis if the normal is closer to x than to y and z. The second axis completes a right-handed

@@ -72,8 +72,8 @@ struct RingHistory {
 /// function of frame and state, so a stream that resumes from a restored State gives the same bits
 /// as without interruption.
 struct State {
-  /// Lattice spacing in world units. It is set with the given spacing, or by the first frame whose
-  /// particles agree on a spacing, and never changes. Frames before it leave no state.
+  /// Lattice spacing in world units, set by the given spacing, or by the first frame whose
+  /// particles agree on a spacing. It never changes; earlier frames leave no state.
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;

@@ -19,7 +19,7 @@ struct Violation {
   friend bool operator==(const Violation&, const Violation&) = default;
 };
 
-/// The reasons of the core. They are part of the public contract (proto/PROTOCOL.md): a reason is
+/// The reasons of the core, which are part of the public contract (proto/PROTOCOL.md): a reason is
 /// never renamed or reused with another meaning.
 inline constexpr std::string_view kReasonOutOfRange = "OUT_OF_RANGE";
 inline constexpr std::string_view kReasonNotFinite = "NOT_FINITE";

@@ -131,7 +131,7 @@ class SurfaceReconstructor {
   SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
 
   SurfaceParameters parameters_;
-  ReconstructionParameters in_space_;  // Resolved, as the stages take them.
+  ReconstructionParameters in_space_;  // Resolved, in the form for the stages.
   FrameLimits limits_;
 };
 

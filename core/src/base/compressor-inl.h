@@ -41,8 +41,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. It works in
-// registers, because some processors are slow when they compress into memory.
+// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. The class
+// works in registers, because some processors are slow when they compress into memory.
 class Compressor {
  public:
   using Bits = hn::CappedTag<std::int32_t, 16>;

@@ -46,7 +46,7 @@ inline Rounded TwoProduct(double a, double b) {
 inline int SignOf(double value) { return (value > 0) - (value < 0); }
 
 /// An exact sum of up to `kTerms` doubles: non-overlapping components in order of magnitude
-/// (Shewchuk, section 2.2). Its sign is the sign of the last component.
+/// (Shewchuk, section 2.2). The sign of the sum is the sign of its last component.
 template <std::size_t kTerms>
 class Expansion {
  public:

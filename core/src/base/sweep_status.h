@@ -10,9 +10,9 @@
 
 namespace partiemc {
 
-/// A directory of short blocks of identifiers. The class does not know the order: the caller passes
-/// predicates and keeps the sequence sorted. Memory is allocated only when the length exceeds its
-/// earlier maximum. Not thread-safe.
+/// A directory of short blocks of identifiers. The order is not part of the class: the caller
+/// passes predicates and keeps the sequence sorted. Memory is allocated only when the length
+/// exceeds its earlier maximum. Not thread-safe.
 class SweepStatus {
  public:
   /// A position of an element, or the end. Valid until the next change.

@@ -54,8 +54,8 @@ struct BinScratch {
 /// a margin around it. The margin contains small holes completely, and no outline meets the end of
 /// the lattice.
 ///
-/// Positions are relative to the first node of the tile, in cells, rounded to multiples of 2^-17.
-/// They are exact floats in their own tile and in each tile that their kernel reaches.
+/// Positions are relative to the first node of the tile, in cells, rounded to multiples of 2^-17. A
+/// position is an exact float in its own tile and in each tile that its kernel reaches.
 struct ParticleBins {
   TileDirectory tiles;
   std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).

@@ -26,7 +26,7 @@ struct TileCoordinate {
   friend auto operator<=>(const TileCoordinate&, const TileCoordinate&) = default;
 };
 
-/// Index of a tile that does not exist. Its nodes are outside.
+/// Index of a tile that does not exist. The nodes of such a tile are outside.
 inline constexpr std::uint32_t kNoTile = std::numeric_limits<std::uint32_t>::max();
 
 /// Neighbours of a tile at index (dy + 1) * 3 + (dx + 1), with the tile itself in the middle.

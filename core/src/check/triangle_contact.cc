@@ -69,8 +69,8 @@ bool SegmentTouchesTriangle(const Vec3& p, const Vec3& q, const std::array<Vec3,
   const int q_side = SideOfPlane(abc[0], abc[1], abc[2], q);
   if (p_side * q_side > 0) return false;
   if (p_side == 0 && q_side == 0) return TouchInPlane(p, q, abc);
-  // The segment meets the plane in one point. It is in the triangle unless the line pq passes
-  // sides of the triangle both on the left and on the right.
+  // The segment meets the plane in one point. This point is in the triangle unless the line pq
+  // passes sides of the triangle both on the left and on the right.
   bool is_left = false, is_right = false;
   for (int k = 0; k < 3; ++k) {
     const int side = SideOfPlane(p, q, abc[k], abc[(k + 1) % 3]);

@@ -43,7 +43,7 @@ class TriangleGrid {
   }
   /// The number of cells of size edge_ that boxes reach, summed over the boxes.
   double Reached() const;
-  /// Whether `cell` is the lowest cell of the intersection of two boxes, the only one that reports
+  /// Whether `cell` is the lowest cell of the intersection of two boxes. Only this cell reports
   /// them.
   bool IsFirstOf(std::uint64_t cell, const Box& a, const Box& b) const;
 

@@ -143,8 +143,8 @@ void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32
 }
 
 // Runs the passes over the tiles [first, last). A pass over a tile reads the results of the
-// previous pass in the neighbouring tiles. It runs as soon as these results are ready, while they
-// are in a near cache. Tiles with neighbours in other ranges are left for later, because other
+// previous pass in the neighbouring tiles. The pass runs as soon as these results are ready, while
+// they are in a near cache. Tiles with neighbours in other ranges are left for later, because other
 // tasks compute these neighbours.
 void SampleTiles(const ParticleBins& bins, const Scale& scale, std::uint32_t first,
                  std::uint32_t last, LevelSet& level_set) {

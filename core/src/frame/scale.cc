@@ -29,7 +29,8 @@ constexpr double kGapSpread = 0.21;
 constexpr double kGapSpreadPerReference = 2.4;
 // Slope of the spread outside a flat boundary, times R.
 constexpr double kSpreadSlope = 0.45;
-// Slope of f across a flat boundary, times R. It converts the density terms of F to lengths.
+// Slope of f across a flat boundary, times R. This slope converts the density terms of F to
+// lengths.
 constexpr double kBoundarySlope = 1.164;
 // The same in space: the normalised kernel, integrated over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;

@@ -19,8 +19,8 @@ namespace {
 // Approximate size of the sample: its median is within a percent of the median of all.
 constexpr std::size_t kSampleSize = 1 << 14;
 
-// A particle whose nearest neighbour is this many medians away is spray. Inside bodies, distances
-// stay below two medians.
+// A particle is spray if its nearest neighbour is farther away than this number of medians. Inside
+// bodies, distances stay below two medians.
 constexpr double kLonelyRatio = 4;
 
 // Radius of the kernel sums, in spacings. Each round uses the spacing that the round before found;

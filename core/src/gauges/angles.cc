@@ -47,7 +47,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
     if (p.y >= rounded) arc.push_back(p);
   }
   if (arc.empty()) return {};
-  // Of the points next to the wall, the one farthest out on this side.
+  // Of the points next to the wall, finds the outermost point on this side.
   const double lowest = std::ranges::min(arc, {}, &Point::y).y;
   Point side{first * INFINITY, 0};
   for (const Point& p : arc) {

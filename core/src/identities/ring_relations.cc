@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint64_t kSmallestPart = 4;
 
 // For a full set of 16 samples: the largest difference between the share of the samples and the
-// share of the nodes, in samples. It is three standard deviations of the samples of a ring that
+// share of the nodes, in samples. This is three standard deviations of the samples of a ring that
 // splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 

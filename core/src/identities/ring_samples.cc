@@ -180,8 +180,8 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
   ChooseParticles(input, KnownHashes(previous, s.known), index, s);
   s.found.clear();
   ForEachChosen(input, s, [&](const ParticleSample& now) {
-    // A sample of the last frame may exceed the limit. It is not added: in a full heap, it would
-    // hide that particles with smaller hashes are missing.
+    // A sample of the last frame that exceeds the limit is not added: in a full heap, it would hide
+    // that particles with smaller hashes are missing.
     if (now.hash <= s.ring_limit[now.ring]) TakeSample(now, s);
     if (const ParticleSample* const before = index.Find(now.hash)) {
       s.found.push_back(

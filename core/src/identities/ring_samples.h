@@ -48,8 +48,9 @@ struct SampleInput {
 /// Selects the samples of each outer ring, and finds the samples of the last frame.
 ///
 /// The samples of a ring are its kMaxSamples particles with the smallest hashes of their ids: a
-/// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). They are a
-/// random choice, independent of the order of the particles, and mostly the same in the next frame.
+/// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). The samples are
+/// a random choice, independent of the order of the particles, and mostly the same in the next
+/// frame.
 ///
 /// On average, 2 kMaxSamples of the n particles of a ring have hashes below 2 kMaxSamples / n of
 /// the largest hash. This is the limit of the ring. One pass over the ids skips each particle whose

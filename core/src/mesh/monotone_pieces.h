@@ -56,8 +56,8 @@ class MonotonePieces {
   void AddToLeftChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, true); }
   void AddToRightChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, false); }
 
-  /// Adds the common last vertex of both chains. It sees the whole stack, so it forms a triangle
-  /// with each side of the stack. The piece is empty afterwards.
+  /// Adds the common last vertex of both chains. The whole stack is visible from it, so it forms a
+  /// triangle with each side of the stack. The piece is empty afterwards.
   void Finish(Piece& piece, const Vertex& last) {
     while (nodes_[piece.top].below != kNoIndex) {
       EmitTopmost(piece, last);
@@ -74,8 +74,8 @@ class MonotonePieces {
 
   void Add(Piece& piece, const Vertex& vertex, bool to_left_chain) {
     if (piece.is_left_chain != to_left_chain) {
-      // A vertex of the other chain sees the whole stack. The last vertex stays on the stack,
-      // because later vertices see it, too.
+      // The whole stack is visible from a vertex of the other chain. The last vertex stays on the
+      // stack, because it is visible from later vertices, too.
       const Vertex last = LastVertex(piece);
       Finish(piece, vertex);
       PushNode(piece, last);

@@ -47,7 +47,7 @@ struct NeighbourChunk {
   int count;
 };
 
-// The disc of a query, in registers. It selects the particles of the query.
+// The disc that selects the particles of a query, in registers.
 class NeighbourDisc {
  public:
   HWY_INLINE explicit NeighbourDisc(const NeighbourRows& near)

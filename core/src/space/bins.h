@@ -20,7 +20,7 @@ namespace partiemc::space {
 /// relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
-  /// Per brick: the first particle of each cell, and the end of the last one.
+  /// Per brick: the first particle of each cell, then the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   std::vector<float> x, y, z;
   std::vector<float> weight;          ///< Empty if uniform.

@@ -215,7 +215,7 @@ bool Checker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& abov
   // corners, which are opposite.
   const int first = CornersOfFace(2 * face.axis + 1)[0];
   const bool is_inside = (crossings_.cells[face.low.active].corners >> first & 1) != 0;
-  // Between the curves remain the four vertices and the two other corners.
+  // The part between the curves has the four vertices and the two other corners.
   constexpr std::array<std::uint8_t, 6> kEven{0, 1, 3, 4, 5, 7}, kOdd{1, 2, 3, 5, 6, 7};
   return is_inside ? check(7, 1) && check(3, 5) && CanTriangulate(face, kOdd, below, above)
                    : check(1, 3) && check(5, 7) && CanTriangulate(face, kEven, below, above);
@@ -337,7 +337,7 @@ bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return has_any;
 }
 
-/// Certifies the bricks that have moved and those around them.
+/// Certifies the bricks in which something has moved, and the bricks around these.
 bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate) {

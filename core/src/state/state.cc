@@ -1,5 +1,5 @@
 // The bytes of a state. Little-endian layout: magic, version, cell size and spacing (0: none), area
-// offset and time (kAbsent: none), identities given, the number of normals, rings, runs and
+// offset and time (kAbsent: none), largest identity, the numbers of normals, rings, runs and
 // samples, these arrays, checksum.
 //
 // A state with sections has another magic, the version and the number of states. Each state

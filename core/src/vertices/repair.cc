@@ -12,8 +12,8 @@ namespace {
 // Rounds in which points move half way only.
 constexpr int kGentleRounds = 4;
 
-// After this number of rounds all points return at once: adversarial frames could need a round for
-// every few points. Ordinary frames need none; hostile test frames need up to nine.
+// After this number of rounds all points return at once, because adversarial frames could need a
+// round for every few points. Ordinary frames need none; hostile test frames need up to nine.
 constexpr int kMostRounds = 24;
 
 // If a round has more misplaced rings, all rings return. Hardly any frame has even one.

@@ -23,10 +23,10 @@ void OffsetRing(std::span<const double> points, double offset, double* target);
 /// nor implied by a given spacing.
 ///
 /// `offset`, in spacings, is the offset of the last frame, if there is one, and becomes the offset
-/// of this frame. Its size is limited, since volumes have errors of a few percent. Its change is
-/// limited, so that outlines do not tremble with their area. The first frame uses the target.
-/// `scratch` is a warm buffer. Leaves the measures of the rings undefined.
-/// Cost: linear in the points.
+/// of this frame. The size of the offset is limited, since volumes have errors of a few percent.
+/// Its change is limited, too, so that outlines do not tremble with their area. The first frame
+/// uses the target. `scratch` is a warm buffer. Leaves the measures of the rings undefined. Cost:
+/// linear in the points.
 void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
                    std::optional<double>& offset, Rings& rings);
 
