@@ -86,7 +86,7 @@ struct NamedConstant {
 std::span<const NamedStep> AllSteps();
 std::span<const NamedConstant> AllConstants();
 
-/// Reconstructor::Create for a variant of `virtual-plane`; other placements ignore it.
+/// Like Reconstructor::Create, for a variant of `virtual-plane`; other placements ignore `variant`.
 /// Requires: constants are positive and finite. Errors: as Reconstructor::Create.
 absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& parameters,
                                             const VirtualPlaneVariant& variant,

@@ -31,7 +31,7 @@ inline constexpr std::array kAllDoubts = {Doubt::kSpacingProvisional, Doubt::kSp
 /// "spacing-provisional", "spacing-contradicted", ...
 std::string_view Name(Doubt doubt);
 
-/// One line for the user: the meaning and the remedy.
+/// One line for the user: what the doubt means, and how to resolve it.
 std::string_view Explanation(Doubt doubt);
 
 /// A set of doubts.

@@ -46,7 +46,7 @@ struct Frame {
   /// only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
-  /// Simulation time. Velocities are used only if it increases from frame to frame.
+  /// Simulation time. Velocities are used only if the time increases from frame to frame.
   double time = 0;
 
   // Ids, velocities and time influence only the identities and parents of rings

@@ -61,7 +61,7 @@ struct VirtualPlaneVariant;  // core/internal/research.h
 /// Reconstructs frames with the parameters of one stream. Immutable; may be shared between threads.
 class Reconstructor {
  public:
-  /// Errors: INVALID_ARGUMENT (Validate of the parameters and of the limits).
+  /// Errors: INVALID_ARGUMENT, as Validate of the parameters and Validate of the limits.
   static absl::StatusOr<Reconstructor> Create(const ReconstructionParameters& parameters,
                                               const FrameLimits& limits = {});
 

@@ -99,7 +99,7 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-/// An attribute of the frame (Frame::attributes) at the vertices.
+/// An attribute of the frame (Frame::attributes), interpolated to the vertices.
 struct AttributeValues {
   std::string name;
   int components = 1;

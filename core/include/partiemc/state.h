@@ -68,9 +68,9 @@ struct RingHistory {
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
-/// The complete state of a stream; default-constructed: no frame yet. Reconstruction is a pure
-/// function of frame and state, so a stream that resumes from a restored State gives the same bits
-/// as without interruption.
+/// The complete state of a stream. A default-constructed State is the state before the first frame.
+/// Reconstruction is a pure function of frame and state, so a stream that resumes from a restored
+/// State gives the same bits as without interruption.
 struct State {
   /// Lattice spacing in world units, set by the given spacing, or by the first frame whose
   /// particles agree on a spacing. It never changes; earlier frames leave no state.

@@ -77,7 +77,7 @@ enum class SurfacePlacement : std::uint8_t {
 struct SurfaceParameters {
   SurfacePlacement placement = SurfacePlacement::kMarchingCubes;
 
-  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of it.
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of h.
   double spacing = 1;
   /// As in ReconstructionParameters, with the same ranges.
   double kernel_radius = 3, cell_size = 1;
@@ -121,9 +121,9 @@ class SurfaceReconstructor {
 
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
-  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// Errors with a Violation: as Reconstructor, but there is no memory guard and no cancellation.
-  /// `surface` is then empty. After an exception (std::bad_alloc) surface and workspace must be
+  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes. Errors with a
+  /// Violation: as Reconstructor, but there is no memory guard and no cancellation. After an error
+  /// `surface` is empty. After an exception (std::bad_alloc) surface and workspace must be
   /// replaced.
   absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
 

@@ -16,8 +16,8 @@ namespace partiemc {
 /// points.
 absl::Status Validate(const Result& result);
 
-/// As above, and M4 if `fill` guarantees it: each side has exactly two triangles, or one triangle
-/// and one segment of a ring.
+/// Checks the same, and M4 if `fill` guarantees it: each side has exactly two triangles, or one
+/// triangle and one segment of a ring.
 absl::Status Validate(const Result& result, Fill fill);
 
 /// Counts the vertices inside a side of a triangle or ring; 0 if M4 holds.

@@ -24,8 +24,8 @@ inline std::uint64_t HashOf(std::uint64_t id) {
 template <typename Thing>
 class HashIndex {
  public:
-  /// Requires: `things` are sorted by hash and distinct. `bucket` is scratch. Both must outlive the
-  /// index.
+  /// Requires: `things` are sorted by hash, and their hashes are distinct. `bucket` is scratch.
+  /// Both must outlive the index.
   HashIndex(std::span<const Thing> things, std::vector<std::uint32_t>& bucket)
       : things_(things),
         bucket_(bucket),

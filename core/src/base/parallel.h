@@ -1,7 +1,7 @@
 // Runs the parts of a stage in parallel, in the caller's arena (partiemc/arena.h). Only this file
-// creates tasks. Each function returns when all work is done, and rethrows an exception of a body.
-// If the caller is cancelled (cancellation.h), the functions throw Cancelled before the next index
-// or range.
+// and parallel.cc create tasks. Each function returns when all work is done, and rethrows an
+// exception of a body. If the frame is cancelled (cancellation.h), the functions throw Cancelled
+// before the next index or range.
 #pragma once
 
 #include <algorithm>

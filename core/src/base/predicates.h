@@ -47,7 +47,7 @@ inline int Orientation(const Point& a, const Point& b, const Point& c) {
   const double bound = kErrorBound * magnitude;
   if (determinant > bound) return 1;
   if (-determinant > bound) return -1;
-  // A difference or product rounds to zero only if it is zero.
+  // In the domain, a difference or product rounds to zero only if its exact value is zero.
   if (magnitude == 0) return 0;
   return OrientationExact(a, b, c);
 }

@@ -29,7 +29,7 @@ double TileMargin(const Scale& scale) {
   return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
 }
 
-// Particles per block: their data stay in the nearest cache.
+// Particles per block, few enough that the data of a block stay in the nearest cache.
 constexpr std::size_t kBlockParticles = 256;
 
 // A direct-mapped cache of tile indices, addressed by the low bits of tile coordinates. A body of
@@ -56,8 +56,9 @@ class RecentHomes {
   std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
 };
 
-// First pass over a stretch: finds the home tile of each particle and counts. Returns false if a
-// particle is too far from the origin, or if there are more than `max_tiles` tiles.
+// First pass over a stretch: finds the home tile of each particle, and counts the particles of each
+// tile. Returns false if a particle is too far from the origin, or if there are more than
+// `max_tiles` tiles.
 template <typename Reader>
 bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
                std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {

@@ -57,7 +57,7 @@ class Probe {
         spacing_(scale.spacing),
         most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
 
-  // Whether the k-th sample of `tile` shows another spacing.
+  // Whether the k-th sample of `tile` contradicts the spacing.
   bool Contradicts(std::size_t tile, std::uint64_t k) {
     const auto particles = ParticlesOf(tile);
     if (static_cast<double>(particles.size()) > most_in_tile_) return true;

@@ -83,7 +83,7 @@ NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>&
 /// Index of an active cell. Requires: the cell is active.
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
 
-/// The next segment of the outline: it enters the neighbouring cell through the exit edge of
+/// The next segment of the outline, which enters the neighbouring cell through the exit edge of
 /// `segment`.
 std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
                           std::uint32_t segment);
@@ -95,7 +95,7 @@ inline Point CellOrigin(const TileDirectory& directory, const ActiveCell& cell) 
           static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
 }
 
-/// Distance of a crossing from the ends of its edge, in cells.
+/// Least distance of a crossing from the ends of its edge, in cells.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
 
 /// The crossing of the outline with `edge` of `cell`, by linear interpolation of F. Both cells of

@@ -14,7 +14,7 @@
 namespace partiemc {
 namespace {
 
-// The last pass that a tile has been through.
+// The last pass that has run over a tile.
 enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
 
 // Tiles per task: enough that most tiles have all neighbours in the same task.

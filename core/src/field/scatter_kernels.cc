@@ -21,8 +21,8 @@ using Lanes = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// The first node after `coordinate`. The offset makes it positive, so that truncation rounds down:
-// particles are at most a tile away from the tile, and kernels reach at most a tile.
+// The first node after `coordinate`. The offset makes the number positive, so that truncation
+// rounds down: particles are at most a tile away from the tile, and kernels reach at most a tile.
 HWY_INLINE int NodeAfter(float coordinate) {
   constexpr int kOffset = 2 * kTileSize;
   return static_cast<int>(coordinate + kOffset) - kOffset + 1;

@@ -1,4 +1,4 @@
-// The table of placements: what each requires of the stages.
+// The table of placements: what each placement requires of the stages.
 #pragma once
 
 #include <array>

@@ -7,7 +7,7 @@ namespace {
 
 // The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
 constexpr double kFourOverPi = 1.27323954473516268615;
-// Over space it integrates to 64 pi R^3 / 315.
+// Over space the kernel integrates to 64 pi R^3 / 315.
 constexpr double kSpaceNorm = 315.0 / 64 / 3.14159265358979323846;
 
 // The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 is at most

@@ -5,8 +5,8 @@
 
 namespace partiemc {
 
-/// Parameters, spacing and lattice as the stages use them. Lengths are in cells (lattice spacings)
-/// unless noted otherwise.
+/// Parameters, spacing and lattice in the form that the stages use. Lengths are in cells (lattice
+/// spacings) unless noted otherwise.
 struct Scale {
   double cell_size = 0;          ///< World units.
   bool is_slice = false;         ///< Particles fill space; volumes are cubic.

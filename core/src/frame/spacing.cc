@@ -16,7 +16,8 @@
 namespace partiemc {
 namespace {
 
-// Approximate size of the sample: its median is within a percent of the median of all.
+// Approximate size of the sample: the median of the sample is within a percent of the median of
+// all.
 constexpr std::size_t kSampleSize = 1 << 14;
 
 // A particle is spray if its nearest neighbour is farther away than this number of medians. Inside
@@ -113,7 +114,7 @@ void ForEachWithin(std::span<const Point> tree, const Point& point, int axis, do
   if (across >= -radius) ForEachWithin(tree.subspan(middle + 1), point, 1 - axis, radius, visit);
 }
 
-// The kernel sum at a point; 0 if particles do not surround it.
+// The kernel sum at a point; 0 if particles do not surround the point.
 double FilledWeight(std::span<const Point> tree, const Point& point, double radius) {
   const double inverse = 1 / radius;
   double weight = 0, moment_x = 0, moment_y = 0, spread = 0;  // In radii.

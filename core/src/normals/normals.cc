@@ -178,8 +178,8 @@ class NormalEstimation {
     StoreNormal(cell, plane);
   }
 
-  // Sets the weak normals of the ring with the segments [first, last). Requires: the others are
-  // set.
+  // Sets the weak normals of the ring with the segments [first, last). Requires: the reliable
+  // normals are set.
   void ReplaceWeakNormals(std::size_t first, std::size_t last) {
     const std::span<CellPlane> planes = planes_.subspan(first, last - first);
     const std::size_t count = planes.size();

@@ -98,7 +98,7 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
   });
 }
 
-// The signed area of a ring through its edge crossings, in cells.
+// The signed area of a ring through its edge crossings, in squared cells.
 double AreaOf(const RingTopology& rings, std::size_t ring) {
   const std::span<const Point> points =
       std::span(rings.entry_points)

@@ -145,8 +145,8 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_particle;
-  // Where the output of a tile begins, if all particles are needed. The output is prefetched while
-  // the particles are selected.
+  // Where the output of a tile would begin if all particles were needed. This range is prefetched
+  // while the particles are selected.
   std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
     const std::uint32_t count = bins.CountOf(tile);

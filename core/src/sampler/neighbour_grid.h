@@ -45,7 +45,7 @@ struct NeighbourGrid {
   static constexpr double kStep = 1.0 / (1 << kFractionBits);
 
   NeighbourGrid() = default;
-  /// For queries within `radius` cells, at most a tile.
+  /// For queries within `radius` cells. Requires: `radius` is at most the side of a tile.
   explicit NeighbourGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
 
   GridAxis columns, rows;

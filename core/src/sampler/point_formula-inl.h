@@ -76,8 +76,8 @@ class PointFormula {
     const double share = inverse_square_ / sum(kKernel);
     const double xx = sum(kKxx) * share, xy = sum(kKxy) * share, yy = sum(kKyy) * share;
     const double spread = LargerEigenvalue(xx, xy, yy);
-    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both are
-    // equal, any direction will do.
+    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both
+    // eigenvalues are equal, any direction is an eigenvector.
     const double gap = 2 * spread - (xx + yy);
     const double exx = gap > 0 ? (spread - yy) / gap : 0.5;
     const double exy = gap > 0 ? xy / gap : 0;

@@ -91,8 +91,8 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
   return absl::OkStatus();
 }
 
-/// Adds the bricks around the box of the particles of each brick. Returns false if there are more
-/// than `most`.
+/// Adds the bricks within `reach` of the box around the particles of each brick. Returns false if
+/// there are more than `most`.
 bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();
   bins.homes.assign(bins.bricks.bricks().begin(), bins.bricks.bricks().end());

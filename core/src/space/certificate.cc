@@ -32,7 +32,8 @@ Triangulations TriangulationsOf(int first, int last) {
   return all;
 }
 
-/// Triangulations by the number of corners: at most six, between the curves of an ambiguous face.
+/// All triangulations of a polygon with 3 to 6 corners. The part between the curves of an ambiguous
+/// face has six.
 const Triangulations& TriangulationsOf(int corners) {
   static const std::array<Triangulations, 7> all = [] {
     std::array<Triangulations, 7> table;

@@ -54,8 +54,8 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
 
-/// The same after vertices have moved from their certified positions. Vertices keep the number of
-/// their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
+/// Certifies again after vertices have moved from their certified positions. Vertices keep the
+/// number of their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);

@@ -57,7 +57,8 @@ struct SpaceCrossings {
   }
 };
 
-/// Deterministic, parallel over bricks: count, sum, fill. Cost: linear in nodes.
+/// Finds the crossed edges, the active cells and their loops. Deterministic, parallel over bricks:
+/// count, sum, fill. Cost: linear in nodes.
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings);
 

@@ -20,7 +20,8 @@ inline constexpr double kEdgeMargin = 1.0 / 4096;
 /// anchors.
 inline constexpr double kAnchorMargin = .12;
 
-/// The nearest point that is kAnchorMargin inside of the cell at `low`.
+/// The point nearest to `point` that is at least kAnchorMargin away from the faces of the cell at
+/// `low`.
 inline Vec3 ClampedToCell(const Vec3& point, const Vec3& low) {
   const auto clamp = [](double value, double from) {
     return std::clamp(value, from + kAnchorMargin, from + 1 - kAnchorMargin);

@@ -119,7 +119,7 @@ bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
   for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
     const BodyMeasure& measure = volumes.measures[body];
     const double wanted = bodies.bodies[body].volume * per_unit;
-    // No particle: the volume of the body is unknown.
+    // Without particles, the volume that the body should have is unknown.
     if (!(wanted > 0) || !(measure.area > 0)) continue;
     const double missing = wanted - measure.volume;
     if (std::abs(missing) <= step.tolerance * wanted) continue;

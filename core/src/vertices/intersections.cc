@@ -25,7 +25,7 @@ namespace {
 using Run = TouchingPairsBuffers::Run;
 using Block = TouchingPairsBuffers::Block;
 
-// Segments of a run. Longer runs have larger boxes, and more boxes overlap.
+// Number of segments of a run. Longer runs would have larger boxes, and more boxes would overlap.
 constexpr std::uint32_t kRunLength = 8;
 
 // Runs of a block.

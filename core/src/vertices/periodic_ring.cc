@@ -20,7 +20,7 @@ PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach) {
   };
   const auto limit =
       static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;
-  // Vertices needed after the last vertex, and before the first one.
+  // Numbers of vertices that windows need after the last vertex and before the first vertex.
   std::size_t after = 0;
   for (std::int64_t distance = length_after(count - 1); distance < limit; ++after) {
     distance += length_after(after % count);

@@ -95,7 +95,7 @@ struct PeriodicRing {
   }
 };
 
-/// The arrays of one short ring, for the stack, so that they stay in the cache.
+/// The arrays of one short ring, small enough for the stack, so that they stay in the cache.
 class ShortRing {
  public:
   static bool Holds(const PeriodicRingSize& size) {

@@ -39,8 +39,8 @@ struct VertexNormal {
 };
 
 /// Vertices of `virtual-plane`, ring by ring. Vertex 2 k is the edge vertex of segment k of the
-/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Lengths in cells, lattice
-/// coordinates of the world.
+/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Positions are in cells from the
+/// origin of the world.
 struct RingVertices {
   std::vector<Point> point;
   std::vector<Point> root;  ///< The anchor: with all vertices at their anchors, rings are simple.
