@@ -13,7 +13,7 @@ struct FrameSize {
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t block_tiles = 0;       ///< Tiles with such cells.
-  std::uint64_t attribute_values = 0;  ///< Per particle, and per vertex.
+  std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or vertex.
 };
 
 /// Bytes per item: measured over frames of all kinds, plus a margin because vectors grow by

@@ -115,8 +115,8 @@ class Interpolation {
     }
   }
 
-  // Sorts the particles of each wanted tile by bucket, once. A tile has the same range as in the
-  // bins.
+  // Sorts the particles of each wanted tile by bucket, once. The particles of a tile have the same
+  // range of indices as in the bins.
   void SortParticles() {
     scratch_.particles.resize(bins_.particles.size());
     scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());

@@ -22,8 +22,8 @@ constexpr std::size_t kCause = 3;
 // Limit of the particles that the check visits. In full tiles one sample visits two thousand.
 constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
 
-// If a tile has more particles per squared spacing, their real spacing is less than half of it, for
-// any arrangement.
+// If a tile has more particles per squared spacing, the spacing of the particles is less than half
+// the spacing in use, for any arrangement.
 constexpr double kMaxDensity = 4;
 
 // The k-th sample of a tile. The choice depends on the positions, not on their order.

@@ -39,8 +39,8 @@ struct Segment {
 
 /// Nodes and cells of a tile as bits.
 struct TileBits {
-  BitRows inside{};                                  ///< The node is inside.
-  BitRows active{};                                  ///< The cell has inside and outside corners.
+  BitRows inside{};                                  ///< Nodes that are inside.
+  BitRows active{};                                  ///< Cells with inside and outside corners.
   std::uint32_t first_cell = 0;                      ///< Index of the tile's first active cell.
   std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below.
 };

@@ -25,7 +25,7 @@ class CellsByRow {
 
  private:
   std::vector<std::uint32_t> cells_;
-  std::vector<std::uint32_t> wanted_;  // In one row of tiles, by tile.
+  std::vector<std::uint32_t> wanted_;  // Selected cells of one row of tiles.
 };
 
 template <typename IsWanted>

@@ -88,7 +88,7 @@ std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch) {
   if (ids.empty()) return std::nullopt;
   const std::uint64_t places = kMaxBitsPerId * ids.size();
-  std::uint64_t bits = 0;  // The union of the ids: an upper bound, cheaper than the maximum.
+  std::uint64_t bits = 0;  // Bitwise or of the ids: an upper bound, cheaper than the maximum.
   for (const std::uint64_t id : ids) bits |= id;
   std::uint64_t lowest = 0, highest = bits;
   if (bits >= places) {

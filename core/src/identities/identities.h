@@ -24,7 +24,7 @@ struct IdentityScratch {
   Scanlines rows;
   std::vector<std::uint32_t> number;             // By ring of the topology.
   std::vector<std::uint32_t> topology_ring;      // By number.
-  std::vector<std::uint32_t> ring_of_component;  // The number of its outer ring, or kNoRing.
+  std::vector<std::uint32_t> ring_of_component;  // By component: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;     // By number.
   std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;

@@ -26,7 +26,7 @@ struct RingSamples {
 
   // Scratch.
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.
-  std::vector<std::uint32_t> bucket;                      // Index of the last frame's samples.
+  std::vector<std::uint32_t> bucket;                      // HashIndex of the last samples.
   std::vector<std::uint64_t> known;                       // Bits of KnownHashes.
   std::vector<std::uint64_t> ring_limit, tile_limit;      // By number, by tile.
   struct Stretch {
@@ -41,7 +41,7 @@ struct SampleInput {
   const ParticleBins& bins;
   const Crossings& crossings;
   const Components& components;
-  std::span<const std::uint32_t> ring_of_component;  ///< The number of its outer ring, or kNoRing.
+  std::span<const std::uint32_t> ring_of_component;  ///< By component: its outer ring, or kNoRing.
   std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
 };
 

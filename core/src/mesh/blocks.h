@@ -27,7 +27,7 @@ struct AttributeSource {
   /// Interpolates all attributes to points in world units, interleaved. The result is valid until
   /// the next call.
   absl::FunctionRef<std::span<const AttributeValues>(std::span<const double>)> at_points;
-  double tolerance;  ///< A fraction of each attribute's range over the particles.
+  double tolerance;  ///< Largest error, a fraction of the attribute's range over the particles.
 };
 
 /// The blocks that cover the interior cells. Keeps its memory warm from frame to frame.

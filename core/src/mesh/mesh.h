@@ -44,7 +44,7 @@ struct MeshInput {
   const Rings& rings;
   const ReconstructionParameters& parameters;
   const Scale& scale;
-  const AttributeSource* attributes = nullptr;  ///< Not null if HasBlocks.
+  const AttributeSource* attributes = nullptr;  ///< Null unless the mesh has blocks.
 };
 
 /// Whether the mesh has blocks (blocks.h) if the frame has attributes.

@@ -30,7 +30,7 @@ class MonotonePieces {
   struct Piece {
     std::uint32_t top = kNoIndex;
     bool is_left_chain =
-        false;  ///< Whether the stack holds the left chain, if it has two vertices.
+        false;  ///< Whether the stack is on the left chain; one vertex alone is on both.
 
     bool IsEmpty() const { return top == kNoIndex; }
   };

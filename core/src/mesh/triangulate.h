@@ -73,7 +73,7 @@ class Triangulator {
   /// An edge that rises from the current point.
   struct RisingEdge {
     Point upper;
-    bool is_left;  // The left end of an interval; else the right end.
+    bool is_left;  // Whether the edge is the left end of an interval, not the right end.
   };
 
   /// A maximal part of the sweep line inside the region. An interval usually has one piece,

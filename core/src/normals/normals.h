@@ -20,11 +20,11 @@ namespace partiemc {
 /// mean at the cell's centre where vertices are particles (placement_traits.h). Results of float
 /// sums are stored as floats, because the planes of a frame do not fit into a cache.
 struct CellPlane {
-  ActiveCell cell;  ///< The cell of the segment, copied, as cells of a ring are not contiguous.
-  bool is_weak = false;                  ///< The gradient was too small; the normal is a fallback.
-  Point point;                           ///< In cells from the origin of the world.
-  Point entry, exit;                     ///< The segment's ends: linear crossings of lattice edges.
-  float value = 0;                       ///< F at the point.
+  ActiveCell cell;       ///< The cell of the segment; a copy, because a ring's cells are scattered.
+  bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
+  Point point;           ///< In cells from the origin of the world.
+  Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
+  float value = 0;       ///< F at the point.
   float gradient_x = 0, gradient_y = 0;  ///< Of F, or of phi if vertices are particles.
   double normal_x = 0, normal_y = 0;     ///< Unit normal, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.

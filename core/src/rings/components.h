@@ -60,7 +60,7 @@ class Components {
  private:
   // The particles of one tile, if they all belong to one component.
   struct TileShare {
-    std::uint32_t component;  // kNoComponent, or kSeveralComponents: not counted.
+    std::uint32_t component;  // With kNoComponent, kSeveralComponents nothing is counted.
     std::uint32_t count;
     double weight;
   };

@@ -21,8 +21,8 @@ struct RingTopology {
   std::vector<Point> entry_points;            ///< By segment: where it enters its cell.
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
-  std::vector<std::uint64_t> particle_count;  ///< Per ring: of its component; 0 for holes.
-  std::vector<double> particle_weight;        ///< Per ring: sum of their weights; 0 if uniform.
+  std::vector<std::uint64_t> particle_count;  ///< Per ring: particles of its component; 0: hole.
+  std::vector<double> particle_weight;        ///< Per ring: their summed weight; 0 if uniform.
   Components components;                      ///< Of inside nodes; each has one outer ring.
   std::vector<std::uint32_t> component_of_ring;
   std::vector<std::uint32_t> outer_ring;  ///< By component.
@@ -40,7 +40,7 @@ struct RingScratch {
   std::vector<std::uint32_t> next_segment;                   // kTaken if already in a ring.
   std::vector<std::uint8_t> visited;                         // By ring.
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
-  std::vector<double> area;                                  // By ring, in cells.
+  std::vector<double> area;                                  // By ring, in squared cells.
   Scanlines rows;
   std::vector<std::uint32_t> outer_rings;  // Each after the outer ring around it.
   std::vector<std::uint32_t> container;    // By outer ring: the outer ring around it, or kNoRing.

@@ -28,7 +28,7 @@ struct FieldSample {
   double spread = 0;                      ///< sigma
   double value = 0;                       ///< F (level_set_formula.h)
   double gradient_x = 0, gradient_y = 0;  ///< grad F, of the term that F equals.
-  bool has_support = false;               ///< Any particle is within the kernel radius.
+  bool has_support = false;               ///< A particle is within the kernel radius.
 };
 
 /// A point in cells relative to a tile; kNoTile if no particle is near.
@@ -175,7 +175,8 @@ void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> point
   const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
-  // The kernel of a particle that is nearer to the rim than the resolution of positions is 0.
+  // A particle nearer to the rim than half the resolution of positions has a kernel of 0, so it
+  // need not be found.
   const double reach = radius - NeighbourGrid::kStep / 2;
   const auto& [columns, rows] = grid_;
   const int first_column = columns.Along(low.x - reach) - columns.size();

@@ -13,7 +13,7 @@ namespace partiemc::space {
 struct SpaceField {
   /// F by brick, layer, row, column. Where `exact` is not set, only the sign of F is right.
   std::vector<std::array<float, kBrickNodes>> values;
-  std::vector<BrickBits> inside;  ///< F < 0.
+  std::vector<BrickBits> inside;  ///< The nodes with F < 0.
   std::vector<BrickBits> exact;
 
   /// F at a node that exists.

@@ -24,7 +24,7 @@ struct MeshInput {
   std::span<const Vec3> normals;    ///< By vertex, unit length.
 };
 
-using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertices of SpaceCrossings.
+using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertex numbers of SpaceCrossings.
 
 struct MeshScratch {
   std::vector<VertexTriangle> triangles;

@@ -16,7 +16,7 @@ namespace partiemc::space {
 /// to world coordinates cannot move a crossing to a node.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
 /// The least distance for anchors of vertices that move. Tetrahedra at a node then have room for
-/// the displacements: with .02, 2 % of the vertices of balls, tori and boxes had to return to
+/// the displacements: with .02, 2 % of the vertices of balls, tori and boxes had to return to their
 /// anchors.
 inline constexpr double kAnchorMargin = .12;
 

@@ -16,7 +16,7 @@ constexpr int kGentleRounds = 4;
 // round for every few points. Ordinary frames need none; hostile test frames need up to nine.
 constexpr int kMostRounds = 24;
 
-// If a round has more misplaced rings, all rings return. Hardly any frame has even one.
+// If a round has more misplaced rings than this, all rings return. Hardly any frame has even one.
 constexpr std::size_t kMostMisplaced = 100;
 
 // Marks both ends of a segment and the points before and after it.
