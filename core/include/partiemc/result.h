@@ -27,10 +27,11 @@ struct RingMeasures {
 };
 
 /// Closed polylines. Guarantees if KeepsGuarantees(placement) (core/METHOD.md, "Guarantees"):
-///   R1 every ring has at least 3 points, all finite and different; the last is not the first
-///   again; R2 rings are simple and do not touch each other; R3 the inside is on the left: outer
-///   rings counter-clockwise, holes clockwise; R4 each hole lies inside the outer ring that
-///   `outer_of` gives.
+///   R1 every ring has at least 3 points, all finite and different (closed, so the first point is
+///      not repeated at the end);
+///   R2 rings are simple and do not touch each other;
+///   R3 the inside is on the left: outer rings counter-clockwise, holes clockwise;
+///   R4 each hole lies inside the outer ring that `outer_of` gives.
 struct Rings {
   std::vector<double> points;                ///< x0, y0, x1, y1, ... in world units.
   std::vector<std::uint32_t> offsets = {0};  ///< Ring k has points [offsets[k], offsets[k + 1]).

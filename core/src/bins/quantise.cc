@@ -19,8 +19,7 @@ namespace {
 
 constexpr double kUnitsPerCell = 1 << kFractionBits;
 constexpr float kCellsPerUnit = 1.0f / (1 << kFractionBits);
-constexpr int kUnitShift =
-    kFractionBits + kTileShift;  // Units per side of a tile, as a power of 2.
+constexpr int kUnitShift = kFractionBits + kTileShift;  // A tile's side has 2^kUnitShift units.
 constexpr double kMaxUnits = (1 << 30) * kUnitsPerCell;
 
 // Adding kRound to a number below 2^51 rounds it to an integer in the lower bits of the sum,

@@ -33,8 +33,8 @@ void Store(Point point, double cell_size, double* target) {
   target[1] = point.y * cell_size;
 }
 
-// Writes the vertices of segment k to `target`. For all placements except `virtual-plane`
-// (PlaceRefinedRings).
+// Writes the vertices of segment k to `target`. PlaceRefinedRings does this for `virtual-plane`,
+// this function for the other placements.
 void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   const CellPlane& plane = input.planes[k];
   const double cell_size = input.scale.cell_size;
