@@ -36,10 +36,12 @@ struct Frame {
   /// in world units cubed. Empty: h^2, with a `slice` h^3.
   std::span<const float> volumes = {};
 
-  /// Distinct numbers that particles keep from frame to frame. Empty: none.
+  /// Distinct numbers that particles keep from frame to frame. Empty if the particles have no
+  /// numbers.
   std::span<const std::uint64_t> ids = {};
 
-  /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty: none.
+  /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty if the frame
+  /// has no velocities.
   std::span<const float> velocities = {};
 
   /// Quantities to interpolate to the vertices (Result::attributes). Attributes change no ring,

@@ -38,8 +38,8 @@ HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
   return hn::Or(hn::Or(below, above), hn::Set(d_bits, std::uint32_t{1} << 2 * kStride));
 }
 
-// A particle reaches a box of tiles. The bits of the box are the product of the bits along both
-// axes.
+// The tiles that a particle reaches form a box. The bits of the box are the product of the bits
+// along both axes.
 HWY_INLINE hn::Vec<Bits> BoxesOf(const BinnedParticle* particles, float reach) {
   hn::Vec<Lanes> x, y, source;
   hn::LoadInterleaved3(Lanes(), &particles->x, x, y, source);

@@ -19,7 +19,7 @@ class TileHalo {
   /// The tiles that the particles of a tile reach. Cost: linear.
   std::uint32_t Of(std::span<const BinnedParticle> particles) const;
 
-  /// Whether at most the eight neighbours can be reached.
+  /// Whether the particles of a tile reach at most its eight neighbours.
   bool AreNeighbours() const { return reach_ <= kTileSize; }
 
   /// Calls visit(tile) for each tile of a set.

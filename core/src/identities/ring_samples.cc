@@ -142,7 +142,8 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
   }
 }
 
-// The second pass: samples every ring that lacks samples again, from all its particles.
+// The second pass: where samples of a ring are missing, samples the ring again from all its
+// particles.
 void FillShortRings(const SampleInput& input, RingSamples& s) {
   bool any = false;
   for (std::size_t ring = 0; ring < s.ring_limit.size(); ++ring) {

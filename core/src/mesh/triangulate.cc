@@ -48,7 +48,8 @@ bool Triangulator::Visit(std::span<const SweepEvent> events) {
   Surroundings around;
   if (!Surround(vertex, *ending_edges, around)) return false;
 
-  // Directly left and right of the point, the region below and above must agree.
+  // The rising edges must fit: directly left of the point, and directly right of it, the places
+  // below and above are both inside the region, or both outside.
   const bool inside_on_left = around.left != kNoIndex;
   const bool inside_on_right = around.right != kNoIndex;
   if (rising_.empty()) {

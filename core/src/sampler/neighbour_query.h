@@ -7,7 +7,7 @@
 
 namespace partiemc {
 
-/// Vectors may read this many particles past the end of a row of buckets.
+/// Loads of vectors may read up to this many particles past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
 /// Points of one query, which share their particles: the points of four segments.

@@ -27,7 +27,8 @@ struct SpaceField {
 /// bricks. Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
 void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field);
 
-/// Evaluates F at `nodes` of each brick, unless F is exact there. Sides do not change.
+/// Evaluates F at `nodes` of each brick, unless F is exact there. Nodes stay inside or outside as
+/// before.
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field);
 

@@ -27,7 +27,8 @@ class RootFinder {
     sampler_.MoveTo(cell.brick, {{x, y, z}, {x + 1, y + 1, z + 1}});
   }
 
-  /// Takes one step, not out of the cell. The normal stays as it is if the gradient is weak.
+  /// Takes one step, which ends at the sides of the cell. If the gradient is weak, position and
+  /// normal stay as they are.
   void Step(Vec3& position, Vec3& normal) {
     const PointSample sample = sampler_.Sample(position - origin_);
     const double square = Dot(sample.gradient, sample.gradient);

@@ -41,16 +41,16 @@ class RingDepths {
     Point point;
     std::uint32_t index;  // Index of the point.
     std::uint32_t ring;
-    bool is_low;     // Whether it is a minimum.
-    bool is_lowest;  // Whether it is the lowest point of its ring.
+    bool is_low;     // Whether the point is a minimum.
+    bool is_lowest;  // Whether the point is the lowest of its ring.
   };
   // A rising piece of a ring, from a minimum to a maximum.
   struct Chain {
     std::uint32_t ring;
-    std::uint32_t at;           // Its last point below the sweep line.
+    std::uint32_t at;           // Last point of the chain below the sweep line.
     std::uint32_t first, last;  // The ring has the points [first, last).
-    bool is_forward;            // Whether it rises in the direction of the ring.
-    std::int32_t depth;         // Winding number of the region directly left of it.
+    bool is_forward;            // Whether the chain rises in the ring's direction.
+    std::int32_t depth;         // Winding number directly left of the chain.
   };
 
   struct Ring {
