@@ -14,8 +14,8 @@
 
 namespace partiemc {
 
-/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). The method has all of
-/// them.
+/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). By default, all steps
+/// are on.
 struct VirtualPlaneSteps {
   bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, besides the cell's.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.

@@ -16,11 +16,11 @@ namespace partiemc {
 /// points.
 absl::Status Validate(const Result& result);
 
-/// Checks the same, and M4 if `fill` guarantees it: each side has exactly two triangles, or one
-/// triangle and one segment of a ring.
+/// Checks R1-R4 and M1-M3 as above, and M4 if `fill` guarantees it: each side belongs to exactly
+/// two triangles, or to one triangle and one segment of a ring.
 absl::Status Validate(const Result& result, Fill fill);
 
-/// Counts the vertices inside a side of a triangle or ring; 0 if M4 holds.
+/// Counts the vertices that lie on a side of a triangle or ring between its ends; 0 if M4 holds.
 /// Requires: Validate(result).ok(). Cost: n log n in the points.
 std::size_t CountTJunctions(const Result& result);
 

@@ -101,8 +101,8 @@ inline void Scanlines::SetRings(const Crossings& crossings, std::span<const std:
 template <typename Visit>
 void Scanlines::ForEachEdge(const TileDirectory& directory, const Crossings& crossings,
                             Visit visit) {
-  // Every horizontal edge is the lower edge of one cell. The first segment of this cell runs
-  // through it.
+  // Every horizontal edge is the lower edge of one cell. If the edge is crossed, the first segment
+  // of this cell runs through the edge.
   const auto crosses_lower_edge = [](const ActiveCell& cell) {
     return ((cell.corners ^ cell.corners >> 1) & 1) != 0;
   };

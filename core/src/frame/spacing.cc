@@ -28,9 +28,9 @@ constexpr double kLonelyRatio = 4;
 // thinned particles need the third round.
 constexpr double kDensityRadius = 3;
 constexpr int kDensityRounds = 3;
-// A test point counts if particles surround it. Their weighted mean lies within kMaxImbalance radii
-// of the point. Their weighted mean square distance, in squared radii, lies between kMinSpread and
-// kMaxSpread; a filled disk has 0.2.
+// A test point counts if particles surround it: if the weighted mean of the particles lies within
+// kMaxImbalance radii of the point, and their weighted mean square distance, in squared radii, lies
+// between kMinSpread and kMaxSpread; a filled disk has 0.2.
 constexpr double kMaxImbalance = 0.15;
 constexpr double kMinSpread = 0.17;
 constexpr double kMaxSpread = 0.25;

@@ -24,7 +24,7 @@ struct RingsNow {
 /// A ring of the last frame and a ring of this frame that may continue it. Either both are outer
 /// rings or both are holes.
 struct RingRelation {
-  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number.
+  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number now.
   std::uint64_t nodes = 0;            ///< Shared nodes, counted or estimated from samples.
   std::uint32_t samples = 0;          ///< Samples of `before` that are in `now`.
   bool counts = false;                ///< Shares at least a quarter of the smaller ring's nodes.

@@ -119,7 +119,7 @@ class NormalEstimation {
     return input_.crossings.segments[input_.topology.segments[segment]].cell;
   }
 
-  // The previous normal of a cell, or nullptr.
+  // The normal of a cell in the last frame; nullptr if the cell had no normal.
   const CellNormal* PreviousOf(std::uint32_t cell) const {
     const std::uint32_t index = scratch_.previous[cell];
     return index == kNoIndex ? nullptr : &previous_[index];

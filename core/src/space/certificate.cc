@@ -46,7 +46,7 @@ const Triangulations& TriangulationsOf(int corners) {
 /// A cell beside a face.
 struct Side {
   std::array<int, 3> at{};          ///< Relative to the brick of the face.
-  std::uint32_t active = kNoIndex;  ///< Its index, if it is active.
+  std::uint32_t active = kNoIndex;  ///< Index among the active cells; kNoIndex if not active.
 };
 
 /// A face between two cells, with its split sides.
@@ -56,7 +56,9 @@ struct Face {
   Side low, high;
   /// Corners and vertices on crossed sides, counter-clockwise as seen from above.
   std::array<Vec3, 8> around;
-  std::array<std::uint32_t, 8> item;  ///< Vertex, or vertex count + node; kNoIndex if it stays.
+  /// For each point of `around`: its vertex, or the vertex count plus its moved node; kNoIndex for
+  /// a node that does not move.
+  std::array<std::uint32_t, 8> item;
   std::array<bool, 8> is_vertex;
   int count = 0;
   int crossed = 0;

@@ -20,8 +20,8 @@ void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   }
 }
 
-/// The origin of the sums of a body, in cells. It keeps the sums exact far from the origin of the
-/// world.
+/// The origin of the sums of a body, in cells: a node of the body, so that the sums lose no digits
+/// far from the origin of the world.
 Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
   const BrickPlace& at = body.lowest;
   return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};

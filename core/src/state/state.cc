@@ -167,7 +167,7 @@ absl::Status CheckContents(const State& state) {
   return status;
 }
 
-// Checks the checksum of all bytes before it, which is at the end. Requires: at least 8 bytes.
+// Checks the last 8 bytes: the checksum of all bytes before them. Requires: at least 8 bytes.
 absl::Status CheckSum(std::string_view bytes) {
   const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
   std::string_view tail = bytes.substr(body.size());
