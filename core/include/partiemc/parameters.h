@@ -137,8 +137,8 @@ struct ReconstructionParameters {
 
   static constexpr std::size_t kMaxSections = 16;
 
-  /// Further outlines of each frame (Result::sections), at most 16. Each costs as much as another
-  /// frame, except that the input is checked only once.
+  /// Further outlines of each frame (Result::sections), at most 16. Each section costs as much as
+  /// another frame, except that the input is checked only once.
   std::vector<Section> sections = {};
 
   friend bool operator==(const ReconstructionParameters&,

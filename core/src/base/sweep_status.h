@@ -10,9 +10,10 @@
 
 namespace partiemc {
 
-/// A directory of short blocks of identifiers. The order is not part of the class: the caller
-/// passes predicates and keeps the sequence sorted. Memory is allocated only when the length
-/// exceeds its earlier maximum. Not thread-safe.
+/// A sequence of identifiers that the caller keeps sorted: the class does not compare identifiers,
+/// and searches with the caller's predicates. A directory lists the short blocks that contain the
+/// identifiers. Memory is allocated only when the length exceeds its earlier maximum. Not
+/// thread-safe.
 class SweepStatus {
  public:
   /// A position of an element, or the end. Valid until the next change.

@@ -204,8 +204,8 @@ std::vector<std::uint32_t> ShellsAround(const Surface& surface) {
     containing.push_back(Containing(surface, columns, shell_of, shell));
   }
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
-    // Of the shells around a shell, the innermost lies in all others, so the most shells contain
-    // it.
+    // Of the shells around `shell`, the innermost is contained in the most shells, because it lies
+    // in all others.
     for (const std::uint32_t other : containing[shell]) {
       if (around[shell] == kNoShell ||
           containing[other].size() > containing[around[shell]].size()) {

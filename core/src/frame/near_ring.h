@@ -47,8 +47,9 @@ class NearRing {
   // noise.
   static constexpr double kMaxRatio = 1.6;
 
-  // Two offsets close the side between them only if the sine of their angle is at least this.
-  // Otherwise noise would close the open side of a particle at the straight edge of a lattice.
+  // An offset counts as left of another only if the sine of the angle between them is at least
+  // this. Otherwise, because of noise, a particle at the straight edge of a lattice would count as
+  // surrounded.
   static constexpr double kMinSine = 0.25;
 
   struct Offset {

@@ -16,8 +16,8 @@
 namespace partiemc {
 namespace {
 
-// Approximate size of the sample: the median of the sample is within a percent of the median of
-// all.
+// Approximate size of the sample: the median distance in the sample is within a percent of the
+// median distance of all particles.
 constexpr std::size_t kSampleSize = 1 << 14;
 
 // A particle is spray if its nearest neighbour is farther away than this number of medians. Inside

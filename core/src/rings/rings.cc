@@ -266,8 +266,8 @@ void FindContainers(const TileDirectory& directory, const Crossings& crossings,
 // Marks the components that are spray or lie inside spray. Returns their number.
 std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spacing,
                         const RingTopology& rings, RingScratch& scratch) {
-  // `outer_rings` has each ring after the ring around it, so backwards each sum is complete when it
-  // is added.
+  // `outer_rings` has each ring after the ring around it. In reverse order, the sum of each ring is
+  // therefore complete when it is added to the ring around.
   scratch.enclosed = rings.particle_count;
   for (std::size_t k = scratch.outer_rings.size(); k-- > 0;) {
     const std::uint32_t ring = scratch.outer_rings[k];
