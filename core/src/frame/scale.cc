@@ -32,7 +32,7 @@ constexpr double kSpreadSlope = 0.45;
 // Slope of f across a flat boundary, times R. This slope converts the density terms of F to
 // lengths.
 constexpr double kBoundarySlope = 1.164;
-// The same in space: the normalised kernel, integrated over a plane through its centre.
+// In space, this slope is the integral of the normalised kernel over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
 }  // namespace

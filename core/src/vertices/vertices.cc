@@ -168,7 +168,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   return RepairRings(placed.roots, scratch.repair, rings);
 }
 
-// Places the rings of the other placements, segment by segment.
+// Places the rings of all placements except `virtual-plane`, segment by segment.
 void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices& placed,
                 Rings& rings) {
   const RingTopology& topology = input.topology;
