@@ -14,7 +14,8 @@
 
 namespace partiemc {
 
-/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). All on is the method.
+/// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). By default, all steps
+/// are on.
 struct VirtualPlaneSteps {
   bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, besides the cell's.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
@@ -23,14 +24,14 @@ struct VirtualPlaneSteps {
   bool smoothing = true;      ///< Vertices smoothed along the ring, but not across corners.
   bool area = true;           ///< Match the particles' volumes where they are known.
 
-  /// One vertex per cell, one Newton step from the middle of its segment, and nothing else.
+  /// No step: one vertex per cell, placed by one Newton step from the middle of its segment.
   static constexpr VirtualPlaneSteps None() { return {false, false, false, false, false, false}; }
 
   friend bool operator==(const VirtualPlaneSteps&, const VirtualPlaneSteps&) = default;
 };
 
 /// The constants of `virtual-plane`. core/METHOD.md, "The default placement", gives the purpose,
-/// the reason and the effect of each. In spacings unless noted otherwise.
+/// the reason and the effect of each. Lengths are in spacings unless noted otherwise.
 struct VirtualPlaneConstants {
   // 1. Roots.
   double newton_step = 0.3;  ///< Longest Newton step, in cells.
@@ -51,8 +52,9 @@ struct VirtualPlaneConstants {
   double area_limit = 0.2;    ///< Largest offset.
   double area_change = 0.01;  ///< Largest change of the offset per frame.
 
-  /// Shorter rings stay at their roots, as windows along them would overlap their own ends. Their
-  /// components do not count for the area.
+  /// Length of the shortest ring with windows, in spacings. A window along a shorter ring would
+  /// overlap itself, so the vertices of shorter rings stay at their roots. Components whose outer
+  /// ring is shorter do not count for the area.
   double ShortestRing() const {
     return 2 * std::max({normal_reach, bilateral_reach, curvature_reach, smoothing_reach});
   }
@@ -84,15 +86,16 @@ struct NamedConstant {
 std::span<const NamedStep> AllSteps();
 std::span<const NamedConstant> AllConstants();
 
-/// Reconstructor::Create for a variant of `virtual-plane`; other placements ignore it.
+/// Like Reconstructor::Create, for a variant of `virtual-plane`; other placements ignore `variant`.
 /// Requires: constants are positive and finite. Errors: as Reconstructor::Create.
 absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& parameters,
                                             const VirtualPlaneVariant& variant,
                                             const FrameLimits& limits = {});
 
-/// `variant` without the steps that `parameters` rule out. A section of a body in space has no area
-/// to match, no curvature across its plane and a slanted outermost layer. The vertices of an
-/// isoline stay on it.
+/// Returns `variant` without the steps that `parameters` rule out. A slice has no known area, its
+/// rings do not show how the body bends across the plane, and the outermost layer leans there. The
+/// steps area, curvature and support are therefore off. For an isovalue, smoothing is off, too, so
+/// that the vertices stay on the isoline.
 VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
                                VirtualPlaneVariant variant);
 

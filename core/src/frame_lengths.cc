@@ -15,17 +15,17 @@
 namespace partiemc {
 namespace {
 
-// A spacing that is estimated in a later frame is clamped to these limits, in cells of the existing
-// lattice, so that a kernel spans a sensible number of cells.
+// With SpacingRule::kEveryFrame, the estimate of a later frame is clamped to these limits, in cells
+// of the existing lattice, so that a kernel spans a sensible number of cells.
 constexpr double kMinSpacingInCells = 0.25;
 constexpr double kMaxSpacingInCells = 4;
 
-// Volumes of one frame may differ from h^2 by this factor. A smaller particle would decide the
-// guard of the whole frame, and float sums would lose the others.
+// Volumes of one frame may differ from h^2 by this factor. A smaller particle would determine the
+// guard term of F for the whole frame. Beside a larger particle, float sums would lose the others.
 constexpr double kMaxVolumeRatio = 1e6;
 
-// Volumes are doubtful if more than half of them are above this times h^2, or below its inverse.
-// Disks of diameter h have 0.79 h^2, hexagonal packing 0.87 h^2.
+// Volumes are doubtful if more than half of them are above this factor times h^2, or more than half
+// below h^2 divided by it. Disks of diameter h have 0.79 h^2, hexagonal packing 0.87 h^2.
 constexpr double kDoubtfulVolumeRatio = 2;
 
 // The side of a square with the median volume.
@@ -36,8 +36,8 @@ double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scr
   return std::sqrt(*middle);
 }
 
-// The spacing that the particles of a frame show; empty without an estimate. If the particles do
-// not agree, the volumes give a better estimate than the distances.
+// The spacing that the particles of a frame show; empty if there is no estimate. If the particles
+// do not agree on a spacing, the volumes give a better estimate than the distances.
 absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(const Frame& frame, Plane plane,
                                                           SpacingScratch& scratch) {
   std::optional<SpacingEstimate> own = EstimateSpacing(frame, plane, scratch);

@@ -1,4 +1,4 @@
-// Decides the spacing and the lattice of a frame, and finds the doubts about them.
+// Determines the spacing and the lattice of a frame, and finds the doubts about them.
 #pragma once
 
 #include <optional>
@@ -15,25 +15,27 @@
 
 namespace partiemc {
 
-/// In world units.
+/// Spacing and cell size of a frame, in world units.
 struct Lengths {
   double spacing, cell_size;
-  bool is_provisional;  ///< No spacing is given or agreed on so far.
+  bool is_provisional;  ///< No spacing is given, and no frame so far agreed on one.
 };
 
-/// Returns the lengths of a checked frame: from the parameters, else the state, else the particles.
-/// Empty if nothing gives even an estimate. Errors: INVALID_ARGUMENT if the agreed spacing exceeds
-/// its range.
+/// Returns the lengths of a checked frame. They come from the parameters, else from the state, else
+/// from the particles. Empty if the particles do not even give an estimate. Errors:
+/// INVALID_ARGUMENT if the spacing on which the particles agree is out of range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
 
-/// Returns the smallest volume of the frame, or `usual` (h^2, of a slice h^3) if particles have
-/// none. Adds the doubts about volumes. Errors: INVALID_ARGUMENT for a volume too far from `usual`.
+/// Returns the smallest volume of the frame, or `usual` if the particles have no volumes. `usual`
+/// is h^2, of a slice h^3. Adds the doubts about volumes. Errors: INVALID_ARGUMENT for a volume too
+/// far from `usual`.
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
-/// Adds the doubts about spacing and resolution. A slab has no doubts about the spacing, as it does
-/// not show it. Errors: as CheckResolution (resolution.h), except if lengths are provisional.
+/// Adds the doubts about spacing and resolution. A slab gets no doubt about the spacing, because
+/// its particles, seen from above the plane, do not show the spacing. Errors: as CheckResolution
+/// (resolution.h), except if lengths are provisional.
 absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
                           const Scale& scale, const ParticleBins& bins, Doubts& doubts);
 

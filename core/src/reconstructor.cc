@@ -38,14 +38,15 @@ auto InStage(StageObserver* observer, Stage stage, Run run) {
   return run();
 }
 
-// Empties a result; rings and mesh keep their buffers.
+// Empties a result, but keeps the buffers of rings and mesh.
 void MakeEmpty(Result& result) {
   result.Clear();
   result.attributes.clear();
   result.sections.clear();
 }
 
-// An outline without points has its attributes, too.
+// Sets the names and component counts of attributes, so that an outline without points lists them,
+// too.
 void Name(std::span<const Attribute> attributes, std::vector<AttributeValues>& values) {
   values.resize(attributes.size());
   for (std::size_t k = 0; k < attributes.size(); ++k) {
@@ -61,7 +62,7 @@ void Prepare(std::span<const Attribute> attributes, std::size_t sections, Result
   for (Result& section : result.sections) Name(attributes, section.attributes);
 }
 
-// The unresolved parameters of a section.
+// The parameters of a section, not yet resolved.
 ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const Section& section) {
   parameters.sections.clear();
   if (section.slice) parameters.slice = section.slice;
@@ -69,12 +70,14 @@ ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const
   return parameters;
 }
 
-// Reserves memory for the outlines of a frame, one after another. Earlier outlines keep theirs.
+// Reserves memory for the outlines of a frame, one after another. The memory of earlier outlines
+// stays reserved.
 class OutlineMemory {
  public:
   explicit OutlineMemory(MemoryGuard* guard) : guard_(guard) {}
 
-  // RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier ones.
+  // Returns RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier
+  // ones.
   absl::Status Reserve(const FrameSize& size) {
     last_ = WorkspaceBytes(size);
     const std::uint64_t bytes = done_ + last_;
@@ -107,7 +110,8 @@ void Summarise(const Workspace::Buffers& b, Result& result) {
   }
 }
 
-// Removes the identities of a frame with provisional lengths, which leaves no state.
+// Removes the identities from the rings of a frame with provisional lengths: such a frame leaves no
+// state, so the next frame could not continue them.
 void ClearIdentities(Rings& rings) {
   for (RingMeasures& measures : rings.measures) measures.identity = 0;
   rings.parents.clear();
@@ -147,9 +151,9 @@ struct OutlineTask {
   bool is_first;  // The first outline checks the frame.
 };
 
-// Stage 1 of a frame that CheckFrame has passed. Sets `seen` to the particles that the later stages
-// use: the frame, or the slab around a slice. `lengths` stays empty without any estimate. Errors:
-// see Reconstruct.
+// Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
+// use: the frame, or the slab around a slice. `lengths` stays empty if the particles give no
+// estimate of the spacing. Errors: see Reconstruct.
 absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
                            const Frame& frame, const State& state, Workspace::Buffers& b,
                            Frame& seen, std::optional<Lengths>& lengths, Scale& scale,
@@ -194,8 +198,8 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// Runs the stages from normals to mesh. Errors: INTERNAL for a bug in RepairRings or BuildMesh,
-// whose comments explain why no input should cause it.
+// Runs the stages from normals to mesh. Errors: INTERNAL if RepairRings or BuildMesh fails, which
+// is a bug; their comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
                          Workspace::Buffers& b, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
@@ -287,7 +291,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
   return absl::OkStatus();
 }
 
-// Commits the new state; swaps buffers with `next`.
+// Commits the new state of one outline. Buffers are swapped, so that both states keep their memory.
 void CommitState(NextState& next, State& state) {
   if (!next.is_kept) return;
   state.cell_size = next.state.cell_size;
@@ -335,7 +339,7 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);
   } catch (...) {
-    // The buffers may be in any state.
+    // The exception may have left the buffers in any state.
     workspace = Workspace();
     MakeEmpty(result);
     try {

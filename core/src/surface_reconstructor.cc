@@ -45,7 +45,8 @@ struct SurfaceWorkspace::Buffers {
 
 namespace {
 
-/// The factor of the reference radius (core/SURFACES.md, "Calibration").
+/// The factor by which the calibrated radius of a slice is multiplied (core/SURFACES.md,
+/// "Calibration").
 double CalibrationOf(SurfacePlacement placement) {
   switch (placement) {
     case SurfacePlacement::kMarchingCubes:
@@ -57,7 +58,8 @@ double CalibrationOf(SurfacePlacement placement) {
   return 1;
 }
 
-/// The parameters as the stages of a slice take them: lengths and weights in space.
+/// The parameters in the form that the stages require: as for a slice, so that lengths and weights
+/// are in space.
 ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space;
   in_space.spacing = parameters.spacing;
@@ -84,10 +86,11 @@ double LightestVolume(const Frame& frame, double spacing) {
   return lightest;
 }
 
-// Smaller cavities are dents of the level set, not voids of the fluid (core/METHOD.md, "Cleaning").
+// Cleaning fills cavities below this volume, in cubed spacings: they are dents of the level set,
+// not voids of the fluid (core/METHOD.md, "Cleaning").
 constexpr double kMinCavityParticles = 2;
 
-/// Finds the bodies. Drops the cavities and bodies that `parameters` exclude.
+/// Finds the bodies, and drops cavities and bodies as `parameters` require.
 SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& parameters,
                                   SurfaceWorkspace::Buffers& b) {
   SurfaceStatistics statistics;
@@ -112,7 +115,8 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
   return statistics;
 }
 
-/// Triangles between the crossings of the edges. Leaves positions in world units.
+/// Places vertices on the crossed edges and connects them by triangles. Positions are in world
+/// units afterwards.
 void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
@@ -121,7 +125,9 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
 }
 
-// The certificate and the cuts of the quads change the volumes of small bodies. In spacings.
+// The certificate and the cuts of the quads change the volumes of small bodies, so volumes are
+// corrected again afterwards: at most kVolumeRounds times, if they are wrong by more than the
+// tolerance. kVolumeLimit is in spacings.
 constexpr int kVolumeRounds = 4;
 constexpr double kVolumeTolerance = .01;
 constexpr double kVolumeLimit = .4;
@@ -132,7 +138,8 @@ void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
   }
 }
 
-/// Moves the vertices of bodies whose triangles miss the volume of their particles. World units.
+/// Moves the vertices of the bodies whose triangles do not enclose the volume of their particles.
+/// Positions are in world units. Returns whether any vertex moved.
 bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
   space::BodyVolumes& volumes = b.virtual_plane.volumes;
   space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
@@ -144,8 +151,8 @@ bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
   return has_moved;
 }
 
-/// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
-/// positions in world units.
+/// Places vertices away from their anchors and connects them by quads that the certificate accepts.
+/// The certificate checks the final coordinates, so positions are in world units.
 absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
                                 SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;

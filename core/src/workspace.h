@@ -1,4 +1,4 @@
-// The buffers of all stages. They are reused from frame to frame.
+// The buffers of all stages, reused from frame to frame.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@
 
 namespace partiemc {
 
-// The next state of an outline, committed when all outlines of the frame are done.
+// The next state of an outline. It is committed only when all outlines of the frame are done.
 struct NextState {
-  bool is_kept = false;  // False: the stream keeps its state.
+  bool is_kept = false;  // False: the stream keeps its old state.
   State state;
 };
 

@@ -13,10 +13,10 @@ struct FrameSize {
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t block_tiles = 0;       ///< Tiles with such cells.
-  std::uint64_t attribute_values = 0;  ///< Per particle, and per vertex.
+  std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or vertex.
 };
 
-/// Bytes per item: measured over frames of all kinds, plus a margin for vectors that grow by
+/// Bytes per item: measured over frames of all kinds, plus a margin because vectors grow by
 /// doubling. Measured: 45 bytes per particle of a compact body, 7 kB per nearly empty tile, 500 to
 /// 900 bytes per segment (with or without ids), 66 bytes per grid cell.
 inline constexpr std::uint64_t kBytesPerParticle = 60;
@@ -24,27 +24,28 @@ inline constexpr std::uint64_t kBytesPerTile = 10'000;
 inline constexpr std::uint64_t kBytesPerSegment = 1'000;
 inline constexpr std::uint64_t kBytesPerGridCell = 80;
 
-/// Additional bytes if particles carry attributes: to sort them, and per value at a vertex.
+/// Additional bytes if the frame has attributes: to sort the particles, and per value at a vertex.
 inline constexpr std::uint64_t kBytesPerCarryingParticle = 16;
 inline constexpr std::uint64_t kBytesPerCarryingTile = 4'200;
 inline constexpr std::uint64_t kBytesPerValueOfSegment = 24;
 inline constexpr std::uint64_t kBytesPerValueOfGridCell = 8;
 
-/// A block of one cell has the bytes of a grid cell, and a node with its values.
+/// A block of one cell takes the bytes of a grid cell, of a node, and of the node's values.
 inline constexpr std::uint64_t kBytesPerBlockCell = kBytesPerGridCell + 24;
 inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
 
-/// Sums over the particles in the windows of a tile with interior cells, if the mesh has blocks. A
-/// vector of two components has three values.
+/// If the mesh has blocks: sums over the particles in the windows of a tile with interior cells. A
+/// vector of two components counts as three values.
 inline constexpr std::uint64_t kBytesPerBlockTile = 2'048;
 inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
 
-/// For any frame.
+/// Bytes that any frame takes.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
-/// Upper bound of the memory of a new Workspace, Result and State after frames of this size. At
-/// most 2.2 times the actual memory, if that exceeds a few MB (tests/core/allocation_test.cc); at
-/// most 4 times if attributes are smooth, whose meshes are small.
+/// Upper bound of the memory of a new Workspace, Result and State after frames of this size. The
+/// bound is at most 2.2 times the actual memory, if that exceeds a few MB
+/// (tests/core/allocation_test.cc); at most 4 times if attributes are smooth, because their meshes
+/// are small.
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +

@@ -1,5 +1,5 @@
-// Doubts: suspicious but legal input, reported with a result. The contradicting values cannot all
-// be right; the caller decides which one is wrong.
+// Doubts: suspicious but legal input, reported with a result. If two values contradict each other,
+// the caller has to find out which one is wrong.
 #pragma once
 
 #include <array>
@@ -10,14 +10,17 @@
 namespace partiemc {
 
 enum class Doubt : std::uint8_t {
-  /// No spacing is given and the particles do not agree on one yet. Lengths are estimates for this
-  /// frame only, nothing is kept for the next frame, and rings have no identities.
+  /// No spacing is given, and the particles do not agree on a spacing yet. Spacing and lattice are
+  /// estimates for this frame only, the state stays as it was, and rings have no identities.
   kSpacingProvisional,
-  /// The particles of this frame have a spacing more than twice, or less than half, the one in use.
+  /// The particles of this frame show a spacing of more than twice, or less than half, the spacing
+  /// in use (core/METHOD.md, "How the paper is read", 10).
   kSpacingContradicted,
-  /// More than half of the volumes are above twice, or below half, the squared spacing.
+  /// More than half of the volumes are above twice the squared spacing, or more than half are below
+  /// half of it. For a slice, the cubed spacing counts.
   kVolumesContradictSpacing,
-  /// Positions are float32, with steps above 1/16 of the spacing at these coordinates.
+  /// Positions are float32, and the step to the next float at these coordinates exceeds 1/16 of the
+  /// spacing.
   kPositionsCoarse,
 };
 
@@ -28,7 +31,7 @@ inline constexpr std::array kAllDoubts = {Doubt::kSpacingProvisional, Doubt::kSp
 /// "spacing-provisional", "spacing-contradicted", ...
 std::string_view Name(Doubt doubt);
 
-/// One line for the user: the meaning and the remedy.
+/// One line for the user: what the doubt means, and how to resolve it.
 std::string_view Explanation(Doubt doubt);
 
 /// A set of doubts.

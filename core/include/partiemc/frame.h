@@ -13,14 +13,14 @@
 
 namespace partiemc {
 
-/// A quantity that particles carry, such as pressure.
+/// A quantity of the particles, such as pressure.
 struct Attribute {
   std::string_view name;          ///< Unique in the frame; 1 to 64 bytes of printable ASCII.
   int components = 1;             ///< 1 to 3.
   std::span<const float> values;  ///< `components` per particle, interleaved. Finite.
 };
 
-/// Limit of the components of all attributes of a frame together.
+/// Most components that all attributes of a frame may have together.
 inline constexpr std::size_t kMostAttributeValues = 32;
 
 /// The particles at one time. All arrays have the same order. The arrays must outlive the call.
@@ -36,19 +36,23 @@ struct Frame {
   /// in world units cubed. Empty: h^2, with a `slice` h^3.
   std::span<const float> volumes = {};
 
-  /// Distinct numbers that particles keep from frame to frame. Empty: none.
+  /// Distinct numbers that particles keep from frame to frame. Empty if the particles have no
+  /// numbers.
   std::span<const std::uint64_t> ids = {};
 
-  /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty: none.
+  /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty if the frame
+  /// has no velocities.
   std::span<const float> velocities = {};
 
-  /// Quantities to interpolate to the vertices (Result::attributes). They change nothing else.
+  /// Quantities to interpolate to the vertices (Result::attributes). Attributes change no ring,
+  /// only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
-  /// Simulation time. Velocities are used only if it increases from frame to frame.
+  /// Simulation time. Velocities are used only if the time increases from frame to frame.
   double time = 0;
 
-  // Ids, velocities and time decide the identities of rings (core/IDENTITIES.md), nothing else.
+  // Ids, velocities and time influence only the identities and parents of rings
+  // (core/IDENTITIES.md).
 
   std::size_t ParticleCount() const {
     return std::visit([](auto view) { return view.size(); }, positions) /
@@ -60,8 +64,8 @@ struct Frame {
 inline constexpr std::string_view kVelocityAttribute = "velocity";
 
 /// Sets `chosen` to views of the attributes with these names, in the order of the names;
-/// kVelocityAttribute selects Frame::velocities if the frame has them. In a frame without particles
-/// every name exists.
+/// kVelocityAttribute selects Frame::velocities if the frame has them. A frame without particles
+/// accepts every name.
 /// Errors: INVALID_ARGUMENT with reason NO_SUCH_ATTRIBUTE; `chosen` is then incomplete.
 absl::Status ChooseAttributes(const Frame& frame, std::span<const std::string> names,
                               std::vector<Attribute>& chosen);
@@ -72,8 +76,8 @@ struct FrameLimits {
   static constexpr std::size_t kMostParticles = 1'000'000'000, kMostTiles = 1'000'000;
 
   std::size_t max_particles = 16'000'000;
-  /// Tiles of 32 x 32 lattice nodes that particles reach. A tile costs about 10 kB of memory, and 1
-  /// kB more for each of its cells that the outline crosses.
+  /// Limit of tiles. A tile is a square of 32 x 32 lattice nodes; tiles exist only near particles.
+  /// A tile costs about 10 kB of memory, and each of its cells that the outline crosses 1 kB more.
   std::size_t max_tiles = 131'072;
 };
 

@@ -12,50 +12,50 @@
 
 namespace partiemc {
 
+/// Kinds of measurements. Below, "Numbers" are the arguments (Gauge::numbers); words in backquotes
+/// are the measured values, except `reach`.
 enum class GaugeKind {
-  /// Free surface above a position x: `highest`, `lowest` crossing of the outline with the vertical
-  /// line at x, number of `crossings`. Numbers: x.
+  /// Height of the free surface at a position x: the `highest` and the `lowest` crossing of the
+  /// outline with the vertical line at x, and the number of `crossings`. Numbers: x.
   kHeight,
-  /// Farthest point of the outline along a direction: its `position` (distance from the origin
-  /// along
-  /// the direction), `x`, `y`. Numbers: dx, dy.
+  /// Farthest point of the outline in a direction: its `position` (the distance from the origin
+  /// along the direction) and its coordinates `x`, `y`. Numbers: dx, dy.
   kFront,
-  /// `length` of a line segment that lies inside the outline. Numbers: x0, y0, x1, y1.
+  /// The `length` of the part of a line segment that lies inside the outline. Numbers: x0, y0, x1,
+  /// y1 (the ends of the segment).
   kWetted,
-  /// `area` and centroid (`x`, `y`) of the inside of the outline in a box. Numbers: min_x, min_y,
-  /// max_x, max_y.
+  /// `area` and centroid (`x`, `y`) of the part of a box that lies inside the outline. Numbers:
+  /// min_x, min_y, max_x, max_y.
   kBox,
-  /// Contact of the largest body with a straight wall through (x, y) with the direction (dx, dy)
-  /// and
-  /// the body on its left: `start_angle`, `end_angle` in degrees, measured inside the body, and
-  /// `start`, `end`, the coordinates of both contact points along the wall from (x, y). A circle is
-  /// fitted to the outline within `reach` of each contact point, without the last spacing before
-  /// the
-  /// wall, where outlines are rounded. Numbers: x, y, dx, dy, reach.
+  /// Contact angles of the largest body on a straight wall. The wall runs through (x, y) in the
+  /// direction (dx, dy), with the body on its left. `start_angle` and `end_angle` are measured
+  /// inside the body, in degrees; `start` and `end` are the coordinates of both contact points
+  /// along the wall, measured from (x, y). A circle is fitted to the outline within `reach` of each
+  /// contact point. The fit leaves out the last spacing before the wall, because outlines are
+  /// rounded there. Numbers: x, y, dx, dy, reach.
   kContact,
-  /// Angle of repose of the largest body: `left_angle`, `right_angle` in degrees. Straight lines
-  /// are
-  /// fitted to its upper surface left and right of the peak, between 20 and 80 % of its height.
-  /// Numbers: none.
+  /// Angle of repose of the largest body: the slopes of its left and right flank, `left_angle` and
+  /// `right_angle`, in degrees. A straight line is fitted to the upper surface on each side of the
+  /// peak, between 20 and 80 % of the body's height. Numbers: none.
   kRepose,
-  /// Packing of particles that are discs in a box: `fraction`, the `discs` area in the box (the sum
-  /// of the discs, so overlaps count twice) divided by the `area` of the inside of the outline in
-  /// the box. Requires Discs. Numbers: min_x, min_y, max_x, max_y.
+  /// Packing of discs in a box: `discs`, the summed area of the discs in the box (overlaps count
+  /// twice); `area`, the area inside the outline in the box; `fraction`, `discs` divided by `area`.
+  /// Requires Discs. Numbers: min_x, min_y, max_x, max_y.
   kPacking,
 };
 
-/// A measurement of an outline. Lengths are in world units, heights and upwards along y (in a
-/// section, along the second axis of the plane).
+/// A measurement to make. Lengths are in world units. Heights are measured along y; in a section,
+/// along the second axis of its plane.
 struct Gauge {
   std::string name;  ///< Letters, digits and "_", at most 40.
   GaugeKind kind = GaugeKind::kHeight;
-  std::vector<double> numbers;  ///< As the kind requires.
+  std::vector<double> numbers;  ///< Arguments, in the order of GaugeTraits::numbers.
 };
 
-/// The particles of the frame as discs. Empty: not known.
+/// The particles of the frame as discs, for GaugeKind::kPacking. Empty if unknown.
 struct Discs {
   std::span<const double> centres;  ///< x0, y0, x1, y1, ...
-  std::span<const float> areas;     ///< Of each disc, 0 or more; as Frame::volumes.
+  std::span<const float> areas;     ///< Area of each disc, 0 or more, as in Frame::volumes.
 };
 
 /// Description of a kind: its name, the names of its numbers, and the names of its values.
@@ -73,19 +73,20 @@ const GaugeTraits& TraitsOf(GaugeKind kind);
 /// that is not finite or out of range.
 absl::Status Check(const Gauge& gauge);
 
-/// Parses "NAME=KIND:NUMBER,NUMBER,...": "level=height:0.5", "slope=repose".
-/// Errors: as Check; INVALID_ARGUMENT for any other text.
+/// Parses "NAME=KIND:NUMBER,NUMBER,...", such as "level=height:0.5" or "slope=repose". Errors: as
+/// Check; INVALID_ARGUMENT for a text of another form.
 absl::StatusOr<Gauge> ParseGauge(std::string_view text);
 
-/// The values of a gauge, in the order of its traits; NaN where the outline has no such point, or
-/// where a gauge requires discs and `discs` has not one area for each centre.
-/// Intersections are computed for each segment, so the only error is that of the outline itself.
-/// Requires: Check(gauge).ok(). Cost: linear in the points, times log n for `height` and `wetted`;
-/// 200 times for `repose`; also linear in the discs for `packing`.
+/// The values of a gauge, in the order of GaugeTraits::values. A value is NaN if the outline has no
+/// such point, or if the gauge requires discs and `discs` is empty or has unequal numbers of
+/// centres and areas. Intersections are computed for each segment, so the only error is the error
+/// of the outline itself.
+/// Requires: Check(gauge).ok(). Cost: linear in the points of the rings. `height` and `wetted` also
+/// sort the crossings, `repose` visits the points 200 times, and `packing` visits every disc.
 std::vector<double> Measure(const Gauge& gauge, const Result& result, const Discs& discs = {});
 
-/// The heights y at which the outline crosses the vertical line at `x`, ascending. The inside is
-/// between heights 0 and 1, 2 and 3, and so on.
+/// The heights y at which the outline crosses the vertical line at `x`, ascending. The inside of
+/// the outline lies between the heights with indices 0 and 1, 2 and 3, and so on.
 std::vector<double> HeightsAt(const Rings& rings, double x);
 
 }  // namespace partiemc

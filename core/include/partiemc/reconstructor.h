@@ -16,11 +16,12 @@
 
 namespace partiemc {
 
-/// Raised whenever the same frames and parameters give other digests.
+/// Version of the method. Each change that gives other digests for the same frames and parameters
+/// increments it.
 inline constexpr std::uint32_t kMethodVersion = 11;
 
-/// Reusable buffers, one set for each thread that calls Reconstruct. Any workspace serves any
-/// reconstructor; its history never changes a result.
+/// Reusable buffers, one set for each thread that calls Reconstruct. A workspace can be used with
+/// any reconstructor. Earlier frames in the same workspace never change a result.
 class Workspace {
  public:
   Workspace();
@@ -35,14 +36,14 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// Admits the memory of a frame.
+/// Decides whether a frame may use the memory that it requires.
 class MemoryGuard {
  public:
   virtual ~MemoryGuard() = default;
 
-  /// Returns whether workspace and result may grow to `bytes` in total. Called on the thread of
-  /// Reconstruct twice per outline, before the memory is allocated: first with a lower bound from
-  /// the tiles, then with the full estimate.
+  /// Returns whether workspace and result may grow to `bytes` in total. Reconstruct calls this on
+  /// its caller's thread twice per outline, before it allocates the memory: first with a lower
+  /// bound from the number of tiles, then, when the outline is known, with the full estimate.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
@@ -50,16 +51,17 @@ class MemoryGuard {
 struct FrameControl {
   StageObserver* observer = nullptr;
   MemoryGuard* memory = nullptr;
-  /// Any thread may set it, once. Tasks check it between tiles, rings and particles.
+  /// Any thread may set the flag, and nothing resets it. Tasks check it between tiles, rings and
+  /// particles.
   const std::atomic<bool>* cancelled = nullptr;
 };
 
 struct VirtualPlaneVariant;  // core/internal/research.h
 
-/// Runs the stages of one stream's method. Immutable; may be shared between threads.
+/// Reconstructs frames with the parameters of one stream. Immutable; may be shared between threads.
 class Reconstructor {
  public:
-  /// Errors: INVALID_ARGUMENT (Validate of the parameters and of the limits).
+  /// Errors: INVALID_ARGUMENT, as Validate of the parameters and Validate of the limits.
   static absl::StatusOr<Reconstructor> Create(const ReconstructionParameters& parameters,
                                               const FrameLimits& limits = {});
 
@@ -70,7 +72,7 @@ class Reconstructor {
   ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, particles
   ///   outside one plane. RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory`
   ///   refused the memory. OUT_OF_RANGE: float32 too coarse for the spacing.
-  /// Errors without one: CANCELLED by `control.cancelled`; INTERNAL, a bug.
+  /// Errors without a Violation: CANCELLED, if `control.cancelled` was set; INTERNAL, a bug.
   /// On an error or exception (std::bad_alloc) `state` is unchanged and `result` is empty. After
   /// CANCELLED or an exception `workspace` is empty, too.
   absl::Status Reconstruct(const Frame& frame, State& state, Workspace& workspace, Result& result,

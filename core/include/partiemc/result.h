@@ -19,15 +19,16 @@ struct RingMeasures {
   double perimeter = 0;  ///< World units.
   double centroid_x = 0, centroid_y = 0;  ///< Centroid of the enclosed area, world units.
   std::uint64_t particle_count = 0;       ///< Particles of the component; 0 for holes.
-  /// Kept by the ring that continues this one in the next frame. Distinct within a frame, never
-  /// reused in a stream (core/IDENTITIES.md).
+  /// The ring that continues this ring in the next frame has the same identity. Distinct within a
+  /// frame, never reused in a stream (core/IDENTITIES.md).
   std::uint64_t identity = 0;  ///< 0: not tracked.
 
   friend bool operator==(const RingMeasures&, const RingMeasures&) = default;
 };
 
 /// Closed polylines. Guarantees if KeepsGuarantees(placement) (core/METHOD.md, "Guarantees"):
-///   R1 every ring has at least 3 points, all finite, none repeated; the first is not stored again;
+///   R1 every ring has at least 3 points, all finite and different (closed, so the first point is
+///      not repeated at the end);
 ///   R2 rings are simple and do not touch each other;
 ///   R3 the inside is on the left: outer rings counter-clockwise, holes clockwise;
 ///   R4 each hole lies inside the outer ring that `outer_of` gives.
@@ -37,9 +38,9 @@ struct Rings {
   std::vector<std::uint32_t> outer_of;       ///< Per ring: its outer ring, or kNoRing.
   std::vector<RingMeasures> measures;        ///< Per ring.
   std::vector<float> normals;                ///< Per point: outward unit normal, interleaved.
-  /// Identities, in the frame before, of the rings that ring k continues, ascending:
-  /// [parent_offsets[k], parent_offsets[k + 1]). None for a new ring, several after a merge. After
-  /// a split, several rings have the same parent.
+  /// Parents of ring k, [parent_offsets[k], parent_offsets[k + 1]): the identities, ascending, of
+  /// the rings of the last frame that ring k continues. A new ring has no parent, a ring after a
+  /// merge has several. After a split, several rings have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< Like `offsets`; {0} without identities.
 
@@ -66,7 +67,7 @@ enum class TriangleClass : std::uint8_t {
 /// Triangles that cover the inside of the rings. Guarantees if KeepsGuarantees(placement):
 ///   M1 every triangle is counter-clockwise, none is folded or degenerate;
 ///   M2 triangles do not overlap and together cover exactly the inside of the rings;
-///   M3 its first points are the points of the rings, bit for bit, in their order;
+///   M3 the first points of the mesh are the points of the rings, bit for bit, in their order;
 ///   M4 no vertex lies inside a side of a triangle or ring (Fill::kConforming, kPolygon, blocks).
 struct Mesh {
   std::vector<double> points;            ///< x0, y0, x1, y1, ... in world units.
@@ -85,21 +86,21 @@ struct FrameStatistics {
   std::uint64_t active_cells = 0;        ///< Cells that the outline crosses.
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
-  std::uint64_t dropped_spray = 0;       ///< Components below the size that parameters set.
+  std::uint64_t dropped_spray = 0;       ///< Components below the minimum size in the parameters.
   std::uint64_t triangles = 0;           ///< Triangles of the mesh.
-  std::uint64_t triangles_grid = 0;      ///< Triangles that `grid` would make of the same rings.
+  std::uint64_t triangles_grid = 0;      ///< Triangles of a mesh by Fill::kGrid of the same rings.
   std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.
   std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
   double area = 0;       ///< Sum over rings of their signed areas, world units squared.
   double perimeter = 0;  ///< Sum over rings, world units.
-  double spacing = 0;    ///< Used in this frame, world units; 0: none.
-  double cell_size = 0;  ///< Lattice spacing, world units; the stream's unless provisional.
+  double spacing = 0;    ///< Spacing used in this frame, world units; 0: unknown.
+  double cell_size = 0;  ///< Lattice spacing, world units; constant in a stream unless provisional.
   Doubts doubts;         ///< Reasons to distrust the result.
 
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-/// An attribute of the frame (Frame::attributes) at the vertices.
+/// An attribute of the frame (Frame::attributes), interpolated to the vertices.
 struct AttributeValues {
   std::string name;
   int components = 1;
@@ -113,9 +114,10 @@ struct AttributeValues {
 struct Result {
   Rings rings;
   Mesh mesh;                                ///< Empty for Fill::kNone.
-  std::vector<AttributeValues> attributes;  ///< In the order of the frame's.
+  std::vector<AttributeValues> attributes;  ///< In the order of Frame::attributes.
   FrameStatistics statistics;
-  /// The results of ReconstructionParameters::sections, each as if it were the only outline.
+  /// The results of ReconstructionParameters::sections. Each is the same as if its outline were the
+  /// only one.
   std::vector<Result> sections;
 
   /// Empties everything. The elements of `attributes` and `sections` remain, without contents.

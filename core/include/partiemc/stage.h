@@ -14,7 +14,7 @@ enum class Stage : std::uint8_t {
   kRings,       ///< Segments joined to closed rings; nesting, cleaning.
   kNormals,     ///< Stabilised cell normals (paper, Eq. 9-11).
   kVertices,    ///< Vertices placed (paper, sections 3.4-3.5).
-  kIdentities,  ///< Rings related to the frame before (core/IDENTITIES.md).
+  kIdentities,  ///< Rings related to rings of the last frame (core/IDENTITIES.md).
   kMesh,        ///< Inside filled with triangles (paper, sections 3.7-3.8).
   kAttributes,  ///< Attributes interpolated to the vertices, if the frame has any.
 };
@@ -28,7 +28,8 @@ constexpr std::string_view Name(Stage stage) {
   return kStageNames[static_cast<std::size_t>(stage)];
 }
 
-/// Receives the begin and end of each stage, on the thread of Reconstruct. The core has no clock.
+/// Receives the begin and the end of each stage, on the thread that calls Reconstruct. Only an
+/// observer can measure times, because the core reads no clock.
 class StageObserver {
  public:
   virtual ~StageObserver() = default;

@@ -25,15 +25,15 @@ struct CellNormal {
 struct KnownRing {
   std::uint64_t identity = 0;
   bool is_hole = false;
-  std::uint32_t outer = kNoRing;  ///< Index of a hole's outer ring, if known.
+  std::uint32_t outer = kNoRing;  ///< Of a hole: the index of its outer ring, if known.
   double velocity_x = 0,
-         velocity_y = 0;  ///< Mean of its particles, world units per time; 0: unknown.
+         velocity_y = 0;  ///< Mean velocity of its particles, world units per time; 0: unknown.
 
   friend bool operator==(const KnownRing&, const KnownRing&) = default;
 };
 
-/// A run of lattice nodes in one row, `first` to `last`. It lay inside an outer ring of the last
-/// frame, or in the void of a hole, close to its ring.
+/// Consecutive lattice nodes of one row, `first` to `last`. In the last frame they were inside an
+/// outer ring, or in the void of a hole, next to the ring of the hole.
 struct NodeRun {
   std::int32_t row = 0, first = 0, last = 0;  ///< In cells from the origin.
   std::uint32_t ring = 0;                     ///< Index in RingHistory::rings.
@@ -41,43 +41,44 @@ struct NodeRun {
   friend bool operator==(const NodeRun&, const NodeRun&) = default;
 };
 
-/// Limit of the samples per outer ring.
+/// Most particle samples of one outer ring.
 inline constexpr std::uint32_t kMaxSamples = 16;
 
-/// A particle of the last frame: a hash of its id, which no other sample has, and its position.
+/// A particle of the last frame: a hash of its id, different from the hashes of all other samples,
+/// and its position.
 struct ParticleSample {
   std::uint64_t hash = 0;
   std::int32_t column = 0, row = 0;  ///< The nearest node, in cells from the origin.
-  std::uint32_t ring = 0;            ///< Index in RingHistory::rings of an outer ring.
+  std::uint32_t ring = 0;            ///< Its outer ring: an index in RingHistory::rings.
 
   friend bool operator==(const ParticleSample&, const ParticleSample&) = default;
 };
 
-/// Data to find the rings of the next frame that continue rings of this one. Its size is
-/// proportional to the length of the outline: two ends of a run lie on it, and samples per ring are
-/// limited.
+/// The data by which the next frame finds which of its rings continue rings of this frame. Their
+/// size is proportional to the length of the outline: both ends of a run lie on the outline, and
+/// the number of samples per ring is limited.
 struct RingHistory {
-  std::uint64_t identities_given = 0;  ///< The largest identity so far; none is reused.
+  std::uint64_t identities_given = 0;  ///< The largest identity so far. No identity is reused.
   std::optional<double> time;          ///< Time of the last frame, finite.
-  std::vector<KnownRing> rings;        ///< By identity.
-  std::vector<NodeRun> runs;  ///< By row, then column; disjoint. Each ring has at least one.
+  std::vector<KnownRing> rings;        ///< Sorted by identity.
+  std::vector<NodeRun> runs;  ///< Disjoint, by row, then column. Each ring has at least one run.
   std::vector<ParticleSample>
-      samples;  ///< By hash. Each ring has its particles with the lowest hashes.
+      samples;  ///< Sorted by hash. Of each outer ring, the particles with the lowest hashes.
 
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
-/// The complete state of a stream; default-constructed: no frame yet. Reconstruction is a pure
-/// function of frame and state, so a stream that resumes from a restored State gives the same bits
-/// as without interruption.
+/// The complete state of a stream. A default-constructed State is the state before the first frame.
+/// Reconstruction is a pure function of frame and state, so a stream that resumes from a restored
+/// State gives the same bits as without interruption.
 struct State {
-  /// Lattice spacing in world units, from the given spacing or the first frame whose particles
-  /// agree on one. It never changes. Frames before leave no state.
+  /// Lattice spacing in world units, set by the given spacing, or by the first frame whose
+  /// particles agree on a spacing. It never changes; earlier frames leave no state.
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;
-  /// Offset of the last outline that matched its area, in spacings (core/METHOD.md, "The default
-  /// placement", step 4).
+  /// Offset, in spacings, by which the area step last moved an outline (core/METHOD.md, "The
+  /// default placement", step 4).
   std::optional<double> area_offset;
   /// Normals of the active cells of the last frame by row, then column; at most one per cell.
   std::vector<CellNormal> normals;
@@ -89,8 +90,8 @@ struct State {
 };
 
 /// Writes a state with version and checksum; same bytes on every machine. Size: 88 bytes, 16 per
-/// normal, 32 per ring, 16 per run, 20 per sample; with sections 24 bytes more, and 8 plus its size
-/// for each state.
+/// normal, 32 per ring, 16 per run, 20 per sample. A state with sections takes 24 bytes, and for
+/// each outline 8 bytes plus the size of its state.
 std::string Serialize(const State& state);
 
 /// The size of Serialize(state), without writing it.

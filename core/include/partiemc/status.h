@@ -19,7 +19,7 @@ struct Violation {
   friend bool operator==(const Violation&, const Violation&) = default;
 };
 
-/// The reasons of the core. They are part of the public contract (proto/PROTOCOL.md): a reason is
+/// The reasons of the core, which are part of the public contract (proto/PROTOCOL.md): a reason is
 /// never renamed or reused with another meaning.
 inline constexpr std::string_view kReasonOutOfRange = "OUT_OF_RANGE";
 inline constexpr std::string_view kReasonNotFinite = "NOT_FINITE";
@@ -37,7 +37,7 @@ inline constexpr std::string_view kReasonCorruptState = "CORRUPT_STATE";
 /// caller has to parse the message.
 absl::Status ViolationError(absl::StatusCode code, Violation violation);
 
-/// The violation of a status of ViolationError; absent for any other status.
+/// Returns the violation in a status that ViolationError made; nothing for any other status.
 std::optional<Violation> FindViolation(const absl::Status& status);
 
 /// Formats a number in the shortest form that reads back the same: "0.1", "nan", "-inf".

@@ -15,7 +15,7 @@
 
 namespace partiemc {
 
-/// The value of Surface::outer_of for a shell that is no cavity.
+/// The value of Surface::outer_of for a shell that is not a cavity.
 inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::max();
 
 struct ShellMeasures {
@@ -30,7 +30,7 @@ struct ShellMeasures {
 struct SurfaceStatistics {
   std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
   std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
-  std::uint64_t dropped_spray = 0;       ///< Bodies below the size that parameters set.
+  std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
 
   friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
 };
@@ -40,17 +40,17 @@ struct SurfaceStatistics {
 ///   S1 every edge has exactly two triangles, which run along it in opposite directions;
 ///   S2 the triangles around each point form one cycle; each point has triangles of one shell;
 ///   S3 triangles intersect only in their common points and edges; none is degenerate;
-///   S4 triangles are counter-clockwise seen from outside the body; no shell encloses
-///      an outer shell, or a cavity does directly, and each cavity lies directly in the shell that
-///      `outer_of` gives;
+///   S4 triangles are counter-clockwise seen from outside the body; shells alternate: the next
+///      shell around an outer shell, if any, is a cavity, and the next shell around a cavity is the
+///      outer shell that `outer_of` gives;
 ///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
 ///      centroids are those of the triangles.
 struct Surface {
   std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.
   std::vector<float> normals;            ///< Per point: outward unit normal, interleaved.
-  std::vector<std::uint32_t> point_offsets = {0};     ///< Shell k has [offsets[k], offsets[k + 1]).
-  std::vector<std::uint32_t> triangle_offsets = {0};  ///< Likewise.
+  std::vector<std::uint32_t> point_offsets = {0};     ///< Shell k: [offsets[k], offsets[k + 1]).
+  std::vector<std::uint32_t> triangle_offsets = {0};  ///< The same for triangles.
   std::vector<std::uint32_t> outer_of;                ///< Per shell: its outer shell, or kNoShell.
   std::vector<ShellMeasures> measures;                ///< Per shell.
   SurfaceStatistics statistics;
@@ -77,27 +77,27 @@ enum class SurfacePlacement : std::uint8_t {
 struct SurfaceParameters {
   SurfacePlacement placement = SurfacePlacement::kMarchingCubes;
 
-  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of it.
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of h.
   double spacing = 1;
-  /// As in ReconstructionParameters, with their ranges.
+  /// As in ReconstructionParameters, with the same ranges.
   double kernel_radius = 3, cell_size = 1;
-  /// Absent: calibrated for the placement.
+  /// Reference radius in spacings. Absent: calibrated for the placement.
   std::optional<double> reference_radius = std::nullopt;
 
   /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for
   /// `kVirtualPlane`, off for the other placements.
   std::optional<bool> clean = std::nullopt;
 
-  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings, or are
-  /// fewer than this. At least 0; 0 keeps all.
+  /// Spray: drops bodies whose particles have less volume than `min_component_volume`, in cubed
+  /// spacings, or number fewer than `min_component_particles`. At least 0; 0 keeps all.
   double min_component_volume = 0;
   std::uint64_t min_component_particles = 0;
 
   friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
 };
 
-/// Reusable buffers, one set for each thread that calls Reconstruct. Its history never changes a
-/// result.
+/// Reusable buffers, one set for each thread that calls Reconstruct. Earlier frames in the same
+/// workspace never change a result.
 class SurfaceWorkspace {
  public:
   SurfaceWorkspace();
@@ -121,9 +121,9 @@ class SurfaceReconstructor {
 
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
-  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// Errors with a Violation: as Reconstructor, but there is no memory guard and no cancellation.
-  /// `surface` is then empty. After an exception (std::bad_alloc) surface and workspace must be
+  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes. Errors with a
+  /// Violation: as Reconstructor, but there is no memory guard and no cancellation. After an error
+  /// `surface` is empty. After an exception (std::bad_alloc) surface and workspace must be
   /// replaced.
   absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
 
@@ -131,7 +131,7 @@ class SurfaceReconstructor {
   SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
 
   SurfaceParameters parameters_;
-  ReconstructionParameters in_space_;  // Resolved, as the stages take them.
+  ReconstructionParameters in_space_;  // Resolved, in the form for the stages.
   FrameLimits limits_;
 };
 

@@ -9,18 +9,18 @@
 
 namespace partiemc {
 
-/// Checks R1-R4 and M1-M3 of result.h with exact arithmetic. M2 is checked by areas (1e-9 relative)
-/// and by sides: the sides of the triangles cancel except for the segments of the rings. With M1
-/// and R2 this excludes gaps and overlaps.
+/// Checks R1-R4 and M1-M3 of result.h with exact arithmetic. M2 is checked in two ways: the areas
+/// of rings and triangles agree (to 1e-9 relative), and opposite sides of the triangles cancel,
+/// except along the segments of the rings. With M1 and R2 this excludes gaps and overlaps.
 /// Errors: INTERNAL with the guarantee, the ring or triangle, and the values. Cost: n log n in the
 /// points.
 absl::Status Validate(const Result& result);
 
-/// As above, and M4 if `fill` guarantees it: each side has exactly two triangles, or one triangle
-/// and one segment of a ring.
+/// Checks R1-R4 and M1-M3 as above, and M4 if `fill` guarantees it: each side belongs to exactly
+/// two triangles, or to one triangle and one segment of a ring.
 absl::Status Validate(const Result& result, Fill fill);
 
-/// Counts the vertices inside a side of a triangle or ring; 0 if M4 holds.
+/// Counts the vertices that lie on a side of a triangle or ring between its ends; 0 if M4 holds.
 /// Requires: Validate(result).ok(). Cost: n log n in the points.
 std::size_t CountTJunctions(const Result& result);
 

@@ -13,15 +13,17 @@
 namespace partiemc {
 namespace {
 
-// Damping of the slope, in squared kernel radii. For comparison, the second moment of particles
-// around a vertex is .1 along each axis inside a body and .03 across a straight rim.
+// Added to the second moments, in squared kernel radii, to damp the slope. For comparison, the
+// second moment of particles around a vertex is .1 along each axis inside a body and .03 across a
+// straight rim.
 constexpr double kSlopeRidge = 1e-3;
 
 constexpr std::size_t kVerticesAtOnce = 256;
 
 constexpr double kLargest = std::numeric_limits<float>::max();
 
-// Divides a tile into square buckets. Their side, a power of two of cells, is at most the radius.
+// Divides a tile into square buckets. Their side is a power of two of cells, at most the radius,
+// but at least one cell.
 class Buckets {
  public:
   explicit Buckets(double radius) {
@@ -39,8 +41,8 @@ class Buckets {
   int shift_ = 0;
 };
 
-// Sums over particles of one component of an attribute: weighted value, and the weighted value
-// times D_x, D_y and D_z.
+// Sums over particles for one component of an attribute: of the weighted value, and of the weighted
+// value times D_x, D_y and D_z.
 using Carried = std::array<double, 4>;
 
 // Fits a plane by least squares and evaluates it at a vertex x. D = (x_i - x) / kernel radius.
@@ -59,8 +61,9 @@ class PlaneFit {
     yy_ += weight * dy * dy;
   }
 
-  // The coefficients of the four sums of `Carried` in the value at the vertex: the first row of the
-  // inverse moment matrix. Eliminates the height first; without a slice its moments are 0.
+  // The value at the vertex is a linear combination of the four sums of `Carried`. Returns its
+  // coefficients, the first row of the inverse moment matrix. The height is eliminated first;
+  // without a slice its moments are 0.
   Carried Coefficients() const {
     if (sum_ == 0) return {};
     const double zz = zz_ + kSlopeRidge * sum_;
@@ -112,7 +115,8 @@ class Interpolation {
     }
   }
 
-  // Sorts the particles of each wanted tile by bucket, once. Each tile keeps its range of the bins.
+  // Sorts the particles of each wanted tile by bucket, once. The particles of a tile have the same
+  // range of indices as in the bins.
   void SortParticles() {
     scratch_.particles.resize(bins_.particles.size());
     scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());
@@ -148,7 +152,8 @@ class Interpolation {
     const std::uint32_t first = bins_.offsets[tile], last = bins_.offsets[tile + 1];
     std::fill_n(offsets, count + 1, 0);
     for (std::uint32_t i = first; i < last; ++i) ++offsets[buckets_.Of(bins_.particles[i])];
-    // Counting sort: `offsets` holds the end of each bucket, then moves down to its first particle.
+    // Counting sort: `offsets` has the end of each bucket, which then moves down to its first
+    // particle.
     std::uint32_t end = first;
     for (std::size_t bucket = 0; bucket <= count; ++bucket) {
       offsets[bucket] = end += offsets[bucket];

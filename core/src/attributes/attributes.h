@@ -16,14 +16,14 @@ namespace partiemc {
 struct CarryingParticle {
   float x, y;            ///< Cells, relative to its tile.
   float height;          ///< Cells above the plane of a slice; 0 without a slice.
-  float weight;          ///< The weight w_i of the field (METHOD.md, "Notation").
+  float weight;          ///< The weight w_i (METHOD.md, "Notation").
   std::uint32_t source;  ///< Index in the frame.
 };
 
 /// Warm buffers of InterpolateAttributes.
 struct AttributeScratch {
   std::vector<std::uint32_t> tile_of;   ///< By vertex.
-  std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if it or a neighbour holds a vertex.
+  std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if it or a neighbour has a vertex.
   std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.
   std::vector<CarryingParticle> particles;
@@ -34,14 +34,14 @@ struct AttributeScratch {
 /// buffers.
 ///
 /// Fits a plane (attribute over x and y, in a slice also over the height) to the particles within
-/// the kernel radius, and evaluates it at the vertex. The fit is a least-squares fit with the
-/// weights w k of the field (moving least squares; Lancaster and Salkauskas, Math. Comp. 37, 1981).
-/// A weighted mean would be wrong at the rim, where all particles lie on one side. The fit damps
-/// slopes that the particles barely determine, such as in a drop of two particles. A vertex without
-/// a particle within the kernel radius gets the value 0.
+/// the kernel radius, and evaluates the plane at the vertex. The fit is a least-squares fit with
+/// the weights w k of the field (moving least squares; Lancaster and Salkauskas, Math. Comp. 37,
+/// 1981). A weighted mean would be wrong at the rim of a body, where all particles lie on one side.
+/// The fit damps slopes that the particles barely determine, such as in a drop of two particles. A
+/// vertex without a particle within the kernel radius gets the value 0.
 ///
 /// Requires: a checked frame (frame/frame_view.h). Several calls may share `scratch` and its sorted
-/// particles; before the first call for other bins, `scratch.sorted` is cleared.
+/// particles; before the first call for other bins, the caller clears `scratch.sorted`.
 /// Deterministic: sums run by tile and bucket, then in the order of the frame. Parallel over
 /// vertices. Cost: linear in the particles of tiles near vertices, plus the particles within the
 /// kernel radius of each vertex.
@@ -49,8 +49,8 @@ void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const S
                            std::span<const double> vertices, AttributeScratch& scratch,
                            std::vector<AttributeValues>& values);
 
-/// The vertices that carry attributes: the points of the rings, followed by those that only the
-/// mesh has.
+/// The vertices that attributes are interpolated to: the points of the rings, then the other points
+/// of the mesh.
 std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh);
 
 }  // namespace partiemc

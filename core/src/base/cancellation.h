@@ -1,4 +1,5 @@
-// Cancels a frame: its tasks check the caller's flag and throw; Reconstruct catches.
+// Cancels a frame: its tasks check the caller's flag and throw Cancelled, which Reconstruct
+// catches.
 #pragma once
 
 #include <atomic>
@@ -8,8 +9,8 @@ namespace partiemc {
 /// Thrown by the tasks of a cancelled frame. Reconstruct returns CANCELLED.
 struct Cancelled {};
 
-/// Sets the cancellation flag of this thread for the scope; null: none. Tasks inherit the flag of
-/// the thread that created them (parallel.h).
+/// Sets the cancellation flag of this thread until the end of the scope; null removes it. Tasks
+/// inherit the flag of the thread that created them (parallel.h).
 class CancellationScope {
  public:
   explicit CancellationScope(const std::atomic<bool>* flag) : outer_(current_) { current_ = flag; }
@@ -25,14 +26,15 @@ class CancellationScope {
   const std::atomic<bool>* const outer_;
 };
 
-/// Relaxed: the flag guards no other data and is never reset, so a late read only delays the end.
+/// Throws Cancelled if the flag is set. The relaxed order is enough: the flag guards no other data
+/// and is never reset, so a late read only delays the end.
 inline void ThrowIfCancelled(const std::atomic<bool>* flag) {
   if (flag != nullptr && flag->load(std::memory_order_relaxed)) [[unlikely]] {
     throw Cancelled();
   }
 }
 
-/// For sequential loops with up to a million steps.
+/// Checks the flag of the calling thread. For sequential loops with up to a million steps.
 inline void ThrowIfCancelled() { ThrowIfCancelled(CancellationScope::Current()); }
 
 }  // namespace partiemc

@@ -9,7 +9,8 @@
 
 namespace partiemc {
 
-// By mask of eight lanes: the selected lanes first. Its lower half also serves four lanes.
+// For each mask of eight lanes: the indices of its selected lanes, then zeros. For four lanes, the
+// first 16 masks are used.
 inline constexpr auto kChosenLanes = [] {
   std::array<std::array<std::uint8_t, 8>, 256> chosen{};
   for (unsigned mask = 0; mask < chosen.size(); ++mask) {
@@ -40,8 +41,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. It works in
-// registers, as some processors compress slowly into memory.
+// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. The class
+// works in registers, because some processors are slow when they compress into memory.
 class Compressor {
  public:
   using Bits = hn::CappedTag<std::int32_t, 16>;
@@ -57,7 +58,7 @@ class Compressor {
  private:
   hn::Mask<Bits> mask_;
 #else
-  // The lane indices are looked up once per mask.
+  // The lane indices are looked up once per mask, so that several vectors can use them.
   HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(Bits(), mask, bits);

@@ -1,5 +1,5 @@
 // The 64-bit digests of proto/PROTOCOL.md: FNV-1a over 64-bit words, with a shift that mixes high
-// bits down. Not cryptographic.
+// bits down. The digests are not cryptographic.
 #include <bit>
 #include <cstdint>
 #include <span>

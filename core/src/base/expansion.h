@@ -12,7 +12,7 @@ struct Rounded {
   double value, error;
 };
 
-/// Knuth: a + b = value + error exactly, for any order of magnitudes.
+/// Knuth's sum: a + b = value + error exactly, whichever of a and b is larger.
 inline Rounded TwoSum(double a, double b) {
   const double value = a + b;
   const double b_part = value - a;
@@ -20,8 +20,8 @@ inline Rounded TwoSum(double a, double b) {
   return {value, (a - a_part) + (b - b_part)};
 }
 
-/// Veltkamp: a = high + low, each of at most 26 significant bits, so that products of halves are
-/// exact.
+/// Veltkamp's split: a = high + low. Both halves have at most 26 significant bits, so products of
+/// halves are exact.
 struct Halves {
   double high, low;
 };
@@ -33,7 +33,7 @@ inline Halves Split(double a) {
   return {high, a - high};
 }
 
-/// Dekker: a * b = value + error exactly.
+/// Dekker's product: a * b = value + error exactly.
 inline Rounded TwoProduct(double a, double b) {
   const double value = a * b;
   const Halves p = Split(a);
@@ -46,7 +46,7 @@ inline Rounded TwoProduct(double a, double b) {
 inline int SignOf(double value) { return (value > 0) - (value < 0); }
 
 /// An exact sum of up to `kTerms` doubles: non-overlapping components in order of magnitude
-/// (Shewchuk, section 2.2). Its sign is the sign of the last component.
+/// (Shewchuk, section 2.2). The sign of the sum is the sign of its last component.
 template <std::size_t kTerms>
 class Expansion {
  public:

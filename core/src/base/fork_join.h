@@ -1,5 +1,5 @@
 // Annotates tasks for ThreadSanitizer, which cannot see how oneTBB hands work from thread to
-// thread: Debian's oneTBB is not instrumented. Compiles to nothing without the sanitizer.
+// thread, because Debian's oneTBB is not instrumented. Compiles to nothing without the sanitizer.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)
@@ -22,8 +22,8 @@ namespace partiemc {
 ///        task:        |    `--> Task(), work, ~Task() ---------'    |
 ///        task:        `-------> Task(), work, ~Task() --------------'
 ///
-/// The arrows are the only annotated order. None leads from task to task, so the sanitizer still
-/// reports races between tasks.
+/// The annotations declare the order that the arrows show, and no other order. No arrow leads from
+/// task to task, so the sanitizer still reports races between tasks.
 class ForkJoin {
  public:
   ForkJoin() { Release(&fork_); }

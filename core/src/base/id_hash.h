@@ -19,13 +19,13 @@ inline std::uint64_t HashOf(std::uint64_t id) {
   return id ^ (id >> 31);
 }
 
-/// Finds things by their member `hash`: a bucket by the leading bits, with about one thing per
-/// bucket, then a binary search.
+/// Finds an element by its member `hash`: the leading bits select a bucket with about one element,
+/// and a binary search in the bucket finds it.
 template <typename Thing>
 class HashIndex {
  public:
-  /// Requires: `things` are sorted by hash and distinct. `bucket` is scratch. Both must outlive the
-  /// index.
+  /// Requires: `things` are sorted by hash, and their hashes are distinct. `bucket` is scratch.
+  /// Both must outlive the index.
   HashIndex(std::span<const Thing> things, std::vector<std::uint32_t>& bucket)
       : things_(things),
         bucket_(bucket),

@@ -1,7 +1,7 @@
 // Runs the parts of a stage in parallel, in the caller's arena (partiemc/arena.h). Only this file
-// creates tasks. Each function returns when all work is done, and rethrows an exception of a body.
-// If the caller is cancelled (cancellation.h), the functions throw Cancelled before the next index
-// or range.
+// and parallel.cc create tasks. Each function returns when all work is done, and rethrows an
+// exception of a body. If the frame is cancelled (cancellation.h), the functions throw Cancelled
+// before the next index or range.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace partiemc {
 
 class TaskArena;
 
-// Type-erased tasks: parallel.cc alone is compiled against oneTBB's templates, and without
-// ThreadSanitizer, which would report its hand-overs as races. The task bodies are in the templates
-// below and are instrumented.
+// Type-erased tasks. Only parallel.cc includes oneTBB's templates, and it is compiled without
+// ThreadSanitizer, which would report their hand-overs of work as races. The bodies of the tasks
+// are called from the templates below, so they are instrumented.
 namespace erased {
 
 // Requires: `body` and `fork_join` outlive the action.
@@ -52,8 +52,8 @@ RangeAction RangeActionOf(ForkJoin& fork_join, const Body& body) {
   return {run, fork_join, &body};
 }
 
-// Both throw Cancelled if the calling task was cancelled because another task of its group threw.
-// oneTBB then skips work without reporting it.
+// Both functions throw Cancelled if the calling task was cancelled because another task of its
+// group threw. In that case oneTBB skips work without reporting it.
 void Invoke(const Action& a, const Action& b);
 void ForRanges(std::size_t count, std::size_t grain, const RangeAction& action);
 
@@ -111,8 +111,8 @@ void ParallelInvoke(const A& a, const B& b) {
   erased::Invoke(erased::ActionOf(fork_join, first), erased::ActionOf(fork_join, second));
 }
 
-/// Sorts by `less`; not stable. Quicksort with at most `splits` nested partitions, then std::sort,
-/// so no input order makes it slow.
+/// Sorts by `less`; not stable. Quicksort partitions at most `splits` levels deep, then std::sort
+/// sorts the parts, so no order of the input makes the sort slow.
 template <typename T, typename Less>
 void ParallelSort(std::span<T> values, const Less& less, int splits = 6) {
   constexpr std::size_t kSortedAtOnce = 1 << 11;

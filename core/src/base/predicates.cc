@@ -20,8 +20,9 @@ int OrientationExact(const Point& a, const Point& b, const Point& c) {
   const Rounded bcx = TwoSum(b.x, -c.x);
   const Rounded bcy = TwoSum(b.y, -c.y);
   if (acx.error == 0 && acy.error == 0 && bcx.error == 0 && bcy.error == 0) {
-    // The differences are exact, as on any lattice: compare two exact products. Rounding is
-    // monotonic, so the rounded values decide unless they are equal.
+    // The differences are exact, as for points of any lattice, so two exact products are compared.
+    // Rounding is monotonic: if the rounded products differ, the exact ones differ in the same
+    // way.
     const Rounded left = TwoProduct(acx.value, bcy.value);
     const Rounded right = TwoProduct(acy.value, bcx.value);
     if (left.value != right.value) return left.value > right.value ? 1 : -1;
@@ -44,7 +45,8 @@ bool SegmentsTouch(const Point& a, const Point& b, const Point& c, const Point& 
   if (c_side * d_side > 0) return false;
   const int a_side = Orientation(c, d, a);
   const int b_side = Orientation(c, d, b);
-  // All four zero: on one line. Overlapping boxes then mean overlapping segments.
+  // All four signs are zero if all points lie on one line. The boxes overlap, so the segments do,
+  // too.
   return a_side * b_side <= 0;
 }
 

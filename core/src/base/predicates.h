@@ -1,12 +1,12 @@
-// Exact geometric predicates: a floating-point filter decides almost every call, exact expansion
-// arithmetic the rest.
+// Exact geometric predicates: a floating-point filter decides almost every call; exact expansion
+// arithmetic decides the others.
 //
 // Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 // Predicates", Discrete & Computational Geometry 18 (1997).
 //
-// Domain: coordinates that are zero or of a magnitude in [kMinMagnitude, kMaxMagnitude]. There no
-// product of two coordinates overflows or loses subnormal bits, so every error-free transformation
-// is exact. Outside the domain a sign may be wrong, without other harm.
+// Domain: coordinates that are zero or of a magnitude in [kMinMagnitude, kMaxMagnitude]. In the
+// domain no product of two coordinates overflows or loses subnormal bits, so every error-free
+// transformation is exact. Outside the domain a sign may be wrong; nothing else happens.
 // Requires round-to-nearest and no contraction of a * b + c (-ffp-contract=off).
 #pragma once
 
@@ -14,8 +14,9 @@
 
 namespace partiemc {
 
-/// Coordinates and their differences are multiples of 2^-451, the last bit of kMinMagnitude.
-/// Products of two are multiples of 2^-902, far above the smallest normal number, 2^-1022.
+/// In the domain, coordinates and their differences are multiples of 2^-451, the last bit of
+/// kMinMagnitude. Products of two differences are multiples of 2^-902, far above the smallest
+/// normal number, 2^-1022.
 inline constexpr double kMinMagnitude = 1e-120;
 /// Six products of two coordinates, and a coordinate times 2^27 + 1, stay below 2^1023.
 inline constexpr double kMaxMagnitude = 1e150;
@@ -26,7 +27,7 @@ constexpr bool InPredicateDomain(double coordinate) {
   return magnitude == 0 || (magnitude >= kMinMagnitude && magnitude <= kMaxMagnitude);
 }
 
-/// Orientation without the filter, for the calls that it cannot decide.
+/// Orientation without the filter, for the calls that the filter cannot decide.
 int OrientationExact(const Point& a, const Point& b, const Point& c);
 
 /// Returns +1 if a, b, c turn counter-clockwise (c is left of the line from a to b), -1 if
@@ -46,7 +47,7 @@ inline int Orientation(const Point& a, const Point& b, const Point& c) {
   const double bound = kErrorBound * magnitude;
   if (determinant > bound) return 1;
   if (-determinant > bound) return -1;
-  // A difference or product rounds to zero only if it is zero.
+  // In the domain, a difference or product rounds to zero only if its exact value is zero.
   if (magnitude == 0) return 0;
   return OrientationExact(a, b, c);
 }

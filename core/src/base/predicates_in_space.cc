@@ -5,7 +5,7 @@
 namespace partiemc {
 namespace {
 
-/// A difference of points, and whether it is exact.
+/// A difference of points, and whether its rounded value is exact.
 struct Difference {
   Vec3 value;
   bool is_exact;
@@ -36,7 +36,7 @@ int SideOfPlaneExact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d)
     AddDeterminant(1, p.value, q.value, r.value, determinant);
     return determinant.Sign();
   }
-  // det(b - a, c - a, d - a) in the coordinates themselves.
+  // The same determinant, det(b - a, c - a, d - a), expanded in the coordinates.
   Expansion<96> determinant;
   AddDeterminant(1, b, c, d, determinant);
   AddDeterminant(-1, a, c, d, determinant);

@@ -1,16 +1,16 @@
-// Exact geometric predicates in space: a floating-point filter decides almost every call, exact
-// expansion arithmetic the rest (predicates.h).
+// Exact geometric predicates in space: a floating-point filter decides almost every call; exact
+// expansion arithmetic (predicates.h) decides the others.
 //
 // Domain: coordinates that are zero or of a magnitude in [kMinSpaceMagnitude, kMaxSpaceMagnitude].
-// There no product of three coordinates overflows or loses subnormal bits.
+// In the domain no product of three coordinates overflows or loses subnormal bits.
 #pragma once
 
 #include "base/vec3.h"
 
 namespace partiemc {
 
-/// Differences are multiples of 2^-53 kMinSpaceMagnitude; products of three are multiples of
-/// 1e-288.
+/// Differences of coordinates are multiples of 2^-53 kMinSpaceMagnitude, so products of three are
+/// multiples of 1e-288.
 inline constexpr double kMinSpaceMagnitude = 1e-80;
 /// 24 products of three coordinates, and a product times 2^27 + 1, stay below 2^1023.
 inline constexpr double kMaxSpaceMagnitude = 1e95;
@@ -21,7 +21,7 @@ constexpr bool InSpaceDomain(double coordinate) {
   return magnitude == 0 || (magnitude >= kMinSpaceMagnitude && magnitude <= kMaxSpaceMagnitude);
 }
 
-/// SideOfPlane without the filter.
+/// SideOfPlane without the filter, for the calls that the filter cannot decide.
 int SideOfPlaneExact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
 /// The sign of (b - a) x (c - a) . (d - a): +1 if d is on the side of the plane from which a, b, c

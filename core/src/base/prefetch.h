@@ -9,7 +9,8 @@
 namespace partiemc {
 
 /// Prefetches the cache lines of `values`. Useful for arrays that have left the near caches, even
-/// for sequential access: not every machine prefetches by itself, virtual ones least of all.
+/// if they are read in sequence: some machines, above all virtual ones, do not prefetch by
+/// themselves.
 template <typename T>
 void PrefetchLines(std::span<const T> values) {
   constexpr std::size_t kLine = 64;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr absl::string_view kPayloadType = "partiemc.v1/violation";
 
-// Separates the parts of the payload. No part contains it.
+// Separates the parts of the payload. No part contains this character.
 constexpr char kSeparator = '\x1f';
 
 }  // namespace

@@ -10,8 +10,10 @@
 
 namespace partiemc {
 
-/// A directory of short blocks. The caller keeps it sorted; the class only calls predicates. Does
-/// not allocate up to the greatest length so far. Not thread-safe.
+/// A sequence of identifiers that the caller keeps sorted: the class does not compare identifiers,
+/// and searches with the caller's predicates. A directory lists the short blocks that contain the
+/// identifiers. Memory is allocated only when the length exceeds its earlier maximum. Not
+/// thread-safe.
 class SweepStatus {
  public:
   /// A position of an element, or the end. Valid until the next change.
@@ -34,8 +36,8 @@ class SweepStatus {
   Cursor Next(Cursor cursor) const { return Normalized({cursor.block, cursor.slot + 1}); }
 
   /// Returns the first element for which `is_before` is false, or the end. Requires: `is_before` is
-  /// true for a prefix of the sequence only; otherwise the result is any element for which it is
-  /// false, or the end.
+  /// true for the first elements up to some position, then false. Otherwise the result is some
+  /// element for which `is_before` is false, or the end.
   template <typename Predicate>
   Cursor FindFirstNot(const Predicate& is_before) const {
     const auto block =
@@ -45,14 +47,15 @@ class SweepStatus {
         });
     if (block == directory_.end()) return {directory_.size(), 0};
     const Block& found = blocks_[*block];
-    // If no earlier element matches, the last one does.
+    // If `is_before` is true for all earlier elements, the last one is the result: the search for
+    // the block has tested it.
     const auto slot =
         std::partition_point(found.ids.begin(), found.ids.begin() + (found.size - 1), is_before);
     return {static_cast<std::size_t>(block - directory_.begin()),
             static_cast<std::size_t>(slot - found.ids.begin())};
   }
 
-  /// Inserts before `cursor`; returns the new cursor of the element at `cursor`.
+  /// Inserts an element before `cursor`; returns the new cursor of the element that was there.
   Cursor Insert(Cursor cursor, std::uint32_t id) {
     if (directory_.empty()) directory_.push_back(NewBlock());
     if (IsEnd(cursor)) cursor = {directory_.size() - 1, BlockOf(directory_.size() - 1).size};

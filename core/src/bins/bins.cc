@@ -21,19 +21,20 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Margin of tiles around a particle beyond its kernel, in cells. An inside node is within the
-// kernel of a particle. The other corners of its active cells are within one cell of it. The nodes
-// of a small hole are within the radius of a disk with the hole's area of its ring.
+// Tiles must exist within the kernel radius plus this margin of a particle, in cells. An inside
+// node is within the kernel radius of a particle, and the other corners of its active cells are at
+// most one cell farther. The nodes of a small hole are farther by at most the radius of a disk with
+// the area of the hole.
 double TileMargin(const Scale& scale) {
   return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
 }
 
-// Particles per block: their data stay in the nearest cache.
+// Particles per block, few enough that the data of a block stay in the nearest cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// A direct-mapped cache of tile indices by the low bits of tile coordinates. A body of up to 256 x
-// 256 tiles finds all its tiles here, scattered tiles most of theirs, without an unpredictable
-// probe of the directory. Indices that do not fit are not cached.
+// A direct-mapped cache of tile indices, addressed by the low bits of tile coordinates. A body of
+// up to 256 x 256 tiles finds all its tiles in the cache, scattered tiles most of theirs, without
+// an unpredictable probe of the directory. Indices that do not fit into 16 bits are not cached.
 class RecentHomes {
  public:
   explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNone); }
@@ -55,8 +56,9 @@ class RecentHomes {
   std::array<std::uint16_t, 1 << (kColumnBits + kRowBits)> index_;
 };
 
-// First pass over a stretch: finds the home tile of each particle and counts. Returns false if a
-// particle is too far from the origin, or if there are more than `max_tiles` tiles.
+// First pass over a stretch: finds the home tile of each particle, and counts the particles of each
+// tile. Returns false if a particle is too far from the origin, or if there are more than
+// `max_tiles` tiles.
 template <typename Reader>
 bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double units_per_world,
                std::size_t max_tiles, BinStretch& stretch, BinScratch& scratch) {
@@ -71,7 +73,8 @@ bool FindHomes(const Reader& reader, std::size_t first, std::size_t last, double
                    scratch.positions.data() + 2 * start)) {
       return false;
     }
-    // The next block arrives while homes are looked up, which needs no distant memory.
+    // The next block is fetched while homes are looked up, because the look-up reads no distant
+    // memory.
     reader.Prefetch(start + count, std::min(kBlockParticles, last - start - count));
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t home = recent.Find({tiles[2 * k + 1], tiles[2 * k]});
@@ -95,7 +98,7 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   }
   scratch.homes.assign(tiles.tiles().begin(), tiles.tiles().end());
   tiles.Sort();
-  // One look-up per tile, not per stretch and tile.
+  // Each tile is looked up once, not once per stretch.
   scratch.next.clear();
   for (const TileCoordinate& home : scratch.homes) scratch.next.push_back(tiles.Find(home));
   for (BinStretch& stretch : scratch.stretches) {
@@ -105,8 +108,9 @@ bool JoinHomes(std::size_t max_tiles, BinScratch& scratch, TileDirectory& tiles)
   return true;
 }
 
-// Turns the counts of all stretches into the indices of their first particles: in each tile's list
-// the particles of the first stretch, then of the second. Returns the number of particles.
+// Turns the counts of all stretches into the indices of their first particles. The list of a tile
+// has the particles of the first stretch, then of the second, and so on. Returns the number of
+// particles.
 std::uint32_t PlaceParticles(BinScratch& scratch) {
   scratch.next.assign(scratch.homes.size(), 0);
   for (const BinStretch& stretch : scratch.stretches) {
@@ -132,11 +136,11 @@ std::uint32_t PlaceParticles(BinScratch& scratch) {
   return total;
 }
 
-// Prefetch distance in the list of a tile: the line after the particle's own. The list continues
-// there only after hundreds of particles of other tiles.
+// Prefetch distance in the list of a tile: the cache line after the line of the particle. The list
+// continues in that line only after hundreds of particles of other tiles.
 constexpr std::size_t kNextLine = 64 / sizeof(BinnedParticle) + 1;
 
-// Second pass over a stretch: writes its particles.
+// Second pass over a stretch: writes its particles to the lists of their tiles.
 void FillTiles(std::size_t first, std::size_t last, std::span<const float> volumes,
                double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
   const float* const positions = bins.scratch.positions.data();
@@ -178,7 +182,7 @@ bool AddReachedTiles(float reach, std::size_t max_tiles, ParticleBins& bins) {
   const TileHalo reached(reach);
   scratch.reached.resize(homes);
   ParallelFor(homes, [&](std::uint32_t k) {
-    // Inside a body no tile is missing.
+    // Inside a body all neighbours exist, so the particles need not be examined.
     scratch.reached[k] = 0;
     if (reached.AreNeighbours() && IsSurrounded(bins.tiles, scratch.homes[k])) return;
     const std::uint32_t end =
@@ -213,7 +217,8 @@ void SetOffsets(ParticleBins& bins) {
   }
 }
 
-// The reason why tiles were not found: the first particle too far away, else too many tiles.
+// The error of a frame that cannot be binned: its first particle too far from the origin, else too
+// many tiles.
 absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::size_t max_tiles) {
   const double units_per_world = UnitsPerWorld(scale);
   const Axes axes = AxesOf(frame, plane);
@@ -222,7 +227,8 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
     for (const auto& [axis, value] :
          {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
       if (IsNearOrigin(value * units_per_world)) continue;
-      // Particles of a slab have other indices and axes in the caller's frame.
+      // In the caller's frame, a particle of a slab has another index and other axes, so neither is
+      // named.
       return InvalidFrame(kReasonOutOfRange,
                           scale.is_slice ? "positions" : CoordinateField("positions", k, axis),
                           ShortestNumber(value),
@@ -238,9 +244,9 @@ absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::s
                     ShortestNumber(scale.spacing * scale.cell_size), " right?")});
 }
 
-// Smallest stretch and largest number of stretches: enough for the tasks to balance, few enough
-// that counts by stretch and tile are fewer than the particles. Each stretch looks up most tiles
-// again, so a single thread has one stretch.
+// Smallest stretch and largest number of stretches. There are enough stretches for the tasks to
+// balance, and few enough that the counts of all stretches and tiles are fewer than the particles.
+// Each stretch looks up most tiles again, so a single thread has one stretch.
 constexpr std::size_t kMinStretch = 1 << 15;
 constexpr std::size_t kMaxStretches = 16;
 constexpr std::size_t kStretchesPerThread = 4;

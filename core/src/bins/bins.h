@@ -15,7 +15,8 @@
 
 namespace partiemc {
 
-/// Holes up to the area of this many particles lie completely on existing tiles.
+/// Tiles extend so far that a hole with the area of this number of particles lies completely on
+/// them.
 inline constexpr double kHoleMarginParticles = 6;
 
 /// A particle in the list of its tile.
@@ -32,33 +33,34 @@ inline bool LiesIn(const BinnedParticle& particle, const BitRows& cells) {
 /// Consecutive particles that one task sorts.
 struct BinStretch {
   std::size_t first = 0, last = 0;    ///< Its particles are [first, last).
-  TileDirectory homes;                ///< The tiles of its particles, by first occurrence.
-  std::vector<std::uint32_t> tiles;   ///< By home: index in BinScratch::homes; finally the tile.
-  std::vector<std::uint32_t> places;  ///< By home: the count, then the next index.
+  TileDirectory homes;                ///< Homes: the tiles of its particles, by first occurrence.
+  std::vector<std::uint32_t> tiles;   ///< By home: index in BinScratch::homes; later the tile.
+  std::vector<std::uint32_t> places;  ///< By home: the count; later the next particle's index.
 };
 
 /// Warm buffers of BinParticles.
 struct BinScratch {
   std::vector<BinStretch> all_stretches;  ///< Kept for later, larger frames.
-  std::span<BinStretch> stretches;        ///< The first of them, in use for this frame.
+  std::span<BinStretch> stretches;        ///< The first of all_stretches: those of this frame.
   std::vector<std::uint32_t> home;        ///< By particle: index in BinStretch::homes.
   std::vector<float> positions;           ///< By particle: x and y in its tile.
   std::vector<TileCoordinate> homes;      ///< Tiles with particles, sorted.
   std::vector<std::uint32_t> offsets;     ///< By home: its first particle.
-  std::vector<std::uint32_t> next;        ///< By home: index for the next stretch.
-  std::vector<std::uint32_t> reached;     ///< By home: tiles that must exist.
+  std::vector<std::uint32_t> next;        ///< By home: first index for the next stretch.
+  std::vector<std::uint32_t> reached;     ///< By home: the tiles around it that must exist.
 };
 
-/// Particles by tile. Tiles also exist where a kernel reaches a node or a cell, and so far around
-/// that no outline meets the end of the lattice and no small hole leaves it.
+/// Particles by tile. Tiles without particles exist where a kernel reaches a node or a cell, and in
+/// a margin around it. The margin contains small holes completely, and no outline meets the end of
+/// the lattice.
 ///
-/// Positions are relative to the first node of the tile, in cells, rounded to multiples of 2^-17.
-/// They are exact floats in their own tile and in each tile that their kernel reaches.
+/// Positions are relative to the first node of the tile, in cells, rounded to multiples of 2^-17. A
+/// position is an exact float in its own tile and in each tile that its kernel reaches.
 struct ParticleBins {
   TileDirectory tiles;
   std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
-  std::vector<float> weight;              ///< By particle: w; empty if all are equal.
+  std::vector<float> weight;              ///< By particle: its weight w; empty if all are equal.
   std::vector<float> height;              ///< By particle of a slice: height in cells; else empty.
   BinScratch scratch;
 

@@ -9,8 +9,8 @@
 
 namespace partiemc {
 
-/// Cells from kMaskMargin before a tile to kMaskMargin beyond it: cell (i, j) is bit
-/// i + kMaskMargin of row j + kMaskMargin.
+/// A CellMask is a set of cells of a tile and of a margin of kMaskMargin cells around it: cell (i,
+/// j) is bit i + kMaskMargin of row j + kMaskMargin.
 inline constexpr int kMaskMargin = kTileSize / 2;
 using CellMask = std::array<std::uint64_t, kTileSize + 2 * kMaskMargin>;
 
@@ -30,7 +30,7 @@ inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
   const int dy = place / 3 - 1;
   const int first = dy < 0 ? kTileSize - kMaskMargin : 0;
   const int end = dy > 0 ? kMaskMargin : kTileSize;
-  // The margin before the tile holds the upper columns of the neighbour.
+  // The margin left of the tile holds the last columns of the left neighbour.
   const int up = dx < 0 ? kTileSize - kMaskMargin : 0;
   const int down = dx < 0 ? 0 : dx > 0 ? kTileSize + kMaskMargin : kMaskMargin;
   BitRows cells{};
@@ -76,7 +76,7 @@ CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int mar
 /// Cells beyond the margin are unknown and add nothing. Requires: 0 <= before, after <=
 /// kMaskMargin.
 inline void Widen(CellMask& mask, int before, int after) {
-  // Each row is read before it is changed.
+  // Rows change in an order in which each row is read before it is changed.
   for (int step = 0; step < before; ++step) {
     for (std::uint64_t& row : mask) row |= row >> 1;
     for (std::size_t row = 0; row + 1 < mask.size(); ++row) mask[row] |= mask[row + 1];

@@ -26,7 +26,7 @@ void TileDirectory::Seal() {
   Neighbourhood alone;
   alone.fill(kNoTile);
   neighbours_.assign(tiles_.size(), alone);
-  // Tiles are sorted, so the row above is visited in order.
+  // Tiles are sorted, so the search for the next row only moves forward.
   std::uint32_t above = 0;
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile) {
     const auto [y, x] = tiles_[tile];

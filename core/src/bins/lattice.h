@@ -26,7 +26,7 @@ struct TileCoordinate {
   friend auto operator<=>(const TileCoordinate&, const TileCoordinate&) = default;
 };
 
-/// Index of a tile that does not exist. Its nodes are outside.
+/// Index of a tile that does not exist. The nodes of such a tile are outside.
 inline constexpr std::uint32_t kNoTile = std::numeric_limits<std::uint32_t>::max();
 
 /// Neighbours of a tile at index (dy + 1) * 3 + (dx + 1), with the tile itself in the middle.
@@ -92,14 +92,14 @@ inline std::uint32_t TileDirectory::Find(TileCoordinate tile) const {
   return slots_.empty() ? kNoTile : slots_[Slot(tile)];
 }
 
-/// A node or cell: its tile, and its column and row in it, 0 <= i, j < 32.
+/// A node or cell: its tile, and its column and row in the tile, 0 <= i, j < 32.
 struct TilePlace {
   std::uint32_t tile;
   int i, j;
 };
 
-/// The node or cell (i, j) relative to `tile`, -32 <= i, j < 64, in the tile that owns it (kNoTile
-/// if that does not exist).
+/// Finds the tile that owns the node or cell (i, j), given relative to `tile`, -32 <= i, j < 64,
+/// and its place there. The owner is kNoTile if that tile does not exist.
 inline TilePlace Normalise(const TileDirectory& directory, std::uint32_t tile, int i, int j) {
   const int dx = i >> kTileShift;
   const int dy = j >> kTileShift;

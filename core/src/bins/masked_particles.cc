@@ -25,8 +25,8 @@ using Bits = hn::RebindToSigned<Lanes>;
 // Prefetch distance in particles.
 constexpr std::uint32_t kAskedAhead = 128;
 
-// Adds the particles of a list up to `last` that lie in its cells to `near`. Reads whole vectors,
-// also beyond `last`.
+// Adds the particles of `list` before the index `last` to `near` if they lie in the cells of the
+// list. Reads whole vectors, also beyond `last`.
 void ChooseParticles(std::span<const BinnedParticle> particles, const MaskedParticles::List& list,
                      std::uint32_t last, ParticleBlock& near) {
   const Lanes d;

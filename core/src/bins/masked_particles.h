@@ -16,7 +16,7 @@ namespace partiemc {
 /// A block of particles, in cells relative to the tile.
 struct ParticleBlock {
   static constexpr int kCapacity = 512;
-  // Vectors of selected lanes are written whole.
+  // Whole vectors are written, also beyond the last selected particle.
   static constexpr int kPadding = 16;
   template <typename Value>
   using PerParticle = std::array<Value, kCapacity + kPadding>;
@@ -26,11 +26,12 @@ struct ParticleBlock {
   int count = 0;
 };
 
-/// A walk over the particles in the cells of `mask`, or over all particles of a tile and its
-/// neighbours if it is null. Cost: linear in the lists of the tiles in which the mask has cells.
+/// Visits the particles in the cells of `mask`, or all particles of a tile and its neighbours if
+/// `mask` is null. Cost: linear in the particles of the tiles in which the mask has cells.
 class MaskedParticles {
  public:
-  /// The rest of a tile's list: its particles in `cells`, to be shifted.
+  /// The particles of one tile that are still to be visited: the indices, the selected cells, and
+  /// the shift to the coordinates of the central tile.
   struct List {
     std::uint32_t next, end;
     BitRows cells;
@@ -49,7 +50,7 @@ class MaskedParticles {
  private:
   static constexpr int kMaxLists = std::tuple_size_v<Neighbourhood>;
 
-  // A block with less free capacity is full.
+  // A block with less free capacity than this counts as full.
   static constexpr int kLeastRoom = 64;
 
   bool ChooseMore();

@@ -19,12 +19,12 @@ namespace {
 
 constexpr double kUnitsPerCell = 1 << kFractionBits;
 constexpr float kCellsPerUnit = 1.0f / (1 << kFractionBits);
-constexpr int kUnitShift = kFractionBits + kTileShift;  // 2^kUnitShift units are a tile.
+constexpr int kUnitShift = kFractionBits + kTileShift;  // A tile's side has 2^kUnitShift units.
 constexpr double kMaxUnits = (1 << 30) * kUnitsPerCell;
 
-// Adding kRound to a number below 2^51 rounds it to an integer in the lower bits of the sum, as
-// doubles between 2^52 and 2^53 have no fraction. Shifted by a tile's units, the bits are the tile
-// number plus kRoundTile.
+// Adding kRound to a number below 2^51 rounds it to an integer in the lower bits of the sum,
+// because doubles between 2^52 and 2^53 have no fraction. Shifted right by kUnitShift, the bits of
+// the sum are the tile number plus kRoundTile.
 constexpr double kRound = 0x1.8p52;
 constexpr auto kRoundTile =
     static_cast<std::uint32_t>(std::bit_cast<std::uint64_t>(kRound) >> kUnitShift);
@@ -49,7 +49,8 @@ HWY_INLINE hn::Vec<D> LoadDoubles(D d, const float* values) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, D>(), values));
 }
 
-// Converts coordinates from `first` on, in whole vectors of `d`. Returns the index after the last.
+// Converts coordinates from `first` on, in whole vectors of `d`. Returns the index after the last
+// converted coordinate.
 template <class D, typename Real>
 HWY_INLINE std::size_t FindTilesIn(D d, std::span<const Real> coordinates, std::size_t first,
                                    double units_per_world, std::int32_t* HWY_RESTRICT tiles,

@@ -13,8 +13,9 @@
 namespace partiemc {
 namespace {
 
-// Steps of 1/16 of the spacing move outlines by up to 0.06 spacings, 1/8 by 0.15, 1/4 by 0.23, 1/2
-// by 0.46 (core/METHOD.md, "Numbers"). The outline's own error is 0.7 at its worst point.
+// If the step of float32 is 1/16 of the spacing, outlines move by up to 0.06 spacings; with 1/8 by
+// 0.15, with 1/4 by 0.23, with 1/2 by 0.46 (core/METHOD.md, "Numbers"). The outline's own error is
+// 0.7 at its worst point.
 constexpr double kDoubtfulStep = 1.0 / 16;
 constexpr double kMaxStep = 1.0 / 4;
 

@@ -13,19 +13,20 @@
 namespace partiemc {
 namespace {
 
-// Sample sizes: the first sample clears a frame with fewer than kCause contradictions.
+// Numbers of samples. If fewer than kCause of the first kAskedFirst samples contradict the spacing,
+// the check ends: there is no doubt.
 constexpr std::size_t kAsked = 64;
 constexpr std::size_t kAskedFirst = 16;
 constexpr std::size_t kCause = 3;
 
-// Limit of the particles to look at. In full tiles a sample needs two thousand.
+// Limit of the particles that the check visits. In full tiles one sample visits two thousand.
 constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
 
-// A tile with more particles per squared spacing has less than half the spacing, for any
-// arrangement.
+// If a tile has more particles per squared spacing, the spacing of the particles is less than half
+// the spacing in use, for any arrangement.
 constexpr double kMaxDensity = 4;
 
-// The k-th sample of a tile. It depends on the positions, not on their order.
+// The k-th sample of a tile. The choice depends on the positions, not on their order.
 const BinnedParticle& Chosen(std::span<const BinnedParticle> particles, std::uint64_t k) {
   const auto hash = [k](const BinnedParticle& particle) {
     const std::uint64_t bits = std::uint64_t{std::bit_cast<std::uint32_t>(particle.x)} << 32 |
@@ -56,7 +57,7 @@ class Probe {
         spacing_(scale.spacing),
         most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
 
-  // Whether the k-th sample of `tile` shows another spacing.
+  // Whether the k-th sample of `tile` contradicts the spacing.
   bool Contradicts(std::size_t tile, std::uint64_t k) {
     const auto particles = ParticlesOf(tile);
     if (static_cast<double>(particles.size()) > most_in_tile_) return true;
@@ -83,7 +84,8 @@ class Probe {
     return std::span(bins_.particles).subspan(bins_.offsets[tile], bins_.CountOf(tile));
   }
 
-  // Adds the particles of `other`, unless the whole tile is farther away than the known ones.
+  // Adds the particles of `other`, unless the whole tile lies beyond the six nearest positions so
+  // far.
   void Gather(std::size_t other, std::size_t tile, const BinnedParticle& at, NearRing& ring) {
     const double x =
         (static_cast<double>(bins_.tiles[other].x) - bins_.tiles[tile].x) * kTileSize - at.x;
@@ -121,8 +123,8 @@ bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
   std::size_t asked = 0, contradicting = 0;
   for (; asked < most && !probe.IsExhausted(); ++asked) {
     if (asked == kAskedFirst && contradicting < kCause) return false;
-    // Spreads the samples, also the first few, over all particles: multiples of an odd step modulo
-    // a power of 2.
+    // The samples are multiples of an odd step modulo a power of 2. The first few samples are
+    // therefore spread over all particles, too.
     const std::size_t place = asked * 37 % kAsked;
     const std::size_t particle = count <= kAsked ? asked : count * place / kAsked;
     const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), particle);

@@ -20,8 +20,8 @@ using Lanes = hn::CappedTag<float, 16>;
 using Bits = hn::RebindToUnsigned<Lanes>;
 constexpr std::size_t kLanes = hn::MaxLanes(Lanes());
 
-// Bit stride * (d + 2) of a lane: whether the particle reaches the tile at distance d along an
-// axis.
+// Sets bit kStride * (d + 2) of a lane if the particle reaches the tile that is d tiles away along
+// an axis.
 template <int kStride>
 HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
   constexpr float kSize = kTileSize;
@@ -38,7 +38,8 @@ HWY_INLINE hn::Vec<Bits> Along(hn::Vec<Lanes> at, float reach) {
   return hn::Or(hn::Or(below, above), hn::Set(d_bits, std::uint32_t{1} << 2 * kStride));
 }
 
-// The bits of a box of tiles are the product of its bits along both axes.
+// The tiles that a particle reaches form a box. The bits of the box are the product of the bits
+// along both axes.
 HWY_INLINE hn::Vec<Bits> BoxesOf(const BinnedParticle* particles, float reach) {
   hn::Vec<Lanes> x, y, source;
   hn::LoadInterleaved3(Lanes(), &particles->x, x, y, source);
@@ -57,7 +58,7 @@ std::uint32_t TilesReached(const BinnedParticle* particles, std::size_t count, f
   for (std::size_t k = 0; k + kLanes <= count; k += kLanes) {
     reached = hn::Or(reached, BoxesOf(particles + k, reach));
   }
-  // Visiting a particle twice changes nothing.
+  // The last vector may overlap the one before it: visiting a particle twice changes nothing.
   reached = hn::Or(reached, BoxesOf(particles + count - kLanes, reach));
   std::array<std::uint32_t, kLanes> lanes;
   hn::StoreU(reached, d, lanes.data());

@@ -13,13 +13,13 @@ namespace partiemc {
 /// Sets of tiles around a home tile: bit 5 (dy + 2) + dx + 2 is the tile at (dx, dy).
 class TileHalo {
  public:
-  /// `reach`: distance from a particle within which tiles must exist, in cells, below two tiles.
+  /// `reach`: tiles must exist within this distance of a particle, in cells; less than two tiles.
   explicit TileHalo(float reach) : reach_(reach) {}
 
   /// The tiles that the particles of a tile reach. Cost: linear.
   std::uint32_t Of(std::span<const BinnedParticle> particles) const;
 
-  /// Whether at most the eight neighbours can be reached.
+  /// Whether the particles of a tile reach at most its eight neighbours.
   bool AreNeighbours() const { return reach_ <= kTileSize; }
 
   /// Calls visit(tile) for each tile of a set.

@@ -65,7 +65,7 @@ absl::Status CheckR1(const Rings& rings) {
   });
   for (std::size_t i = 1; i < order.size(); ++i) {
     if (point_at(order[i - 1]) != point_at(order[i])) continue;
-    // Equal points of different rings are a touch, which R2 reports.
+    // Equal points of different rings are not checked here: the rings touch, which R2 reports.
     const std::size_t ring = RingOf(rings, order[i]);
     if (RingOf(rings, order[i - 1]) != ring) continue;
     return Broken("R1: ring ", ring, " has points ", order[i - 1], " and ", order[i],
@@ -86,8 +86,8 @@ absl::Status CheckR2(const Rings& rings) {
                 RingOf(rings, second));
 }
 
-/// +1 for a counter-clockwise ring, -1 for a clockwise one: the turn at the lowest point. Requires:
-/// R1 and R2, so that this turn is not flat.
+/// +1 for a counter-clockwise ring, -1 for a clockwise ring, by the turn at the lowest point.
+/// Requires: R1 and R2, so that this turn is not flat.
 int RingOrientation(std::span<const double> ring) {
   const std::size_t count = ring.size() / 2;
   std::size_t lowest = 0;
@@ -112,8 +112,8 @@ absl::Status CheckR3(const Rings& rings) {
 
 // --- R4 -----------------------------------------------------------------------------------------
 
-/// Each hole lies directly inside the outer ring that it names. Each outer ring lies directly
-/// inside a hole or inside no ring. Requires: R1-R3.
+/// Checks that each hole lies directly inside the outer ring that `outer_of` gives, and that each
+/// outer ring lies directly inside a hole or inside no ring. Requires: R1-R3.
 absl::Status CheckR4(const Rings& rings) {
   const auto is_hole = [&](std::uint32_t ring) { return rings.outer_of[ring] != kNoRing; };
   RingDepths nesting;

@@ -76,7 +76,7 @@ int OrientationOf(const Surface& surface, std::size_t shell) {
                  (std::abs(b.x) + std::abs(b.y) + std::abs(b.z)) *
                  (std::abs(c.x) + std::abs(c.y) + std::abs(c.z));
   }
-  // Each term has fewer than 16 roundings, the sum one for each triangle.
+  // Each term has fewer than 16 rounding errors, and the sum one for each triangle.
   const double bound = 0x1p-52 * (16 + static_cast<double>(last - first)) * magnitude;
   if (std::abs(volume) > bound) return SignOf(volume);
   return OrientationExactly(surface, shell);
@@ -84,18 +84,20 @@ int OrientationOf(const Surface& surface, std::size_t shell) {
 
 // --- Nesting ------------------------------------------------------------------------------------
 
-// A vertical line through a point p passes a triangle if it passes its shadow. If it would run
-// through a corner or side of a shadow, p is moved by (e, e^2) with an infinitely small e > 0.
+// The shadow of a triangle is its projection along z. A vertical line through a point p passes the
+// triangle if it passes the shadow. So that no line runs through a corner or side of a shadow, p is
+// moved by (e, e^2) with an infinitely small e > 0.
 
-/// The side of p of the line from a to b: +1 left. Requires: a != b.
+/// The side of the moved p relative to the line from a to b: +1 left, -1 right. Requires: a != b.
 int SideOfMoved(const Point& a, const Point& b, const Point& p) {
   if (const int side = Orientation(a, b, p); side != 0) return side;
-  // Moved by e along x, p gets on the left of a line that runs down.
+  // If p is on the line, moving p by e along x brings it to the left of a line that runs down.
   if (a.y != b.y) return a.y > b.y ? 1 : -1;
   return b.x > a.x ? 1 : -1;
 }
 
-/// +1 or -1 if the line through p passes the triangle, by the turn of its shadow; else 0.
+/// If the vertical line through p passes the triangle: the orientation of its shadow, +1 or -1.
+/// Else 0.
 int PassesShadow(const std::array<Point, 3>& shadow, const Point& p) {
   const int turn = Orientation(shadow[0], shadow[1], shadow[2]);
   if (turn == 0) return 0;
@@ -105,7 +107,7 @@ int PassesShadow(const std::array<Point, 3>& shadow, const Point& p) {
   return turn;
 }
 
-/// Triangles by the columns of a grid over x and y.
+/// Lists the triangles in each column of a grid over x and y.
 class Columns {
  public:
   explicit Columns(const Surface& surface) {
@@ -154,7 +156,7 @@ class Columns {
   std::vector<std::vector<std::uint32_t>> triangles_;
 };
 
-/// The shells with a winding number other than 0 around the first point of `shell`, except itself.
+/// The other shells that have a winding number other than 0 around the first point of `shell`.
 std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& columns,
                                       const std::vector<std::uint32_t>& shell_of,
                                       std::uint32_t shell) {
@@ -166,8 +168,8 @@ std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& col
     const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
     const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
     const int turn = PassesShadow({Point{a.x, a.y}, Point{b.x, b.y}, Point{c.x, c.y}}, {p.x, p.y});
-    // Above p: p is on the lower side. On the plane but outside the triangle, the line passes it
-    // nowhere near p.
+    // Only triangles above p count: p is on their lower side. If p is in the plane of a triangle,
+    // the vertical line does not pass the triangle at p, because triangles do not touch.
     if (turn == 0 || SideOfPlane(a, b, c, p) != -turn) continue;
     winding[shell_of[t]] += turn;
   }
@@ -202,7 +204,8 @@ std::vector<std::uint32_t> ShellsAround(const Surface& surface) {
     containing.push_back(Containing(surface, columns, shell_of, shell));
   }
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
-    // The innermost of the shells around it lies in all the others.
+    // Of the shells around `shell`, the innermost is contained in the most shells, because it lies
+    // in all others.
     for (const std::uint32_t other : containing[shell]) {
       if (around[shell] == kNoShell ||
           containing[other].size() > containing[around[shell]].size()) {

@@ -1,4 +1,4 @@
-// Which shell is turned which way, and which lies in which.
+// Finds the orientation of the shells of a surface, and the shell around each shell.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace partiemc {
 
-/// Per shell: the sign of its enclosed volume, exactly.
+/// By shell: the sign of its enclosed volume, computed exactly.
 /// Requires: S1, coordinates in the domain of predicates_in_space.h.
 std::vector<int> OrientationsOf(const Surface& surface);
 
-/// Per shell: the innermost shell around it, or kNoShell. Exact. Requires: S1 to S3.
-/// Cost: shells times the triangles above and below one of their points.
+/// By shell: the innermost shell around it, or kNoShell. Exact. Requires: S1 to S3. Cost: for each
+/// shell, the triangles above and below one of its points.
 std::vector<std::uint32_t> ShellsAround(const Surface& surface);
 
 }  // namespace partiemc

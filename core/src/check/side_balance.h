@@ -11,23 +11,24 @@
 
 namespace partiemc {
 
-/// A multiset of directed sides. It is balanced if every piece of every side is passed equally
+/// A multiset of directed sides. The set is balanced if every piece of every side occurs equally
 /// often in both directions.
 ///
-/// Why this proves a cover: add the sides of counter-clockwise triangles, and the boundary of a
-/// region reversed. If they are balanced, the number of triangles around any point is the winding
-/// number of the boundary. The triangles therefore cover the region once, and nothing else.
+/// Why balance proves a cover: add the sides of counter-clockwise triangles, and the boundary of a
+/// region reversed. If the sides are balanced, the number of triangles around any point is the
+/// winding number of the boundary. The triangles therefore cover the region once, and nothing
+/// outside it.
 ///
 /// Sides along an axis may meet in T-junctions, as the sides of merged lattice cells do. Slanted
-/// sides must match as a whole. Exact: coordinates are compared only.
+/// sides must match as a whole. Exact: coordinates are only compared.
 /// Cost: n log n.
 class SideBalance {
  public:
   struct Finding {
     /// A point where the sides are not balanced, if there is one.
     std::optional<Point> imbalance;
-    /// Number of side ends that lie inside another side; set only if the sides are balanced. If it
-    /// is 0, two triangles share each side, or one triangle and the boundary.
+    /// Number of ends of sides that lie inside another side; set only if the sides are balanced. If
+    /// the number is 0, each side belongs to two triangles, or to one triangle and the boundary.
     std::size_t t_junctions = 0;
     Point t_junction;  ///< One of these ends.
 
@@ -96,8 +97,8 @@ class SideBalance {
     return std::nullopt;
   }
 
-  /// Walks along each line. The sides on it cancel if and only if the changes at each position sum
-  /// to 0. A position lies inside the sides that begin before it and do not end at it.
+  /// Walks along each line. The sides on a line cancel if and only if the changes at each position
+  /// sum to 0. A position lies inside the sides that begin before it and do not end at it.
   void WalkSteps(Finding& finding) {
     std::sort(steps_.begin(), steps_.end(),
               [](const Step& a, const Step& b) { return Place(a) < Place(b); });

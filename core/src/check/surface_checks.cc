@@ -63,7 +63,7 @@ absl::Status CheckCoordinates(const Surface& surface) {
   return absl::OkStatus();
 }
 
-/// Each triangle has three different points of its shell.
+/// Checks that each triangle has three different points of its shell.
 absl::Status CheckIndices(const Surface& surface) {
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
@@ -122,7 +122,8 @@ absl::Status LinkSides(const Surface& surface, std::vector<Side>& sides) {
   return absl::OkStatus();
 }
 
-/// Requires: S1. The triangles around a point are one cycle if turning about the point visits all.
+/// Checks that the triangles around each point form one cycle: turning about the point visits all
+/// of them. Requires: S1.
 absl::Status CheckLinks(const Surface& surface, const std::vector<Side>& sides) {
   const auto side_of = [&](std::uint32_t from, std::uint32_t to) {
     return std::lower_bound(sides.begin(), sides.end(), Side{from, to, 0});
@@ -156,7 +157,7 @@ absl::Status CheckLinks(const Surface& surface, const std::vector<Side>& sides) 
   return absl::OkStatus();
 }
 
-/// Requires: S1. All triangles of a shell are connected.
+/// Checks that all triangles of a shell are connected. Requires: S1.
 absl::Status CheckConnected(const Surface& surface, const std::vector<Side>& sides) {
   std::vector<std::uint32_t> parent(surface.PointCount());
   for (std::uint32_t k = 0; k < parent.size(); ++k) parent[k] = k;

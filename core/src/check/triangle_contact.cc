@@ -9,14 +9,14 @@
 namespace partiemc {
 namespace {
 
-/// The shadow of a point along axis 0, 1 or 2.
+/// The shadow of a point: its projection along axis 0, 1 or 2.
 Point ShadowOf(const Vec3& a, int axis) {
   if (axis == 0) return {a.y, a.z};
   if (axis == 1) return {a.z, a.x};
   return {a.x, a.y};
 }
 
-/// An axis along which the shadow of the triangle is no segment; 3 if there is none.
+/// An axis along which the shadow of the triangle is not a segment; 3 if there is no such axis.
 int AxisOf(const Vec3& a, const Vec3& b, const Vec3& c) {
   int axis = 0;
   while (axis < 3 && Orientation(ShadowOf(a, axis), ShadowOf(b, axis), ShadowOf(c, axis)) == 0) {
@@ -25,7 +25,7 @@ int AxisOf(const Vec3& a, const Vec3& b, const Vec3& c) {
   return axis;
 }
 
-/// Whether p lies in the closed triangle abc of the plane, which is not degenerate.
+/// Whether p lies in the closed triangle abc. Requires: abc is not degenerate.
 bool LiesInTriangle(const Point& p, const std::array<Point, 3>& abc) {
   bool is_left = false, is_right = false;
   for (int k = 0; k < 3; ++k) {
@@ -69,8 +69,8 @@ bool SegmentTouchesTriangle(const Vec3& p, const Vec3& q, const std::array<Vec3,
   const int q_side = SideOfPlane(abc[0], abc[1], abc[2], q);
   if (p_side * q_side > 0) return false;
   if (p_side == 0 && q_side == 0) return TouchInPlane(p, q, abc);
-  // The segment meets the plane in one point. It is in the triangle unless the line pq passes
-  // sides of the triangle both on the left and on the right.
+  // The segment meets the plane in one point. This point is in the triangle unless the line pq
+  // passes sides of the triangle both on the left and on the right.
   bool is_left = false, is_right = false;
   for (int k = 0; k < 3; ++k) {
     const int side = SideOfPlane(p, q, abc[k], abc[(k + 1) % 3]);
@@ -82,7 +82,7 @@ bool SegmentTouchesTriangle(const Vec3& p, const Vec3& q, const std::array<Vec3,
 
 bool TrianglesCollide(std::span<const double> points, const Triangle& first,
                       const Triangle& second) {
-  // The corners that they share come first.
+  // Moves the corners that the triangles share to the front.
   Triangle a = first, b = second;
   int shared = 0;
   for (int k = 0; k < 3; ++k) {
@@ -101,7 +101,9 @@ bool TrianglesCollide(std::span<const double> points, const Triangle& first,
       }
       return false;
     case 1:
-      // A ray from the common corner leaves both triangles through the opposite side of one.
+      // If the triangles also meet elsewhere, a ray from the common corner through such a point
+      // leaves one triangle first, through the side opposite to the corner. This side touches the
+      // other triangle.
       return SegmentTouchesTriangle(p[1], p[2], q) || SegmentTouchesTriangle(q[1], q[2], p);
     case 2:
       return OverlapAtEdge(p[0], p[1], p[2], q[2]);

@@ -21,7 +21,7 @@ class TriangleGrid {
   /// `points` must outlive the grid. Requires: finite coordinates.
   TriangleGrid(std::span<const double> points, std::span<const std::uint32_t> triangles);
 
-  /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until it
+  /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until `visit`
   /// returns false. The order of the pairs is fixed.
   template <typename Visit>
   void ForEachPair(Visit visit) const;
@@ -41,9 +41,10 @@ class TriangleGrid {
   static std::uint64_t Key(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
     return (z << 42) | (y << 21) | x;
   }
-  /// The number of cells that all boxes reach, with cells of size edge_.
+  /// The number of cells of size edge_ that boxes reach, summed over the boxes.
   double Reached() const;
-  /// Whether `cell` is the lowest cell of the intersection of two boxes.
+  /// Whether `cell` is the lowest cell of the intersection of two boxes. Only this cell reports
+  /// them.
   bool IsFirstOf(std::uint64_t cell, const Box& a, const Box& b) const;
 
   std::vector<Box> boxes_;
@@ -79,7 +80,7 @@ inline TriangleGrid::TriangleGrid(std::span<const double> points,
   if (boxes_.empty()) return;
   double extent = 0;
   for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] - low_[axis]);
-  // 21 bits for each coordinate of a cell.
+  // The lower bounds keep each coordinate of a cell below 2^21, the bits of a key.
   edge_ = std::max({extents / 3 / static_cast<double>(boxes_.size()), extent / 0x1p20,
                     std::numeric_limits<double>::min()});
   constexpr double kMostCells = 16;  // For each triangle.

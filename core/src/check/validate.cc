@@ -30,8 +30,8 @@ class CompensatedSum {
   double sum_ = 0, lost_ = 0;
 };
 
-/// Twice the area of triangle abc, positive if counter-clockwise. Subtracts coordinates first, so
-/// that the distance from the origin costs no digits.
+/// Twice the area of triangle abc, positive if counter-clockwise. Coordinates are subtracted first,
+/// so that triangles far from the origin lose no digits.
 double DoubleArea(const Point& a, const Point& b, const Point& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
@@ -82,7 +82,7 @@ absl::Status CheckM3(const Result& result) {
 // --- M2 -----------------------------------------------------------------------------------------
 
 /// Compares the areas of rings and triangles. The tolerance is 1e-9 relative, plus the change of
-/// area if every coordinate changes by its last bit.
+/// the area if every coordinate changes by its last bit.
 absl::Status CheckAreas(const Result& result) {
   const Rings& rings = result.rings;
   CompensatedSum ring_area, mesh_area;
@@ -132,7 +132,8 @@ SideBalance::Finding BalanceSides(const Result& result) {
   return sides.Take();
 }
 
-/// Balanced sides exclude a gap and an overlap of the same area, which CheckAreas accepts.
+/// Checks M2 by the sides. CheckAreas accepts a gap and an overlap of the same area; balanced sides
+/// exclude both.
 absl::Status CheckCover(const SideBalance::Finding& sides) {
   if (!sides.imbalance.has_value()) return absl::OkStatus();
   return Broken("M2: the triangles leave a gap or overlap at (", ShortestNumber(sides.imbalance->x),
@@ -142,8 +143,9 @@ absl::Status CheckCover(const SideBalance::Finding& sides) {
 // --- M4 -----------------------------------------------------------------------------------------
 
 /// Requires: M2. Then there is no T-junction if and only if every side cancels as a whole. At a
-/// T-junction, the side that contains the vertex cancels only piece by piece. Conversely, if that
-/// side cancels as a whole, the triangles around the vertex overlap its two triangles.
+/// T-junction, the side that contains the vertex cancels only piece by piece. Conversely, if this
+/// side cancelled as a whole, two triangles would share it, and the triangles around the vertex
+/// would overlap them.
 absl::Status CheckM4(const SideBalance::Finding& sides) {
   if (sides.t_junctions == 0) return absl::OkStatus();
   return Broken("M4: ", sides.t_junctions, " vertices lie inside sides, one of them at (",
@@ -164,7 +166,7 @@ absl::Status CheckMesh(const Result& result, bool allows_t_junctions) {
 
 absl::Status Validate(const Result& result) {
   if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
-  // Fill::kNone makes no mesh.
+  // With Fill::kNone there is no mesh to check.
   return result.mesh == Mesh{} ? absl::OkStatus() : CheckMesh(result, true);
 }
 

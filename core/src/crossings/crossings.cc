@@ -15,8 +15,8 @@ struct EdgePair {
   std::uint8_t entry, exit;
 };
 
-// Entry and exit of the first segment of a cell by its case, inside on the left. Saddles use
-// kSaddles.
+// By case of a cell: the entry and the exit edge of its segment, with the inside on the left.
+// Saddles have two segments, in kSaddles.
 constexpr std::array<EdgePair, 16> kSegments = {{
     {0, 0},             // 0: all outside
     {kBottom, kLeft},   // 1: corner 0

@@ -25,7 +25,8 @@ struct ActiveCell {
   std::uint8_t i = 0, j = 0;
   std::uint8_t corners = 0;  ///< The case, 1 to 14.
   std::uint8_t joined = 0;   ///< Saddles only: 1 if the inside corners are joined.
-  /// The first of its segments; a saddle has two. If one runs through edge 0, it is the first.
+  /// Index of the cell's first segment; a saddle has two segments. If a segment runs through edge
+  /// 0, it is the first one.
   std::uint32_t first_segment = 0;
 
   bool IsSaddle() const { return corners == 5 || corners == 10; }
@@ -38,10 +39,10 @@ struct Segment {
 
 /// Nodes and cells of a tile as bits.
 struct TileBits {
-  BitRows inside{};                                  ///< The node is inside.
-  BitRows active{};                                  ///< The cell has inside and outside corners.
+  BitRows inside{};                                  ///< Nodes that are inside.
+  BitRows active{};                                  ///< Cells with inside and outside corners.
   std::uint32_t first_cell = 0;                      ///< Index of the tile's first active cell.
-  std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in lower rows.
+  std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below.
 };
 
 /// Numbers of cells and segments.
@@ -52,10 +53,10 @@ struct CrossingCounts {
 struct Crossings {
   std::vector<TileBits> tiles;
   std::vector<BitRows> interior;  ///< By tile: cells with all corners inside.
-  std::vector<ActiveCell> cells;  ///< By tile, row, column.
-  std::vector<Segment> segments;  ///< By cell.
+  std::vector<ActiveCell> cells;  ///< Sorted by tile, row, column.
+  std::vector<Segment> segments;  ///< Sorted by cell.
 
-  std::vector<CrossingCounts> counts;  ///< Scratch: before each tile, and the total.
+  std::vector<CrossingCounts> counts;  ///< Scratch: counts in all earlier tiles; last, the total.
 };
 
 /// Finds the active cells of a level set and their segments. Deterministic, parallel over tiles:
@@ -70,9 +71,9 @@ inline bool IsInside(const Crossings& crossings, const TilePlace& node) {
   return node.tile != kNoTile && (crossings.tiles[node.tile].inside[node.j] >> node.i & 1) != 0;
 }
 
-/// The inside nodes of a tile, with the row above and the column right of it. Bit i of row j of
-/// `left` is node (i, j), of `right` node (i + 1, j), so cell (i, j) has bit i of rows j and j + 1
-/// of both as corners.
+/// The inside nodes of a tile, of the row above it and of the column right of it. Bit i of row j is
+/// node (i, j) in `left` and node (i + 1, j) in `right`. The corners of cell (i, j) are therefore
+/// bit i of the rows j and j + 1 in both arrays.
 struct NodeRows {
   std::array<std::uint32_t, kTileSize + 1> left, right;
 };
@@ -82,7 +83,7 @@ NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>&
 /// Index of an active cell. Requires: the cell is active.
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
 
-/// The next segment of the outline: it enters the neighbouring cell through the exit edge of
+/// The next segment of the outline, which enters the neighbouring cell through the exit edge of
 /// `segment`.
 std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
                           std::uint32_t segment);
@@ -94,16 +95,16 @@ inline Point CellOrigin(const TileDirectory& directory, const ActiveCell& cell) 
           static_cast<double>((std::int64_t{tile.y} << kTileShift) + cell.j)};
 }
 
-/// Distance of a crossing from the ends of its edge, in cells.
+/// Least distance of a crossing from the ends of its edge, in cells.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
 
 /// The crossing of the outline with `edge` of `cell`, by linear interpolation of F. Both cells of
-/// an edge get the same bits. Kept 2^-12 cells away from the nodes, so that rounding to world
-/// coordinates cannot move it to a node. Inline and without a branch on the edge: the crossings of
-/// many cells wait for memory at the same time.
+/// an edge get the same bits. The crossing stays 2^-12 cells away from the nodes, so that rounding
+/// to world coordinates cannot move it to a node. The function is inline and has no branch on
+/// `edge`, so that the memory accesses of many cells overlap.
 inline Point EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
                           const ActiveCell& cell, int edge) {
-  // From the lower or left node, so that both cells compute the same.
+  // Both cells of the edge interpolate from its lower or left node, so they get the same bits.
   const int right = edge == 1, up = edge == 2;
   const int along_x = ~edge & 1, along_y = edge & 1;
   const int i = cell.i + right;

@@ -1,5 +1,5 @@
-// Visits active cells and crossed horizontal edges by row of the lattice. The edges show the
-// nesting of rings without filling them.
+// Visits active cells and crossed horizontal edges by row of the lattice. The order of the edges in
+// a row shows the nesting of rings, so rings need not be filled.
 #pragma once
 
 #include <array>
@@ -17,15 +17,15 @@ namespace partiemc {
 /// Lists active cells by row of the lattice, then column. Reuses its memory.
 class CellsByRow {
  public:
-  /// The indices of the cells with is_wanted(ActiveCell); valid until the next call. Cost: linear
-  /// in tiles and cells, branch-free.
+  /// Returns the indices of the cells for which is_wanted(ActiveCell) is true; valid until the next
+  /// call. Cost: linear in tiles and cells, branch-free.
   template <typename IsWanted>
   std::span<const std::uint32_t> List(const TileDirectory& directory, const Crossings& crossings,
                                       IsWanted is_wanted);
 
  private:
   std::vector<std::uint32_t> cells_;
-  std::vector<std::uint32_t> wanted_;  // In one row of tiles, by tile.
+  std::vector<std::uint32_t> wanted_;  // Selected cells of one row of tiles.
 };
 
 template <typename IsWanted>
@@ -36,7 +36,7 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
   wanted_.resize(cells.size());
   std::uint32_t listed = 0;
   std::uint32_t first = 0;
-  // Cells are sorted by tile, tiles by row: a counting sort per row of tiles.
+  // Cells are sorted by tile, and tiles by row, so a counting sort in each row of tiles is enough.
   for (std::size_t tile = 0; tile < directory.size();) {
     const std::int32_t y = directory[tile].y;
     while (tile < directory.size() && directory[tile].y == y) ++tile;
@@ -62,8 +62,8 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
   return std::span(cells_).first(listed);
 }
 
-/// A horizontal lattice edge that a ring crosses. Along a row, edges that begin and that end an
-/// inside stretch alternate.
+/// A horizontal lattice edge that a ring crosses. Along a row of the lattice, edges at the
+/// beginning and edges at the end of an inside stretch alternate.
 struct CrossedEdge {
   std::int32_t row = 0, column = 0;  ///< Its left node, in cells from the world's origin.
   std::uint32_t ring = kNoRing;
@@ -101,7 +101,8 @@ inline void Scanlines::SetRings(const Crossings& crossings, std::span<const std:
 template <typename Visit>
 void Scanlines::ForEachEdge(const TileDirectory& directory, const Crossings& crossings,
                             Visit visit) {
-  // Every horizontal edge is the lower edge of one cell, whose first segment runs through it.
+  // Every horizontal edge is the lower edge of one cell. If the edge is crossed, the first segment
+  // of this cell runs through the edge.
   const auto crosses_lower_edge = [](const ActiveCell& cell) {
     return ((cell.corners ^ cell.corners >> 1) & 1) != 0;
   };

@@ -1,4 +1,4 @@
-// Passes what the kernels of a tile add to nodes of neighbouring tiles.
+// Passes on the density that the particles of a tile add at the nodes of neighbouring tiles.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace partiemc {
 ///   llll      rrrr
 ///   uuuuuuuuuuuuuu
 ///
-/// Parts that no kernel reaches are left out.
+/// AddTo skips parts that no kernel reaches.
 class DensityHalo {
  public:
   /// Allocates the margins. Requires: radius <= kSumMargin.

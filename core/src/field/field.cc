@@ -14,10 +14,10 @@
 namespace partiemc {
 namespace {
 
-// The last pass that a tile has been through.
+// The last pass that has run over a tile.
 enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
 
-// Tiles per task: enough that most have all neighbours in the same task.
+// Tiles per task: enough that most tiles have all neighbours in the same task.
 constexpr std::size_t kTilesAtOnce = 64;
 
 // Null if weights are uniform.
@@ -32,7 +32,8 @@ TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
           bins.CountOf(tile)};
 }
 
-// Factor from kernel sums to density; 1 if particles have own weights.
+// Factor from kernel sums to density; 1 if particles have weights, because the sums are then
+// weighted.
 float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
@@ -48,7 +49,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     values.fill(0);
     return;
   }
-  // Prefetched for writing: the sums take longer than distant memory.
+  // Fetches the memory that is written at the end: the sums take longer than this fetch.
   PrefetchLines(std::span<const float>(values));
   alignas(64) NodeSums sums;
   sums.fill(0);
@@ -61,14 +62,14 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
       ScatterNearKernels(near, WeightsOf(bins), radius, sums);
     });
   }
-  // Fixed size and inlined, unlike copy_n.
+  // memcpy of a fixed size is inlined, unlike copy_n.
   for (int j = 0; j < kTileSize; ++j) {
     std::memcpy(values.data() + j * kTileSize, sums.data() + SumIndex(0, j),
                 kTileSize * sizeof(float));
   }
 }
 
-// Second pass: the density at every node, and the sides that it decides.
+// First part of the second pass: sums the density at every node and sets the sides that it decides.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
@@ -78,7 +79,7 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
-// Sets F at the given nodes of a tile from the moments there. Returns which of them are inside.
+// Computes F at the given nodes of a tile from their moments. Returns the nodes that are inside.
 BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                     const AskedNodes& asked, LevelSet& level_set) {
   const NodeBlocks blocks = BlocksOf(asked.rows);
@@ -87,7 +88,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   CellMask mask = MaskOf(asked.rows);
   const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
   const bool masked = reach < kMaskMargin;
-  // The kernel reaches a node from cells whose far side is less than the radius before it.
+  // A kernel reaches node i from the cells i - reach to i + reach - 1: cell c extends from c to c +
+  // 1.
   if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
   MaskedParticles(bins, tile, masked ? &mask : nullptr)
@@ -98,8 +100,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
                        level_set.tiles[tile].data());
 }
 
-// Second pass with F at the nodes that the density leaves open, while the sums are in the nearest
-// cache.
+// Second pass. Computes F at the nodes whose side the density does not decide at once, while the
+// sums are in the nearest cache.
 void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                   LevelSet& level_set) {
   ClassifyByDensity(bins, scale, tile, level_set);
@@ -111,7 +113,7 @@ void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t ti
   for (int j = 0; j < kTileSize; ++j) level_set.inside[tile][j] |= inside[j];
 }
 
-// The nodes with a neighbour on the other side.
+// The ends of crossed edges: the nodes of a tile with a neighbour node on the other side.
 BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level_set,
                            std::uint32_t tile) {
   const Neighbourhood& near = directory.neighbours(tile);
@@ -131,7 +133,7 @@ BitRows EndsOfCrossedEdges(const TileDirectory& directory, const LevelSet& level
   return ends;
 }
 
-// Third pass: F at the decided ends of crossed edges.
+// Third pass: computes F at those ends of crossed edges whose side the density decided.
 void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   level_set.passes[tile] = kSampled;
@@ -140,9 +142,10 @@ void SampleDecidedEnds(const ParticleBins& bins, const Scale& scale, std::uint32
   if (!IsEmpty(ends)) SampleNodes(bins, scale, tile, {ends, false, false}, level_set);
 }
 
-// Runs the passes over the tiles [first, last). A pass reads the results of the pass before in the
-// neighbouring tiles. A tile goes through it as soon as these are ready, while they are in a near
-// cache. Tiles next to other ranges, which may not be ready, are left for later.
+// Runs the passes over the tiles [first, last). A pass over a tile reads the results of the
+// previous pass in the neighbouring tiles. The pass runs as soon as these results are ready, while
+// they are in a near cache. Tiles with neighbours in other ranges are left for later, because other
+// tasks compute these neighbours.
 void SampleTiles(const ParticleBins& bins, const Scale& scale, std::uint32_t first,
                  std::uint32_t last, LevelSet& level_set) {
   // The neighbourhood includes the tile itself.

@@ -29,7 +29,7 @@ struct Chosen {
 };
 
 // Selects the particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
-// Their coordinates along it become relative to node `first`.
+// Their coordinates along this axis become relative to node `first`.
 HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
                        Chosen& chosen) {
   const Lanes d;

@@ -16,13 +16,13 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A row of a kernel with R = 3 has six nodes; more than eight lanes would idle.
+// A row of a kernel with R = 3 has six nodes, so more than eight lanes would idle.
 using Lanes = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// The first node after `coordinate`. The offset makes it positive, so that truncation rounds down:
-// particles are at most a tile away from the tile, and kernels reach at most a tile.
+// The first node after `coordinate`. The offset makes the number positive, so that truncation
+// rounds down: particles are at most a tile away from the tile, and kernels reach at most a tile.
 HWY_INLINE int NodeAfter(float coordinate) {
   constexpr int kOffset = 2 * kTileSize;
   return static_cast<int>(coordinate + kOffset) - kOffset + 1;
@@ -42,8 +42,9 @@ HWY_INLINE void AddTo(float* HWY_RESTRICT sums, Vector term) {
   hn::StoreU(hn::Add(hn::LoadU(d, sums), term), d, sums);
 }
 
-// Adds the kernel of a particle to `rows` x `columns` sums from `sums` on; x and y are relative to
-// that node. k = max(0, row term - column term)^3 with the terms 1 - dy^2 / R^2 and dx^2 / R^2.
+// Adds the kernel of a particle to a block of `rows` x `columns` sums that begins at `sums`; x and
+// y are relative to the first node of the block. k = max(0, row term - column term)^3 with the
+// terms 1 - dy^2 / R^2 and dx^2 / R^2.
 template <bool kWeighted>
 HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse_square,
                           float weight, float* HWY_RESTRICT sums) {
@@ -58,7 +59,8 @@ HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse
   }
   for (int column = 0; column < columns; column += kLanes) {
     const Vector dx = hn::Sub(hn::Set(d, x - static_cast<float>(column)), lane);
-    // The term exceeds any row term after the last column, so k = 0 for every instruction set.
+    // After the last column the term is 2, which exceeds any row term, so k = 0 for every
+    // instruction set.
     const auto reached = hn::Lt(lane, hn::Set(d, static_cast<float>(columns - column)));
     const Vector column_term =
         hn::IfThenElse(reached, hn::Mul(hn::Mul(dx, dx), scale), hn::Set(d, 2.0f));
@@ -108,8 +110,8 @@ HWY_INLINE void FindCorners(const BinnedParticle* particles, int count, float ra
 }
 
 // Calls add(x, y, index, first sum) for each particle of a tile. Requires: kernels fit the margin.
-// Each covers the same number of rows and columns, so no branch depends on the position of a
-// particle.
+// Every kernel covers the same number of rows and columns, so no branch depends on the position of
+// a particle.
 template <typename Add>
 HWY_INLINE void ForEachCorner(const TileParticles& tile, float radius, NodeSums& sums, Add add) {
   KernelCorners corners;

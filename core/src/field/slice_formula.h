@@ -47,9 +47,9 @@ struct SliceSums {
     return std::sqrt(x * x + y * y + z * z) / kernel - scale.reference_radius;
   }
 
-  /// sigma: an upper bound of the largest eigenvalue of the moments. It is exact if one axis along
-  /// the plane is independent of the height, as between two flat bodies in any position. Inside
-  /// bodies, where moments are isotropic, there is no difference.
+  /// sigma: an upper bound of the largest eigenvalue of the moments. The bound is exact if one axis
+  /// along the plane is independent of the height, as between two flat bodies in any position.
+  /// Inside bodies, where moments are isotropic, there is no difference.
   double Spread(const Scale& scale) const {
     const double along = LargerEigenvalue(xx, xy, yy);
     const double across = std::sqrt(xz * xz + yz * yz);

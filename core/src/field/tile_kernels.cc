@@ -76,7 +76,8 @@ class NodeFormula {
         void_value_(Constant(VoidValue(scale))),
         inverse_square_(Constant(1 / (scale.kernel_radius * scale.kernel_radius))) {}
 
-  // F at the nodes of a block from `first` on. `value`: the result of ClassifyNodes there.
+  // F at the nodes of a block from `first` on. `value`: the results of ClassifyNodes at these
+  // nodes.
   HWY_INLINE Vector operator()(Vector value, const BlockSums& sums, int first) const {
     const auto load = [&](const BlockSums::Channel& of)
                           HWY_ATTR { return hn::Load(d_, of.data() + first); };
@@ -95,7 +96,7 @@ class NodeFormula {
     const Vector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
     const DensityBranches branches = BranchesOf(value);
     const Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
-    // No kernel reaches the node.
+    // If k is 0, no kernel reaches the node.
     return hn::IfThenElse(hn::Gt(k, hn::Zero(d_)), f, asked_.is_open ? void_value_ : value);
   }
 
@@ -113,7 +114,7 @@ class NodeFormula {
       const Vector f = hn::Mul(weight_, value);
       return {hn::Mul(hn::Sub(guard_, f), slope_), hn::Mul(hn::Sub(saturation_, f), slope_)};
     }
-    // The value is the term that decided the side; the other term cannot change it.
+    // `value` is the density term that decided the side. The other density term is `between` away.
     const Vector between = hn::Mul(hn::Sub(saturation_, guard_), slope_);
     const auto is_inside = hn::Lt(value, hn::Zero(d_));
     return {hn::IfThenElse(is_inside, hn::Sub(value, between), value),
@@ -126,7 +127,7 @@ class NodeFormula {
       void_value_, inverse_square_;
 };
 
-// Sets the requested values of a block to F. Returns which of them are inside.
+// Sets the requested values of a block to F. Returns the bits of the nodes that are inside.
 HWY_INLINE unsigned EvaluateBlock(const NodeFormula& formula, const BlockSums& sums, unsigned asked,
                                   BlockSums::Channel& values) {
   const Lanes d;

@@ -17,15 +17,16 @@
 
 namespace partiemc {
 
-/// Margin of the sums of a tile, in nodes. Kernels of at most this radius are summed whole, beyond
-/// the sides of the tile too. Wider kernels are cut at the sides, and each tile sums its own piece.
+/// Margin of the sums of a tile, in nodes. If the kernel radius is at most this margin, a tile sums
+/// the whole kernels of its particles, also beyond its sides. Wider kernels are cut at the sides of
+/// tiles, and each tile sums the pieces on its nodes.
 inline constexpr int kSumMargin = 8;
 inline constexpr int kSumColumns = kTileSize + 2 * kSumMargin;
 inline constexpr int SumIndex(int i, int j) {
   return (j + kSumMargin) * kSumColumns + i + kSumMargin;
 }
-/// Two more rows: vectors may write into the next row, and beyond the reach of the last particle
-/// into the one after.
+/// Two extra rows: a vector may write beyond the end of the last row, and kernels are written in
+/// pairs of rows, which may exceed their reach by one row.
 using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumns>;
 
 /// A square of nodes of a tile, some of which need moments.
@@ -50,14 +51,15 @@ struct NodeBlocks {
   const NodeBlock& operator[](int block) const { return blocks[block]; }
 };
 
-/// Greedy: each block begins at the first requested node that no earlier block contains.
+/// Finds the blocks. Greedy: each block begins at the first requested node that no earlier block
+/// contains.
 NodeBlocks BlocksOf(const BitRows& asked);
 
 /// Kernel sums at the nodes of one block. Moments are relative to the node, so that the mean loses
 /// no digits far from the corner of the tile.
 struct alignas(64) BlockSums {
   using Channel = std::array<float, NodeBlock::kNodes>;
-  Channel kernel;    ///< sum k, unless the density gives it.
+  Channel kernel;    ///< sum k; unused if the density gives it.
   Channel moment_x;  ///< sum k (x_i - x)
   Channel moment_y;
   Channel xx;  ///< sum k (x_i - x)^2, and so on.
@@ -69,7 +71,7 @@ using MomentSums = std::array<BlockSums, NodeBlocks::kMost>;
 /// The nodes of a tile that need moments.
 struct AskedNodes {
   BitRows rows;
-  bool is_open;          ///< The density left their sides open; otherwise it decided them.
+  bool is_open;          ///< The density does not decide their sides.
   bool has_kernel_sums;  ///< Their values are sum k (ClassifyNodes).
 };
 
@@ -89,8 +91,8 @@ void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums);
 
-/// Adds particles to the moments of blocks, one after another. `has_kernel_sums`: sum k is known
-/// already and not added.
+/// Adds particles to the moments of blocks, one after another. `has_kernel_sums`: sum k is known,
+/// so it is not added.
 void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
                     bool has_kernel_sums, MomentSums& sums);
 
@@ -99,7 +101,8 @@ void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& b
 /// itself if f = 0.
 void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
-/// Sets the requested values, as ClassifyNodes left them, to F. Returns which of them are inside.
+/// Replaces the requested values, which ClassifyNodes has set, by F. Returns the requested nodes
+/// that are inside.
 BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
                       float weight, const Scale& scale, float* values);
 

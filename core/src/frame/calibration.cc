@@ -9,8 +9,8 @@ namespace {
 
 // For particles on an axis-aligned lattice that fills a half plane: the distance, in spacings, from
 // a point h/2 outside the outermost layer to the weighted mean of the particles. Layer k is at the
-// distance d = k + 1/2. Its weight is the kernel integrated along the layer, proportional to
-// (1 - (d / beta)^2)^(7/2); in space the exponent is 4.
+// distance d = k + 1/2. The weight of a layer is the kernel integrated along the layer,
+// proportional to (1 - (d / beta)^2)^(7/2); in space the exponent is 4.
 template <bool kInSpace>
 double AxisAlignedLatticeDistance(double beta) {
   double moment = 0;

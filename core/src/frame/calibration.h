@@ -5,12 +5,12 @@
 
 namespace partiemc {
 
-/// alpha_r of Eq. 7 in spacings: the value for an axis-aligned lattice (core/METHOD.md,
-/// "Calibration") times the factor of the placement. `kernel_radius` in spacings.
+/// The reference radius alpha_r (paper, Eq. 7) in spacings: the value for an axis-aligned lattice
+/// (core/METHOD.md, "Calibration") times the factor of the placement. `kernel_radius` in spacings.
 double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 
-/// The value for slices, for every placement. No factor: balls and tori cut at many heights need
-/// none (core/METHOD.md, "Slices").
+/// The reference radius of slices, for every placement. The lattice value needs no factor, as tests
+/// with balls and tori cut at many heights show (core/METHOD.md, "Slices").
 double CalibratedSliceRadius(double kernel_radius);
 
 }  // namespace partiemc

@@ -43,8 +43,8 @@ bool AllDifferByNumber(std::span<const std::uint64_t> ids, std::uint64_t lowest,
   return true;
 }
 
-// A repeated id finds its bit set, and so do a few others by chance. All ids with such a bit are
-// compared exactly.
+// Whether all ids differ, by a bitmap of hashes. A repeated id finds its bit set; a few other ids
+// do so by chance. The hashes of all ids with such a bit are sorted and compared.
 bool AllDifferByHash(std::span<const std::uint64_t> ids, DistinctIdsScratch& s) {
   const int width = static_cast<int>(std::bit_width(kMaxBitsPerId / 2 * ids.size()));
   const std::uint64_t places = std::uint64_t{1} << width;
@@ -66,7 +66,8 @@ bool AllDifferByHash(std::span<const std::uint64_t> ids, DistinctIdsScratch& s) 
   return std::adjacent_find(s.suspects.begin(), s.suspects.end()) == s.suspects.end();
 }
 
-// Requires: some id repeats. The frame is refused, so speed does not matter.
+// Returns the first id that repeats an earlier one. Requires: there is such an id. Speed does not
+// matter, because the frame is refused.
 RepeatedId FirstRepeated(std::span<const std::uint64_t> ids) {
   std::vector<std::size_t> places(ids.size());
   std::iota(places.begin(), places.end(), std::size_t{0});
@@ -87,7 +88,7 @@ std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch) {
   if (ids.empty()) return std::nullopt;
   const std::uint64_t places = kMaxBitsPerId * ids.size();
-  std::uint64_t bits = 0;  // The union of the ids: an upper bound, cheaper than the maximum.
+  std::uint64_t bits = 0;  // Bitwise or of the ids: an upper bound, cheaper than the maximum.
   for (const std::uint64_t id : ids) bits |= id;
   std::uint64_t lowest = 0, highest = bits;
   if (bits >= places) {

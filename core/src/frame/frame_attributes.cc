@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
 
-// Errors go to logs and messages, so values must be printable.
+// Names appear in errors, which go to logs and messages, so they must be printable.
 std::string Escaped(std::string_view name) { return absl::CHexEscape({name.data(), name.size()}); }
 
 absl::Status CheckAttribute(const Frame& frame, std::size_t k) {

@@ -13,21 +13,21 @@
 namespace partiemc {
 namespace {
 
-// The largest coordinate in world units: the largest number of cells times the largest spacing.
-// Squares of distances stay finite.
+// The largest coordinate in world units: the largest number of cells times the largest spacing. Up
+// to this limit, squares of distances stay finite.
 constexpr double kMaxCoordinate = 1e69;
 
-// Largest distance of positions from their plane, relative to their extent in it: above the
-// rounding noise of simulators, far below real depth.
+// Largest distance of positions from their plane, relative to their extent in the plane. The limit
+// is above the rounding noise of simulators and far below the depth of particles that fill space.
 constexpr double kPlanarTolerance = 1e-5;
 
-// Values per task: enough to hide the cost of a task.
+// Values per task: enough that the cost of a task does not matter.
 constexpr std::size_t kCheckedAtOnce = 1 << 16;
 
 constexpr char kAxisNames[] = "xyz";
 
-// Whether every value is a number of at most kMaxCoordinate. Without early exit, so that the
-// compiler vectorises the loop.
+// Whether every value is a number of at most kMaxCoordinate. The loop has no early exit, so that
+// the compiler vectorises it.
 template <typename Real>
 bool AreCoordinates(std::span<const Real> values) {
   constexpr double kLargest = std::numeric_limits<Real>::max();

@@ -90,11 +90,11 @@ PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle);
 /// The name of a coordinate for a Violation: "positions[17].x".
 std::string CoordinateField(std::string_view array, std::size_t particle, int axis);
 
-/// INVALID_ARGUMENT with a Violation about one field of the frame.
+/// Makes an INVALID_ARGUMENT status with a Violation about one field of the frame.
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
                           std::string rule);
 
-/// Checks the attributes of a frame, like CheckFrame.
+/// Checks the attributes of a frame. Errors: as CheckFrame.
 absl::Status CheckAttributes(const Frame& frame);
 
 /// Checks that every number of the frame is usable: coordinates finite and, without a slice, in one

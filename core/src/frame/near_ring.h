@@ -10,8 +10,8 @@
 
 namespace partiemc {
 
-/// The six positions nearest to a point, as offsets. On a square lattice the four at the lattice
-/// constant and two at the diagonal, on a hexagonal lattice the whole ring.
+/// The six positions nearest to a point, as offsets. On a square lattice they are the four
+/// neighbours along the axes and two diagonal ones, on a hexagonal lattice all six neighbours.
 class NearRing {
  public:
   /// Adds an offset if it is among the six nearest. The point itself and repeated positions are
@@ -27,26 +27,29 @@ class NearRing {
     offsets_[k] = {x, y, square};
   }
 
-  /// Offsets beyond this squared distance are ignored; infinite until there are six.
+  /// Offsets beyond this squared distance are ignored; infinite until six offsets are known.
   double reach_square() const { return offsets_[kCount - 1].square; }
 
-  /// Whether the six surround the point at similar distances: no half-plane is free of them, and
-  /// the farthest is at most 1.6 times as far as the second nearest. The nearest may be closer, as
-  /// the particles of many simulations form pairs. In bodies 40 % (shaken or thinned at random) to
-  /// 100 % (regular) of the inner particles are surrounded, of random points at most 24 %.
+  /// Whether the six positions surround the point at similar distances: no half-plane is free of
+  /// them, and the farthest is at most 1.6 times as far as the second nearest. The nearest may be
+  /// much closer, because particles of many simulations form pairs. In bodies, 40 % (shaken or
+  /// thinned at random) to 100 % (regular) of the inner particles are surrounded; of random points,
+  /// at most 24 %.
   bool IsAround() const;
 
-  /// The distance of the fourth nearest: 1 to 1.4 spacings. Requires: IsAround().
+  /// The distance of the fourth nearest position: 1 to 1.4 spacings. Requires: IsAround().
   double Distance() const { return std::sqrt(offsets_[3].square); }
 
  private:
   static constexpr std::size_t kCount = 6;
-  // Maximum ratio of the distances of the farthest and the second nearest. In a square lattice it
-  // is 1.41, because the farthest is a diagonal neighbour; the rest is for noise.
+  // Maximum ratio of the distances of the farthest and the second nearest. In a square lattice the
+  // ratio is 1.41, because the farthest is a diagonal neighbour; the margin above 1.41 is for
+  // noise.
   static constexpr double kMaxRatio = 1.6;
 
-  // Two offsets whose angle has a smaller sine do not close the side between them. Otherwise noise
-  // would close the open side at the straight edge of a lattice.
+  // An offset counts as left of another only if the sine of the angle between them is at least
+  // this. Otherwise, because of noise, a particle at the straight edge of a lattice would count as
+  // surrounded.
   static constexpr double kMinSine = 0.25;
 
   struct Offset {
@@ -60,7 +63,7 @@ inline bool NearRing::IsAround() const {
   if (!std::isfinite(farthest) || farthest > kMaxRatio * kMaxRatio * offsets_[1].square) {
     return false;
   }
-  // From each offset, another one follows within half a turn to the left.
+  // No half-plane is free if each offset has another one on its left, less than half a turn away.
   return std::all_of(offsets_.begin(), offsets_.end(), [&](const Offset& a) {
     return std::any_of(offsets_.begin(), offsets_.end(), [&](const Offset& b) {
       const double cross = a.x * b.y - a.y * b.x;
@@ -69,8 +72,8 @@ inline bool NearRing::IsAround() const {
   });
 }
 
-/// Whether enough of the sampled points are surrounded to trust them: a dozen, and 30 %. A strip of
-/// four layers has enough, ten drops do not.
+/// Whether enough of the sampled points are surrounded to trust their distances: at least 12, and
+/// at least 30 %. A strip of four layers of particles has enough; ten drops do not.
 constexpr bool AreEnough(std::size_t surrounded, std::size_t asked) {
   return surrounded >= 12 && 10 * surrounded >= 3 * asked;
 }

@@ -51,7 +51,7 @@ absl::Status Refused(std::string field, std::string value, std::string rule) {
                          std::move(value), std::move(rule)});
 }
 
-// `of` is empty, or the path of a section.
+// Checks a slice. `of`: the path of its section in errors; empty for the slice of the stream.
 absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
   constexpr std::string_view kAxes = "xyz";
   for (std::size_t k = 0; k < 3; ++k) {

@@ -1,4 +1,4 @@
-// The table of placements: what each requires of the stages.
+// The table of placements: what each placement requires of the stages.
 #pragma once
 
 #include <array>
@@ -12,11 +12,12 @@ namespace partiemc {
 struct PlacementTraits {
   Placement placement;
   std::string_view name;
-  /// Factor of the reference radius of an axis-aligned lattice that gives no mean offset on disks
-  /// under relaxed sampling (core/METHOD.md, "Calibration"). Linear interpolation cuts bulges off
-  /// and needs a larger factor than vertices on the level set.
+  /// Factor on the reference radius of an axis-aligned lattice. With this factor, outlines of discs
+  /// with relaxed particles have a mean offset of 0 (core/METHOD.md, "Calibration"). Linear
+  /// interpolation cuts bulges off and needs a larger factor than vertices on the level set.
   double calibration;
-  /// Distance from active cells at which it samples the field: cells plus kernel radii.
+  /// Largest distance from an active cell at which the placement samples the field: this number of
+  /// cells plus this number of kernel radii.
   double reach_cells, reach_kernels;
   bool on_edges;  ///< One vertex on each crossed lattice edge.
   bool in_cells;  ///< One vertex for each segment in its cell.
@@ -24,7 +25,7 @@ struct PlacementTraits {
   /// (farthest_particle.h). Rings may cross; the mesh connects the middles of the segments.
   bool takes_particles;
   /// Vertices move from the level set along their normals and may leave their cells. Rings are
-  /// repaired, and the interior loses the cells that they touch.
+  /// therefore repaired, and cells that a ring touches are removed from the interior.
   bool refines;
   bool cleans;  ///< The default of ReconstructionParameters::clean.
 

@@ -7,29 +7,32 @@ namespace {
 
 // The kernel (1 - s^2)^3 integrates to pi R^2 / 4 over the plane.
 constexpr double kFourOverPi = 1.27323954473516268615;
-// Over space it integrates to 64 pi R^3 / 315.
+// Over space the kernel integrates to 64 pi R^3 / 315.
 constexpr double kSpaceNorm = 315.0 / 64 / 3.14159265358979323846;
 
 // The guard against spurious contours (core/METHOD.md, "Spurious contours"): f_0 is at most
 // 0.9 / beta^2, with beta = R / h; 0.10 at beta = 3. This value is above f in the void between two
 // components and below f at a lone particle.
 constexpr double kGuardFactor = 0.9;
-// A lone particle must survive: at most this share of the lightest particle's own f.
+// A lone particle must survive, so f_0 is at most this share of the density that the lightest
+// particle alone has at its position.
 constexpr double kGuardShareOfLightest = 0.7;
 // A node with a higher density is inside, whatever the weighted mean gives. For comparison: f is
 // about 1 inside, 0.5 on a flat boundary, 0.6 at the edge of a void with the area of six particles.
 constexpr double kSaturation = 0.85;
-// The gap term: the spread is 0.1 inside bodies and on their boundaries, and 0.21 in the middle of
-// a gap of 1.7 spacings.
+// The gap term begins at this spread (sigma). The spread is 0.1 inside bodies and on their
+// boundaries, and 0.21 in the middle of a gap of 1.7 spacings.
 constexpr double kGapSpread = 0.21;
-// The spread at the reference radius of a lone particle is (r / R)^2. Outlines with a larger
-// reference radius than usual must not be cut off; the calibrated radii give at most 0.21.
+// At the distance r from a lone particle, the spread is (r / R)^2. The gap term must not cut off
+// outlines with a larger reference radius r than usual, so its limit rises with (r / R)^2. The
+// calibrated radii give at most 0.21.
 constexpr double kGapSpreadPerReference = 2.4;
 // Slope of the spread outside a flat boundary, times R.
 constexpr double kSpreadSlope = 0.45;
-// Slope of f across a flat boundary, times R: makes both terms lengths.
+// Slope of f across a flat boundary, times R. This slope converts the density terms of F to
+// lengths.
 constexpr double kBoundarySlope = 1.164;
-// In space: the normalised kernel integrated over a plane through its centre.
+// In space, this slope is the integral of the normalised kernel over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
 }  // namespace
@@ -56,7 +59,7 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   scale.saturation = kSaturation;
   scale.guard_slope =
       scale.kernel_radius / (scale.is_slice ? kBoundarySlopeInSpace : kBoundarySlope);
-  // Both density terms of F are then the same and decide F alone.
+  // With equal limits, both density terms of F are the same, and F equals them.
   if (parameters.isovalue) scale.guard = scale.saturation = *parameters.isovalue;
   const double reference = scale.reference_radius / scale.kernel_radius;
   scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);

@@ -5,8 +5,8 @@
 
 namespace partiemc {
 
-/// Parameters, spacing and lattice as the stages use them. Lengths are in cells (lattice spacings)
-/// unless noted otherwise.
+/// Parameters, spacing and lattice in the form that the stages use. Lengths are in cells (lattice
+/// spacings) unless noted otherwise.
 struct Scale {
   double cell_size = 0;          ///< World units.
   bool is_slice = false;         ///< Particles fill space; volumes are cubic.
@@ -23,8 +23,8 @@ struct Scale {
   double gap_slope = 0;          ///< R / 0.45: converts spread to a length.
 };
 
-/// Arguments in world units; `lightest_volume` is an area (h^2 without volumes), for a slice a
-/// volume. Requires: resolved parameters.
+/// Arguments in world units. `lightest_volume`: the smallest volume of a particle; an area (h^2
+/// without volumes), but for a slice a volume in space. Requires: resolved parameters.
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
                 double lightest_volume);
 

@@ -10,7 +10,8 @@ using Vector = std::array<double, 3>;
 
 double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// Returns `v` normalised. Scaled first, so that squares stay in range. Requires: not 0.
+// Returns the unit vector along `v`. Scales `v` first, so that squares stay in range. Requires: `v`
+// is not 0.
 Vector UnitOf(Vector v) {
   const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
   for (double& component : v) component /= largest;

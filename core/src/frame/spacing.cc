@@ -16,31 +16,36 @@
 namespace partiemc {
 namespace {
 
-// Approximate size of the sample: its median is within a percent of the median of all.
+// Approximate size of the sample: the median distance in the sample is within a percent of the
+// median distance of all particles.
 constexpr std::size_t kSampleSize = 1 << 14;
 
-// A particle whose nearest neighbour is this many medians away is spray. Inside bodies, distances
-// stay below two medians.
+// A particle is spray if its nearest neighbour is farther away than this number of medians. Inside
+// bodies, distances stay below two medians.
 constexpr double kLonelyRatio = 4;
 
-// Radius of the kernel sums, in spacings as known so far. Each round starts from the result of the
-// round before; thinned particles need the third.
+// Radius of the kernel sums, in spacings. Each round uses the spacing that the round before found;
+// thinned particles need the third round.
 constexpr double kDensityRadius = 3;
 constexpr int kDensityRounds = 3;
-// A point counts if particles surround it: their mean is within this share of the radius, and their
-// mean square distance is about the 0.2 R^2 of a filled disk.
+// A test point counts if particles surround it: if the weighted mean of the particles lies within
+// kMaxImbalance radii of the point, and their weighted mean square distance, in squared radii, lies
+// between kMinSpread and kMaxSpread; a filled disk has 0.2.
 constexpr double kMaxImbalance = 0.15;
 constexpr double kMinSpread = 0.17;
 constexpr double kMaxSpread = 0.25;
-// With fewer such points, bodies are too thin or too small; the distances decide.
+// With fewer such points, bodies are too thin or too small for a density, and the spacing is the
+// median distance.
 constexpr std::size_t kMinFilledPoints = 32;
-// Relative error of the sums in small or thin bodies. If the distances agree within it, they are
-// the better estimate; on lattices they are exact.
+// Relative error of the kernel sums in small or thin bodies. If the spacing by density is closer to
+// the median distance than this error, the median distance is the better estimate; on lattices it
+// is exact.
 constexpr double kSumTolerance = 0.05;
 constexpr double kQuarterPi = 0.78539816339744830962;
 
-// Offsets of the points from their particles, in kernel radii. At distance 1 the particle itself
-// adds nothing, so the mean of the sums is unbiased for any arrangement.
+// Offsets of the test points from the sampled particles, in kernel radii. At distance 1 the
+// particle itself adds nothing to the kernel sum, so the mean of the sums is unbiased for any
+// arrangement.
 constexpr Point kDirections[] = {{1, 0},       {0.8, 0.6},  {0.6, 0.8},  {0, 1},
                                  {-0.6, 0.8},  {-0.8, 0.6}, {-1, 0},     {-0.8, -0.6},
                                  {-0.6, -0.8}, {0, -1},     {0.6, -0.8}, {0.8, -0.6}};
@@ -67,7 +72,7 @@ void BuildTree(std::span<Point> positions, int axis) {
   }
 }
 
-// Finds the nearest other position.
+// Collects offsets and keeps the squared distance of the nearest other position.
 struct Nearest {
   double square = std::numeric_limits<double>::infinity();
 
@@ -78,8 +83,9 @@ struct Nearest {
   double reach_square() const { return square; }
 };
 
-// Adds to `near` (Nearest or NearRing) the offsets of positions within its reach of `query`. The
-// reach shrinks with each. The tree's order decides between equal distances.
+// Adds the offsets of positions near `query` to `near` (Nearest or NearRing). Skips branches of the
+// tree beyond the reach of `near`, which shrinks with each position. If distances are equal, the
+// order of the tree decides.
 template <typename Near>
 void GatherNearest(std::span<const Point> tree, const Point& query, int axis, Near& near) {
   if (tree.empty()) return;
@@ -108,7 +114,7 @@ void ForEachWithin(std::span<const Point> tree, const Point& point, int axis, do
   if (across >= -radius) ForEachWithin(tree.subspan(middle + 1), point, 1 - axis, radius, visit);
 }
 
-// The kernel sum at a point; 0 if particles do not surround it.
+// The kernel sum at a point; 0 if particles do not surround the point.
 double FilledWeight(std::span<const Point> tree, const Point& point, double radius) {
   const double inverse = 1 / radius;
   double weight = 0, moment_x = 0, moment_y = 0, spread = 0;  // In radii.
@@ -129,7 +135,8 @@ double FilledWeight(std::span<const Point> tree, const Point& point, double radi
   return is_filled ? weight : 0;
 }
 
-// The spacing by the density inside bodies. Empty if too few points are surrounded.
+// The spacing that follows from the density inside bodies. Empty if too few test points are
+// surrounded.
 std::optional<double> SpacingOfDensity(std::span<const Point> tree, std::span<const Point> asked,
                                        double radius, std::vector<double>& weights) {
   weights.resize(asked.size());
@@ -160,8 +167,9 @@ double MedianOf(std::vector<double>& values) {
   return *middle;
 }
 
-// The median distance at which enough of the sampled particles are surrounded, within a factor of
-// two. Empty if they do not agree.
+// The median distance of the surrounded particles in the sample (NearRing::Distance). Empty unless
+// enough of them have a distance within a factor of two of this median. `asked_in_company`: the
+// number of sampled particles that are not spray.
 std::optional<double> AgreedDistance(std::span<const Point> tree, std::span<const Point> asked,
                                      std::size_t asked_in_company, std::vector<double>& distances) {
   distances.resize(asked.size());
@@ -181,7 +189,7 @@ std::optional<double> AgreedDistance(std::span<const Point> tree, std::span<cons
 }
 
 // Refines a distance between neighbours to the spacing by density. Returns the distance itself if
-// both agree within the error of the sums, or if there is no density.
+// both agree within the error of the sums, or if bodies are too thin for a density.
 double RefineSpacing(double distance, SpacingScratch& scratch) {
   double spacing = distance;
   for (int round = 0; round < kDensityRounds; ++round) {
@@ -203,8 +211,8 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   VisitPositions(frame, plane, [&](const auto& reader) {
     for (std::size_t k = 0; k < count; ++k) scratch.positions[k] = reader[k];
   });
-  // Sorted and without duplicates: the tree does not depend on the order of the particles, and no
-  // query visits a million copies of one position.
+  // Positions are sorted and made unique, so that the tree does not depend on the order of the
+  // particles, and no query visits a million copies of one position.
   ParallelSort(std::span(positions),
                [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
   const auto same = [](const auto& a, const auto& b) { return a.x == b.x && a.y == b.y; };
@@ -230,7 +238,7 @@ std::optional<SpacingEstimate> EstimateSpacing(const Frame& frame, Plane plane,
   const std::optional<double> around =
       AgreedDistance(positions, asked, distances.size(), scratch.distances);
   if (!around) return SpacingEstimate{spacing, false};
-  // Neighbours closer than half of that are pairs.
+  // Nearest neighbours closer than half the agreed distance are pairs.
   const bool is_doubled = 2 * spacing < *around;
   return SpacingEstimate{is_doubled ? RefineSpacing(*around, scratch) : spacing, true};
 }

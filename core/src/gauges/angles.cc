@@ -12,10 +12,11 @@
 namespace partiemc {
 namespace {
 
-// Below this distance from the wall, in spacings, the outline of a drop is rounded.
+// An outline is rounded within this distance of a wall, in spacings.
 constexpr double kRoundedSpacings = 1;
 
-// Samples of the upper surface, and the part of the height that is a flank.
+// Number of samples of the upper surface. A flank lies between these fractions of the peak's
+// height.
 constexpr int kSurfaceSamples = 200;
 constexpr double kFlankFrom = 0.2, kFlankTo = 0.8;
 
@@ -37,15 +38,16 @@ struct Contact {
   double place = NAN, angle = NAN;
 };
 
-// `points` are (along the wall, height above it). `first` is +1 for the start of the contact, -1
-// for its end.
+// Finds one contact point and its angle; both are NaN if no circle can be fitted. `points`:
+// coordinates along the wall and heights above the wall. `first`: +1 for the start of the contact,
+// -1 for its end.
 Contact FindContact(std::span<const Point> points, double reach, double rounded, int first) {
   std::vector<Point> arc;
   for (const Point& p : points) {
     if (p.y >= rounded) arc.push_back(p);
   }
   if (arc.empty()) return {};
-  // The outermost of the points next to the wall.
+  // Of the points next to the wall, finds the outermost point on this side.
   const double lowest = std::ranges::min(arc, {}, &Point::y).y;
   Point side{first * INFINITY, 0};
   for (const Point& p : arc) {
@@ -56,8 +58,8 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
   const std::optional<Circle> circle = FitCircle(arc);
   if (!circle || std::abs(circle->centre.y) > circle->radius) return {};
   // The wall cuts the circle at +-radius sin(angle). For a drop, the centre is on the body's side
-  // of the contact, and cos(angle) = -height of the centre / radius. For a meniscus, it is on the
-  // other side, and the angle is the supplement.
+  // of the contact, and cos(angle) = -height of the centre / radius. For a meniscus, the centre is
+  // on the other side, and the angle is the supplement.
   const double angle = std::acos(-circle->centre.y / circle->radius);
   const bool is_meniscus = first * (circle->centre.x - side.x) < 0;
   const int toward_contact = is_meniscus ? first : -first;

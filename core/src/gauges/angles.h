@@ -11,7 +11,7 @@ namespace partiemc {
 /// A straight wall. The body is on the left of its direction.
 struct Wall {
   Point origin, direction;
-  double reach = 0;  ///< Distance from a contact point within which the outline is a circle.
+  double reach = 0;  ///< A circle is fitted to the outline within this distance of a contact.
 };
 
 /// The values of GaugeKind::kContact.

@@ -8,7 +8,7 @@
 namespace partiemc {
 namespace {
 
-// Keeps the part of a closed polygon where inside(point) >= 0. `inside` is linear.
+// Keeps the part of a closed polygon where inside(point) >= 0. `inside` is a linear function.
 template <typename Inside>
 void Clip(const std::vector<Point>& polygon, std::vector<Point>& clipped, const Inside& inside) {
   clipped.clear();
@@ -30,7 +30,8 @@ void Clip(const std::vector<Point>& polygon, std::vector<Point>& clipped, const 
 }  // namespace
 
 BoxArea AreaInBox(const Rings& rings, const Point& min, const Point& max) {
-  // Sums relative to the middle of the box, which loses no digits far from the origin.
+  // Coordinates are relative to the middle of the box, so that the sums lose no digits far from the
+  // origin.
   const Point middle{min.x + (max.x - min.x) / 2, min.y + (max.y - min.y) / 2};
   double twice_area = 0, moment_x = 0, moment_y = 0;
   double magnitude = 0;  // Sum of the absolute terms of twice_area.
@@ -54,7 +55,8 @@ BoxArea AreaInBox(const Rings& rings, const Point& min, const Point& max) {
       moment_y += (a.y + b.y) * cross;
     }
   }
-  // A box in a hole has parts that cancel, except for rounding.
+  // If the box lies in a hole, the clipped outer ring and the clipped hole cancel, except for
+  // rounding.
   constexpr double kRounding = 1e-14;
   if (std::abs(twice_area) <= kRounding * magnitude) return {.area = 0, .centroid = {NAN, NAN}};
   return {

@@ -44,7 +44,7 @@ double DiscAreaInBox(const Point& centre, double radius, const Point& min, const
   const Point low{min.x - centre.x, min.y - centre.y}, high{max.x - centre.x, max.y - centre.y};
   const double inner = std::min({-low.x, -low.y, high.x, high.y});
   if (inner >= radius) return kPi * radius * radius;
-  // The distance of the box.
+  // The distance of the box from the centre of the disc, along each axis.
   const double x = std::max({low.x, -high.x, 0.0}), y = std::max({low.y, -high.y, 0.0});
   if (std::hypot(x, y) >= radius) return 0;
   const std::array<Point, 4> corners = {low, {high.x, low.y}, high, {low.x, high.y}};

@@ -9,7 +9,7 @@
 namespace partiemc {
 
 /// The parameters t of the points origin + t direction where the rings cross the line, ascending. A
-/// vertex on the line belongs to its left side, so their number is even.
+/// vertex on the line counts as left of the line, so the number of crossings is even.
 /// Cost: linear in the points, n log n in the crossings.
 std::vector<double> LineCrossings(const Rings& rings, const Point& origin, const Point& direction);
 

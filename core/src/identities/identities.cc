@@ -18,8 +18,8 @@ std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   return s.number[ring];
 }
 
-// Collects the runs of this frame and numbers the rings. Each run lies between two crossed edges.
-// Every ring has a run: the ring encloses a node, so it crosses the row of that node.
+// Collects the runs of this frame and numbers the rings. Each run lies between two crossed edges of
+// a row. Every ring has a run: it encloses a node, so it crosses the row of that node.
 void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;
   runs.clear();
@@ -35,7 +35,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
     if (!edge.begins_inside) {  // The nodes of the run are inside.
       if (topology.outer_of[ring] != kNoRing) ring = topology.outer_of[ring];
     } else if (topology.outer_of[ring] == kNoRing) {
-      ring = from.ring;  // A run between two outer rings belongs to no hole.
+      ring = from.ring;  // A run between outer rings is in no hole.
       if (topology.outer_of[ring] == kNoRing) return;
     }
     if (input.placed.kept_as[ring] == kNoRing) return;
@@ -43,7 +43,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
   });
 }
 
-// Fills the arrays by number, and the outer rings of components.
+// Fills the arrays by number, and finds the outer ring of each component.
 void FillNumberedRings(const IdentityInput& input, IdentityScratch& s) {
   const RingTopology& topology = input.topology;
   s.rings.clear();
@@ -61,7 +61,8 @@ void FillNumberedRings(const IdentityInput& input, IdentityScratch& s) {
   }
 }
 
-// Passes identities on along the largest relations first, then assigns new identities.
+// Passes on identities, along the largest relations first. Assigns new identities to the other
+// rings.
 void AssignIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory& next) {
   std::sort(s.relations.begin(), s.relations.end(),
             [](const RingRelation& x, const RingRelation& y) {

@@ -24,7 +24,7 @@ struct IdentityScratch {
   Scanlines rows;
   std::vector<std::uint32_t> number;             // By ring of the topology.
   std::vector<std::uint32_t> topology_ring;      // By number.
-  std::vector<std::uint32_t> ring_of_component;  // Number of its outer ring, or kNoRing.
+  std::vector<std::uint32_t> ring_of_component;  // By component: its outer ring, or kNoRing.
   std::vector<std::uint64_t> particle_count;     // By number.
   std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;
@@ -49,9 +49,10 @@ struct IdentityInput {
 /// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the
 /// next frame. core/IDENTITIES.md has the rules.
 ///
-/// Ties: among pairs of rings that share equally many nodes, the older identity comes first, then
-/// the lower and more left ring. New identities are assigned by the lowest rows of the rings.
-/// Deterministic: independent of the order of rings and particles, and of threads.
+/// Ties: if pairs of rings share equally large numbers of nodes, the older identity comes first,
+/// then the lower and more left ring. New identities are assigned in the order of the rings' lowest
+/// rows. The result depends neither on the order of rings and particles nor on the number of
+/// threads.
 /// Cost: linear in segments, rows of tiles and runs; n log n in rings and their relations; with ids
 /// or velocities, also the cost of FollowParticles.
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,

@@ -9,19 +9,20 @@
 namespace partiemc {
 namespace {
 
-// Two rings that share fewer nodes than the smaller ring has, divided by this, are neighbours: one
-// moved to where the other was.
+// Two rings that share fewer than a quarter of the nodes of the smaller one are neighbours: one of
+// them moved to where the other was.
 constexpr std::uint64_t kSmallestPart = 4;
 
-// Largest difference between the shares of a full set of 16 samples and of the nodes, in samples.
-// It is three standard deviations of the samples of a ring that splits in halves.
+// For a full set of 16 samples: the largest difference between the share of the samples and the
+// share of the nodes, in samples. This is three standard deviations of the samples of a ring that
+// splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 
-// If the samples of other rings account for this part of a ring, in quarters, shared nodes alone
-// make no parent of it.
+// If samples of other rings account for this part of a ring, in quarters, a ring that only shares
+// nodes with it is not its parent.
 constexpr std::uint64_t kAccountedQuarters = 3;
 
-// Largest movement within a frame, in cells; coordinates of the lattice have 32 bits.
+// Largest movement within a frame, in cells, because lattice coordinates have 32 bits.
 constexpr double kMaxShift = 1u << 31;
 
 void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
@@ -37,7 +38,7 @@ void MoveHolesAlong(std::span<const KnownRing> rings, std::vector<CellShift>& sh
   }
 }
 
-// The lower median, robust against a few stray particles. Requires: not empty.
+// The lower median: a few stray particles do not change it much. Requires: not empty.
 std::int64_t MedianOf(std::vector<std::int64_t>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -146,8 +147,8 @@ void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationS
   Unite(relations);
 }
 
-// Estimates the nodes that a ring passed to another one: its nodes times the share of its samples
-// found there.
+// Estimates the nodes that a ring passed to another ring: its number of nodes, times the share of
+// its samples that are in the other ring.
 std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch& s) {
   const std::uint64_t nodes = s.nodes_before[relation.before];
   const std::uint64_t count = s.sample_count[relation.before];
@@ -157,7 +158,7 @@ std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch
 }
 
 // Whether the samples of a ring agree with its nodes, within the statistical error. False for an
-// incomplete set: it holds all particles of the ring, so it has no such error and is exact.
+// incomplete set: such a set has all particles of the ring, so it is exact and decides alone.
 bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScratch& s) {
   const std::uint32_t ring = of_one_ring.front().before;
   if (s.sample_count[ring] < kMaxSamples) return false;
@@ -174,7 +175,7 @@ bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScrat
 // Corrects the shared nodes of all relations of one ring of the last frame by its samples.
 void CorrectBySamples(std::span<RingRelation> of_one_ring, const RelationScratch& s) {
   const bool sampled = s.sample_count[of_one_ring.front().before] > 0;
-  // If both agree, the nodes are more accurate than the estimate from samples.
+  // If samples and nodes agree, the nodes are more accurate than the estimate from samples.
   const bool by_nodes = !sampled || SamplesAgree(of_one_ring, s);
   for (RingRelation& relation : of_one_ring) {
     if (relation.samples > 0) {
@@ -210,8 +211,9 @@ void MarkCounting(RelationScratch& s, std::vector<RingRelation>& relations) {
   }
 }
 
-// Relates rings at their original positions, if moving found no relation for either of them: a hole
-// may not follow the body around it, and velocities may be wrong. Skips outer rings with samples.
+// Relates two rings by their nodes at the original positions, if moving found no relation for
+// either ring: a hole may not follow the body around it, and velocities may be wrong. Skips outer
+// rings with samples.
 void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
                 std::vector<RingRelation>& relations) {
   FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);

@@ -24,9 +24,9 @@ struct RingsNow {
 /// A ring of the last frame and a ring of this frame that may continue it. Either both are outer
 /// rings or both are holes.
 struct RingRelation {
-  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number.
+  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number now.
   std::uint64_t nodes = 0;            ///< Shared nodes, counted or estimated from samples.
-  std::uint32_t samples = 0;          ///< Samples of `before` that are now in `now`.
+  std::uint32_t samples = 0;          ///< Samples of `before` that are in `now`.
   bool counts = false;                ///< Shares at least a quarter of the smaller ring's nodes.
 };
 
@@ -43,10 +43,10 @@ struct RelationScratch {
   std::vector<std::uint8_t> linked_before, linked_now;
 };
 
-/// Finds the related rings (core/IDENTITIES.md). Moves rings by the displacement of their samples,
-/// else by their velocities, else not at all, and counts the nodes that they share. If samples
-/// contradict the nodes, the samples decide. `relations` has each pair once, in no particular
-/// order.
+/// Finds the related rings (core/IDENTITIES.md). Rings move by the displacement of their samples,
+/// else by their velocities, else not at all; then the nodes that they share are counted. If
+/// samples contradict the nodes, the samples decide. `relations` has each pair once, in no
+/// particular order.
 /// Cost: n log n in runs, rings and samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,
                  std::vector<RingRelation>& relations);

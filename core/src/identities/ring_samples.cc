@@ -15,8 +15,8 @@ namespace {
 constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
 // Average number of particles below the limit of a ring, divided by the number of samples. With 2,
-// one ring of 1,500 finds fewer than 16 of its 32 expected particles and needs the second pass. A
-// larger value would cost time for every ring.
+// a ring expects 32 such particles. One ring of 1,500 finds fewer than 16 and needs the second
+// pass. A larger value would cost time for every ring.
 constexpr std::uint64_t kSurplus = 2;
 
 bool HasLessHash(const ParticleSample& a, const ParticleSample& b) { return a.hash < b.hash; }
@@ -55,8 +55,8 @@ void TakeSample(const ParticleSample& sample, RingSamples& s) {
   std::push_heap(first, first + count, HasLessHash);
 }
 
-// A filter for the hashes of samples: one bit for each value of their leading bits. At most one in
-// 32 other hashes passes, one in thousands if there are few samples.
+// A filter for the hashes of samples: one bit for each value of their leading bits. Of all other
+// hashes, at most one in 32 passes, and one in thousands if there are few samples.
 class KnownHashes {
  public:
   KnownHashes(std::span<const ParticleSample> samples, std::vector<std::uint64_t>& bits)
@@ -142,7 +142,8 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
   }
 }
 
-// The second pass: samples the rings that lack samples again, from all of their particles.
+// The second pass: where samples of a ring are missing, samples the ring again from all its
+// particles.
 void FillShortRings(const SampleInput& input, RingSamples& s) {
   bool any = false;
   for (std::size_t ring = 0; ring < s.ring_limit.size(); ++ring) {
@@ -180,8 +181,8 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
   ChooseParticles(input, KnownHashes(previous, s.known), index, s);
   s.found.clear();
   ForEachChosen(input, s, [&](const ParticleSample& now) {
-    // A sample of the last frame above the limit could fill the heap, and so hide that it lacks
-    // particles with smaller hashes.
+    // A sample of the last frame that exceeds the limit is not added: in a full heap, it would hide
+    // that particles with smaller hashes are missing.
     if (now.hash <= s.ring_limit[now.ring]) TakeSample(now, s);
     if (const ParticleSample* const before = index.Find(now.hash)) {
       s.found.push_back(

@@ -8,7 +8,7 @@ namespace partiemc {
 namespace {
 
 // Converts velocities to integers. The unit is a power of two, chosen such that the sum over all
-// particles fits into 62 bits. Sums are therefore exact and independent of the order.
+// particles fits into 62 bits. Sums are therefore exact and do not depend on the order.
 class VelocityUnits {
  public:
   explicit VelocityUnits(const Frame& frame) {
@@ -16,7 +16,7 @@ class VelocityUnits {
     for (const float value : frame.velocities) largest = std::max(largest, std::abs(value));
     if (largest == 0) return;
     int exponent = 0;
-    std::frexp(largest, &exponent);  // This and ldexp touch exponents only: they are exact.
+    std::frexp(largest, &exponent);  // frexp and ldexp only change exponents: they are exact.
     per_unit_ =
         std::ldexp(1.0, 62 - static_cast<int>(std::bit_width(frame.ParticleCount())) - exponent);
   }

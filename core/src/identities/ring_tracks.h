@@ -25,7 +25,8 @@ struct TrackInput {
 };
 
 /// Samples the rings if the frame has ids (SampleRings), and sets the mean velocity of each outer
-/// ring if the frame has velocities. Sums of integers make the means independent of the order.
+/// ring if the frame has velocities. The means are sums of integers, so they do not depend on the
+/// order of the particles.
 /// Requires: a checked frame; the velocities of `rings` are 0.
 /// Cost: the cost of SampleRings; with velocities, also linear in particles.
 void FollowParticles(const TrackInput& input, const RingHistory& previous,

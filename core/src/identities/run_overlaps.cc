@@ -51,7 +51,7 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
     moved.push_back({static_cast<std::int32_t>(row), static_cast<std::int32_t>(first),
                      static_cast<std::int32_t>(last), run.ring});
   }
-  // Usually still sorted: all runs move alike or not at all.
+  // Usually the runs are still sorted, because all of them move alike or not at all.
   if (std::is_sorted(moved.begin(), moved.end(), ComesBefore)) return;
   std::sort(moved.begin(), moved.end(), ComesBefore);
 }
@@ -77,7 +77,8 @@ void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b
       }
       const NodeRun& b = b_runs[k];
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
-      // Usually a ring overlaps the same ring as in the row before.
+      // Usually a ring overlaps the same ring as in the previous row, so its newest pair is tried
+      // first.
       if (a.ring >= newest.size()) newest.resize(a.ring + 1, kNoIndex);
       std::uint32_t& pair = newest[a.ring];
       if (pair != kNoIndex && shared[pair].b == b.ring) {

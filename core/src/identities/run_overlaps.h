@@ -26,11 +26,11 @@ struct SharedNodes {
 void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of_ring,
               std::vector<NodeRun>& moved);
 
-/// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b.
-/// `newest`, by ring of `a_runs`, is scratch: the index in `shared` of the ring's newest pair.
-/// Requires: both sets of runs sorted by row, then column, and `b_runs` disjoint. MoveRuns can move
-/// rings onto each other, and their runs then overlap without limit. If there are more than 16
-/// overlaps for each run of both sets, `shared` is therefore left empty.
+/// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b. `newest`
+/// is scratch: by ring of `a_runs`, the index in `shared` of the ring's newest pair.
+/// Requires: both sets of runs sorted by row, then column, and `b_runs` disjoint.
+/// After MoveRuns, rings may lie on each other, and the number of overlaps of their runs has no
+/// limit. If there are more than 16 overlaps for each run of both sets, `shared` is left empty.
 /// Cost: linear in runs, rings and overlaps, n log n in pairs of rings.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);

@@ -42,8 +42,8 @@ void ForEachBlockIn(const BitRows& cells, int level, const Visit& visit) {
   }
 }
 
-// Blocks of at least this level are tested at few nodes and by the particles in windows, whose side
-// is half of such a block.
+// Blocks of at least this level are tested at few nodes, and by the particles in windows. The side
+// of a window is half the side of the smallest such block.
 constexpr int kLevelOfWindows = 3;
 constexpr int kWindowShift = kLevelOfWindows - 1;
 constexpr int kWindowsAlong = kTileSize >> kWindowShift;
@@ -52,8 +52,9 @@ constexpr int kWindowsOfTile = kWindowsAlong * kWindowsAlong;
 // Distance of the nodes at which a block is tested.
 int StepOf(int level) { return level >= kLevelOfWindows ? 1 << (level - 1) : 1; }
 
-// A part of an attribute: a component, or the length of a vector. Pictures are coloured by the
-// length, which is not linear near a zero of a linear vector field.
+// Number of parts of an attribute. A part is a component, or the length of a vector. The length is
+// tested, too, because pictures are coloured by it, and it is not linear near a zero of a linear
+// vector field.
 int PartsOf(int components) { return components == 1 ? 1 : components + 1; }
 
 double PartOf(const float* value, int components, int part) {
@@ -63,8 +64,8 @@ double PartOf(const float* value, int components, int part) {
   return std::sqrt(sum);
 }
 
-// Sums over the particles of a window: their number, and x, y and x y in cells of the tile. The
-// sums of the values of all parts follow.
+// Number of moments of a window: the number of its particles, and the sums of x, y and x y in cells
+// of the tile. The sums of the values of all parts follow.
 constexpr std::size_t kWindowMoments = 4;
 
 // The bilinear interpolation of the corners of a block at (i, j).
@@ -77,14 +78,14 @@ class CornerInterpolation {
     const double u = (x - i_) / side_, v = (y - j_) / side_;
     return a_ + right_ * u + up_ * v + twist_ * u * v;
   }
-  // The sum over the particles of a window.
+  // The sum of the interpolation over the particles of a window, by their moments.
   double SumOver(const double* moments) const {
     const auto [n, x, y, xy] = std::array{moments[0], moments[1], moments[2], moments[3]};
     const double u = (x - i_ * n) / side_, v = (y - j_ * n) / side_;
     const double uv = (xy - i_ * y - j_ * x + i_ * j_ * n) / (side_ * side_);
     return a_ * n + right_ * u + up_ * v + twist_ * uv;
   }
-  // The distance of the two diagonals in the centre.
+  // In the centre: the difference of the interpolations along the two diagonals.
   double DistanceOfDiagonals() const { return std::abs(twist_) / 2; }
 
  private:
@@ -149,7 +150,7 @@ class LevelTest {
   // Let D be the largest deviation of a node from the bilinear interpolation of the corners, and T
   // the distance of the two diagonals in the centre. Triangles between corners and middles of edges
   // deviate from the bilinear interpolation by at most T / 2 + D: T / 2 for the diagonals, D at the
-  // middles. So they deviate from a node by at most 2 D + T / 2.
+  // middles. The triangles therefore deviate from a node by at most 2 D + T / 2.
   bool IsPartLinear(std::uint32_t tile, int i, int j, const AttributeValues& attribute, int part,
                     std::size_t index) const {
     const int side = 1 << level_;
@@ -238,7 +239,8 @@ void SumWindows(const AttributeSource& attributes, Blocks& blocks) {
   });
 }
 
-// A vector's tolerance is a fraction of the range of the component that varies most.
+// Sets the tolerances of all parts. The tolerance of a vector is a fraction of the range of the
+// component that varies most.
 void FindTolerances(const AttributeSource& attributes, std::vector<double>& tolerances) {
   tolerances.clear();
   for (const Attribute& attribute : attributes.frame.attributes) {
@@ -252,7 +254,7 @@ void FindTolerances(const AttributeSource& attributes, std::vector<double>& tole
       range = std::max(range, most - least);
       largest = std::max({largest, std::abs(least), std::abs(most)});
     }
-    // Sums round, and values are floats: a constant must not look rough.
+    // Sums are rounded, and values are floats. With this lower bound, a constant passes the test.
     constexpr double kRounding = 0x1p-22;
     const double tolerance = std::max(attributes.tolerance * range, kRounding * largest);
     tolerances.insert(tolerances.end(), PartsOf(attribute.components), tolerance);
@@ -270,13 +272,13 @@ void FindInteriorBlocks(const BitRows& interior, Blocks::Levels& levels) {
   }
 }
 
-// Interior cells whose blocks are smaller than a level.
+// The interior cells whose blocks have a smaller level than a given one.
 class SmallerCells {
  public:
   SmallerCells(const TileDirectory& directory, const Blocks& blocks, int level)
       : directory_(directory), blocks_(blocks), level_(level) {}
 
-  // Whether one of the cells along the four edges of a block is smaller.
+  // Whether such a cell lies along one of the four edges of a block.
   bool Beside(std::uint32_t tile, int i, int j, int side) const {
     const std::uint32_t span = Span(i, side);
     if ((Row(tile, i, j - 1) & span) != 0 || (Row(tile, i, j + side) & span) != 0) return true;

@@ -27,7 +27,7 @@ struct AttributeSource {
   /// Interpolates all attributes to points in world units, interleaved. The result is valid until
   /// the next call.
   absl::FunctionRef<std::span<const AttributeValues>(std::span<const double>)> at_points;
-  double tolerance;  ///< A fraction of each attribute's range over the particles.
+  double tolerance;  ///< Largest error, a fraction of the attribute's range over the particles.
 };
 
 /// The blocks that cover the interior cells. Keeps its memory warm from frame to frame.
@@ -38,20 +38,20 @@ struct Blocks {
   std::vector<Levels> linear;            ///< Cells of blocks in which all attributes are linear.
   std::vector<std::uint32_t> window_of;  ///< By tile: its first window, if it has windows.
   std::vector<double> windows;           ///< Sums over the particles of each window.
-  std::vector<double> tolerances;        ///< By part.
+  std::vector<double> tolerances;        ///< By part of an attribute.
   NodeVertices nodes;                    ///< Nodes of one level.
-  std::vector<double> node_points;       ///< Their positions.
+  std::vector<double> node_points;       ///< Positions of `nodes`.
 };
 
 /// Covers the interior cells with disjoint blocks. The blocks are as large as two rules allow:
 /// 1. Every component of an attribute, and the length of a vector, is linear enough: interpolation
-///    from the corners deviates by at most the tolerance. In blocks of up to 4 cells along a side
-///    this holds at every node, for any choice of diagonals. In larger blocks it holds at the
-///    middles of block and edges, and for the mean of the particles in each window of 4 x 4 cells.
-/// 2. A block and its neighbours along an edge differ by at most one level. So only the middle of
-///    an edge can be the corner of another block.
-/// Deterministic. Parallel over tiles. Cost: linear in the particles, times values, and
-/// interpolation to the nodes that are tested: few where attributes are smooth.
+///    from the corners deviates by at most the tolerance. Blocks of up to 4 cells along a side are
+///    tested at every node, for any choice of diagonals. Larger blocks are tested at the middles of
+///    the block and its edges, and by the mean of the particles in each window of 4 x 4 cells.
+/// 2. A block and its neighbours along an edge differ by at most one level. Therefore only the
+///    middle of an edge can be the corner of another block.
+/// Deterministic. Parallel over tiles. Cost: linear in the particles, times the values of each,
+/// plus the interpolation to the tested nodes, which are few where attributes are smooth.
 void FindBlocks(const TileDirectory& directory, std::span<const BitRows> interior, double cell_size,
                 const AttributeSource& attributes, Blocks& blocks);
 

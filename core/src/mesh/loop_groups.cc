@@ -65,8 +65,8 @@ bool LoopGroups::TriangulateGroup(std::span<const double> points, std::size_t gr
     return batch.strip.Triangulate(points, PointsOf(loop), PointsOf(other), batch.triangles);
   };
   // Exchanging the loops reverses the direction of the walkers. An obstacle, such as a pocket of
-  // the ring, rarely stops them in both directions; starting elsewhere in the same direction fails
-  // again.
+  // the ring, rarely stops walkers in both directions. In one direction, it stops them from any
+  // start.
   if (loops.size() == 2 && (strip(loops[0], loops[1]) || strip(loops[1], loops[0]))) return true;
   batch.points.clear();
   batch.offsets.assign(1, 0);

@@ -12,10 +12,10 @@
 
 namespace partiemc {
 
-/// Loops as Triangulator wants them, each in a group. Loops of different groups bound regions that
-/// have no inner point in common; a group's loops are all that bound its region. Two loops alone, a
-/// ring and its staircase, are triangulated as a strip where that will do (loop_strip.h).
-/// Keeps its memory warm from frame to frame.
+/// Loops in groups. Each loop meets the requirements of Triangulator. The loops of a group are the
+/// whole boundary of a region; regions of different groups have no inner point in common. If a
+/// group has two loops, a ring and its staircase, LoopStrip (loop_strip.h) is tried first, because
+/// it is faster. Keeps its memory warm from frame to frame.
 class LoopGroups {
  public:
   void Clear();
@@ -31,10 +31,10 @@ class LoopGroups {
   /// Ends the current loop. `reversed` reverses its direction.
   void EndLoop(std::uint32_t group, bool reversed = false);
 
-  /// Appends the triangles of all groups, in the order of the groups, and forgets the loops.
-  /// Groups are taken together to batches of about the same number of points, whatever the number
-  /// of threads. Returns false if Triangulator finds that the loops of a group break its
-  /// requirements; that group has no triangles. LoopStrip does not check them.
+  /// Appends the triangles of all groups, in the order of the groups, and removes the loops. Groups
+  /// are combined to batches of about the same number of points, independent of the number of
+  /// threads. Returns false if Triangulator finds that the loops of a group break its requirements;
+  /// such a group gets no triangles. LoopStrip does not check the requirements.
   [[nodiscard]] bool Triangulate(std::span<const double> points,
                                  std::vector<std::uint32_t>& triangles);
 

@@ -29,8 +29,8 @@ std::size_t Nearest(std::span<const double> points, std::span<const std::uint32_
 }  // namespace
 
 /// Lists the vertices in the order of the walkers. The region lies to the left of both loops, so
-/// one walker follows its loop and the other walks against its loop. False if a coordinate is
-/// outside the domain of predicates.h.
+/// one walker follows its loop and the other walks against its loop. Returns false if a coordinate
+/// is outside the domain of predicates.h.
 bool LoopStrip::Collect(std::span<const double> points, std::span<const std::uint32_t> loop,
                         std::span<const std::uint32_t> other) {
   bool in_domain = true;

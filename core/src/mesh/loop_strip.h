@@ -20,16 +20,16 @@ namespace partiemc {
 /// Correctness: each triangle replaces two sides of the front by its third side. Apart from sides
 /// that cancel, the sides of the triangles and the front therefore always sum to the first front
 /// plus the paths of the walkers. After one round both walkers are back at their starts. If the
-/// front is then again the single first side, only the loops remain. As in side_balance.h, the
-/// number of triangles around a point is then the winding number of the loops: 1 inside the region,
-/// 0 elsewhere. Any choice of walker is therefore correct; a bad choice only leaves a longer front,
-/// and Triangulate returns false.
+/// front is then again the single first side, the sides of the triangles sum to the loops alone. As
+/// in side_balance.h, the number of triangles around a point is then the winding number of the
+/// loops: 1 inside the region, 0 elsewhere. Any choice of walker is therefore correct; a bad choice
+/// only leaves a longer front, and Triangulate returns false.
 ///
 /// Keeps its buffers warm. Use one object per thread.
 class LoopStrip {
  public:
   /// Appends one triangle for each point of the loops, all strictly counter-clockwise by
-  /// Orientation. Otherwise returns false and leaves `triangles` unchanged. Reasons:
+  /// Orientation. On failure, returns false and leaves `triangles` unchanged. Reasons:
   ///   - the front is not used up;
   ///   - the loops do not turn once each, in opposite directions;
   ///   - a coordinate is outside the domain of predicates.h.

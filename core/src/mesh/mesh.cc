@@ -14,9 +14,9 @@ namespace partiemc {
 namespace {
 
 // The state of BuildMesh. Points are numbered as follows: first the points of the rings (the
-// middles of all segments if vertices move), then the lattice nodes that triangles use. If the
-// nodes are not numbered yet when loops are triangulated, the corners of the staircases take their
-// place until PutNodesInPlace.
+// middles of all segments if vertices move), then the lattice nodes that triangles use. With
+// several threads, loops are triangulated before the nodes are numbered. The corners of the
+// staircases then take the place of the nodes until PutNodesInPlace.
 struct Work {
   const MeshInput& input;
   MeshScratch& scratch;
@@ -247,7 +247,7 @@ void TriangulateByLoops(Work& w) {
   TriangulateLoops(w, TriangleClass::kInterior);
 }
 
-// Traces the staircases and triangulates everything. With several threads, rectangles run in
+// Traces the staircases and triangulates everything. With several threads, rectangles are made in
 // parallel with the band, because a single long ring uses only one thread. A single thread numbers
 // the nodes first, which avoids renumbering. Both ways produce the same triangles.
 void TriangulateAll(Work& w) {
@@ -346,7 +346,8 @@ bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
     if (!w.is_complete) return false;
     if (w.MovesVertices()) MoveVertices(w);
   }
-  // Each node of a block along the staircase adds one triangle, which `grid` does not have.
+  // Each requested node on a straight part of a staircase adds one triangle that `grid` does not
+  // have.
   const auto band_triangles =
       w.HasBand() ? static_cast<std::uint64_t>(std::count(
                         w.mesh.classes.begin(), w.mesh.classes.end(), TriangleClass::kBoundary)) -

@@ -44,10 +44,10 @@ struct MeshInput {
   const Rings& rings;
   const ReconstructionParameters& parameters;
   const Scale& scale;
-  const AttributeSource* attributes = nullptr;  ///< Not null if HasBlocks.
+  const AttributeSource* attributes = nullptr;  ///< Null unless the mesh has blocks.
 };
 
-/// Whether the mesh of `parameters` has blocks (blocks.h) if it carries attributes.
+/// Whether the mesh has blocks (blocks.h) if the frame has attributes.
 inline bool HasBlocks(const ReconstructionParameters& parameters) {
   return parameters.fill == Fill::kGreedy && parameters.attribute_tolerance < 1;
 }
@@ -56,12 +56,12 @@ inline bool HasBlocks(const ReconstructionParameters& parameters) {
 /// `folded_triangles` of the statistics.
 ///
 /// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points. It is the same for `grid`, `greedy` without blocks, and `conforming`. With blocks, it
-/// also has the corners of blocks along the staircase, so the mesh has no T-junctions. Where
+/// points. The band is the same for `grid`, `greedy` without blocks, and `conforming`. With blocks,
+/// it also has the corners of blocks along the staircase, so the mesh has no T-junctions. If
 /// vertices are particles (placement_traits.h), the middles of the segments are triangulated and
-/// moved to the vertices afterwards, so a triangle folds if its vertices do. Returns false if a
-/// component cannot be triangulated. That is a bug: rings are simple, and the remaining interior
-/// cells lie inside them. Cost: n log n in the points of rings and staircases, linear in cells.
+/// then moved to the vertices, which may fold triangles. Returns false if a component cannot be
+/// triangulated. That is a bug: rings are simple, and the remaining interior cells lie inside the
+/// rings. Cost: n log n in the points of rings and staircases, linear in cells.
 [[nodiscard]] bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
                              FrameStatistics& statistics);
 

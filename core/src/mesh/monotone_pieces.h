@@ -23,13 +23,14 @@ class MonotonePieces {
     std::uint32_t index = 0;
   };
 
-  /// The part of a piece that is not triangulated yet, as a stack. Its bottom is the last vertex of
-  /// one chain, the vertices above are the end of the other chain. That end nowhere turns towards
-  /// the inside, so no triangle can be cut off. Valid only with the object that started it.
+  /// The part of a piece that is not triangulated yet, as a stack. The bottom of the stack is the
+  /// last vertex of one chain; the vertices above are the end of the other chain. This end never
+  /// turns towards the inside, so no triangle can be cut off there. Valid only with the object that
+  /// started the piece.
   struct Piece {
     std::uint32_t top = kNoIndex;
     bool is_left_chain =
-        false;  ///< Whether the stack holds the left chain, if it has two vertices.
+        false;  ///< Whether the stack is on the left chain; one vertex alone is on both.
 
     bool IsEmpty() const { return top == kNoIndex; }
   };
@@ -55,7 +56,8 @@ class MonotonePieces {
   void AddToLeftChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, true); }
   void AddToRightChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, false); }
 
-  /// Adds the common last vertex, which sees the whole stack. The piece is empty afterwards.
+  /// Adds the common last vertex of both chains. The whole stack is visible from it, so it forms a
+  /// triangle with each side of the stack. The piece is empty afterwards.
   void Finish(Piece& piece, const Vertex& last) {
     while (nodes_[piece.top].below != kNoIndex) {
       EmitTopmost(piece, last);
@@ -72,7 +74,8 @@ class MonotonePieces {
 
   void Add(Piece& piece, const Vertex& vertex, bool to_left_chain) {
     if (piece.is_left_chain != to_left_chain) {
-      // A vertex of the other chain sees the whole stack. The last vertex stays visible for later.
+      // The whole stack is visible from a vertex of the other chain. The last vertex stays on the
+      // stack, because it is visible from later vertices, too.
       const Vertex last = LastVertex(piece);
       Finish(piece, vertex);
       PushNode(piece, last);
@@ -86,7 +89,7 @@ class MonotonePieces {
     PushNode(piece, vertex);
   }
 
-  /// Whether the two topmost vertices and `vertex`, the next one of their chain, form a triangle
+  /// Whether the two topmost vertices and `vertex`, the next vertex of their chain, form a triangle
   /// inside the piece.
   bool TopmostTurnsInward(const Piece& piece, const Vertex& vertex) const {
     const Node& upper = nodes_[piece.top];

@@ -14,8 +14,8 @@
 
 namespace partiemc {
 
-/// A set of nodes, stored as bits by tile. The number of a node is the count of bits before it.
-/// Keeps its memory warm from frame to frame.
+/// A set of nodes, stored as bits by tile. The number of a node is the number of bits before its
+/// bit. Keeps its memory warm from frame to frame.
 class NodeVertices {
  public:
   /// Removes all nodes.

@@ -7,8 +7,8 @@
 namespace partiemc {
 namespace {
 
-// Moves the free cells of row j from (tile, i) to the right into `span`, across tiles; returns
-// their number.
+// Moves free cells of row j into `span`: from (tile, i) to the right until the first cell that is
+// not free, across tiles. Returns their number.
 int TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t tile, int i,
             int j) {
   int width = 0;
@@ -28,9 +28,10 @@ int TakeRow(const TileDirectory& directory, MergeScratch& scratch, std::uint32_t
   }
 }
 
-// Takes the rows above `span` while all of their cells are free. `row` is the first of these rows,
-// counted from the first row of the span's tiles. Returns the first row that is not taken, and
-// moves `span` to the tiles of that row. Works tile by tile, as the rows of a tile are contiguous.
+// Removes the rows above `span` from the free cells, while all cells of a row are free. `row` is
+// the first of these rows, counted from the first row of the span's tiles. Returns the first row
+// that is not free, and moves `span` to the tiles of that row. Works tile by tile, because the rows
+// of a tile are contiguous.
 int TakeRowsAbove(const TileDirectory& directory, MergeScratch& scratch, int row) {
   while (true) {
     const int first = row % kTileSize;

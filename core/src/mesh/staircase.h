@@ -14,15 +14,15 @@ namespace partiemc {
 /// counter-clockwise, voids clockwise. Only corners and requested nodes are listed. At a pinch, a
 /// node at which two interior cells touch diagonally, each loop stays with its cell.
 struct Staircases {
-  std::vector<TilePlace> corners;      ///< And the requested nodes along straight parts.
-  std::uint64_t straight_nodes = 0;    ///< Number of the latter.
+  std::vector<TilePlace> corners;      ///< Corners, and requested nodes on straight parts.
+  std::uint64_t straight_nodes = 0;    ///< Number of requested nodes in `corners`.
   std::vector<std::uint32_t> offsets;  ///< Loop k has corners [offsets[k], offsets[k + 1]).
   std::uint64_t pinches = 0;           ///< Number of pinches.
   std::vector<BitRows> visited;        ///< Scratch: bottom edges that a loop has passed.
 };
 
-/// Traces all loops. `interior` has one bit for each cell, by tile. `nodes` are the requested
-/// nodes; null: none. Cost: linear in tiles and in the length of the loops.
+/// Traces all loops. `interior` has one bit for each cell, by tile. `nodes`: the requested nodes,
+/// or null. Cost: linear in tiles and in the length of the loops.
 void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> interior,
                      const NodeVertices* nodes, Staircases& staircases);
 

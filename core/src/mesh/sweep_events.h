@@ -19,9 +19,10 @@ struct SweepEvent {
 /// The sorted corners; keeps its memory warm from one use to the next.
 class SweepEvents {
  public:
-  /// Lists the corners of the loops in the order of SweepsBefore; corners at the same position by
-  /// index. Parameters as for Triangulator::Triangulate. Returns false, without events, if they
-  /// break its first requirement (neighbours at different positions are not checked).
+  /// Lists the corners of the loops in the order of SweepsBefore; corners at the same position are
+  /// ordered by index. Parameters as for Triangulator::Triangulate. Returns false, without events,
+  /// if the parameters break the first requirement of Triangulate, except that neighbours may have
+  /// equal positions.
   /// Cost: linear if heights are spread evenly, n log n if many points have similar heights.
   [[nodiscard]] bool Collect(std::span<const double> points,
                              std::span<const std::uint32_t> loop_points,

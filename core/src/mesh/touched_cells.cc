@@ -78,7 +78,7 @@ class CellClearer {
 
   const TileDirectory& directory_;
   std::span<BitRows> interior_;
-  std::uint32_t tile_ = kNoTile;              // The current tile: it held the last range.
+  std::uint32_t tile_ = kNoTile;              // The current tile: the tile of the last range.
   std::int64_t origin_x_ = 0, origin_y_ = 0;  // Its lower left cell.
 };
 

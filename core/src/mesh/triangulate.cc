@@ -38,9 +38,9 @@ bool Triangulator::Triangulate(std::span<const double> points,
 
 /// Moves the sweep line past one point; `events` are the passages of loops through it. Returns
 /// false if the requirements are broken here. Comparing each vertex with its neighbours on the
-/// sweep line finds every crossing: the first crossing exchanges two neighbouring edges. Nothing
-/// can be inserted between them any more, and the one that ends first ends on the wrong side of the
-/// other.
+/// sweep line finds every crossing: the first crossing exchanges two neighbouring edges. Afterwards
+/// no edge can be inserted between the two, and the edge that ends first ends on the wrong side of
+/// the other.
 bool Triangulator::Visit(std::span<const SweepEvent> events) {
   const SweepEvent& vertex = events.front();
   const std::optional<std::size_t> ending_edges = SplitEdges(events);
@@ -48,7 +48,8 @@ bool Triangulator::Visit(std::span<const SweepEvent> events) {
   Surroundings around;
   if (!Surround(vertex, *ending_edges, around)) return false;
 
-  // Directly left and right of the point, the region below and above must agree.
+  // The rising edges must fit: directly left of the point, and directly right of it, the places
+  // below and above are both inside the region, or both outside.
   const bool inside_on_left = around.left != kNoIndex;
   const bool inside_on_right = around.right != kNoIndex;
   if (rising_.empty()) {
@@ -62,7 +63,7 @@ bool Triangulator::Visit(std::span<const SweepEvent> events) {
 }
 
 /// Collects the edges that rise from a point, from left to right. Returns the number of edges that
-/// end in it, or nullopt if an edge has length 0.
+/// end in the point, or nullopt if an edge has length 0.
 std::optional<std::size_t> Triangulator::SplitEdges(std::span<const SweepEvent> events) {
   const Point point = events.front().point;
   rising_.clear();
@@ -91,8 +92,8 @@ bool Triangulator::RisingEdgesAlternate(const Point& point) const {
   return true;
 }
 
-/// Finds the intervals around a point and closes the intervals that end in it. Returns false if an
-/// edge contains the point in its inside, or if not all ending edges were found.
+/// Finds the intervals around a point and closes the intervals that end in it. Returns false if the
+/// point lies inside an edge, or if not all ending edges were found.
 bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
                             Surroundings& found) {
   const Point& point = vertex.point;
@@ -134,10 +135,11 @@ bool Triangulator::Surround(const SweepEvent& vertex, std::size_t ending_edges,
 }
 
 /// Updates the intervals at the point:
-///   - inside an interval: splits it, and starts an interval between each inner pair of edges;
-///   - the interval on the left continues with the leftmost rising edge as its right edge, the
-///     interval on the right with the rightmost rising edge as its left edge;
-///   - no rising edge, intervals on both sides: merges them;
+///   - inside an interval: splits this interval, and starts an interval between each inner pair of
+///     rising edges;
+///   - else the interval on the left continues with the leftmost rising edge as its right edge, and
+///     the interval on the right with the rightmost rising edge as its left edge;
+///   - if no edge rises and there are intervals on both sides: merges the two intervals;
 ///   - each remaining pair of rising edges starts a new interval.
 void Triangulator::Advance(const SweepEvent& vertex, const Surroundings& around) {
   SweepStatus::Cursor cursor = around.cursor;
@@ -199,8 +201,8 @@ std::uint32_t Triangulator::SplitInterval(std::uint32_t id, const SweepEvent& ve
     right.left_piece = left.right_piece;
     left.right_piece = {};
   } else {
-    // On the side of the last vertex's chain, the new piece starts with that vertex only. The other
-    // side keeps the rest of the piece.
+    // On the side of the chain of the last vertex, the new piece starts with that vertex only. On
+    // the other side, the rest of the piece continues.
     const MonotonePieces::Piece fresh = pieces_.Start(pieces_.LastVertex(left.left_piece));
     right.left_piece = fresh;
     if (left.left_piece.is_left_chain) std::swap(left.left_piece, right.left_piece);

@@ -73,13 +73,13 @@ class Triangulator {
   /// An edge that rises from the current point.
   struct RisingEdge {
     Point upper;
-    bool is_left;  // The left end of an interval; else the right end.
+    bool is_left;  // Whether the edge is the left end of an interval, not the right end.
   };
 
-  /// A maximal part of the sweep line inside the region. It usually has one piece, `left_piece`.
-  /// After a merge point, at which two intervals became one, it has two pieces until its next
-  /// vertex: the diagonal from the merge point to that vertex finishes one of them. The merge point
-  /// ends the right chain of `left_piece` and the left chain of `right_piece`.
+  /// A maximal part of the sweep line inside the region. An interval usually has one piece,
+  /// `left_piece`. After a merge point, at which two intervals became one, it has two pieces until
+  /// its next vertex: the diagonal from the merge point to that vertex finishes one of the pieces.
+  /// The merge point ends the right chain of `left_piece` and the left chain of `right_piece`.
   struct Interval {
     Edge left, right;
     MonotonePieces::Piece left_piece, right_piece;
@@ -87,7 +87,7 @@ class Triangulator {
     bool IsMerged() const { return !right_piece.IsEmpty(); }
   };
 
-  /// The intervals that a point touches, after the intervals that end in it were closed.
+  /// The intervals that a point touches, after the intervals that end in the point were closed.
   struct Surroundings {
     std::uint32_t left = kNoIndex;  // Directly left of the point.
     std::uint32_t right =

@@ -9,7 +9,8 @@
 namespace partiemc {
 namespace {
 
-// A point near `cell`, given in cells relative to the cell's tile, relative to its own tile.
+// Converts a point near `cell`: from cells relative to the tile of `cell` to cells relative to the
+// tile that contains the point.
 FieldPoint PointNear(const TileDirectory& directory, const ActiveCell& cell, double x, double y) {
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));

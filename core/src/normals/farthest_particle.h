@@ -1,6 +1,6 @@
 // The placement `farthest-particle`: the paper's rule to the letter (sections 3.3 and 3.5).
 // Everything that only this placement does is here, in MoveVertices of mesh.cc and in AppendRing of
-// vertices.cc; its other needs are its row in placement_traits.h.
+// vertices.cc. What it requires of the other stages is in its row of placement_traits.h.
 #pragma once
 
 #include "normals/normals.h"
@@ -8,14 +8,15 @@
 
 namespace partiemc {
 
-/// Samples planes and selects vertices. Refers to its arguments. Thread-safe.
+/// Samples planes and selects vertices. Keeps references to the constructor's arguments.
+/// Thread-safe.
 class FarthestParticle {
  public:
   FarthestParticle(const TileDirectory& directory, const LevelSetSampler& field)
       : directory_(directory), field_(field) {}
 
   /// Sets the point of a plane to the weighted mean at the centre of its cell (Eq. 4), and its
-  /// gradient to grad phi there (Eq. 9). Where no particle reaches the mean, the gradient is 0.
+  /// gradient to grad phi at this mean (Eq. 9). If no particle reaches the mean, the gradient is 0.
   void SampleAtMean(CellPlane& plane) const;
 
   /// The vertex of a plane, in world units: the position of the particle farthest along its normal.

@@ -14,7 +14,7 @@
 namespace partiemc {
 namespace {
 
-// Orders cells by row, then column, as State::normals are.
+// A key that orders cells by row, then column: the order of State::normals.
 std::int64_t KeyOf(const CellNormal& normal) {
   return (std::int64_t{normal.row} << 32) + normal.column;
 }
@@ -25,8 +25,8 @@ CellNormal PositionOfCell(const TileDirectory& directory, const ActiveCell& cell
   return {(tile.x << kTileShift) + cell.i, (tile.y << kTileShift) + cell.j, 0, 0};
 }
 
-// Finds the previous normals of the cells of `order` by a merge: both lists are sorted by row.
-// Writes the positions of the cells to `next`.
+// Finds the previous normals of the cells of `order` by a merge, since both lists are sorted by
+// row. Writes the positions of the cells to `next`.
 void MatchPrevious(std::span<const CellNormal> previous, std::span<const std::uint32_t> order,
                    const TileDirectory& directory, const Crossings& crossings,
                    NormalScratch& scratch, std::vector<CellNormal>& next) {
@@ -49,8 +49,8 @@ void SetNormal(double x, double y, CellPlane& plane) {
   plane.normal_y = y / length;
 }
 
-// Adds the points of segment k to sample: its middle as vertex 2 k + 1, and optionally its entry as
-// vertex 2 k.
+// Adds the points of segment k that must be sampled to `groups`: its middle as vertex 2 k + 1, and
+// its entry, if requested, as vertex 2 k.
 template <typename Groups>
 void AddPoints(const TileDirectory& directory, std::size_t k, bool with_entry, CellPlane& plane,
                Groups& groups) {
@@ -119,7 +119,7 @@ class NormalEstimation {
     return input_.crossings.segments[input_.topology.segments[segment]].cell;
   }
 
-  // The previous normal of a cell, or nullptr.
+  // The normal of a cell in the last frame; nullptr if the cell had no normal.
   const CellNormal* PreviousOf(std::uint32_t cell) const {
     const std::uint32_t index = scratch_.previous[cell];
     return index == kNoIndex ? nullptr : &previous_[index];
@@ -178,7 +178,8 @@ class NormalEstimation {
     StoreNormal(cell, plane);
   }
 
-  // Sets the weak normals of the ring with the segments [first, last); reliable ones are set.
+  // Sets the weak normals of the ring with the segments [first, last). Requires: the reliable
+  // normals are set.
   void ReplaceWeakNormals(std::size_t first, std::size_t last) {
     const std::span<CellPlane> planes = planes_.subspan(first, last - first);
     const std::size_t count = planes.size();
@@ -205,7 +206,7 @@ class NormalEstimation {
     }
   }
 
-  // Stores a normal for the next frame, unless its cell has two normals.
+  // Stores a normal for the next frame, unless its cell is a saddle, which has two normals.
   void StoreNormal(std::uint32_t cell, const CellPlane& plane) {
     if (plane.cell.IsSaddle()) return;
     scratch_.normal[cell] = {static_cast<float>(plane.normal_x),

@@ -17,16 +17,16 @@
 namespace partiemc {
 
 /// The level set at the point that represents a segment: the middle of the segment, or the weighted
-/// mean at the cell's centre where vertices are particles (placement_traits.h).
-/// Sums of floats stay floats, because the planes of a frame do not fit into a cache.
+/// mean at the cell's centre where vertices are particles (placement_traits.h). Results of float
+/// sums are stored as floats, because the planes of a frame do not fit into a cache.
 struct CellPlane {
-  ActiveCell cell;  ///< The cell of the segment, copied, as cells of a ring are not contiguous.
-  bool is_weak = false;                  ///< The gradient was too small; the normal is a fallback.
-  Point point;                           ///< Lattice coordinates of the world, in cells.
-  Point entry, exit;                     ///< The segment's ends: linear crossings of lattice edges.
-  float value = 0;                       ///< F at the point.
-  float gradient_x = 0, gradient_y = 0;  ///< Of F; of phi where vertices are particles.
-  double normal_x = 0, normal_y = 0;     ///< Unit, oriented (Eq. 11).
+  ActiveCell cell;       ///< The cell of the segment; a copy, because a ring's cells are scattered.
+  bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
+  Point point;           ///< In cells from the origin of the world.
+  Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
+  float value = 0;       ///< F at the point.
+  float gradient_x = 0, gradient_y = 0;  ///< Of F, or of phi if vertices are particles.
+  double normal_x = 0, normal_y = 0;     ///< Unit normal, oriented (Eq. 11).
   /// `virtual-plane` only: F and its gradient at `entry`.
   float entry_value = 0;
   float entry_gradient_x = 0, entry_gradient_y = 0;

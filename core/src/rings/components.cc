@@ -46,7 +46,7 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
   const std::uint32_t right = directory.neighbours(tile)[5];
   const std::uint32_t above = directory.neighbours(tile)[7];
   const bool full = IsFull(rows);
-  // One node of each overlap of two rows joins their runs.
+  // Unites the runs of two rows that overlap, at one node of each overlap.
   const auto unite_rows = [&](int j, std::uint32_t upper_tile, int upper_j) {
     const std::uint32_t upper_row = crossings.tiles[upper_tile].inside[upper_j];
     std::uint32_t shared = rows[j] & upper_row;
@@ -63,7 +63,7 @@ void Components::UniteRuns(const TileDirectory& directory, const Crossings& cros
   for (int j = 0; !full && j + 1 < kTileSize; ++j) unite_rows(j, tile, j + 1);
   if (above != kNoTile) unite_rows(kTileSize - 1, above, 0);
   if (right == kNoTile) return;
-  // If both are full, one row suffices.
+  // If both tiles are full, each of them is one run, so one row suffices.
   const int last = full && IsFull(crossings.tiles[right].inside) ? 1 : kTileSize;
   for (int j = 0; j < last; ++j) {
     if (rows[j] >> (kTileSize - 1) && (crossings.tiles[right].inside[j] & 1)) {
@@ -110,6 +110,7 @@ std::uint32_t Components::At(const Crossings& crossings, const TilePlace& node) 
 }
 
 // The component of all inside nodes of a tile and of its cells' corners in neighbouring tiles.
+// kNoComponent if there are no such nodes, kSeveralComponents if they differ.
 std::uint32_t Components::ComponentSeenFrom(const TileDirectory& directory,
                                             const Crossings& crossings, std::uint32_t tile) const {
   std::uint32_t seen = kNoComponent;
@@ -151,7 +152,8 @@ std::uint32_t Components::ComponentOf(const TileDirectory& directory, const Cros
                                       std::uint32_t tile, float x, float y) const {
   const int i = static_cast<int>(x);
   const int j = static_cast<int>(y);
-  // Usually the nearest of the four corners is inside. Ties: the lower, then the left one.
+  // Usually the nearest of the four corners is inside. Of corners at equal distance, the lower one
+  // counts, then the left one.
   const TilePlace closest = Normalise(directory, tile, i + (x - static_cast<float>(i) > 0.5f),
                                       j + (y - static_cast<float>(j) > 0.5f));
   if (IsInside(crossings, closest)) return At(crossings, closest);

@@ -27,8 +27,8 @@ class Components {
   /// The component of an inside node.
   std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
 
-  /// The component of a particle at (x, y) of a tile: of the nearest inside corner of its cell, or
-  /// kNoComponent without one.
+  /// The component of a particle at (x, y) of a tile: the component of the nearest inside corner of
+  /// its cell; kNoComponent if no corner is inside.
   std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
                             std::uint32_t tile, float x, float y) const;
 
@@ -51,16 +51,16 @@ class Components {
   void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
                          Visit visit) const;
 
-  /// Adds the particles of each component to `counts`, and their weights, if not uniform, to
-  /// `weights`; both have size() elements. Parallel over tiles. Looks up single particles only in
-  /// tiles with several components.
+  /// Adds the number of particles of each component to `counts`, and the sum of their weights,
+  /// unless weights are uniform, to `weights`; both have size() elements. Parallel over tiles.
+  /// Particles are examined one by one only in tiles with several components.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
                       std::span<std::uint64_t> counts, std::span<double> weights);
 
  private:
   // The particles of one tile, if they all belong to one component.
   struct TileShare {
-    std::uint32_t component;  // kNoComponent, or kSeveralComponents: not counted.
+    std::uint32_t component;  // With kNoComponent, kSeveralComponents nothing is counted.
     std::uint32_t count;
     double weight;
   };
@@ -76,7 +76,8 @@ class Components {
   void Unite(std::uint32_t a, std::uint32_t b);
   void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
 
-  // By tile * 32 + row: its first run; finally the number of runs. A full tile is one run.
+  // The first run of each row, by tile * 32 + row; last, the number of runs. A full tile is one
+  // run.
   std::vector<std::uint32_t> first_run_;
   std::vector<std::uint32_t> label_;  // By run: its parent in the union, then its component.
   std::vector<TileShare> shares_;     // By tile.

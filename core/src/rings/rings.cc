@@ -11,8 +11,8 @@
 namespace partiemc {
 namespace {
 
-// Smaller holes, in squared spacings, are dents of the level set, not voids of the fluid
-// (core/METHOD.md, "Cleaning").
+// Cleaning closes holes below this area, in squared spacings: they are dents of the level set, not
+// voids of the fluid (core/METHOD.md, "Cleaning").
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
@@ -25,7 +25,8 @@ constexpr std::size_t kRingGrain = 64;
 // Prefetch distance in segments.
 constexpr std::size_t kFetchedAhead = 16;
 
-// Successors are found in parallel; only the walk along the rings is sequential.
+// Joins segments to rings. Successors are found in parallel; only the walk along rings is
+// sequential.
 void Trace(const TileDirectory& directory, const Crossings& crossings,
            std::vector<std::uint32_t>& next, RingTopology& rings) {
   constexpr std::uint32_t kTaken = 0xffffffff;
@@ -62,12 +63,12 @@ EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
   const auto node = [&](int corner) {
     return Normalise(directory, cell.tile, cell.i + kCornerX[corner], cell.j + kCornerY[corner]);
   };
-  // Edge k joins corners k and k + 1. The inside is on the left of the segment: the first corner of
-  // its entry edge.
+  // Edge k joins corners k and k + 1. The inside is on the left of the segment, so the first corner
+  // of its entry edge is the inside node.
   return {node(here.entry), node((here.entry + 1) & 3)};
 }
 
-// Prefetches the level set at the corners of a cell, except in the next tile.
+// Prefetches the level set at the corners of a cell, except corners in the next tile.
 void FetchCorners(const LevelSet& level_set, const ActiveCell& cell) {
   const float* lower = level_set.tiles[cell.tile].data() + cell.j * kTileSize + cell.i;
   hwy::Prefetch(lower);
@@ -87,8 +88,8 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
       return crossings.cells[segment_of(k).cell];
     };
     for (std::size_t k = first; k < last; ++k) {
-      // The address of the values depends on the cell, and the cell on the segment: a prefetch for
-      // each.
+      // The address of the values depends on the cell, and the address of the cell on the segment.
+      // Each is prefetched one step before the next.
       if (k + 3 * kFetchedAhead < last) hwy::Prefetch(&segment_of(k + 3 * kFetchedAhead));
       if (k + 2 * kFetchedAhead < last) hwy::Prefetch(&cell_of(k + 2 * kFetchedAhead));
       if (k + kFetchedAhead < last) FetchCorners(level_set, cell_of(k + kFetchedAhead));
@@ -97,7 +98,7 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
   });
 }
 
-// The signed area of a ring through its edge crossings, in cells.
+// The signed area of a ring through its edge crossings, in squared cells.
 double AreaOf(const RingTopology& rings, std::size_t ring) {
   const std::span<const Point> points =
       std::span(rings.entry_points)
@@ -122,7 +123,7 @@ void MeasureAreas(const RingTopology& rings, RingScratch& scratch) {
 void ClearDropped(const RingTopology& rings, const RingScratch& scratch, Crossings& crossings) {
   rings.components.ForEachRun(
       crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
-        // ForEachRun has read this row already.
+        // ForEachRun has read this row already, so the row may change.
         if (scratch.dropped[component]) crossings.tiles[tile].inside[j] &= ~mask;
       });
 }
@@ -136,8 +137,8 @@ void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopolog
   if (rings.dropped_components > 0) ClearDropped(rings, scratch, crossings);
 }
 
-// Sets every node that a ring encloses. The ring crosses a row of the lattice in pairs of
-// horizontal edges, with the enclosed nodes between the two.
+// Makes every node inside that a ring encloses. The ring crosses a row of the lattice in pairs of
+// horizontal edges, and the enclosed nodes lie between the two edges of a pair.
 void FillRing(const TileDirectory& directory, const RingTopology& rings, std::size_t ring,
               Crossings& crossings, std::vector<std::pair<std::int64_t, std::int64_t>>& edges) {
   edges.clear();
@@ -240,8 +241,9 @@ void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scr
   }
 }
 
-// Finds the outer ring around each outer ring. To the left of a ring's lowest row, the next ring is
-// a hole of the ring around it, or a neighbour in the same void that was visited before.
+// Finds the outer ring around each outer ring. At the first edge of an outer ring, the edge on its
+// left in the row belongs to a hole, which the ring around both contains, or to an outer ring in
+// the same void, which was visited before.
 void FindContainers(const TileDirectory& directory, const Crossings& crossings,
                     const RingTopology& rings, RingScratch& scratch) {
   scratch.outer_rings.clear();
@@ -264,7 +266,8 @@ void FindContainers(const TileDirectory& directory, const Crossings& crossings,
 // Marks the components that are spray or lie inside spray. Returns their number.
 std::uint64_t FindSpray(const ReconstructionParameters& parameters, double spacing,
                         const RingTopology& rings, RingScratch& scratch) {
-  // Outer rings come after the rings around them.
+  // `outer_rings` has each ring after the ring around it. In reverse order, the sum of each ring is
+  // therefore complete when it is added to the ring around.
   scratch.enclosed = rings.particle_count;
   for (std::size_t k = scratch.outer_rings.size(); k-- > 0;) {
     const std::uint32_t ring = scratch.outer_rings[k];

@@ -18,12 +18,12 @@ namespace partiemc {
 /// Rings as sequences of segments with the inside on the left.
 struct RingTopology {
   std::vector<std::uint32_t> segments;        ///< Indices of segments, ring by ring.
-  std::vector<Point> entry_points;            ///< The point where each enters its cell.
+  std::vector<Point> entry_points;            ///< By segment: where it enters its cell.
   std::vector<std::uint32_t> offsets;         ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;        ///< Per ring: its outer ring, or kNoRing.
-  std::vector<std::uint64_t> particle_count;  ///< Per ring: in its component; 0 for holes.
-  std::vector<double> particle_weight;        ///< The same for weights, unless uniform.
-  Components components;                      ///< Of inside nodes, one per outer ring.
+  std::vector<std::uint64_t> particle_count;  ///< Per ring: particles of its component; 0: hole.
+  std::vector<double> particle_weight;        ///< Per ring: their summed weight; 0 if uniform.
+  Components components;                      ///< Of inside nodes; each has one outer ring.
   std::vector<std::uint32_t> component_of_ring;
   std::vector<std::uint32_t> outer_ring;  ///< By component.
   std::uint64_t dropped_holes = 0;
@@ -37,12 +37,12 @@ struct RingTopology {
 struct RingScratch {
   std::vector<std::uint64_t> particle_count;
   std::vector<double> particle_weight;
-  std::vector<std::uint32_t> next_segment;                   // kTaken if in a ring already.
+  std::vector<std::uint32_t> next_segment;                   // kTaken if already in a ring.
   std::vector<std::uint8_t> visited;                         // By ring.
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;  // Row, column of the left node.
-  std::vector<double> area;                                  // By ring, in cells.
+  std::vector<double> area;                                  // By ring, in squared cells.
   Scanlines rows;
-  std::vector<std::uint32_t> outer_rings;  // From the outside in.
+  std::vector<std::uint32_t> outer_rings;  // Each after the outer ring around it.
   std::vector<std::uint32_t> container;    // By outer ring: the outer ring around it, or kNoRing.
   std::vector<std::uint64_t> enclosed;     // By outer ring: particles in it and its islands.
   std::vector<std::uint8_t> dropped;       // By component.
@@ -52,11 +52,11 @@ struct RingScratch {
 /// each hole to its outer ring. Cost: linear in segments, tiles and particles. Requires: resolved
 /// parameters.
 /// - `parameters.clean`: drops components without particles, and holes below 2 h^2 with everything
-/// in them (core/METHOD.md, "Cleaning").
-/// - `min_component_area`, `min_component_particles`, with or without `clean`: then drops outer
-/// rings that enclose less area (h^2) or fewer particles, with everything in them.
-/// In `crossings`, the nodes of a dropped component become outside, those of a dropped hole inside.
-/// Areas are measured on the level set, before vertices are placed.
+///   in them (core/METHOD.md, "Cleaning").
+/// - `min_component_area`, `min_component_particles`: afterwards, and also without `clean`, drops
+///   outer rings that enclose less area (in h^2) or fewer particles, with everything in them.
+/// In `crossings`, the nodes of a dropped component become outside, and the nodes of a dropped hole
+/// inside. Areas are measured on the level set, before vertices are placed.
 void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
                 const ReconstructionParameters& parameters, Crossings& crossings,
                 RingScratch& scratch, RingTopology& rings);

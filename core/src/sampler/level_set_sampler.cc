@@ -41,7 +41,7 @@ void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& cross
   };
   BitRows all_cells;
   all_cells.fill(~std::uint32_t{0});
-  // Masks end at their margin; farther out all cells are marked.
+  // A mask ends at its margin. If the reach is larger, all cells are marked.
   const double distance = std::ceil(wander);
   const double reach = distance + std::ceil(scale_.kernel_radius);
   const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
@@ -92,7 +92,7 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
     }
     runs_.back().last_tile = tile;
     run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
-    // Space for all particles of the tile; counting the needed ones takes longer.
+    // Reserves space for all particles of the tile, because counting the needed ones takes longer.
     particle_count += bins.CountOf(tile);
   }
   std::uint32_t bucket_count = 0;
@@ -118,7 +118,7 @@ void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t til
   for (int y = 0; y < 3; ++y) {
     RunBeside& beside = tiles_[tile].runs[y];
     beside = {};
-    // All neighbours in a row with a run have the same.
+    // All neighbours in this row that belong to a run belong to the same run.
     for (int x = 0; x < 3; ++x) {
       const std::uint32_t near = neighbours[y * 3 + x];
       if (near == kNoTile || run_of_[near] == kNoRun) continue;
@@ -133,8 +133,9 @@ void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t til
   }
 }
 
-// Sorts the needed particles of a run by bucket: counting sort. offsets[b + 2] counts bucket b,
-// then offsets[b + 1] is its next index, and finally offsets[b] its first.
+// Sorts the needed particles of a run by bucket, by a counting sort. At first offsets[b + 2] is the
+// count of bucket b, then offsets[b + 1] is its next index, and at the end offsets[b] is its first
+// index.
 void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
@@ -144,7 +145,8 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_particle;
-  // The output of a tile, if all its particles are needed: prefetched while they are selected.
+  // Where the output of a tile would begin if all particles were needed. This range is prefetched
+  // while the particles are selected.
   std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
     const std::uint32_t count = bins.CountOf(tile);

@@ -28,7 +28,7 @@ struct FieldSample {
   double spread = 0;                      ///< sigma
   double value = 0;                       ///< F (level_set_formula.h)
   double gradient_x = 0, gradient_y = 0;  ///< grad F, of the term that F equals.
-  bool has_support = false;               ///< Any particle is within the kernel radius.
+  bool has_support = false;               ///< A particle is within the kernel radius.
 };
 
 /// A point in cells relative to a tile; kNoTile if no particle is near.
@@ -45,19 +45,21 @@ struct LevelSetSample {
 using FieldPoints = PointGroup<Point>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
-/// An index of the particles near the outline. It sorts them into rows of buckets (NeighbourGrid)
-/// that span adjacent tiles; a query visits the buckets around its points.
+/// An index of the particles near the outline. Particles are sorted into rows of buckets
+/// (NeighbourGrid) that span adjacent tiles; a query visits the buckets around its points.
 class LevelSetSampler {
  public:
-  /// Indexes the particles for points in active cells, and in cells up to `wander` cells from one
-  /// along each axis. SourceOf requires `tells_sources`. Cost: linear in the particles of the tiles
-  /// around those cells; in all particles if kernel and `wander` exceed kMaskMargin.
+  /// Indexes the particles for points in active cells, and in cells that are up to `wander` cells
+  /// away from an active cell along each axis. `tells_sources`: whether SourceOf may be called.
+  /// Cost: linear in the particles of the tiles around these cells; linear in all particles if
+  /// kernel radius and `wander` together exceed kMaskMargin.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander, bool tells_sources);
 
-  /// The sample at a point of a tile, in cells relative to it, 0 <= x, y <= 32. Requires:
-  /// IsIndexed(tile). Incomplete outside Covers. Particles are summed in the order of buckets, then
-  /// of the bins (SampleAtPoints). Cost: the particles in the rows of buckets within R.
+  /// The sample at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32. Requires:
+  /// IsIndexed(tile). If Covers is false for the point, particles may be missing. Particles are
+  /// summed in the order of buckets, then of the bins (SampleAtPoints). Cost: the particles in the
+  /// rows of buckets within R.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
   /// Samples the points of at most kQueriesAtOnce groups, faster than one by one. The points of a
@@ -65,12 +67,12 @@ class LevelSetSampler {
   void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
   /// Calls visit(x, y, particle) for the particles within `radius` of a point, in cells relative to
-  /// `tile`, and some more. Requires: radius <= R.
+  /// `tile`, and for some particles farther away. Requires: radius <= R.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// Sets `near` to the particles within `radius` of any of `points`, which have members x and y in
-  /// cells relative to the tile, and some more.
+  /// Sets `near` to the particles within `radius` of any of `points`, and some particles farther
+  /// away. Points have members x and y, in cells relative to the tile.
   template <typename Member>
   void FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
                 NeighbourRows& near) const;
@@ -80,15 +82,16 @@ class LevelSetSampler {
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
 
-  /// Whether a point of a tile, 0 <= x, y < 32, is near enough to an active cell.
+  /// Whether samples at a point of a tile, 0 <= x, y < 32, are complete: an active cell is near
+  /// enough.
   bool Covers(std::uint32_t tile, double x, double y) const {
     return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
   }
 
  private:
-  // Adjacent tiles in a row whose particles are sorted together: each row of buckets spans all of
-  // them, so a query reads one span per row. A single missing tile is bridged by empty buckets, so
-  // no query sees two runs in a row of tiles.
+  // Adjacent tiles in a row whose particles are sorted together. Each row of buckets spans all
+  // these tiles, so a query reads one span per row. Empty buckets bridge a single missing tile, so
+  // a query never needs two runs in one row of tiles.
   struct Run {
     std::uint32_t first_tile = 0, last_tile = 0;
     std::int32_t first_column = 0;  // In tiles.
@@ -97,7 +100,7 @@ class LevelSetSampler {
     std::uint32_t first_particle = 0;
   };
 
-  // The run above, beside or below a tile, relative to the tile.
+  // The run in the row of tiles above, beside or below a tile. Positions are relative to the tile.
   struct RunBeside {
     std::uint32_t bucket = 0;  // At the tile's first column in the first row, modulo 2^32.
     std::uint32_t row_stride = 0;
@@ -108,7 +111,8 @@ class LevelSetSampler {
   // shorter.
   static constexpr double kDiagonal = 0.41422;
 
-  // More than the rounding error of floats, in cells. Particles that far out contribute nothing.
+  // Added to the radius of the disc that selects particles, in cells: more than the rounding error
+  // of floats. The additional particles contribute nothing.
   static constexpr double kDiscMargin = 1e-3;
 
   struct Tile {
@@ -134,11 +138,11 @@ class LevelSetSampler {
   NeighbourGrid grid_;
   std::vector<Tile> tiles_;
   std::vector<BitRows> asked_;   // By tile: cells in which points may lie.
-  std::vector<BitRows> wanted_;  // By tile: cells that kernels reach from there.
+  std::vector<BitRows> wanted_;  // By tile: cells whose particles such points need.
   std::vector<Run> runs_;
   std::vector<std::uint32_t> run_of_;  // By tile, or kNoRun.
   std::vector<std::uint32_t> bucket_offsets_;
-  // The selected particles of each run, tile by tile up to chosen_end_.
+  // The selected particles of each run, tile by tile. The particles of a tile end at chosen_end_.
   struct Chosen {
     std::uint32_t bucket, particle;
   };
@@ -171,7 +175,8 @@ void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> point
   const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
-  // Particles at the rim, within the resolution of positions, contribute nothing.
+  // A particle nearer to the rim than half the resolution of positions has a kernel of 0, so it
+  // need not be found.
   const double reach = radius - NeighbourGrid::kStep / 2;
   const auto& [columns, rows] = grid_;
   const int first_column = columns.Along(low.x - reach) - columns.size();

@@ -26,7 +26,7 @@ class GridAxis {
     const int cell = static_cast<int>(coordinate + kTileSize);
     return std::clamp(cell, 0, 3 * kTileSize - 1) >> shift_;
   }
-  /// The tile of a bucket of Along, 0 to 2.
+  /// The tile, 0 to 2, of a bucket that Along returned.
   int TileOf(int along) const { return along >> (kTileShift - shift_); }
 
   /// The bucket of a coordinate in its own tile, 0 <= coordinate < 32.
@@ -38,14 +38,14 @@ class GridAxis {
   int shift_ = 0;
 };
 
-/// Buckets much wider than high: skipping the particles outside the disk of a query in vectors
-/// costs less than more offsets would.
+/// Buckets are much wider than high. Queries therefore read few offsets, but more particles outside
+/// their disk. Vectors skip such particles at less cost than more offsets would have.
 struct NeighbourGrid {
   /// Resolution of positions.
   static constexpr double kStep = 1.0 / (1 << kFractionBits);
 
   NeighbourGrid() = default;
-  /// For queries within `radius` cells, at most a tile.
+  /// For queries within `radius` cells. Requires: `radius` is at most the side of a tile.
   explicit NeighbourGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
 
   GridAxis columns, rows;

@@ -7,32 +7,33 @@
 
 namespace partiemc {
 
-/// Vectors may read this many particles past the end of a row of buckets.
+/// Loads of vectors may read up to this many particles past the end of a row of buckets.
 inline constexpr int kRowPadding = 16;
 
-/// Points per query that share their particles: of four segments.
+/// Points of one query, which share their particles: the points of four segments.
 inline constexpr std::size_t kPointsAtOnce = 8;
-/// Queries that run at once, so that none waits for memory alone.
+/// Queries that run at once, so that their memory accesses overlap.
 inline constexpr std::size_t kQueriesAtOnce = 6;
 
-/// Positions along x are modulo this many cells, more than any query spans.
+/// Positions along x are modulo this number of cells, which is more than any query spans.
 inline constexpr float kColumnPeriod = 128;
 
 /// Consecutive buckets in consecutive rows of a run.
 struct NeighbourBand {
   const std::uint32_t* offsets;  ///< The first particles of the buckets.
-  int columns, rows;             ///< Buckets to look at.
+  int columns, rows;             ///< Number of buckets to visit.
   int row_stride;                ///< Buckets from one row to the next.
   float origin_y;                ///< NeighbourRows::origin_y, relative to the run's tiles.
 };
 
-/// The particles around points of a tile: one span per row of buckets. Not initialised: most
-/// queries need one band.
+/// The particles around points of a tile: one span per row of buckets. Members are not initialised,
+/// because most queries need only one band.
 struct NeighbourRows {
   const float* x;       ///< By particle, in cells, modulo kColumnPeriod.
   const float* y;       ///< By particle, in cells relative to its own tile.
   const float* weight;  ///< By particle; null if all have Scale::uniform_weight.
-  /// The corner of a cell near the points, relative to the tile. Sums use floats relative to it.
+  /// The corner of a cell near the points, relative to the tile. Sums use floats relative to this
+  /// corner.
   float origin_x, origin_y;
   float column;  ///< The origin in the coordinates of `x`.
   /// Only particles in this disk count; its centre is relative to the origin.

@@ -1,7 +1,8 @@
 // Sums over the particles near a point in vectors of floats. The particles within reach are first
 // copied to a short array, which serves all points of a query. Particle k of the array goes to
-// partial sum k modulo sixteen, and the sixteen are added in one tree. So the bits do not depend on
-// the width of vectors. Compiled once for each instruction set, so the include guard toggles.
+// partial sum k modulo sixteen, and the sixteen sums are added in one fixed tree, so the bits do
+// not depend on the width of vectors. Compiled once for each instruction set, so the include guard
+// toggles.
 #if defined(PARTIEMC_NEIGHBOUR_SUMS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_NEIGHBOUR_SUMS_INL_H
 #undef PARTIEMC_NEIGHBOUR_SUMS_INL_H
@@ -33,8 +34,8 @@ using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPartialSums / kLanes;
 
-// Packed particles in coordinates relative to the origin of NeighbourRows, followed by at least
-// kPartialSums distant ones.
+// Packed particles in coordinates relative to the origin of NeighbourRows. At least kPartialSums
+// distant dummies follow, whose kernels are 0.
 struct NeighbourChunk {
   static constexpr int kCapacity = 128;
   static constexpr float kFar = 1e6f;
@@ -46,7 +47,7 @@ struct NeighbourChunk {
   int count;
 };
 
-// The data of a query in registers.
+// The disc that selects the particles of a query, in registers.
 class NeighbourDisc {
  public:
   HWY_INLINE explicit NeighbourDisc(const NeighbourRows& near)
@@ -58,8 +59,8 @@ class NeighbourDisc {
         centre_y_(hn::Set(Lanes(), near.centre_y)),
         reach_square_(hn::Set(Lanes(), near.reach_square)) {}
 
-  // Appends the particles of [first, last), at most kPartialSums, that are within reach to the
-  // first `to` particles of a chunk. Requires: space for kPartialSums. Returns the new number of
+  // Reads the first kPartialSums particles of [first, last) and appends the ones in the disc to a
+  // chunk, which has `to` particles. Requires: space for kPartialSums. Returns the new number of
   // particles.
   template <bool kWeighted>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
@@ -95,7 +96,7 @@ class NeighbourDisc {
   Vector column_, centre_x_, centre_y_, reach_square_;
 };
 
-// Appends distant particles, which fill the last vector.
+// Appends distant dummies, which fill the last vector.
 template <bool kWeighted>
 HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
@@ -107,8 +108,8 @@ HWY_INLINE void Close(NeighbourChunk& chunk) {
   }
 }
 
-// Collects the particles of `near` in a chunk. If it may be full, make_room() must consume it, or
-// return false to stop. Returns false if stopped.
+// Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(), which
+// consumes it, or returns false to stop. Returns false if stopped.
 template <bool kWeighted, typename MakeRoom>
 HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);
@@ -155,9 +156,9 @@ HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
   return fits;
 }
 
-// Calls visit(query, chunk, is_all) for the particles of each query, one full chunk at a time;
-// `is_all` if a query has only one. Copies the particles of all queries first, so that the sums of
-// one do not wait for its memory.
+// Calls visit(query, chunk, is_all) for the particles of each query, one full chunk at a time.
+// `is_all`: the chunk has all particles of the query. The particles of all queries are copied
+// first, so that the sums of a query do not wait for memory.
 template <bool kWeighted, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NeighbourChunk chunks[kQueriesAtOnce];
@@ -176,7 +177,7 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   }
 }
 
-// Sixteen partial sums of several channels.
+// Sixteen partial sums for each of several channels.
 template <int kChannels>
 class PartialSums {
  public:
@@ -258,8 +259,8 @@ class PartialSums {
   Vector parts_[kChannels][kParts];
 };
 
-// The totals of one channel at kLanes points, added like in PartialSums. Lane k: the total of
-// parts[min(first + k, last)].
+// The totals of one channel at kLanes points, added in the order of PartialSums. Lane k is the
+// total of parts[min(first + k, last)].
 HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t first,
                                  std::size_t last) {
   const Lanes d;
@@ -281,7 +282,7 @@ HWY_INLINE Vector TotalsAtPoints(const float (*parts)[kPartialSums], std::size_t
       sums[k] = hn::Add(hn::ConcatLowerLower(d, sums[k + 8], sums[k]),
                         hn::ConcatUpperUpper(d, sums[k + 8], sums[k]));
     }
-    // In blocks of four lanes: k, k + 4, k + 8, k + 12.
+    // Afterwards the four blocks of sums[k] belong to the points k, k + 4, k + 8, k + 12.
     for (int k = 0; k < 4; ++k) {
       sums[k] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(sums[k + 4]), sums[k]),
                         hn::OddEvenBlocks(sums[k + 4], hn::SwapAdjacentBlocks(sums[k])));

@@ -42,7 +42,7 @@ enum Channel {
   kSums
 };
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
-// (dk / da) d_b d_c, symmetric in a, b, c; few points need them.
+// (dk / da) d_b d_c, symmetric in a, b, c. Only points where the gap term determines F need them.
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
 
 template <bool kWeighted>
@@ -56,8 +56,9 @@ class PointFormula {
   HWY_INLINE explicit PointFormula(const Scale& scale)
       : scale_(scale), inverse_square_(1 / (scale.kernel_radius * scale.kernel_radius)) {}
 
-  // Sets the samples at the first `count` points, and some more to fill vectors. Returns the points
-  // whose gradient is the gap's, which is not set: bit k is point k.
+  // Sets the samples at the first `count` points, and at some more to fill vectors. Returns bit k
+  // for point k if the gap term determines F there. The gradient of such a point is not set
+  // (GapGradient).
   HWY_INLINE std::uint64_t operator()(const Totals& totals, std::size_t count,
                                       PointSamples& samples) const {
     std::uint64_t gaps = 0;
@@ -75,8 +76,8 @@ class PointFormula {
     const double share = inverse_square_ / sum(kKernel);
     const double xx = sum(kKxx) * share, xy = sum(kKxy) * share, yy = sum(kKyy) * share;
     const double spread = LargerEigenvalue(xx, xy, yy);
-    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both are
-    // equal, any direction will do.
+    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both
+    // eigenvalues are equal, any direction is an eigenvector.
     const double gap = 2 * spread - (xx + yy);
     const double exx = gap > 0 ? (spread - yy) / gap : 0.5;
     const double exy = gap > 0 ? xy / gap : 0;
@@ -103,8 +104,8 @@ class PointFormula {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
   }
 
-  // Sets the samples at the points from `at` on. Bit k of the result: the gap decides at point at +
-  // k.
+  // Sets the samples at the points from `at` on. Returns bit k if the gap term determines F at
+  // point at + k.
   HWY_INLINE std::uint8_t Sample(const Totals& totals, std::size_t at,
                                  PointSamples& samples) const {
     const Doubles d;

@@ -131,7 +131,7 @@ class SumsAtPoints {
         if ((alone_ >> point & 1) != 0) TakeAlone(point, point);
       }
     } else {
-      // The lanes after the last point need defined values.
+      // Whole vectors are computed, so the lanes after the last point need defined values.
       constexpr std::size_t kEnd = std::max(kFewPoints, PointFormula<kWeighted>::kLanes);
       for (std::size_t point = 0; point < kEnd; ++point) {
         TakeAlone(std::min(point, count_ - 1), point);
@@ -144,7 +144,7 @@ class SumsAtPoints {
 
  private:
   static constexpr int kChannels = AddSums<kWeighted>::kChannels;
-  // So few points are totalled faster one by one.
+  // Up to this number of points, computing the totals one by one is faster.
   static constexpr std::size_t kFewPoints = 2;
   static_assert(PointSamples::kCapacity % kPartialSums == 0 && PointSamples::kCapacity < 64);
 

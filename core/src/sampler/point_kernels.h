@@ -30,11 +30,11 @@ struct PointSamples {
   PerPoint density, mean_x, mean_y, phi, phi_x, phi_y, spread, value, gradient_x, gradient_y;
 };
 
-/// Samples the points of at most kQueriesAtOnce queries. Requires: all of them have weights, or
-/// none. Terms, and their sums over up to 128 particles, are floats with an error of a few 1e-7 of
-/// the sum of their magnitudes; the rest is doubles. The bits depend neither on the processor nor
-/// on the other queries. The particles of a query go to sixteen partial sums by their index, and
-/// these are added in one order (neighbour_sums-inl.h).
+/// Samples the points of at most kQueriesAtOnce queries. Requires: all queries have weights, or no
+/// query has. Terms, and their sums over up to 128 particles, are floats with an error of a few
+/// 1e-7 of the sum of their magnitudes; all else is computed in doubles. The bits depend neither on
+/// the processor nor on the other queries. The particles of a query go to sixteen partial sums by
+/// their index, and these sums are added in one order (neighbour_sums-inl.h).
 void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries, PointSamples& samples);
 
 }  // namespace partiemc

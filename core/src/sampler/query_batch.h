@@ -28,10 +28,10 @@ class QueryBatch {
  public:
   explicit QueryBatch(Sink sink) : sink_(sink) {}
 
-  /// Later points do not join the groups of earlier ones.
+  /// Ends the last group: later points begin another group.
   void Part() { is_open_ = false; }
 
-  /// Adds a point. It joins the last group, if that is of its tile and not full.
+  /// Adds a point. The point joins the last group if that group has the same tile and is not full.
   void Add(std::size_t vertex, std::uint32_t tile, const Member& point) {
     if (!is_open_ || groups_[count_ - 1].tile != tile ||
         groups_[count_ - 1].count == kPointsAtOnce) {
@@ -68,8 +68,8 @@ QueryBatch<Member, Sink> CollectPoints(Sink sink) {
   return QueryBatch<Member, Sink>(sink);
 }
 
-/// Consecutive segments whose points share a group. With more, each point would look at too many
-/// particles of the others.
+/// Number of consecutive segments whose points share a group. With more segments, each point would
+/// visit too many particles that only the other points need.
 inline constexpr std::size_t kSegmentsOfGroup = 4;
 static_assert(2 * kSegmentsOfGroup <= kPointsAtOnce, "a segment has two points");
 

@@ -23,7 +23,8 @@ std::int64_t Quantised(double cells) {
   return static_cast<std::int64_t>(std::floor(cells * (1 << kFractionBits) + .5));
 }
 
-/// A position in its brick: cell first, then fractions, so that keys sort by cell.
+/// A position in its brick as a number: first the cell, then the fractions, so that keys sort by
+/// cell.
 std::uint64_t KeyOf(const std::array<std::int64_t, 3>& at) {
   std::uint64_t key = 0;
   for (int axis = 2; axis >= 0; --axis) {
@@ -90,8 +91,8 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
   return absl::OkStatus();
 }
 
-/// Adds the bricks around the box of the particles of each brick. Returns false if there are more
-/// than `most`.
+/// Adds the bricks within `reach` of the box around the particles of each brick. Returns false if
+/// there are more than `most`.
 bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();
   bins.homes.assign(bins.bricks.bricks().begin(), bins.bricks.bricks().end());
@@ -124,7 +125,8 @@ bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
   return true;
 }
 
-/// Sets the order of the particles of a brick, which are `sorted` from `first` to `last`.
+/// Sorts the particles of a brick, [first, last) of `sorted`, and finds the first particle of each
+/// cell.
 void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBins& bins,
                std::uint32_t brick) {
   const auto before = [&](const SpaceBins::Keyed& a, const SpaceBins::Keyed& b) {
@@ -147,7 +149,7 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   const std::size_t count = bins.keys.size();
   const std::size_t bricks = bins.bricks.size();
   std::vector<std::uint32_t>& next = bins.next;
-  // From insertion order to sorted order.
+  // Maps the bricks with particles from insertion order to sorted order.
   std::vector<std::uint32_t>& brick_of = bins.brick_of;
   brick_of.resize(bins.homes.size());
   for (std::size_t home = 0; home < brick_of.size(); ++home) {
@@ -203,8 +205,8 @@ absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLim
       [&](auto positions) { return FindHomes(positions, scale, limits.max_tiles, bins); },
       frame.positions);
   if (!status.ok()) return status;
-  // Inside nodes are within the kernel of a particle, the other corners of their cells one cell
-  // further; a little more for the rounding of positions.
+  // Inside nodes are within the kernel radius of a particle, and the other corners of their cells
+  // at most one cell farther. 1/64 of a cell is for the rounding of positions.
   constexpr double kMargin = 1 + 1.0 / 64;
   if (!AddReachedBricks(scale.kernel_radius + kMargin, limits.max_tiles, bins)) {
     return TooManyBricks(scale, limits.max_tiles);

@@ -20,7 +20,7 @@ namespace partiemc::space {
 /// relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
-  /// Per brick: the first particle of each cell, and the end of the last one.
+  /// Per brick: the first particle of each cell, then the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   std::vector<float> x, y, z;
   std::vector<float> weight;          ///< Empty if uniform.
@@ -30,7 +30,7 @@ struct SpaceBins {
     std::uint64_t key;  // Cell and fractions: the whole position.
     std::uint32_t source;
   };
-  /// The particles of a home brick lie in it.
+  /// The bounding box of the particles of a home brick, a brick with particles.
   struct Box {
     std::array<float, 3> low{8, 8, 8}, high{0, 0, 0};
   };
@@ -44,9 +44,10 @@ struct SpaceBins {
   void Clear();
 };
 
-/// Sorts particles; bricks exist wherever a node lies within the kernel radius and one cell of a
-/// particle. Requires: CheckFrame has passed the frame for a slice, three components.
-/// Errors with a Violation: OUT_OF_RANGE positions beyond 2^30 cells from the origin;
+/// Sorts the particles of a frame. Bricks exist where a node is at most the kernel radius plus one
+/// cell away from a particle. Requires: CheckFrame has passed the frame as for a slice, with three
+/// components.
+/// Errors with a Violation: INVALID_ARGUMENT for positions beyond 2^30 cells from the origin;
 /// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
 absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
                           SpaceBins& bins);

@@ -30,7 +30,7 @@ BrickBits Connected(const BrickBits& inside, const BrickBits& seed) {
   return found;
 }
 
-/// Appends the parts of a brick.
+/// Appends the parts of a brick: its connected sets of inside nodes.
 void SplitBrick(const BrickBits& inside, std::uint32_t brick, std::vector<Bodies::Part>& parts) {
   BrickBits rest = inside;
   for (int k = 0; k < kBrickSize;) {
@@ -47,7 +47,7 @@ void SplitBrick(const BrickBits& inside, std::uint32_t brick, std::vector<Bodies
   }
 }
 
-/// Whether parts of a brick and of its next brick along an axis are connected.
+/// Whether parts of a brick and of the next brick along an axis are connected.
 bool AreJoined(const BrickBits& low, const BrickBits& high, int axis) {
   if (axis == 2) return (low[kBrickSize - 1] & high[0]) != 0;
   for (int k = 0; k < kBrickSize; ++k) {
@@ -87,7 +87,7 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   for (std::uint32_t part = 0; part < parts; ++part) RootOf(bodies.parts, part);
   std::vector<std::int64_t>& lowest_z = bodies.lowest_z;
   lowest_z.clear();
-  // Roots come before their other parts.
+  // The root of a body is its first part.
   for (std::uint32_t index = 0; index < parts; ++index) {
     Bodies::Part& part = bodies.parts[index];
     std::uint32_t parent = part.body;
@@ -108,8 +108,8 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   }
 }
 
-// Search distance from a particle to its body, in layers of nodes. Most particles of a small drop
-// lie in cells without inside nodes.
+// Largest distance from the cell of a particle to an inside node of its body, in layers of nodes.
+// Small drops require it: most of their particles lie in cells without inside nodes.
 constexpr int kMostLayers = 2;
 
 /// The nearest inside node among the corners of the cell of a particle and `layers` layers around

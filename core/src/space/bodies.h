@@ -1,7 +1,7 @@
 // The bodies of a frame: connected sets of inside nodes.
 //
-// Inside nodes are connected along lattice edges only, as the surface separates inside corners that
-// are not neighbours (cell_loops.h).
+// Inside nodes are connected along lattice edges only, because the surface separates inside corners
+// of a cell that are not neighbours (cell_loops.h).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace partiemc::space {
 struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
   std::uint64_t particles = 0;  ///< Particles whose nearest inside node is in the body.
-  double volume = 0;            ///< Their volume, world units cubed.
+  double volume = 0;            ///< Volume of these particles, world units cubed.
 };
 
 struct Bodies {
@@ -42,8 +42,8 @@ struct Bodies {
   }
 };
 
-/// Finds the bodies, in the order of their first parts, and counts their particles.
-/// `spacing` in world units: a particle without a volume has its cube.
+/// Finds the bodies, in the order of their first parts, and counts their particles. `spacing` is in
+/// world units; without volumes, each particle has the volume spacing^3.
 void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
                 Bodies& bodies);
 

@@ -6,7 +6,7 @@ namespace partiemc::space {
 namespace {
 
 CellLoops Trace(unsigned corners) {
-  // The curve that starts at each crossing: where it ends and its face.
+  // By crossing: the crossing at the end of the curve that starts here, and the face of this curve.
   constexpr int kNone = -1;
   std::array<int, kMostCrossings> next, face_of;
   next.fill(kNone);
@@ -56,7 +56,7 @@ bool ShareFace(int a, int b) {
 }
 
 /// Triangulates the polygon of the steps [first, last] of a loop, which has a side from last to
-/// first. Returns false if that needs a diagonal on a face.
+/// first. Returns false if every triangulation has a diagonal on a face.
 bool Triangulate(const CellLoops& loops, int base, int size, int first, int last,
                  LoopTriangles& triangles) {
   if (last - first < 2) return true;

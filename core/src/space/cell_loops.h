@@ -5,8 +5,8 @@
 // coordinate s.
 //
 // On each face, inside corners that are not neighbours are separated. A curve on a face joins two
-// crossings. The curves of a cell form loops, which run around the outside counter-clockwise as
-// seen from there. The cell on the other side of a face has the same curves reversed.
+// crossings. The curves of a cell form loops, which run counter-clockwise as seen from the outside
+// of the body. The cell on the other side of a face has the same curves reversed.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ struct CellLoops {
   std::array<std::uint8_t, kMostLoops + 1> first{};  ///< Loop m has steps [first[m], first[m + 1]).
   std::array<std::uint8_t, kMostCrossings> edge{}, face{};
   std::array<std::uint8_t, kMostCrossings> loop_of{};  ///< By step.
-  /// Per face: whether its four edges are crossed.
+  /// One bit for each face: whether all four edges of the face are crossed.
   std::uint8_t ambiguous_faces = 0;
 
   int Steps() const { return first[loops]; }
@@ -38,8 +38,8 @@ struct CellLoops {
 /// The loops of the case whose bit c is set if corner c is inside.
 const CellLoops& LoopsOf(unsigned corners);
 
-/// Triangles over the crossings of one loop without a diagonal on a face of the cell: indices of
-/// steps relative to the first of the loop, three for each triangle.
+/// Triangles between the crossings of one loop, without a diagonal on a face of the cell. Corners
+/// are indices of steps, relative to the first step of the loop.
 struct LoopTriangles {
   std::uint8_t count = 0;
   std::array<std::array<std::uint8_t, 3>, kMostCrossings - 2> corners{};

@@ -32,7 +32,8 @@ Triangulations TriangulationsOf(int first, int last) {
   return all;
 }
 
-/// By the number of corners, up to the six between the curves of an ambiguous face.
+/// All triangulations of a polygon with 3 to 6 corners. The part between the curves of an ambiguous
+/// face has six.
 const Triangulations& TriangulationsOf(int corners) {
   static const std::array<Triangulations, 7> all = [] {
     std::array<Triangulations, 7> table;
@@ -45,7 +46,7 @@ const Triangulations& TriangulationsOf(int corners) {
 /// A cell beside a face.
 struct Side {
   std::array<int, 3> at{};          ///< Relative to the brick of the face.
-  std::uint32_t active = kNoIndex;  ///< Its index, if it is active.
+  std::uint32_t active = kNoIndex;  ///< Index among the active cells; kNoIndex if not active.
 };
 
 /// A face between two cells, with its split sides.
@@ -55,7 +56,9 @@ struct Face {
   Side low, high;
   /// Corners and vertices on crossed sides, counter-clockwise as seen from above.
   std::array<Vec3, 8> around;
-  std::array<std::uint32_t, 8> item;  ///< Vertex, or vertices + moved node; kNoIndex: stays.
+  /// For each point of `around`: its vertex, or the vertex count plus its moved node; kNoIndex for
+  /// a node that does not move.
+  std::array<std::uint32_t, 8> item;
   std::array<bool, 8> is_vertex;
   int count = 0;
   int crossed = 0;
@@ -74,7 +77,7 @@ class Checker {
   /// A face of the cell (i, j, k) of a brick.
   Face FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, int face) const;
 
-  /// Whether a mode is valid; sets it.
+  /// Returns whether any mode is valid, and sets `mode`.
   bool FindMode(const Face& face, QuadMode& mode) const;
 
   /// Calls visit(item) for the vertices and nodes of a face that may move.
@@ -111,7 +114,7 @@ class Checker {
     const std::uint32_t node = nodes_.IndexOf(NodeOf(brick, cell, corner));
     return node == kNoIndex ? rest : rest + nodes_.moves[node];
   }
-  /// The vertex of a cell with one loop; without a vertex, the mean of the corners.
+  /// The vertex of a cell with one loop; if the cell has no vertex, the mean of its corners.
   Vec3 ApexOf(std::uint32_t brick, const Side& side) const;
   bool IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const;
   bool IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const;
@@ -139,7 +142,7 @@ Face Checker::FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, int fa
                            (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
     if (is_active) side->active = crossings_.CellAt(place);
   }
-  // Seen from above: the corners of the upper face of the cell below.
+  // The corners as seen from above: they are the corners of the upper face of the cell below.
   const std::array<int, 4> corners = CornersOfFace(2 * of.axis + 1);
   const bool has_crossings = of.low.active != kNoIndex && of.high.active != kNoIndex;
   for (int k = 0; k < 4; ++k) {
@@ -190,13 +193,14 @@ bool Checker::CanTriangulate(const Face& face, std::span<const std::uint8_t> pol
   return false;
 }
 
-/// The curves cut the face into parts, each of which is triangulated.
+/// Whether kAlongFace is valid. The curves cut the face into parts; each part is triangulated
+/// alone.
 bool Checker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const {
   if (face.crossed == 0) {
     return CanTriangulate(face, std::array<std::uint8_t, 4>{0, 1, 2, 3}, below, above);
   }
   std::array<std::uint8_t, 8> part;
-  const auto check = [&](int first, int last) {  // From one vertex to the next, around.
+  const auto check = [&](int first, int last) {  // The part from one vertex to the next.
     int size = 0;
     for (int k = first;; k = k + 1 < face.count ? k + 1 : 0) {
       part[size++] = static_cast<std::uint8_t>(k);
@@ -210,10 +214,11 @@ bool Checker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& abov
     if (face.is_vertex[k]) vertices[count++] = k;
   }
   if (count == 2) return check(vertices[0], vertices[1]) && check(vertices[1], vertices[0]);
-  // Ambiguous: vertices are at 1, 3, 5, 7. Each of two opposite corners, those inside, is cut off.
+  // The face is ambiguous: its vertices are at 1, 3, 5, 7. The curves cut off the two inside
+  // corners, which are opposite.
   const int first = CornersOfFace(2 * face.axis + 1)[0];
   const bool is_inside = (crossings_.cells[face.low.active].corners >> first & 1) != 0;
-  // Between the curves remain the four vertices and the two other corners.
+  // The part between the curves has the four vertices and the two other corners.
   constexpr std::array<std::uint8_t, 6> kEven{0, 1, 3, 4, 5, 7}, kOdd{1, 2, 3, 5, 6, 7};
   return is_inside ? check(7, 1) && check(3, 5) && CanTriangulate(face, kOdd, below, above)
                    : check(1, 3) && check(5, 7) && CanTriangulate(face, kEven, below, above);
@@ -225,7 +230,8 @@ bool Checker::FindMode(const Face& face, QuadMode& mode) const {
   if (is_low_fixed && is_high_fixed) return true;
   const Vec3 below = is_low_fixed ? Vec3{} : ApexOf(face.brick, face.low);
   const Vec3 above = is_high_fixed ? Vec3{} : ApexOf(face.brick, face.high);
-  // The face of a fixed cell is flat: the other vertex must be on its own side.
+  // A face of a fixed cell is flat. The vertex of the other cell must be on its own side of the
+  // face.
   const double level = Along(face.around[0], face.axis);
   if (is_low_fixed) return Along(above, face.axis) > level;
   if (is_high_fixed) return Along(below, face.axis) < level;
@@ -249,7 +255,7 @@ void ForEachFace(const BrickDirectory& bricks, const MovedNodes& nodes, std::uin
       const std::array<int, 3> cell{bit % kBrickSize, bit / kBrickSize, k};
       for (int side = 0; side < 6; ++side) {
         if ((side & 1) == 0) {
-          // The cell below has this face, if it is near.
+          // If the cell below is near, the face is visited as its upper face.
           std::array<int, 3> at = cell;
           --at[side / 2];
           const BrickPlace place = Normalise(bricks, brick, at[0], at[1], at[2]);
@@ -274,7 +280,7 @@ bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
   });
 }
 
-/// Moves the vertices and nodes of refused faces back. Returns whether there are any that can.
+/// Moves the vertices and nodes of refused faces back. Returns whether any of them could move.
 bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
               const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
               Certificate& certificate) {
@@ -334,7 +340,7 @@ bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return has_any;
 }
 
-/// Certifies the bricks that have moved and those around them.
+/// Certifies the bricks in which something has moved, and the bricks around these.
 bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate) {
@@ -445,7 +451,7 @@ void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
       const int to_edge = loops.edge[loops.Next(step)];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
       const CellLoops& across = LoopsOf(other.corners);
-      // The curve runs the other way there.
+      // In the other cell, the curve runs in the opposite direction.
       int reversed = 0;
       while (across.edge[reversed] != EdgeAcross(to_edge, face) ||
              across.face[reversed] != (face ^ 1)) {

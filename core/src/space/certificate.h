@@ -1,20 +1,20 @@
 // Proves that a surface with moved vertices does not intersect itself, without a search for pairs.
 //
-// The two cells of a lattice face have vertices C_i and C_j. The cones of both over the face, whose
-// crossed edges are split at their vertices E, are a bipyramid. The bipyramids of all faces tile
-// space while all vertices are at their anchors. If each has a decomposition into tetrahedra that
-// are positively oriented with the moved vertices, the piecewise linear map from the anchors is
-// injective (Lipman, arXiv 1310.0955), so triangles that are faces of these tetrahedra intersect
-// nowhere. Vertices may leave their cells. Lattice nodes are auxiliary points that follow them
-// (moved_nodes.h).
+// The two cells of a lattice face have vertices C_i and C_j. The cones of both vertices over the
+// face, whose crossed edges are split at their vertices E, form a bipyramid. While all vertices are
+// at their anchors, the bipyramids of all faces tile space. If each bipyramid has a decomposition
+// into tetrahedra that are positively oriented with the moved vertices, the piecewise linear map
+// from the anchors is injective (Lipman, arXiv 1310.0955). Triangles that are faces of these
+// tetrahedra then intersect nowhere. Vertices may leave their cells. Lattice nodes are auxiliary
+// points that follow the vertices (moved_nodes.h).
 //
 // A curve on a face joins E and E'; its quad (C_i, E, C_j, E') is cut in one of two modes:
 //   kAcrossCells  along C_i C_j: valid if the tetrahedra (A, B, C_i, C_j) over the sides A B of the
 //                 split face are positive;
 //   kAlongFace    along E E': valid if a triangulation of the split face with the edge E E' has
-//                 positive tetrahedra with C_i and with C_j. Always so at the anchors.
-// The vertices of cells with several loops stay at their anchors, and their faces stay flat. A cell
-// without a vertex has a virtual one, the mean of its corners.
+//                 positive tetrahedra with C_i and with C_j. At the anchors it is always valid.
+// The vertices of cells with several loops stay at their anchors, and the faces of these cells stay
+// flat. A cell without a vertex has a virtual vertex, the mean of its corners.
 #pragma once
 
 #include <cstdint>
@@ -31,14 +31,14 @@ namespace partiemc::space {
 enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 
 struct Certificate {
-  std::vector<std::array<QuadMode, 3>> modes;  ///< By cell: of its face above along each axis.
+  std::vector<std::array<QuadMode, 3>> modes;  ///< By cell: of its upper face along each axis.
   std::uint32_t rounds = 0;                    ///< Rounds of repair.
   std::uint32_t returned = 0;                  ///< Vertices that were moved back at least once.
 
   MovedNodes nodes;
   std::vector<std::uint8_t> setbacks;   ///< By vertex.
-  std::vector<std::uint8_t> is_bad;     ///< By vertex, then by node: refused in this round.
-  std::vector<std::uint8_t> has_moved;  ///< By brick: since the last round.
+  std::vector<std::uint8_t> is_bad;     ///< By vertex, then by node: on a refused face.
+  std::vector<std::uint8_t> has_moved;  ///< By brick: in the last round.
   std::vector<Vec3> certified;          ///< Positions of the vertices, once certified.
 };
 
@@ -46,21 +46,21 @@ struct Certificate {
 void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        std::vector<std::uint8_t>& is_fixed);
 
-/// Finds a mode for each face. Where none is valid, the vertices and nodes of the face move back
-/// towards their anchors (setbacks, moved_nodes.h). `positions` and `anchors` in world units, as
-/// the surface will have them. Returns false if a face is refused although its vertices are at
-/// their anchors: a bug. Requires: fixed vertices are at their anchors.
+/// Finds a mode for each face. If no mode is valid, the vertices and nodes of the face move back
+/// towards their anchors (setbacks, moved_nodes.h). `positions` and `anchors` are the final
+/// coordinates of the surface, in world units. Returns false if a face is refused although its
+/// vertices are at their anchors, which is a bug. Requires: fixed vertices are at their anchors.
 bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
 
-/// The same after vertices have moved from their certified positions. Vertices keep the number of
-/// their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
+/// Certifies again after vertices have moved from their certified positions. Vertices keep the
+/// number of their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// The number of faces for which the certificate does not hold: 0 once certified. For tests.
+/// The number of faces that are refused in their modes: 0 once certified. For tests.
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate);

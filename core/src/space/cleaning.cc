@@ -11,8 +11,8 @@
 namespace partiemc::space {
 namespace {
 
-/// Half of the directions in which outside nodes are connected, those to earlier nodes by layer,
-/// row, column. The others are opposite.
+/// Half of the directions in which outside nodes are connected: the directions to nodes that come
+/// earlier by layer, row, column. The other half is opposite.
 constexpr std::array<std::array<int, 3>, 9> kBefore = {{{-1, 0, 0},
                                                         {0, -1, 0},
                                                         {-1, -1, 0},
@@ -23,7 +23,7 @@ constexpr std::array<std::array<int, 3>, 9> kBefore = {{{-1, 0, 0},
                                                         {0, -1, -1},
                                                         {0, 1, -1}}};
 
-/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has one.
+/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has at least one.
 void FindFirstNodes(const BrickDirectory& bricks, const SpaceField& field,
                     std::vector<BrickBits>& first_nodes) {
   first_nodes.resize(bricks.size());
@@ -37,8 +37,8 @@ void FindFirstNodes(const BrickDirectory& bricks, const SpaceField& field,
   });
 }
 
-/// Whether the outside nodes connected to `first` are an enclosed cavity of at most `most` nodes;
-/// lists them.
+/// Whether the outside nodes connected to `first` are an enclosed cavity of at most `most` nodes.
+/// Lists its nodes.
 bool FindCavity(const BrickDirectory& bricks, const SpaceField& field, const BrickPlace& first,
                 std::size_t most, std::vector<BrickPlace>& cavity) {
   cavity.assign(1, first);
@@ -75,7 +75,7 @@ std::uint64_t FillCavities(const BrickDirectory& bricks, std::size_t most_nodes,
       for (std::uint64_t bits = scratch.first_nodes[brick][k]; bits != 0; bits &= bits - 1) {
         const int bit = std::countr_zero(bits);
         const BrickPlace first{brick, bit % kBrickSize, bit / kBrickSize, k};
-        // A cavity may have several first nodes.
+        // A cavity with several first nodes may be filled already.
         if (field.IsInside(first)) continue;
         if (!FindCavity(bricks, field, first, most_nodes, scratch.cavity)) continue;
         for (const BrickPlace& node : scratch.cavity) {

@@ -43,7 +43,7 @@ void MarkBrick(const BrickDirectory& bricks, const SpaceField& field, std::uint3
   at.first_cell = cells;
 }
 
-/// Replaces counts by sums.
+/// Replaces each count by the sum of the counts before it. Returns the total.
 template <typename CountOf>
 std::uint32_t SumUp(std::size_t count, CountOf count_of) {
   std::uint32_t total = 0;

@@ -41,14 +41,14 @@ struct SpaceCrossings {
 
   std::uint32_t VertexCount() const { return edge_count + loop_count; }
 
-  /// The vertex on the edge from a node along an axis. Requires: it is crossed.
+  /// The vertex on the edge from a node along an axis. Requires: the edge is crossed.
   std::uint32_t EdgeVertex(const BrickPlace& node, int axis) const {
     const Brick& at = bricks[node.brick];
     const std::uint64_t below = (std::uint64_t{1} << node.Bit()) - 1;
     return at.first_edge + at.edges_before[axis][node.k] +
            static_cast<std::uint32_t>(CountBits(at.crossed[axis][node.k] & below));
   }
-  /// Index of an active cell. Requires: it is active.
+  /// Index of an active cell. Requires: the cell is active.
   std::uint32_t CellAt(const BrickPlace& place) const {
     const Brick& at = bricks[place.brick];
     const std::uint64_t below = (std::uint64_t{1} << place.Bit()) - 1;
@@ -57,7 +57,8 @@ struct SpaceCrossings {
   }
 };
 
-/// Deterministic, parallel over bricks: count, sum, fill. Cost: linear in nodes.
+/// Finds the crossed edges, the active cells and their loops. Deterministic, parallel over bricks:
+/// count, sum, fill. Cost: linear in nodes.
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings);
 
@@ -70,7 +71,7 @@ inline std::uint32_t EdgeVertexOf(const BrickDirectory& bricks, const SpaceCross
                               AxisOfEdge(edge));
 }
 
-/// The cell on the other side of a face. Requires: it is active.
+/// The cell on the other side of a face. Requires: that cell is active.
 inline std::uint32_t CellAcross(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 const ActiveCell& cell, int face) {
   std::array<int, 3> at{cell.i, cell.j, cell.k};

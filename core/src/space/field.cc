@@ -13,8 +13,8 @@
 namespace partiemc::space {
 namespace {
 
-/// Calls visit(i, j, k) for each marked node of a brick, in blocks of 2 x 2 x 2 nodes, and before
-/// each block move_to(i, j, k) with its lowest node.
+/// Calls visit(i, j, k) for each marked node of a brick, in blocks of 2 x 2 x 2 nodes. Before each
+/// block, calls move_to(i, j, k) with the lowest node of the block.
 template <typename MoveTo, typename Visit>
 void ForEachInBlocks(const BrickBits& nodes, MoveTo move_to, Visit visit) {
   for (int k = 0; k < kBrickSize; k += 2) {
@@ -70,7 +70,7 @@ void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
     const float f = weight * density[node];
     const std::uint64_t bit = std::uint64_t{1} << node % (kBrickSize * kBrickSize);
     const int layer = node / (kBrickSize * kBrickSize);
-    // Above f_1 saturation decides, up to f_0 the guard.
+    // Above f_1 the saturation term decides the side, up to f_0 the guard term.
     if (f > saturation) {
       inside[layer] |= bit;
       values[node] = (saturation - f) * slope;
@@ -113,7 +113,8 @@ void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<
     }
     if (any == 0) return;
     EvaluateBrick(bins, scale, brick, missing, field);
-    // The density of the other sum decided the side. Both may differ by rounding at f_0 and f_1.
+    // The density sum of SampleBrick decided the side. At f_0 and f_1, the sums here may differ
+    // from it by rounding, so values are adapted to the sides.
     for (int layer = 0; layer < kBrickSize; ++layer) {
       for (std::uint64_t bits = missing[layer]; bits != 0; bits &= bits - 1) {
         const int bit = std::countr_zero(bits);

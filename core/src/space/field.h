@@ -13,7 +13,7 @@ namespace partiemc::space {
 struct SpaceField {
   /// F by brick, layer, row, column. Where `exact` is not set, only the sign of F is right.
   std::vector<std::array<float, kBrickNodes>> values;
-  std::vector<BrickBits> inside;  ///< F < 0.
+  std::vector<BrickBits> inside;  ///< The nodes with F < 0.
   std::vector<BrickBits> exact;
 
   /// F at a node that exists.
@@ -23,11 +23,12 @@ struct SpaceField {
   }
 };
 
-/// Finds the sides of all nodes: by the density where it decides, else by F. Parallel over bricks.
-/// Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
+/// Finds the sides of all nodes, by F where the density does not decide the side. Parallel over
+/// bricks. Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
 void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field);
 
-/// Evaluates F at `nodes` of each brick, where it is not exact yet. Sides do not change.
+/// Evaluates F at `nodes` of each brick, unless F is exact there. Nodes stay inside or outside as
+/// before.
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field);
 

@@ -63,7 +63,7 @@ void BrickDirectory::Seal() {
   constexpr int kMiddle = 13;
   for (std::uint32_t brick = 0; brick < bricks_.size(); ++brick) {
     neighbours_[brick][kMiddle] = brick;
-    // The neighbours before it in the order; links are mutual.
+    // Finds the neighbours that come earlier in the order. Links are mutual, so later ones follow.
     for (int place = 0; place < kMiddle; ++place) {
       const BrickCoordinate& at = bricks_[brick];
       const std::uint32_t other =

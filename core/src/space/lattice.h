@@ -28,8 +28,8 @@ struct BrickCoordinate {
   friend auto operator<=>(const BrickCoordinate&, const BrickCoordinate&) = default;
 };
 
-/// Neighbours of a brick at index ((dz + 1) * 3 + dy + 1) * 3 + dx + 1; kNoIndex: none. Nodes of
-/// bricks that do not exist are outside.
+/// Neighbours of a brick at index ((dz + 1) * 3 + dy + 1) * 3 + dx + 1; kNoIndex if there is none.
+/// Nodes of bricks that do not exist are outside.
 using BrickNeighbours = std::array<std::uint32_t, 27>;
 
 /// The bricks of a frame, sorted, with their neighbours.
@@ -65,7 +65,7 @@ class BrickDirectory {
       slots_;  // Open addressing, linear probing; kNoIndex marks a free slot.
 };
 
-/// A node or cell: its brick, and its place in it, 0 <= i, j, k < 8.
+/// A node or cell: its brick, and its place in the brick, 0 <= i, j, k < 8.
 struct BrickPlace {
   std::uint32_t brick;
   int i, j, k;
@@ -74,8 +74,8 @@ struct BrickPlace {
   int Bit() const { return j * kBrickSize + i; }
 };
 
-/// The node or cell (i, j, k) relative to `brick`, -8 <= i, j, k < 16, in the brick that owns it
-/// (kNoIndex if that does not exist).
+/// Finds the brick that owns the node or cell (i, j, k), given relative to `brick`, -8 <= i, j, k <
+/// 16, and its place there. The owner is kNoIndex if that brick does not exist.
 inline BrickPlace Normalise(const BrickDirectory& directory, std::uint32_t brick, int i, int j,
                             int k) {
   const int dx = i >> kBrickShift, dy = j >> kBrickShift, dz = k >> kBrickShift;

@@ -74,7 +74,7 @@ struct Slopes {
 
 enum class Term { kPhi, kGuard, kGap, kSaturation };
 
-/// F at a point, and the term that determines it.
+/// F at a point, and the term that determines F there.
 struct LevelSetAt {
   double value;
   Term term;

@@ -5,7 +5,8 @@
 namespace partiemc::space {
 namespace {
 
-// Longer loops of marching cubes get a vertex in their middle: their triangles could intersect.
+// Longer loops of marching cubes get a vertex in their middle, because their triangles could
+// intersect without it.
 constexpr int kLongestFlatLoop = 6;
 
 std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t vertex) {
@@ -82,7 +83,8 @@ void CopyTriangles(std::uint32_t shells, MeshScratch& scratch, Surface& surface)
   }
 }
 
-/// The shell below the lowest node of each body is its outer one, the others are cavities.
+/// Sets outer_of. The shell below the lowest node of a body is its outer shell; the other shells of
+/// the body are cavities.
 void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scratch,
                 Surface& surface) {
   const SpaceCrossings& crossings = input.crossings;

@@ -14,7 +14,7 @@
 
 namespace partiemc::space {
 
-/// What the assembly of a surface needs.
+/// The input of AssembleSurface.
 struct MeshInput {
   const BrickDirectory& bricks;
   const SpaceField& field;
@@ -24,19 +24,21 @@ struct MeshInput {
   std::span<const Vec3> normals;    ///< By vertex, unit length.
 };
 
-using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertices of SpaceCrossings.
+using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertex numbers of SpaceCrossings.
 
 struct MeshScratch {
   std::vector<VertexTriangle> triangles;
   std::vector<std::uint32_t> parent, shell_of, point_of, next;
 };
 
-/// The triangles of marching cubes, by cell: only vertices on edges, except in long loops.
+/// The triangles of marching cubes, cell by cell. Their corners are vertices on edges; in long
+/// loops, one corner is the vertex in the cell.
 void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        std::vector<VertexTriangle>& triangles);
 
 /// Sorts `scratch.triangles` and their vertices by shell and measures the shells. Shells are
-/// ordered by their first vertex. The outer shell of a body is the one below its lowest node.
+/// ordered by their first vertex. The outer shell of a body is the shell directly below its lowest
+/// node.
 void AssembleSurface(const MeshInput& input, MeshScratch& scratch, Surface& surface);
 
 }  // namespace partiemc::space

@@ -27,7 +27,7 @@ std::uint64_t AtTheEnd(const BrickDirectory& bricks, std::uint32_t brick, int k)
   return nodes;
 }
 
-// In squared cells. Keeps the weight of a vertex at the node finite.
+// Added to squared distances, in squared cells, to keep the weight of a vertex at the node finite.
 constexpr double kLeastSquare = 1e-3;
 
 bool HasOneLoop(const ActiveCell& cell) { return LoopsOf(cell.corners).loops == 1; }

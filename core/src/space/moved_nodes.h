@@ -20,7 +20,7 @@ namespace partiemc::space {
 struct MovedNodes {
   struct Brick {
     BrickBits nodes{};  ///< Nodes that may move.
-    BrickBits near{};   ///< Active cells, and cells with such a node.
+    BrickBits near{};   ///< Active cells, and cells with such nodes.
     std::uint32_t first = 0;
     std::array<std::uint16_t, kBrickSize> before{};
   };
@@ -41,14 +41,15 @@ struct MovedNodes {
   }
 };
 
-/// Setbacks of a vertex. The first ones replace its displacement by the mean move of the nodes
-/// around it: a refused face is uneven, but its common displacement need not be lost. Each of the
-/// next ones keeps kKeptOfMove of it, the last one nothing. Nodes skip the first ones.
+/// Setbacks of a vertex on a refused face. The first kSmoothings setbacks replace its displacement
+/// by the mean move of the nodes around it. This makes the uneven face even, but keeps the common
+/// displacement. Each later setback keeps kKeptOfMove of the displacement, and setback number
+/// kMostSetbacks keeps nothing. The first kSmoothings setbacks of a node change nothing.
 inline constexpr int kSmoothings = 4;
 inline constexpr int kMostSetbacks = 12;
 inline constexpr double kKeptOfMove = .7;
 
-/// Finds the nodes that may move, without setbacks. Parallel over bricks.
+/// Finds the nodes that may move, and sets their moves and setbacks to 0. Parallel over bricks.
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                     MovedNodes& nodes);
 

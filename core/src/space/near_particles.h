@@ -16,8 +16,8 @@ struct NearBox {
   std::array<float, 3> low, high;
 };
 
-/// A block of particles, in cells relative to a brick. Filled up to a multiple of the lanes with
-/// particles that are too far away to count.
+/// A block of particles, in cells relative to a brick. Dummies that are too far away to count fill
+/// the block up to a multiple of kLanes.
 struct NearBlock {
   static constexpr int kCapacity = 512;
   static constexpr int kLanes = 8;
@@ -37,15 +37,15 @@ struct NearBlock {
   }
 };
 
-/// The particles that lie in a row of cells: indices [first, last) of the bins, and what to add to
-/// their coordinates.
+/// The particles that lie in a row of cells: indices [first, last) of the bins, and the shift to
+/// add to their coordinates.
 struct NearRun {
   std::uint32_t first, last;
   float shift_x, shift_y, shift_z;
 };
 
 /// Calls visit(NearRun) for runs that contain all particles within `radius` of the box, in the
-/// order of the bins: brick by brick, row by row. May contain others.
+/// order of the bins: brick by brick, row by row. Runs may also contain other particles.
 template <typename Visit>
 void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
                     Visit visit) {
@@ -75,7 +75,7 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
             const float rest = square - dy * dy - dz * dz;
             if (rest <= 0) continue;
             const float half = std::sqrt(rest);
-            // Truncation rounds down: coordinates are more than -64 cells.
+            // Coordinates are above -64 cells. With 64 added, truncation rounds down.
             const int first =
                 std::max(static_cast<int>(box.low[0] - half + 64) - 64, base[0]) - base[0];
             const int last =

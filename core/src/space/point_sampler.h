@@ -9,7 +9,7 @@
 
 namespace partiemc::space {
 
-/// F at a point with its gradient, per cell.
+/// F at a point and its gradient. Lengths in cells.
 struct PointSample {
   double value = 0;
   Vec3 gradient;
@@ -20,14 +20,14 @@ class PointSampler {
  public:
   PointSampler(const SpaceBins& bins, const Scale& scale) : bins_(bins), scale_(scale) {}
 
-  /// Sets the box of the points to come, in cells relative to `brick`.
+  /// Sets the box that contains the points of later calls, in cells relative to `brick`.
   void MoveTo(std::uint32_t brick, const NearBox& box);
 
   /// F at a point of the box, relative to the brick.
   double Value(const Vec3& point);
 
-  /// F and the gradient of the term that determines it: analytic, of the gap by the derivative of
-  /// its eigenvalue.
+  /// F at a point, and the gradient of the term that determines F there. Gradients are analytic;
+  /// the gradient of the gap term uses the derivative of the eigenvalue.
   PointSample Sample(const Vec3& point);
 
  private:

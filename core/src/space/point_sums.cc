@@ -33,8 +33,8 @@ struct Offsets {
   }
 };
 
-// Calls add(first lane, offsets, index of the first particle) for all particles of a block. Lanes
-// [0, 8) of the partial sums are served in turn.
+// Calls add(offsets, index of the first particle) for each vector of particles that is added to the
+// partial sums from `lane` on.
 template <class Add>
 HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, float inverse_square,
                               int lane, Add add) {

@@ -1,5 +1,5 @@
 // Kernel sums at nodes and points, in vectors. Every instruction set gives the same bits: terms go
-// to eight partial sums by their index, which are added by halves.
+// to eight partial sums by their index, and the partial sums are added by halves.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct QueryPoint {
   float x, y, z;
 };
 
-/// Each adds the particles of a block.
+/// Each function adds the terms of the particles of a block to partial sums.
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums);
 void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
@@ -39,7 +39,8 @@ void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_sq
 void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
                PartialThirds& sums);
 
-/// The sums of all blocks. `weight`: of every particle if the bins have none.
+/// The totals of partial sums. `weight`: the weight of every particle if the bins have no weights,
+/// else 1.
 Sums TotalOf(const PartialMoments& sums, double weight);
 Slopes TotalOf(const PartialSlopes& sums, double weight);
 

@@ -12,14 +12,16 @@
 
 namespace partiemc::space {
 
-/// Distance of a crossing from the ends of its edge, in cells. Rounding to world coordinates cannot
-/// move it to a node.
+/// Least distance of a crossing from the ends of its edge, in cells. With this distance, rounding
+/// to world coordinates cannot move a crossing to a node.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
-/// The same for anchors of vertices that move. Tetrahedra at a node then have room for the
-/// displacements: with .02, 2 % of the vertices of balls, tori and boxes had to return.
+/// The least distance for anchors of vertices that move. Tetrahedra at a node then have room for
+/// the displacements: with .02, 2 % of the vertices of balls, tori and boxes had to return to their
+/// anchors.
 inline constexpr double kAnchorMargin = .12;
 
-/// The nearest point that is kAnchorMargin inside of the cell at `low`.
+/// The point nearest to `point` that is at least kAnchorMargin away from the faces of the cell at
+/// `low`.
 inline Vec3 ClampedToCell(const Vec3& point, const Vec3& low) {
   const auto clamp = [](double value, double from) {
     return std::clamp(value, from + kAnchorMargin, from + 1 - kAnchorMargin);
@@ -27,8 +29,8 @@ inline Vec3 ClampedToCell(const Vec3& point, const Vec3& low) {
   return {clamp(point.x, low.x), clamp(point.y, low.y), clamp(point.z, low.z)};
 }
 
-/// Sets the vertices on edges to the linear crossings of F, at least `margin` from the nodes, and
-/// those in cells to the mean of the crossings of their loop. In cells.
+/// Sets the vertices on edges to the linear crossings of F, at least `margin` away from the nodes,
+/// and the vertices in cells to the mean of the crossings of their loop. In cells.
 void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
                       const SpaceCrossings& crossings, double margin, std::vector<Vec3>& positions);
 

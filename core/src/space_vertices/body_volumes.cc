@@ -9,7 +9,7 @@
 namespace partiemc::space {
 namespace {
 
-/// Calls visit(from, to) for the crossings of a loop: each curve from one to the next.
+/// Calls visit(from, to) for each curve of a loop, from one crossing to the next.
 template <typename Visit>
 void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const ActiveCell& cell, int loop, Visit visit) {
@@ -20,13 +20,14 @@ void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   }
 }
 
-/// The origin of the sums of a body: keeps them exact far from the origin of the world. In cells.
+/// The origin of the sums of a body, in cells: a node of the body, so that the sums lose no digits
+/// far from the origin of the world.
 Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
   const BrickPlace& at = body.lowest;
   return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};
 }
 
-/// Calls visit(cell, loop of the cell, loop).
+/// Calls visit(cell, loop of the cell, loop) for all loops, in parallel over cells.
 template <typename Visit>
 void ForEachLoopOfCells(const SpaceCrossings& crossings, const Visit& visit) {
   ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
@@ -118,7 +119,7 @@ bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
   for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
     const BodyMeasure& measure = volumes.measures[body];
     const double wanted = bodies.bodies[body].volume * per_unit;
-    // No particle: the volume of the body is unknown.
+    // Without particles, the volume that the body should have is unknown.
     if (!(wanted > 0) || !(measure.area > 0)) continue;
     const double missing = wanted - measure.volume;
     if (std::abs(missing) <= step.tolerance * wanted) continue;

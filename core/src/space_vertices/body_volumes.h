@@ -13,7 +13,7 @@
 
 namespace partiemc::space {
 
-/// Size of a body with its cavities.
+/// Measures of a body, which its outer shell and its cavities bound.
 struct BodyMeasure {
   double area = 0, volume = 0;
   Vec3 centroid;
@@ -22,7 +22,7 @@ struct BodyMeasure {
 struct BodyVolumes {
   std::vector<std::uint32_t> body_of;  ///< By vertex.
   std::vector<BodyMeasure> measures;   ///< By body.
-  std::vector<double> areas;           ///< By loop: of the triangles around its vertex.
+  std::vector<double> areas;           ///< By loop: area of the triangles around its vertex.
 
   struct Part {
     double volume = 0;
@@ -42,8 +42,8 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
 void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
-/// Measures the bodies as the triangles bound them. Positions are in world units, as are area and
-/// volume. Requires: FindBodyOfVertices. Linear in triangles.
+/// Measures the bodies that the triangles bound. Positions, area and volume are in world units.
+/// Requires: FindBodyOfVertices. Linear in triangles.
 void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
                       std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
                       BodyVolumes& volumes);

@@ -8,7 +8,7 @@
 namespace partiemc::space {
 namespace {
 
-// Keeps the weight of a loop at the edge finite.
+// Added to squared distances, in squared cells, to keep the weight of a loop at the edge finite.
 constexpr double kLeastSquare = .01;
 
 /// The loops around a crossed edge: vertices of the four cells that share it.

@@ -1,4 +1,4 @@
-// Places the vertices on edges from those in the cells around them.
+// Places the vertices on edges by the vertices in the cells around them.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,8 @@ namespace partiemc::space {
 /// Moves each vertex e on an edge from its anchor along its normal n to the surface through the
 /// loops around it, at most four. The height is the mean of (n + n_j) / 2 . (c_j - e) with the
 /// weights 1 / d^2. The normal is the normalised mean of the n_j with the same weights. Exact on
-/// spheres and planes. Requires: positions and normals of the vertices in cells. In cells. Parallel
-/// over bricks.
+/// spheres and planes. Requires: positions and normals of the vertices in cells are set. Lengths
+/// are in cells. Parallel over bricks.
 void PlaceEdgesByLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                        std::vector<Vec3>& normals);

@@ -1,8 +1,8 @@
 // Weighted means over windows of loops: normals, bends and planes.
 //
-// Loop j has in the window of loop i the weight area_j B(d, reach), where d = |c_j - c_i| and
-// B(d, r) = max(0, 1 - d^2 / r^2)^2. `kAtEdges` multiplies it by max(0, n_i . n_j)^32. Lengths are
-// in cells.
+// In the window of loop i, loop j has the weight area_j B(d, reach), where d = |c_j - c_i| and B(d,
+// r) = max(0, 1 - d^2 / r^2)^2. `kAtEdges` multiplies this weight by max(0, n_i . n_j)^32. Lengths
+// are in cells.
 #pragma once
 
 #include <span>
@@ -21,8 +21,8 @@ struct LoopSurface {
 
 enum class Stop { kNowhere, kAtEdges };
 
-/// The normalised weighted mean of the normals. `smooth` does not overlap `normals`. Keeps a normal
-/// whose mean is 0.
+/// The normalised weighted mean of the normals. `smooth` does not overlap `normals`. If the mean is
+/// 0, the normal stays.
 void SmoothNormals(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                    Stop stop, std::span<Vec3> smooth);
 
@@ -32,8 +32,8 @@ void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double
                double limit, std::span<double> bends);
 
 /// Moves each centre along its normal by the weighted mean of (n_i + n_j) / 2 . (c_j - c_i) +
-/// base_j: to the mean of the near planes. A sphere with base 0 stays unchanged, as the mean normal
-/// of two of its points is perpendicular to their chord.
+/// base_j: to the mean of the near planes. A sphere with base 0 stays unchanged, because the mean
+/// normal of two of its points is perpendicular to their chord.
 void SmoothOnPlanes(const LoopSurface& surface, std::span<const Vec3> normals,
                     std::span<const double> bases, double reach, std::span<Vec3> smooth);
 

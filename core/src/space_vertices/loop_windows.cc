@@ -30,7 +30,7 @@ void LinkLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
       const int face = loops.face[step];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
       const CellLoops& across = LoopsOf(other.corners);
-      // The curve runs the other way there.
+      // In the other cell, the curve runs in the opposite direction.
       const int from = EdgeAcross(loops.edge[loops.Next(step)], face);
       int reversed = 0;
       while (across.edge[reversed] != from || across.face[reversed] != (face ^ 1)) ++reversed;

@@ -1,4 +1,5 @@
-// Windows: for each loop, the loops within a distance that are connected to it through such loops.
+// The window of a loop: the loops within a distance that are connected with it through loops within
+// the same distance.
 //
 // A loop is the index of a vertex in a cell, minus `edge_count`. Two loops are linked if a curve on
 // a face belongs to both.
@@ -16,8 +17,8 @@
 namespace partiemc::space {
 
 struct LoopWindows {
-  /// Loops of a window at most, the first that the search reaches: bounds the memory of small
-  /// cells.
+  /// Most loops of a window: the first ones that the search reaches. This bounds the memory if
+  /// cells are small.
   static constexpr std::size_t kMostLoopsOfWindow = 320;
   /// Loops per task.
   static constexpr std::size_t kLoopsAtOnce = 256;
@@ -40,8 +41,8 @@ struct LoopWindows {
   }
 };
 
-/// Finds the window of each loop: within `reach` of it, in cells. `centres` by loop.
-/// Deterministic, parallel over loops. Cost: linear in the sizes of the windows.
+/// Finds the window of each loop, the loops within `reach` cells. `centres` by loop. Deterministic,
+/// parallel over loops. Cost: linear in the sizes of the windows.
 void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                  std::span<const Vec3> centres, double reach, LoopWindows& windows);
 

@@ -1,4 +1,4 @@
-// The placement `qef`: vertices in cells at the least square of the distances from tangent planes.
+// The placement `qef`: vertices in cells minimise the squared distances from tangent planes.
 //
 // Ju, Losasso, Schaefer, Warren: Dual Contouring of Hermite Data, 2002; with the regularisation
 // towards the mean of the crossings instead of a truncated inverse.
@@ -23,9 +23,9 @@ struct TangentPlane {
 Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean);
 
 /// Samples the level set at the crossings of the edges for their normals. Moves each vertex in a
-/// cell to the LeastSquarePoint of the crossings of its loop, not out of the cell. Its normal is
-/// the normalised mean of theirs. In cells. Parallel over bricks and cells. Requires: vertices at
-/// their crossings. Sets all normals.
+/// cell to the LeastSquarePoint of the crossings of its loop, but not out of the cell. The normal
+/// of the vertex is the normalised mean of the normals of these crossings. Lengths are in cells.
+/// Parallel over bricks and cells. Requires: vertices are at their crossings. Sets all normals.
 void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                 std::vector<Vec3>& positions, std::vector<Vec3>& normals);
 

@@ -11,7 +11,7 @@ namespace {
 
 // A smaller squared gradient has no direction.
 constexpr double kWeakGradient = 1e-3;
-// Cells per task: hides the cost of a sampler.
+// Cells per task: enough that the cost of a sampler does not matter.
 constexpr std::size_t kCellsAtOnce = 64;
 
 class RootFinder {
@@ -27,7 +27,8 @@ class RootFinder {
     sampler_.MoveTo(cell.brick, {{x, y, z}, {x + 1, y + 1, z + 1}});
   }
 
-  /// Takes one step, not out of the cell. The normal stays as it is if the gradient is weak.
+  /// Takes one step, which ends at the sides of the cell. If the gradient is weak, position and
+  /// normal stay as they are.
   void Step(Vec3& position, Vec3& normal) {
     const PointSample sample = sampler_.Sample(position - origin_);
     const double square = Dot(sample.gradient, sample.gradient);
@@ -51,7 +52,7 @@ class RootFinder {
   Vec3 origin_, low_;
 };
 
-/// The area normal of a loop: the direction if the gradient is weak.
+/// The area normal of a loop, which is used if the gradient is weak.
 Vec3 NormalOfLoop(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const ActiveCell& cell, int loop, const std::vector<Vec3>& positions) {
   const CellLoops& loops = LoopsOf(cell.corners);

@@ -15,9 +15,10 @@ struct RootConstants {
   double long_step = .07;   ///< After longer steps the gradient is evaluated again, in cells.
 };
 
-/// Moves the vertices in cells by one Newton step, not out of their cells, and sets their normals.
-/// A normal is the direction of the gradient, or if that is weak the normal of the loop. Vertices
-/// on edges stay. Positions and normals by vertex, in cells. Parallel over cells.
+/// Moves the vertices in cells by one Newton step, but not out of their cells, and sets their
+/// normals. A normal is the direction of the gradient, or, if the gradient is weak, the area normal
+/// of the loop. Vertices on edges stay. Positions and normals by vertex, in cells. Parallel over
+/// cells.
 void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                const RootConstants& constants, std::vector<Vec3>& positions,
                std::vector<Vec3>& normals);

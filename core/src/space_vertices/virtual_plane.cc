@@ -50,7 +50,8 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   SmoothLoops(input, constants, scratch, centres, std::span(normals).subspan(crossings.edge_count));
   PlaceEdgesByLoops(bricks, crossings, anchors, positions, normals);
 
-  // The first round misses the volume of small bodies, which bend.
+  // The first round misses the volume of small bodies: where a surface bends strongly, moving it
+  // changes its area.
   for (int round = 0; round < 2; ++round) {
     MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
     MatchVolumes(input.bodies, {.unit = cell_size, .limit = constants.volume_limit * h}, normals,

@@ -1,9 +1,9 @@
 // The bytes of a state. Little-endian layout: magic, version, cell size and spacing (0: none), area
-// offset and time (kAbsent: none), identities given, the counts of normals, rings, runs and
-// samples, these, checksum.
+// offset and time (kAbsent: none), largest identity, the numbers of normals, rings, runs and
+// samples, these arrays, checksum.
 //
-// A state with sections has another magic, the version and the number of states. Then follows each
-// state, the main one first, as its number of bytes and its bytes; checksum.
+// A state with sections has another magic, the version and the number of states. Each state
+// follows, the main one first: the number of its bytes, then its bytes. The checksum is last.
 #include "partiemc/state.h"
 
 #include <array>
@@ -32,7 +32,7 @@ constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream r
 constexpr std::size_t kChecksumBytes = 8;
 constexpr char kAsWritten[] = "must be what Serialize wrote";
 
-// The arrays of a state in the order of the layout, and the bytes of an element.
+// The arrays of a state in the order of the layout, and the number of bytes of one element.
 struct Kind {
   const char* name;
   std::size_t bytes;
@@ -46,7 +46,7 @@ auto ArraysOf(auto& state) {
   return std::tie(state.normals, history.rings, history.runs, history.samples);
 }
 
-// The numbers of an element in the order of the layout.
+// The members of an element in the order of the layout.
 auto NumbersOf(auto& item) {
   using Item = std::remove_cvref_t<decltype(item)>;
   if constexpr (std::is_same_v<Item, CellNormal>) {
@@ -167,7 +167,7 @@ absl::Status CheckContents(const State& state) {
   return status;
 }
 
-// Checks the last bytes, the checksum of all before them. Requires: there are enough bytes.
+// Checks the last 8 bytes: the checksum of all bytes before them. Requires: at least 8 bytes.
 absl::Status CheckSum(std::string_view bytes) {
   const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
   std::string_view tail = bytes.substr(body.size());
@@ -192,7 +192,8 @@ std::uint64_t BytesOf(const Counts& counts) {
   return bytes;
 }
 
-// Takes the counts of the arrays that fill the rest. Each is bounded before it is multiplied.
+// Reads the sizes of the arrays, which fill the rest of the bytes. Each size is bounded before it
+// is multiplied, so that the product cannot overflow.
 absl::StatusOr<Counts> TakeCounts(std::string_view& rest) {
   Counts counts;
   for (std::uint64_t& count : counts) count = TakeNumber<std::uint64_t>(rest);
@@ -219,7 +220,7 @@ void PutOptional(std::optional<double> value, std::string& bytes) {
   PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
 }
 
-// A flag is a number of 4 bytes, 0 or 1.
+// Reads a number. A bool is stored as a number of 4 bytes; returns false if this is not 0 or 1.
 template <typename Number>
 bool TakeNumberOrFlag(std::string_view& rest, Number& number) {
   if constexpr (std::is_same_v<Number, bool>) {
@@ -244,7 +245,7 @@ std::size_t OwnBytes(const State& state) {
   return kHeaderBytes + BytesOf(CountsOf(state)) + kChecksumBytes;
 }
 
-// Appends a state without its sections.
+// Appends the state of one outline, without the states of its sections.
 void PutOwn(const State& state, std::string& bytes) {
   const std::size_t start = bytes.size();
   PutNumber(kMagic, bytes);

@@ -1,5 +1,5 @@
-// A hierarchical grid: cells of all sizes in one hash table. A box lies in one cell of the grid of
-// its size.
+// A hierarchical grid: grids with cells of different sizes, in one hash table. Each box is stored
+// in one cell, of the grid with the smallest cells that can hold the box.
 #pragma once
 
 #include <algorithm>
@@ -18,9 +18,9 @@ inline constexpr int kGridLevelBits = 5;
 inline constexpr int kGridLevels = 1 << kGridLevelBits;
 static_assert(2 * kGridIndexBits + kGridLevelBits <= 64);
 
-// Smallest ratio of the sizes of a cell and its box. It ensures that two touching boxes lie at most
-// one cell apart, even if an index is rounded to the wrong side of a border. Any value well above 1
-// + 2^-24, the error of an index, is sufficient.
+// Smallest ratio of the sizes of a cell and its box. The ratio ensures that two touching boxes lie
+// at most one cell apart, even if an index is rounded to the wrong side of a border. Any value well
+// above 1 + 2^-24, the error of an index, is sufficient.
 inline constexpr double kGridSlack = 1.0 + 0x1p-10;
 
 /// Level k has square cells of side `finest` * 2^k.

@@ -3,10 +3,10 @@
 // right. On contours, comparing coordinates in this way excludes nearly all pairs of neighbours.
 //
 // Successive runs of a ring form a block. A hierarchical grid finds blocks that are near each
-// other. A block lies in one cell only: in the grid whose cells are just larger than its box, in
-// the cell of its lower left corner. It is compared with blocks of the same grid and of coarser
-// grids; only a few cells of each can hold blocks that reach it. Comparing all runs of two blocks
-// costs less than finding the neighbours of each run in a grid.
+// other. Each block is stored in one cell: the cell at its lower left corner, in the grid whose
+// cells are just larger than its box. A block is compared with blocks of the same grid and of
+// coarser grids. In each of these grids, only a few cells can hold blocks that reach it. Comparing
+// all runs of two blocks costs less than finding the neighbours of each run in a grid.
 #include "vertices/intersections.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 using Run = TouchingPairsBuffers::Run;
 using Block = TouchingPairsBuffers::Block;
 
-// Segments of a run. Longer runs have larger boxes, and more boxes overlap.
+// Number of segments of a run. Longer runs would have larger boxes, and more boxes would overlap.
 constexpr std::uint32_t kRunLength = 8;
 
 // Runs of a block.
@@ -141,7 +141,7 @@ void FillGrid(Search& s, const HierarchicalGrid& grid) {
   }
 }
 
-/// Whether a pair of segments counts (see the header).
+/// Whether two segments count as a pair: successive segments must overlap, others must touch.
 bool Touches(const Search& s, const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) {
   const Segment a = s.SegmentAt(of_i, i);
   const Segment b = s.SegmentAt(of_j, j);
@@ -197,9 +197,10 @@ void ForEachPairBetween(const Search& s, const Block& first, const Block& second
   }
 }
 
-/// Calls visit(i, j) for all pairs that count between segments of a block and of later blocks.
-/// Searches the cells that can contain the lower left corner of a touching block: those that meet
-/// the block's box, one more column on the left and one more row below.
+/// Calls visit(i, j) for the pairs that a block finds: within the block, with later blocks of its
+/// grid, and with blocks of coarser grids. Searches the cells that can contain the lower left
+/// corner of a touching block: the cells that meet the block's box, one more column on the left and
+/// one more row below.
 template <typename Visit>
 void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
   const std::span<const Block> blocks = s.buffers.blocks;
@@ -251,7 +252,8 @@ std::size_t CountTouchingPairs(std::span<const double> points,
   if (buffers.blocks.empty()) return 0;
   const HierarchicalGrid grid = MakeGrid(s);
   FillGrid(s, grid);
-  // Nearly all frames have no pair. Pairs are listed by block, independent of the threads.
+  // Nearly all frames have no pair, so the blocks are searched in parallel first. Pairs are then
+  // listed block by block, so that their order does not depend on the threads.
   if (!FindPairs(s, grid)) return 0;
   std::size_t count = 0;
   const std::size_t max_pairs = points.size() / 2;

@@ -26,7 +26,7 @@ struct TouchingPairsBuffers {
     Box box;                      // Box of the runs.
     std::uint32_t first_run = 0;  // Runs [first_run, last_run).
     std::uint32_t last_run = 0;
-    std::uint64_t cell = 0;          // Its cell in the grid of its size.
+    std::uint64_t cell = 0;          // Key of its cell in the grid of its level.
     std::uint32_t next_in_slot = 0;  // Next block of the same slot.
     std::uint8_t level = 0;          // Level of its grid.
     bool finds_pair = false;         // Whether it is the first block of a touching pair.

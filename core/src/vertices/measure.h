@@ -7,8 +7,8 @@
 
 namespace partiemc {
 
-/// Measures a closed ring of interleaved points; particle_count and identity are 0. Computes
-/// relative to the first point, so that a ring far from the origin loses no digits.
+/// Measures a closed ring of interleaved points; particle_count and identity are 0. Coordinates are
+/// taken relative to the first point, so that a ring far from the origin loses no digits.
 /// Requires: at least one point.
 RingMeasures MeasureRing(std::span<const double> points);
 

@@ -5,7 +5,7 @@
 namespace partiemc {
 namespace {
 
-// Windows compare distances in floats and may include a vertex that is farther by this factor.
+// Windows compare distances in floats and may include a vertex beyond the reach by this factor.
 constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
@@ -20,7 +20,7 @@ PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach) {
   };
   const auto limit =
       static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;
-  // Vertices needed after the last vertex, and before the first one.
+  // Numbers of vertices that windows need after the last vertex and before the first vertex.
   std::size_t after = 0;
   for (std::int64_t distance = length_after(count - 1); distance < limit; ++after) {
     distance += length_after(after % count);

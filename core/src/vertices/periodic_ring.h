@@ -43,8 +43,8 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
 }
 
 /// The size of a closed ring. Its margin is the largest number of vertices that a window of `reach`
-/// cells needs beyond either end. Uses the lengths of LengthInUnits, as windows do: nearly
-/// coincident vertices must not be missed.
+/// cells needs beyond either end. The lengths are computed by LengthInUnits, as in the windows:
+/// with exact lengths, the margin could be too short for nearly coincident vertices.
 /// Cost: linear in the vertices.
 PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach);
 
@@ -71,7 +71,7 @@ struct PeriodicRing {
   }
 
   std::ptrdiff_t count, margin;
-  std::int32_t *x, *y;         ///< Lattice coordinates of the world, in units.
+  std::int32_t *x, *y;         ///< Position relative to the origin of the world, in units.
   std::int32_t* arc;           ///< Arc length up to the vertex, in units; continues in the margins.
   float *normal_x, *normal_y;  ///< Unit, outward.
   float *next_x, *next_y;      ///< Scratch: next normals; later next_x is the variance of supports.
@@ -95,7 +95,7 @@ struct PeriodicRing {
   }
 };
 
-/// The arrays of one short ring, for the stack, so that they stay in the cache.
+/// The arrays of one short ring, small enough for the stack, so that they stay in the cache.
 class ShortRing {
  public:
   static bool Holds(const PeriodicRingSize& size) {
@@ -120,7 +120,7 @@ class PeriodicRings {
  public:
   using Size = PeriodicRingSize;
 
-  /// The size of each ring, to be set before Allocate; 0 vertices for a ring without arrays here.
+  /// The size of each ring, to be set before Allocate; 0 vertices for a ring that needs no arrays.
   std::vector<Size>& sizes() { return sizes_; }
   /// Allocates the arrays. Elements are uninitialised.
   void Allocate();

@@ -7,8 +7,8 @@
 
 namespace partiemc {
 
-/// Distance between clamped vertices and the sides of their cells, in cells. It keeps neighbouring
-/// vertices apart, and on their sides, when they are rounded to world coordinates.
+/// Distance between clamped vertices and the sides of their cells, in cells. With this distance,
+/// rounding to world coordinates neither joins neighbouring vertices nor moves one across a side.
 inline constexpr double kCellMargin = 1.0 / 1024;
 
 /// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates
@@ -16,8 +16,9 @@ inline constexpr double kCellMargin = 1.0 / 1024;
 /// Requires: the point is at least kCellMargin away from the sides.
 Point ClampToHalf(const Segment& segment, Point point);
 
-/// Moves `point` into its cell, kCellMargin away from the sides. In a saddle moves it into the half
-/// that belongs to `segment`, so that the two segments never meet; other cells ignore `segment`.
+/// Moves `point` into its cell, kCellMargin away from the sides. In a saddle, `point` moves into
+/// the half that belongs to `segment`, so that the two segments never meet; other cells ignore
+/// `segment`.
 inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
                          const Segment& segment, Point point) {
   const Point origin = CellOrigin(directory, cell);

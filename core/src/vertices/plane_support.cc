@@ -18,7 +18,7 @@ enum SupportChannel { kWeight, kDistance, kSquare, kSupportSums };
 
 HWY_INLINE Vector Constant(double value) { return hn::Set(Lanes(), static_cast<float>(value)); }
 
-// B(d, s) by d^2 and 1 / s^2.
+// B(d, s), computed from d^2 and 1 / s^2.
 HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
   const Vector t =
       hn::Max(hn::Sub(Constant(1), hn::Mul(square, inverse_square)), hn::Zero(Lanes()));
@@ -58,7 +58,8 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
 
     Vector w = hn::Max(hn::Add(hn::Mul(distance, shape.inverse_spacing), shape.depth), hn::Zero(d));
     for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
-    // Masks every term: far away, or in padding, weights and distances may be NaN.
+    // Every term is masked, because weights and distances of far particles and of padding may be
+    // NaN.
     const auto supports = hn::And(hn::Lt(square, shape.radius_square), hn::Lt(above, shape.height));
     w = hn::IfThenElseZero(supports, hn::Mul(Bump(square, shape.inverse_square), w));
     const Vector moment = hn::IfThenElseZero(supports, hn::Mul(w, distance));

@@ -10,9 +10,10 @@
 
 namespace partiemc {
 
-/// Selects and weighs the particles that support a plane. A particle supports it if it is nearer to
-/// its point than `radius` and less than `height` above it. Its weight is B(distance, radius)
-/// max(0, u / spacing + depth)^8, with its height u above the bent plane. Lengths in cells.
+/// Selects and weighs the particles that support a plane. A particle supports a plane if it is
+/// nearer to the plane's point than `radius`, and less than `height` above the plane. The weight of
+/// a particle is B(distance, radius) max(0, u / spacing + depth)^8, where u is its height above the
+/// bent plane. Lengths in cells.
 struct SupportShape {
   double radius, height, spacing;
   double depth;  ///< In spacings.
@@ -31,7 +32,8 @@ struct SupportSums {
   double weight, distance, square;
 };
 
-/// Up to kPointsAtOnce planes. `near` contains at least the particles within the radius of each.
+/// Up to kPointsAtOnce planes. `near` contains at least the particles within the radius of their
+/// points.
 struct SupportQuery {
   NeighbourRows near;
   std::span<const BentPlane> planes;
@@ -40,7 +42,7 @@ struct SupportQuery {
 using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
 
 /// Computes sums[k][i] for planes[i] of queries[k]. Float arithmetic in a fixed order: the bits are
-/// the same on any processor, as for SumAtPoints.
+/// the same on any processor, as in SampleAtPoints (point_kernels.h).
 /// Requires: at most kQueriesAtOnce queries.
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
                  std::span<QuerySupports> sums);

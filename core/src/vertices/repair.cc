@@ -12,11 +12,11 @@ namespace {
 // Rounds in which points move half way only.
 constexpr int kGentleRounds = 4;
 
-// After this number of rounds all points return at once: adversarial frames could need a round for
-// every few points. Ordinary frames need none; hostile test frames need up to nine.
+// After this number of rounds all points return at once, because adversarial frames could need a
+// round for every few points. Ordinary frames need none; hostile test frames need up to nine.
 constexpr int kMostRounds = 24;
 
-// With more misplaced rings in a round, all rings return. Hardly any frame has one.
+// If a round has more misplaced rings than this, all rings return. Hardly any frame has even one.
 constexpr std::size_t kMostMisplaced = 100;
 
 // Marks both ends of a segment and the points before and after it.
@@ -52,8 +52,8 @@ Point LeftmostOf(const Rings& rings, std::size_t ring) {
   return leftmost;
 }
 
-// Lists the misplaced rings. An outer ring is misplaced if the winding number of the others around
-// it is not 0, a hole if it is not 1.
+// Lists the misplaced rings. An outer ring is misplaced if the winding number of the other rings
+// around it is not 0, a hole if this number is not 1. Rings turned inside out are misplaced, too.
 // Requires: rings were measured, and do not cross.
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
@@ -67,7 +67,7 @@ void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Marks the misplaced rings, and the rings whose boxes surround them. Marks all rings if many are
-// misplaced, as searching around each would take too long.
+// misplaced, because searching around each of them would take too long.
 void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   if (scratch.misplaced.size() > kMostMisplaced) {
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
@@ -83,7 +83,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
     const Box box = BoxOf(rings, other);
     for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
       const Point& point = scratch.leftmost[k];
-      // Equal left sides are ordered by the number of the ring.
+      // Of rings with equal left sides, the ring with the lower number begins first.
       const bool begins_before =
           box.left != point.x ? box.left < point.x : other < scratch.misplaced[k];
       if (!begins_before || point.x > box.right || point.y < box.bottom || point.y > box.top) {
@@ -128,7 +128,8 @@ bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
       all_the_way = true;
     }
     if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
-    // The rounds are used up, or every marked point is at its root and an unmarked one is at fault.
+    // Either the rounds are used up, or every marked point is at its root already, so an unmarked
+    // point is wrong. All points return.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
     if (!Retreat(roots, true, scratch, rings)) return false;
   }

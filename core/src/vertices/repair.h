@@ -24,10 +24,10 @@ struct RepairScratch {
 /// are simple, do not touch and are nested by `outer_of`. `roots` are interleaved, one for each
 /// point of the rings, in world units.
 ///
-/// If segments cross or touch, their ends and the next points move half way back, from the fifth
-/// round on all the way. A ring is misplaced if it was turned inside out, or if a larger ring has
-/// passed over it. A misplaced ring returns as a whole, with the rings around it. Ordinary frames
-/// need no round. After 24 rounds, all points return.
+/// If segments cross or touch, both ends of each segment and the points next to these move half way
+/// back, from the fifth round on all the way. A ring is misplaced if it was turned inside out, or
+/// if a larger ring has passed over it. A misplaced ring returns as a whole, together with the
+/// rings around it. Ordinary frames need no round. After 24 rounds, all points return.
 ///
 /// Returns false if rings still cross or are misplaced with every point at its root. This is a bug,
 /// because rings through the roots are simple and nested. A path between two roots stays in one

@@ -60,7 +60,7 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets)
   Chain on{turn.ring, turn.index, first, last, true, depth};
   Chain back{turn.ring, turn.index, first, last, false, depth};
   // If the forward chain is on the right, the ring winds counter-clockwise around the region
-  // between.
+  // between the two chains.
   const bool on_is_right =
       Orientation(turn.point, PointAt(points_, Above(on)), PointAt(points_, Above(back))) > 0;
   if (turn.is_lowest) {
@@ -68,7 +68,7 @@ void RingDepths::Begin(const Turn& turn, std::span<const std::uint32_t> offsets)
     ring = {depth, kNoRing, on_is_right};
     if (!status_.IsEnd(right)) {
       const Chain& beside = chains_[status_.At(right)];
-      const Ring& other = rings_[beside.ring];  // Known, as its lowest point was passed before.
+      const Ring& other = rings_[beside.ring];  // Known: its lowest point is below.
       ring.around = beside.is_forward == other.is_counter_clockwise ? beside.ring : other.around;
     }
   }

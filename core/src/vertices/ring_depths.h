@@ -16,8 +16,9 @@ namespace partiemc {
 ///
 /// Method: one sweep from bottom to top in the order of SweepsBefore. The sweep line crosses
 /// chains, the rising pieces of rings. Chains begin in pairs at the local minima of a ring and end
-/// in pairs at its local maxima. Their order on the line is fixed in between, as nothing crosses.
-/// Each chain stores the winding number of the region directly left of it.
+/// in pairs at its local maxima. In between, the order of the chains on the line stays the same,
+/// because rings do not cross. Each chain stores the winding number of the region directly left of
+/// it.
 ///
 /// Keeps its memory warm. Use one object per thread.
 class RingDepths {
@@ -40,16 +41,16 @@ class RingDepths {
     Point point;
     std::uint32_t index;  // Index of the point.
     std::uint32_t ring;
-    bool is_low;     // Whether it is a minimum.
-    bool is_lowest;  // Whether it is the lowest point of its ring.
+    bool is_low;     // Whether the point is a minimum.
+    bool is_lowest;  // Whether the point is the lowest of its ring.
   };
   // A rising piece of a ring, from a minimum to a maximum.
   struct Chain {
     std::uint32_t ring;
-    std::uint32_t at;           // Its last point below the sweep line.
+    std::uint32_t at;           // Last point of the chain below the sweep line.
     std::uint32_t first, last;  // The ring has the points [first, last).
-    bool is_forward;            // Whether it rises in the direction of the ring.
-    std::int32_t depth;         // Winding number of the region directly left of it.
+    bool is_forward;            // Whether the chain rises in the ring's direction.
+    std::int32_t depth;         // Winding number directly left of the chain.
   };
 
   struct Ring {

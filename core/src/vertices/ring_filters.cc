@@ -26,7 +26,8 @@ HWY_INLINE Vector Dot(Vector ax, Vector ay, Vector bx, Vector by) {
   return hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by));
 }
 
-// max(0, cosine)^16. Falls from 1 to 0.1 at 30 degrees, so vertices beyond a corner do not count.
+// max(0, cosine)^16: 1 at 0 degrees and 0.1 at 30 degrees, so vertices beyond a corner hardly
+// count.
 HWY_INLINE Vector AngleWeight(Vector cosine) {
   Vector power = hn::Max(cosine, hn::Zero(Lanes()));
   for (int squaring = 0; squaring < 4; ++squaring) power = hn::Mul(power, power);
@@ -46,8 +47,9 @@ HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
 }
 
 // Processes the vertices [begin, end) in blocks. Calls start(first vertex) for each block. Then
-// calls add(j, w) for every offset in the window of any of its vertices. Here j is the neighbour of
-// the first vertex, and w are the weights, 0 beyond a window. At the end calls finish(block).
+// calls add(j, w) for each distance, counted in vertices, at which any vertex of the block has a
+// neighbour in its window. j is the neighbour of the first vertex; w has the weights of the
+// neighbours of all vertices, 0 beyond their windows. At the end calls finish(block).
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
@@ -59,7 +61,7 @@ HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, st
     block.lanes = std::min(kLanes, end - block.first);
     const auto in_block = hn::FirstN(d, static_cast<std::size_t>(block.lanes));
     const auto here = hn::LoadU(Units(), ring.arc + block.first);
-    // Falls with the distance, to 0 or less at the window's end.
+    // 1 - d^2 / reach^2: positive inside the window only.
     const auto nearness_of = [&](std::ptrdiff_t j) HWY_ATTR {
       const auto units = hn::Sub(hn::LoadU(Units(), ring.arc + j), here);
       const Vector distance = hn::ConvertTo(d, units);
@@ -74,7 +76,8 @@ HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, st
     const auto is_near = [&](Vector nearness) HWY_ATTR {
       return !hn::AllFalse(d, hn::And(hn::Gt(nearness, hn::Zero(d)), in_block));
     };
-    // Each direction ends by itself: the other one may continue beyond the margin on this side.
+    // The two directions end separately, because the margin on one side may be used up while the
+    // window on the other side continues.
     bool goes_before = true, goes_after = true;
     for (std::ptrdiff_t apart = 1; goes_before || goes_after; ++apart) {
       if (goes_before) {

@@ -18,9 +18,9 @@ void MeasureArc(const PeriodicRing& ring);
 
 /// The three functions below process the vertices [begin, end) of a ring. Each sums over the
 /// vertices j nearer than `reach` cells along the ring, with weights that contain l_j B(d, reach).
-/// Arithmetic is in floats, one vertex for each lane. A sum starts with the vertex itself and
-/// continues with the next vertex on each side, the one before first, until the window ends. The
-/// bits do not depend on the width of vectors or on `begin`.
+/// Arithmetic is in floats, one vertex for each lane. A sum starts with the vertex itself. It
+/// continues outward with one vertex on each side, the earlier one first, until the window ends.
+/// The bits depend neither on the width of vectors nor on `begin`.
 /// Requires: the ring is at least two reaches long; its margins have the size of SizeForWindows
 /// plus kWindowPadding.
 
@@ -29,13 +29,13 @@ void MeasureArc(const PeriodicRing& ring);
 void MeanNormals(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach,
                  bool by_angle);
 
-/// Writes the curvature, positive where the ring is convex, to shift: the change of the normals
-/// along the tangent.
+/// Writes the curvature to `shift`: the change of the normals along the tangent, positive where the
+/// ring is convex.
 void MeanCurvature(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                    double reach);
 
-/// Writes the shift of each vertex along its normal to shift: to the mean of the neighbours'
-/// planes, each moved by its base, with weights by angle as above.
+/// Writes to `shift` how far each vertex moves along its normal: to the mean of the neighbours'
+/// planes, each moved by its `base`. Weights contain max(0, n_i . n_j)^16.
 void MeanShift(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end, double reach);
 
 }  // namespace partiemc

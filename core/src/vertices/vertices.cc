@@ -33,7 +33,8 @@ void Store(Point point, double cell_size, double* target) {
   target[1] = point.y * cell_size;
 }
 
-// Writes the vertices of segment k to `target`. Not for `virtual-plane` (PlaceRefinedRings).
+// Writes the vertices of segment k to `target`. PlaceRefinedRings does this for `virtual-plane`,
+// this function for the other placements.
 void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   const CellPlane& plane = input.planes[k];
   const double cell_size = input.scale.cell_size;
@@ -66,8 +67,8 @@ void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>
   normals.push_back(static_cast<float>(y / length));
 }
 
-// The sign that makes the plane's normal point outward: +1 or -1. The memory of normals may have
-// turned it inward, but reported normals point outward.
+// The sign, +1 or -1, that makes the plane's normal point outward. The memory of normals may have
+// turned the normal inward, but reported normals point outward.
 double OutwardSign(const CellPlane& plane) {
   return plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY() < 0 ? -1 : 1;
 }
@@ -128,8 +129,8 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
   return keep;
 }
 
-// The rings of `virtual-plane`, moved, matched to their area and repaired. Returns false if the
-// repair failed.
+// Places the rings of `virtual-plane`: moves vertices, matches the area and repairs the rings.
+// Returns false if the repair failed.
 bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
                        VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
   RingVertices& vertices = scratch.vertices;
@@ -150,7 +151,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
       if (!vertices.is_kept[i]) continue;
-      // The cell vertex of segment i / 2 overwrites the edge vertex; it is always kept.
+      // The cell vertex of segment i / 2 comes second and is always kept, so its index remains.
       placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
       Store(vertices.point[i], cell_size, &rings.points[2 * point]);
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
@@ -167,7 +168,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   return RepairRings(placed.roots, scratch.repair, rings);
 }
 
-// The rings of the other placements, segment by segment.
+// Places the rings of all placements except `virtual-plane`, segment by segment.
 void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices& placed,
                 Rings& rings) {
   const RingTopology& topology = input.topology;
@@ -190,7 +191,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
     if (outer != kNoRing) outer = placed.kept_as[outer];
   }
   MeasureRings(rings);
-  // Rings of the other placements do not cross. Only Validate checks this.
+  // If vertices are not particles, rings do not cross. Only Validate checks this.
   if (!traits.takes_particles) return;
   placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }

@@ -39,8 +39,8 @@ struct VertexNormal {
 };
 
 /// Vertices of `virtual-plane`, ring by ring. Vertex 2 k is the edge vertex of segment k of the
-/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Lengths in cells, lattice
-/// coordinates of the world.
+/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Positions are in cells from the
+/// origin of the world.
 struct RingVertices {
   std::vector<Point> point;
   std::vector<Point> root;  ///< The anchor: with all vertices at their anchors, rings are simple.
@@ -82,7 +82,8 @@ struct VertexInput {
 ///   - marching-squares: the crossings of lattice edges, by linear interpolation of F.
 ///   - qef: the same, and in each cell the minimiser of Eq. 14, clamped to the cell.
 ///   - virtual-plane: a vertex for each cell and crossed edge, moved to a plane that particles
-///     support (virtual_plane.h), matched to their area (volume_correction.h), repaired (repair.h).
+///     support (virtual_plane.h). The rings are then matched to the area of the particles
+///     (volume_correction.h) and repaired (repair.h).
 ///
 /// The rings of marching-squares and qef are simple because each vertex stays in its cell or on its
 /// edge (core/METHOD.md, "Why rings are simple"). Vertices of virtual-plane may leave their cells;

@@ -42,8 +42,8 @@ Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
-// Finds the tile of a point in or near a cell. It is usually the cell's own tile, which is indexed
-// as it has an active cell.
+// Finds the tile of a point in or near a cell. Usually this is the tile of the cell, which is
+// indexed because it has an active cell.
 FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point& point) {
   const Point origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
@@ -189,7 +189,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.variant.steps;
   const VirtualPlaneConstants& c = input.variant.constants;
-  const SupportShape support{// Particles are listed within the kernel radius.
+  const SupportShape support{// The sampler finds particles within the kernel radius.
                              .radius = std::min(c.support_radius * h, input.scale.kernel_radius),
                              .height = c.support_height * h,
                              .spacing = h,
@@ -219,7 +219,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
         // A radius of curvature below one spacing is noise.
         const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
         ring.base[i] = steps.curvature ? static_cast<float>(rounding * curvature) : 0;
-        ring.shift[i] = -ring.base[i];  // Kept if no particle supports the plane.
+        ring.shift[i] = -ring.base[i];  // Stays so if no particle supports the plane.
         scatter[i] = 0;
         if (!steps.support) continue;
         const FieldPoint at = Locate(input, cell, v.point[2 * first_segment + i]);
@@ -274,7 +274,7 @@ void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, Ring
   SmoothPositions(input, 2 * first_segment, ring, v);
 }
 
-// Drops edge vertices that lie on the chord of the neighbouring cell vertices.
+// Drops edge vertices that lie nearly on the chord of the neighbouring cell vertices.
 void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const double min_distance = input.variant.constants.thinning_distance * input.scale.spacing;
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};

@@ -6,13 +6,14 @@
 
 namespace partiemc {
 
-/// One Newton step from the middle of the segment to F = 0 along the cell plane's normal, of at
-/// most `max_step` cells; none where the gradient is weak. In lattice coordinates.
+/// Moves the middle of the segment towards F = 0, by one Newton step of at most `max_step` cells
+/// along the gradient. Returns the middle if the gradient is weak. In lattice coordinates.
 Point VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
-/// Steps 1 to 3: roots, normals, planes. Leaves the rest to volume_correction.h and repair.h.
-/// Deterministic, in parallel over segments, rings and stretches of long rings. Cost: a few field
-/// samples and a window of about twenty vertices per vertex.
+/// Steps 1 to 3 (roots, normals, planes), and thinning. The area is matched by volume_correction.h,
+/// and rings are repaired by repair.h. Deterministic, in parallel over segments, rings and
+/// stretches of long rings. Cost: a few field samples and a window of about twenty vertices per
+/// vertex.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);
 
 }  // namespace partiemc

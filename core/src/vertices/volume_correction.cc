@@ -23,7 +23,7 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-// The target of the offset for this frame, in spacings; nullopt without large components.
+// The target of the offset for this frame, in spacings; empty if no component is long enough.
 std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
@@ -58,7 +58,8 @@ void OffsetRing(std::span<const double> points, double offset, double* target) {
   for (std::size_t k = 0; k < count; ++k) {
     const Point next = PointAt(points, k + 1 < count ? k + 1 : 0);
     const Point after = normal_of(point, next);
-    // The length of (a + b) / (1 + a . b) is 1 / cos(half the turn).
+    // For unit normals a and b, the mitre (a + b) / (1 + a . b) has the length 1 / cos(half the
+    // turn).
     const double divisor =
         std::max(1 + before.x * after.x + before.y * after.y, 2 / (kMaxMitre * kMaxMitre));
     target[2 * k] = point.x + offset * (before.x + after.x) / divisor;

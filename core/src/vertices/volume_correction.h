@@ -10,23 +10,23 @@
 
 namespace partiemc {
 
-/// Moves the points of a closed ring by `offset` along the mitres of their segments, to the right
-/// of the ring's direction: outward if the inside lies on the left. A mitre is at most twice as
-/// long as the offset; a segment of length 0 has no direction. `points` and `target` are
-/// interleaved.
+/// Moves the points of a closed ring by `offset` along the mitres of their segments' normals, to
+/// the right of the ring's direction: outward if the inside lies on the left. A mitre is at most
+/// twice as long as the offset; a segment of length 0 has no normal and does not count. `points`
+/// and `target` are interleaved.
 /// Requires: at least one point; `target` has the size of `points` and does not overlap it.
 void OffsetRing(std::span<const double> points, double offset, double* target);
 
-/// Moves all vertices along mitred normals by one offset. Its target matches the area to the sum of
-/// the volumes, over the components whose outer rings are at least
+/// Moves all vertices along mitred normals by one offset. The target of the offset matches the area
+/// to the sum of the volumes, over the components whose outer rings are at least
 /// VirtualPlaneConstants::ShortestRing() long. Does nothing if volumes are unknown: neither given
 /// nor implied by a given spacing.
 ///
 /// `offset`, in spacings, is the offset of the last frame, if there is one, and becomes the offset
-/// of this frame. Its size is limited, since volumes have errors of a few percent. Its change is
-/// limited, so that outlines do not tremble with their area. The first frame uses the target.
-/// `scratch` is a warm buffer. Leaves the measures of the rings undefined.
-/// Cost: linear in the points.
+/// of this frame. The size of the offset is limited, since volumes have errors of a few percent.
+/// Its change is limited, too, so that outlines do not tremble with their area. The first frame
+/// uses the target. `scratch` is a warm buffer. Leaves the measures of the rings undefined. Cost:
+/// linear in the points.
 void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
                    std::optional<double>& offset, Rings& rings);
 
