@@ -1,4 +1,5 @@
 import { Gateway } from '../stream/gateway';
+import { NO_OPTIONS, optionsText, parseOptions } from '../input/options';
 import type { FrameSource } from '../input/source';
 import { FileTrack } from '../stream/file_track';
 import { AS_STREAMED, type Settings } from '../stream/settings';
@@ -8,7 +9,7 @@ import { addressText, parseAddress, type Address } from './address';
 import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
 import { button } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
-import { FilesPanel } from './files_panel';
+import { FilesPanel, type OpenFile } from './files_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
 import { Layout } from './layout';
 import { LookPanel } from './look_panel';
@@ -34,6 +35,9 @@ export class App {
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
   private readonly exports: ExportPanel;
+  private readonly files: FilesPanel;
+  /** The files of tracks. */
+  private readonly opened = new Map<Track, OpenFile>();
   private ownAddress = '';
   /** False while the address of the link is read, which must not be overwritten. */
   private isReady = false;
@@ -48,6 +52,7 @@ export class App {
     this.stage = new Stage(this.gateway, this.look.look, {
       chosen: () => this.chosenChanged(),
       moved: () => this.writeAddress(),
+      released: (track) => this.released(track),
     });
     this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
       (cells) => this.cellSizeFor(cells));
@@ -62,8 +67,12 @@ export class App {
     });
     this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
-    new FilesPanel((source) => this.openFile(source),
-                   (text, isError) => this.status.report(text, isError));
+    this.files = new FilesPanel({
+      opened: (source, file) => this.openFile(source, file),
+      asks: () => this.layout.ask(),
+      report: (text, isError, isGone) => this.status.report(text, isError, isGone),
+      optionsOf: (title) => this.linkedFile?.file === title ? parseOptions(this.linkedFile.open) : { ...NO_OPTIONS },
+    });
     button('side-by-side').addEventListener('click', () => this.addBeside());
     button('fit').addEventListener('click', () => this.fit());
     this.listenForKeys();
@@ -137,29 +146,46 @@ export class App {
   }
 
   /** Shows a track in the chosen pane, or in a new first one. */
-  private show(track: Track): void {
+  private show(track: Track, settings: Settings = AS_STREAMED): void {
     const pane = this.stage.chosen;
     if (!pane) {
-      this.stage.add(track, { ...AS_STREAMED });
+      this.stage.add(track, { ...settings });
     } else {
-      pane.setSettings({ ...AS_STREAMED });
+      pane.setSettings({ ...settings });
       this.stage.replace(pane, track);
     }
     this.chosenChanged();
     this.writeAddress();
   }
 
-  /** Shows files; those of the link as the link says. */
-  private openFile(source: FrameSource): void {
-    const address = this.linkedFile;
+  /** Shows files; those of the link as the link says. Files that are shown get their new options. */
+  private openFile(source: FrameSource, file: OpenFile): void {
+    const address = this.linkedFile?.file === source.title ? this.linkedFile : null;
+    const old = [...this.opened].find(([, { input }]) => input === file.input)?.[0];
+    const settings = address?.panes[0].settings ?? old?.settings ?? file.settings ?? AS_STREAMED;
+    const track = new FileTrack(this.gateway, source, { ...settings });
+    this.opened.set(track, file);
     this.layout.chosen();
-    if (!address || address.file !== source.title) {
-      this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED }));
-      return;
+    if (address) {
+      this.linkedFile = null;
+      this.showPanes(address, track);
+    } else if (old) {
+      if (old.player.mode === 'paused') track.player.seek(old.player.sequence ?? 1);
+      this.replaceTrack(old, track);
+    } else {
+      this.show(track, settings);
+      if (file.sequence != null) track.player.seek(file.sequence);
     }
-    this.linkedFile = null;
-    this.showPanes(address, new FileTrack(this.gateway, source, { ...address.panes[0].settings }));
     this.writeAddress();
+  }
+
+  /** Offers a file that no pane shows any more. */
+  private released(track: Track): void {
+    const file = this.opened.get(track);
+    this.opened.delete(track);
+    if (!file || [...this.opened.values()].some(({ input }) => input === file.input)) return;
+    const { mode, sequence } = track.player;
+    this.files.addClosed({ ...file, settings: track.settings, sequence: mode === 'paused' ? sequence : null });
   }
 
   private reportFull(): void {
@@ -198,6 +224,7 @@ export class App {
     const number = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
     const name = this.stage.panes.length > 1 ? `of picture ${number}` : '';
     this.settings.show(pane?.settings ?? AS_STREAMED, name);
+    this.files?.show((pane && this.opened.get(pane.track)) ?? null);
     this.time.refresh();
     this.streams?.setShown(this.stage.tracks.filter(({ kind }) => kind === 'watch').map(({ title }) => title));
     this.writeAddress();
@@ -277,6 +304,7 @@ export class App {
         stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
       })),
       file: file?.title ?? '',
+      open: optionsText((file && this.opened.get(file)?.options) ?? NO_OPTIONS),
       frame: isPaused && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
       view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,

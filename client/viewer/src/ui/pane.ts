@@ -55,7 +55,12 @@ export class Pane {
   private readonly noticeText = make('span');
   private readonly switchButton = make('button', { type: 'button', title: 'Shows the stream that has this name now.' },
     'Switch to the new run');
-  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton);
+  private readonly hideButton = make('button', {
+    type: 'button', class: 'icon', 'aria-label': 'Hide notice', title: 'Hides this notice.',
+  }, '✕');
+  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton, this.hideButton);
+  /** The notice of the files that the user has hidden. */
+  private hiddenNotice = '';
   /** Settings and method of the frame shown. */
   private shownText = '';
   /** Why the frame of the track is refused, or empty. */
@@ -91,6 +96,7 @@ export class Pane {
       this.numbers.element);
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
+    this.hideButton.addEventListener('click', () => { this.hiddenNotice = this.track.notice ?? ''; });
     this.switchButton.addEventListener('click', () => this.track.switchRun?.());
     this.element.addEventListener('pointerdown', () => events.chosen(this));
     this.element.addEventListener('focusin', () => events.chosen(this));
@@ -252,11 +258,13 @@ export class Pane {
     this.badge.dataset.state = state.kind;
     setText(this.badge, stateName(state, this.track));
     if (this.badge.title !== state.text) this.badge.title = state.text;
-    const isNoted = this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
+    const isOfFiles = state.kind === 'doubtful' && (this.track.notice ?? '') !== '' && this.track.notice !== this.hiddenNotice;
+    const isNoted = isOfFiles || this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
       (state.kind === 'waiting' && !this.frame);
     this.notice.hidden = !isNoted || this.track.kind === 'report';
     this.switchButton.hidden = !this.track.hasNewRun;
-    if (isNoted) setText(this.noticeText, state.text);
+    this.hideButton.hidden = !isOfFiles;
+    if (isNoted) setText(this.noticeText, isOfFiles ? this.track.notice ?? '' : state.text);
   }
 
   private get isVariant(): boolean {
@@ -308,7 +316,7 @@ export class Pane {
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
-    if (!this.variant || this.track.kind === 'watch' || isFailed) return;
+    if (!this.variant || this.track.kind === 'watch' || isFailed || !this.track.parameters) return;
     this.variant.request(this.track, sequence, this.settings);
     const { result, problem } = this.variant;
     if (problem && this.frame) this.clear();

@@ -19,6 +19,8 @@ export class Stage {
   constructor(private readonly gateway: Gateway, private look: Look, private readonly events: {
     chosen(): void;
     moved(pane: Pane): void;
+    /** No pane shows the track any more. */
+    released(track: Track): void;
   }) {}
 
   get isFull(): boolean { return this.panes.length >= MOST_PANES; }
@@ -82,6 +84,8 @@ export class Stage {
   }
 
   private release(track: Track): void {
-    if (!this.tracks.includes(track)) track.close();
+    if (this.tracks.includes(track)) return;
+    this.events.released(track);
+    track.close();
   }
 }
