@@ -2,7 +2,7 @@ import { channelLabel } from '../protocol/channels';
 import type { Frame } from '../protocol/frame';
 import { attributeOf, DEFAULT_LOOK, type Look } from './look';
 import { RingIndex } from './pick';
-import { type Range, rampStops, rangeOf } from './ramp';
+import { chosenRange, type Range, rampStops, rangeOf } from './ramp';
 import { Selection } from './selection';
 import { SvgDrawing } from './svg_drawing';
 import { type Drawing, Renderer } from './webgl/renderer';
@@ -183,9 +183,7 @@ export class Scene {
 
   private get colourRange(): Range | null {
     if (!this.range) return null;
-    const { min, max } = this.fixedRange ?? this.range;
-    const chosen = { min: this.look.from ?? min, max: this.look.to ?? max };
-    return chosen.min < chosen.max ? chosen : { min, max };
+    return chosenRange(this.fixedRange ?? this.range, this.look.from, this.look.to);
   }
 
   /** The attribute's values: of the mesh (or of the rings, without a mesh), and of the particles. */

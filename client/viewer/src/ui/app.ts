@@ -7,7 +7,7 @@ import type { Track } from '../stream/track';
 import { WatchTrack } from '../stream/watch_track';
 import { addressText, parseAddress, type Address } from './address';
 import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
-import { button } from './dom';
+import { button, byId, input } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
 import { FilesPanel, type OpenFile } from './files_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
@@ -19,6 +19,7 @@ import { Stage } from './stage';
 import { StatusLine } from './status_line';
 import { StreamsPanel } from './streams_panel';
 import { Theme } from './theme';
+import { TimeLink } from './time_link';
 import { TimePanel } from './time_panel';
 
 const TOKEN_KEY = 'partiemc-token';
@@ -28,6 +29,7 @@ export class App {
   private readonly gateway = new Gateway(new URL(location.origin));
   private readonly layout = new Layout();
   private readonly status = new StatusLine();
+  private readonly link = new TimeLink();
   private readonly look: LookPanel;
   private readonly settings: SettingsPanel;
   private readonly stage: Stage;
@@ -74,6 +76,9 @@ export class App {
       optionsOf: (title) => this.linkedFile?.file === title ? parseOptions(this.linkedFile.open) : { ...NO_OPTIONS },
     });
     button('side-by-side').addEventListener('click', () => this.addBeside());
+    input('linked').addEventListener('change', () => {
+      this.stage.isLinked = this.link.isOn = input('linked').checked;
+    });
     button('fit').addEventListener('click', () => this.fit());
     this.listenForKeys();
     this.streams = this.openStreams();
@@ -236,7 +241,10 @@ export class App {
   }
 
   private fit(): void {
-    this.stage.chosen?.fit();
+    const { chosen } = this.stage;
+    if (!chosen) return;
+    chosen.fit();
+    this.stage.linkViews(chosen, true);
   }
 
   private goTo(sequence: number): void {
@@ -283,12 +291,21 @@ export class App {
     }
     this.stage.choose(this.stage.panes[0]);
     if (file) {
-      if (address.frame !== null) file.player.seek(file.sequenceOf(address.frame));
+      if (address.frame !== null) this.seekInFile(file, address.frame);
       return;
     }
     this.linkedFrame = address.frame;
     const track = this.stage.panes[0].track;
     if (address.frame !== null && track instanceof WatchTrack) track.request(address.frame);
+  }
+
+  private seekInFile(file: FileTrack, frame: number): void {
+    const sequence = file.sequenceOf(frame);
+    const { last } = file.range();
+    if (sequence > last) {
+      this.status.report(`The file has no frame ${frame} of the link. Its last frame is ${file.labelOf(last)}.`, true);
+    }
+    file.player.seek(sequence);
   }
 
   private writeAddress(): void {
@@ -298,14 +315,15 @@ export class App {
     // A link opens one file only.
     const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch' || track === file);
     const player = first?.track.player;
-    const isPaused = player?.mode === 'paused';
+    const leader = first && this.link.holds(first.track) ? this.track : first?.track;
+    const isPaused = leader?.player.mode === 'paused';
     const address: Address = {
       panes: panes.map(({ track, settings }, k) => ({
         stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
       })),
       file: file?.title ?? '',
       open: optionsText((file && this.opened.get(file)?.options) ?? NO_OPTIONS),
-      frame: isPaused && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
+      frame: isPaused && player && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
       view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,
     };
@@ -315,27 +333,38 @@ export class App {
     }
   }
 
-  /** Goes to the frame of the link once it has arrived. */
+  /** Goes to the frame of the link once it has arrived. Until then the first picture says that it waits. */
   private followLink(): void {
     const linked = this.linkedFrame;
-    const track = this.stage.panes[0]?.track;
-    if (linked === null || !track) return;
+    const [pane] = this.stage.panes;
+    if (!pane) return;
+    const { track } = pane;
+    const last = track.range()?.last;
+    pane.note = linked !== null && last !== undefined && linked > last
+      ? `Waiting for frame ${linked} of the link. The newest frame is ${last}.` : '';
+    if (linked === null) return;
     if (track.history.get(linked)) {
       track.player.seek(linked);
       this.linkedFrame = null;
     } else if (track instanceof WatchTrack && track.isGone(linked)) {
       this.status.report(`The server no longer holds frame ${linked}.`, true);
       this.linkedFrame = null;
+    } else if (track.state.kind === 'ended' && last !== undefined && linked > last) {
+      this.status.report(`The stream has ended with frame ${last}, before frame ${linked} of the link.`, true);
+      this.linkedFrame = null;
     }
+    if (this.linkedFrame === null) pane.note = '';
   }
 
   private refresh(now: number): void {
-    for (const track of this.stage.tracks) {
-      const before = track.player.mode;
+    const { tracks } = this.stage;
+    const modes = tracks.map(({ player }) => player.mode);
+    for (const track of tracks) {
       track.player.tick(now);
       track.refresh();
-      if (track.player.mode !== before) this.writeAddress();
     }
+    this.link.refresh(this.track, tracks);
+    if (tracks.some(({ player }, k) => player.mode !== modes[k])) this.writeAddress();
     this.followLink();
     for (const pane of this.stage.panes) pane.refresh(now);
     this.refreshPanels(now);
@@ -343,6 +372,7 @@ export class App {
   }
 
   private refreshPanels(now: number): void {
+    byId('linked-label', HTMLElement).hidden = this.stage.panes.length < 2;
     const pane: Pane | null = this.stage.chosen;
     const isVariant = (pane?.variantStream ?? null) !== null;
     this.look.setAttributes(pane?.scene.channels ?? [], this.track);

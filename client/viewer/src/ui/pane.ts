@@ -1,6 +1,6 @@
 import { attachNavigation, Scene, type Look, type Picked } from '../draw';
 import { valuesAt } from '../draw/values';
-import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
+import { boundsOf, fitBounds, toCss, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
 import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
@@ -14,7 +14,7 @@ import type { Variant } from '../stream/variant';
 import type { VariantStream } from '../stream/variant_stream';
 import { make, select, setText } from './dom';
 import { count, number } from './format';
-import { Measurement, type MeasureMode } from './measure';
+import { Measurement, type MeasureMode, type Point } from './measure';
 import { Numbers } from './numbers';
 import { Overlay } from './overlay';
 import { paneState, type PaneState, stateName } from './pane_state';
@@ -28,7 +28,9 @@ export interface PaneEvents {
   chosen(pane: Pane): void;
   closed(pane: Pane): void;
   /** The view changed, by the user or because the picture has grown. */
-  moved(pane: Pane): void;
+  moved(pane: Pane, byUser: boolean): void;
+  /** The user selected the ring at a world position, or none. */
+  selected?(pane: Pane, point: Point | null): void;
 }
 
 /** Makes the computations of a pane with other settings than those of its track. */
@@ -42,6 +44,8 @@ export class Pane {
   readonly element: HTMLElement;
   readonly scene: Scene;
   frame: Frame | null = null;
+  /** A notice of the page over the picture, or empty. */
+  note = '';
   /** Whether the view follows the content. False once the user has moved it. */
   isFree = true;
 
@@ -104,7 +108,7 @@ export class Pane {
     this.detach = attachNavigation(this.canvas, this.scene, () => {
       this.isFree = false;
       this.dirty = true;
-      events.moved(this);
+      events.moved(this, true);
     }, track.kind === 'report');
     this.listenForRings();
     this.observer = new ResizeObserver(() => this.resize());
@@ -259,12 +263,12 @@ export class Pane {
     setText(this.badge, stateName(state, this.track));
     if (this.badge.title !== state.text) this.badge.title = state.text;
     const isOfFiles = state.kind === 'doubtful' && (this.track.notice ?? '') !== '' && this.track.notice !== this.hiddenNotice;
-    const isNoted = isOfFiles || this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
+    const isNoted = this.note !== '' || isOfFiles || this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
       (state.kind === 'waiting' && !this.frame);
     this.notice.hidden = !isNoted || this.track.kind === 'report';
     this.switchButton.hidden = !this.track.hasNewRun;
-    this.hideButton.hidden = !isOfFiles;
-    if (isNoted) setText(this.noticeText, isOfFiles ? this.track.notice ?? '' : state.text);
+    this.hideButton.hidden = !isOfFiles || this.note !== '';
+    if (isNoted) setText(this.noticeText, this.note || (isOfFiles ? this.track.notice ?? '' : state.text));
   }
 
   private get isVariant(): boolean {
@@ -356,7 +360,7 @@ export class Pane {
     if (this.extent && sameBounds(extent, this.extent)) return;
     this.extent = extent;
     this.scene.view = fitBounds(extent, this.scene.size);
-    this.events.moved(this);
+    this.events.moved(this, false);
   }
 
   private async addParticles(frame: Frame): Promise<void> {
@@ -391,7 +395,7 @@ export class Pane {
     this.scene.resize();
     if (this.isFree && this.extent) {
       this.scene.view = fitBounds(this.extent, this.scene.size);
-      this.events.moved(this);
+      this.events.moved(this, false);
     }
     this.dirty = true;
   }
@@ -410,6 +414,7 @@ export class Pane {
       if (event.key === 'Escape') {
         this.measurement.clear();
         this.select(null);
+        this.events.selected?.(this, null);
       }
       if (event.key !== 'Enter') return;
       this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
@@ -429,10 +434,17 @@ export class Pane {
     const mode = select('measure').value as MeasureMode;
     if (mode === 'off') {
       this.select(identity);
+      this.events.selected?.(this, identity === null ? null : [x, y]);
     } else {
       this.measurement.add(mode, [x, y], identity);
       this.dirty = true;
     }
+  }
+
+  /** Selects the ring at a world position, or none. */
+  selectAt(point: Point | null): void {
+    const ring = point && this.scene.pick(...toCss(this.scene.view, this.scene.size, ...point)).ring;
+    this.select(ring === null ? null : this.frame?.rings.identities[ring] ?? null);
   }
 
   private select(identity: bigint | null): void {
