@@ -29,6 +29,13 @@ export interface Legend {
   stops: string[];
 }
 
+/** The legend of a look; null without a channel to colour by, or without numbers of it so far. */
+export function legendOf(look: Look, range: Range | null, channels: readonly string[]): Legend | null {
+  const name = attributeOf(look);
+  if (!range || name === null) return null;
+  return { ...range, name: channelLabel(name, channels), stops: rampStops(look) };
+}
+
 /**
  * A canvas that shows one frame after another. Only `draw` draws: the caller calls it after changes
  * of frame, look, view, size or selection, once per refresh of the screen.
@@ -149,10 +156,7 @@ export class Scene {
 
   /** Legend of the attribute that the look colours by; null without one. */
   legend(): Legend | null {
-    const range = this.colourRange;
-    const name = attributeOf(this.look);
-    if (!range || name === null) return null;
-    return { ...range, name: channelLabel(name, this.channels), stops: rampStops(this.look) };
+    return legendOf(this.look, this.colourRange, this.channels);
   }
 
   /** Names of the numbers that the frame can be coloured by. */

@@ -202,6 +202,11 @@ export class Pane {
   /** The outlines of the frame. */
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
+  /** The measurement over the picture, for exports. */
+  get measured(): { points: readonly Point[]; text: string } {
+    return { points: this.measurement.points, text: this.measurement.text((identity) => this.areaText(identity)) };
+  }
+
   /** Name, frame, time and settings, for exports. */
   get caption(): string {
     if (!this.frame) return this.track.title;
@@ -231,8 +236,7 @@ export class Pane {
     this.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
-    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement,
-      this.measurement.text((identity) => this.areaText(identity)));
+    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement, this.measured.text);
     this.updateReadout();
   }
 
