@@ -9,6 +9,8 @@ import { isRecording, RecordingSource } from './recording';
 import { InputError, type FrameSource } from './source';
 import { factsOf, ReaderChain, type TableReader, TableSource } from './table_source';
 import { blobOf, plainName, textOf } from './text_file';
+import { VtkLegacyReader } from './vtk_legacy';
+import { VtkXmlReader } from './vtk_xml';
 import { isXyz, XyzReader } from './xyz';
 
 /** Files of a dropped entry, including folders. */
@@ -61,6 +63,11 @@ const extensionOf = (name: string) => name.slice(name.lastIndexOf('.') + 1);
 const KINDS: readonly Kind[] = [
   { matches: (_, head) => head.startsWith('\x93NUMPY'), open: async (file) => NpyReader.open(await blobOf(file), file.name) },
   { matches: (_, head) => /^PK(\x03\x04|\x05\x06)/.test(head), open: async (file) => new NpzReader(await blobOf(file), file.name) },
+  { matches: (_, head) => head.startsWith('# vtk DataFile'), open: async (file) => new VtkLegacyReader(await blobOf(file), file.name) },
+  {
+    matches: (name, head) => head.includes('<VTKFile') && !/\.(pvd|series)$/.test(name),
+    open: async (file) => new VtkXmlReader(await blobOf(file), file.name),
+  },
   {
     matches: (name, head) => isXyz(head, extensionOf(name)) || (/xyz$/.test(name) && isPacked(head)),
     open: async (file) => XyzReader.open(await textOf(file), file.name),

@@ -1,4 +1,4 @@
-// Files of NumPy and XYZ, and kinds that the page refuses. Leaves a screenshot in build/screenshots.
+// Files of NumPy, VTK and XYZ, and kinds that the page refuses. Leaves a screenshot in build/screenshots.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, writeFileSync } from 'node:fs';
@@ -68,7 +68,8 @@ test('NPY, NPZ and XYZ have the digests of the command line', async () => {
 
 test('files of other programs have the digests of the command line', async () => {
   viewer = await Viewer.open(browser, world.url);
-  for (const name of ['frame_deflate.npz', 'dump.elem.xyz', 'dump.atom']) {
+  for (const name of ['frame_deflate.npz', 'dump.elem.xyz', 'dump.atom', 'appended_raw_bigendian.vtu',
+    'appended_raw_zlib_u64.vtp', 'inline_base64_zlib.vtp', 'polydata_v51_binary.vtk', 'ugrid_v42_binary.vtk']) {
     const [truth] = await world.statistics(sample(name), '--frames', '0:1');
     await viewer.drop(sample(name));
     await until(name, async () => await viewer.pane().locator('.name').textContent() === name);
@@ -82,12 +83,13 @@ test('other kinds are refused by name, with what to do', async () => {
   viewer = await Viewer.open(browser, world.url);
   writeFileSync(place('run.h5'), Buffer.from('\x89HDF\r\n\x1a\n', 'latin1'));
   for (const [file, kind] of [
-    [sample('ugrid_v42_binary.vtk'), 'a legacy VTK file'], [sample('appended_raw_zlib_u64.vtp'), 'a VTK XML file'],
     [sample('binary_le.ply'), 'a PLY file'], [place('run.h5'), 'an HDF5 file'], [sample('in.styles'), 'a LAMMPS input script'],
   ]) {
     await viewer.drop(file);
     const name = path.basename(file);
     await until(kind, async () => (await viewer.status()).startsWith(`${name} is ${kind}, which the page cannot read. Run `));
   }
+  await viewer.drop(sample('appended_raw_lz4.vtp'));
+  await until('the compression', async () => /compressed by vtkLZ4DataCompressor, which the page cannot read\. Run /.test(await viewer.status()));
   await viewer.page.screenshot({ path: path.join(screenshots, 'file_refused.png') });
 });

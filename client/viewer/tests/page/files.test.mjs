@@ -173,11 +173,11 @@ test('a link to a file shows it once it is opened', async () => {
 });
 
 test('unreadable files are reported', async () => {
-  const bad = path.join(world.folder, 'water.vtp');
-  writeFileSync(bad, '<VTKFile/>');
+  const bad = path.join(world.folder, 'water.ply');
+  writeFileSync(bad, 'ply\n');
   viewer = await Viewer.open(browser, world.url);
   await drop(bad);
-  await until('it is told', async () => /water\.vtp is a VTK XML file.*convert/.test(await viewer.status()));
+  await until('it is told', async () => /water\.ply is a PLY file.*convert/.test(await viewer.status()));
   const broken = path.join(world.folder, 'broken.csv');
   writeFileSync(broken, 'x,y\n1,2\n3\n');
   await drop(broken);
