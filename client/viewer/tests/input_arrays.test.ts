@@ -122,6 +122,9 @@ test('damaged and unknown arrays are refused', async () => {
   await refused('a.npy', npy("'<f8'", '(1, 2, 2)', Float64Array.of(1, 2, 3, 4), 'True'), /ascontiguousarray/);
   const archive = zip({ x: whole, y: whole }, true);
   await refused('a.npz', archive.slice(0, -30), /truncated or damaged/);
+  const long = archive.slice();
+  long[long.length - 22 - 5 - 46 + 28] = 255;  // The length of the last name.
+  await refused('a.npz', long, /truncated or damaged/);
   const damaged = archive.slice();
   damaged.fill(0x55, 45, 90);
   await refused('a.npz', damaged, /a\.npz: x\.npy is damaged/);

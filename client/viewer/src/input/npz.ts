@@ -15,6 +15,8 @@ const LOCAL_BYTES = 30;
 const MOST_COMMENT_BYTES = 65_535;
 const STORED = 0;
 const DEFLATED = 8;
+/** Bytes that a byte can unpack to at most. */
+const MOST_EXPANSION = 1032;
 
 interface ZipEntry { name: string; method: number; packed: number; size: number; at: number }
 
@@ -33,6 +35,7 @@ async function entriesOf(file: Blob, name: string): Promise<ZipEntry[]> {
   for (let at = 0; at + ENTRY_BYTES <= list.byteLength;) {
     if (list.getUint32(at, true) !== ENTRY_MAGIC) throw damaged();
     const length = list.getUint16(at + 28, true);
+    if (at + ENTRY_BYTES + length > list.byteLength) throw damaged();
     entries.push({
       name: new TextDecoder().decode(new Uint8Array(list.buffer, at + ENTRY_BYTES, length)),
       method: list.getUint16(at + 10, true), packed: list.getUint32(at + 20, true),
@@ -51,6 +54,9 @@ async function bytesOf(file: Blob, entry: ZipEntry, name: string): Promise<Uint8
   const packed = file.slice(begin, begin + entry.packed);
   if (entry.method !== STORED && entry.method !== DEFLATED) {
     throw new InputError(`${name}: ${entry.name} is packed by an unknown method. Use numpy.savez.`);
+  }
+  if (entry.size > MOST_EXPANSION * entry.packed + LOCAL_BYTES) {
+    throw new InputError(`${name}: ${entry.name} is damaged: its size is wrong.`);
   }
   const stream = entry.method === STORED ? packed.stream()
     : packed.stream().pipeThrough(new DecompressionStream('deflate-raw'));

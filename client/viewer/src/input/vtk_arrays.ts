@@ -31,6 +31,7 @@ export function tableOf(points: VtkArray | null, arrays: readonly VtkArray[], fi
                         index: number, name: string): FrameTable {
   if (!points) throw new InputError(`${name} has no points.`);
   const rows = points.bytes.length / sizeOf(points.type) / 3;
+  if (points.components !== 3 || !Number.isInteger(rows)) throw new InputError(`${name} has points without three coordinates.`);
   const all: NamedColumns = { names: [], columns: [] };
   for (const array of [points, ...arrays]) {
     const isOfPoints = array.bytes.length === rows * array.components * sizeOf(array.type);
