@@ -202,7 +202,7 @@ export class Viewer {
     const session = await this.page.context().newCDPSession(this.page);
     const data = { items: [], files: paths, dragOperationsMask: 1 };
     for (const type of ['dragEnter', 'dragOver', 'drop']) {
-      await session.send('Input.dispatchDragEvent', { type, x: 700, y: 300, data });
+      await session.send('Input.dispatchDragEvent', { type, x: 300, y: 300, data });
     }
   }
 
