@@ -4,6 +4,7 @@ import { hex, theme } from '../src/draw/colours';
 import { DEFAULT_LOOK, type Look } from '../src/draw/look';
 import { isolineColour } from '../src/draw/look_colours';
 import { rampStops } from '../src/draw/ramp';
+import { legendOf } from '../src/draw/scene';
 import { marksOf } from '../src/export/marks';
 import { svg } from '../src/export/svg';
 import type { Frame } from '../src/protocol/frame';
@@ -157,4 +158,32 @@ test('caption, scale and legend are on the picture', () => {
   assert.deepEqual([...new Set(colours)], legend.stops);
   const plain = marksOf('dam', SIZE, VIEW, null, true);
   assert.equal(plain.length, 3, 'caption, length and bar');
+});
+
+test('axes and a measurement are on the picture, clear of caption and legend', () => {
+  const legend = { name: 'p', min: 0, max: 1, stops: rampStops(DEFAULT_LOOK) };
+  const drawn = { axes: true, points: [[8.5, 5.5], [9.5, 5.5]] as [number, number][], text: 'distance 1' };
+  const marks = marksOf('dam', SIZE, VIEW, legend, false, drawn);
+  const text = svg(FRAME, NOTHING, VIEW, SIZE, legend, [], marks);
+  assert.ok(text.includes('<polyline points="425,275 475,275"'), 'the measured line');
+  assert.equal(count(text, /<circle /g), 2);
+  assert.match(text, /<text x="483" y="267" [^>]*paint-order="stroke"[^>]*>distance 1</);
+  const ticks = marks.filter((mark) => mark.kind === 'line' && mark.width === 1);
+  assert.ok(ticks.length >= 6, `${ticks.length} ticks`);
+  assert.match(text, /text-anchor="middle">5</, 'x = 5');
+  const at = (content: string) => marks.find((mark) => mark.kind === 'text' && mark.text === content) as { x: number; y: number };
+  assert.ok(at('dam').y < SIZE.height - 20 && at('dam').x > 50, 'the caption is above the axis');
+  assert.ok(at('p').x > 50, 'the legend is beside the axis');
+});
+
+test('without a channel there is no legend', () => {
+  const range = { min: 0, max: 1 };
+  assert.equal(legendOf(DEFAULT_LOOK, range, ['p']), null, 'one colour');
+  assert.equal(legendOf({ ...DEFAULT_LOOK, colour: 'identity' }, range, ['p']), null, 'by identity');
+  assert.equal(legendOf({ ...DEFAULT_LOOK, colour: 'p' }, null, []), null, 'no number so far');
+  const kept = legendOf({ ...DEFAULT_LOOK, colour: 'v' }, range, []);
+  assert.deepEqual([kept?.name, kept?.min, kept?.max], ['v', 0, 1], 'a frame without the channel keeps the range');
+  assert.equal(legendOf({ ...DEFAULT_LOOK, colour: 'v' }, range, ['v', 'v x'])?.name, 'v, magnitude');
+  const marks = marksOf('dam', SIZE, VIEW, null, false);
+  assert.deepEqual(marks.map(({ kind }) => kind), ['text', 'text', 'box']);
 });

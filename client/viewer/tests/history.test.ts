@@ -1,6 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { History, type Entry } from '../src/stream/history';
+import { Player } from '../src/stream/player';
+import type { Track } from '../src/stream/track';
+import { TimeLink } from '../src/ui/time_link';
 
 const ENTRY = 600;  // Size of an entry without its message.
 
@@ -60,4 +63,58 @@ test('a frame larger than the whole limit is kept alone', () => {
   history.insert(entry(1), Infinity);
   assert.ok(history.insert(entry(2, 5000), Infinity));
   assert.deepEqual(sequences(history), [2]);
+});
+
+test('a frame is found by its time', () => {
+  const history = new History(1e6);
+  assert.equal(history.nearestInTime(1), null);
+  for (let k = 1; k <= 20; ++k) history.insert(entry(k), Infinity);
+  const at = (time: number) => history.nearestInTime(time)?.sequence;
+  assert.deepEqual([at(-1), at(0.62), at(0.3 + Number.EPSILON), at(9)], [1, 6, 3, 20]);
+});
+
+/** A track with the times of its frames. */
+function track(live: boolean, times: number[]): Track {
+  const history = new History(1e6);
+  times.forEach((time, k) => history.insert({ ...entry(k + 1), time }, Infinity));
+  const range = () => ({ first: 1, last: times.length });
+  const player = new Player({ range, rate: () => 30, livePosition: () => times.length }, live);
+  player.tick(0);
+  return { player, history, entryAt: (sequence: number) => history.get(sequence) } as unknown as Track;
+}
+
+test('linked tracks show the time of the chosen one', () => {
+  const slow = track(false, [0, 0.25, 0.5, 0.75, 1]);
+  const fast = track(false, [0, 0.125, 0.25, 0.375, 0.5, 0.625]);
+  const link = new TimeLink();
+  slow.player.seek(3);
+  link.refresh(slow, [slow, fast]);
+  assert.deepEqual([fast.player.sequence, fast.player.mode, link.holds(fast)], [5, 'paused', true]);
+  slow.player.seek(5);
+  link.refresh(slow, [slow, fast]);
+  assert.equal(fast.player.sequence, 6, 'its last frame');
+  slow.player.seek(1);
+  slow.player.play();
+  link.refresh(slow, [slow, fast]);
+  link.refresh(fast, [slow, fast]);
+  assert.equal(fast.player.mode, 'playing', 'the chosen one goes on playing');
+  assert.equal(slow.player.mode, 'paused');
+  link.isOn = false;
+  fast.player.seek(6);
+  link.refresh(fast, [slow, fast]);
+  assert.equal(slow.player.sequence, 1);
+});
+
+test('linked streams follow their newest frame again', () => {
+  const one = track(true, [0, 1, 2]);
+  const other = track(true, [0, 1, 2, 3]);
+  const link = new TimeLink();
+  link.refresh(one, [one, other]);
+  assert.equal(other.player.mode, 'live');
+  one.player.seek(2);
+  link.refresh(one, [one, other]);
+  assert.deepEqual([other.player.mode, other.player.sequence], ['paused', 2]);
+  one.player.follow();
+  link.refresh(one, [one, other]);
+  assert.deepEqual([other.player.mode, link.holds(other)], ['live', false]);
 });

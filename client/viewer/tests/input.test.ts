@@ -4,12 +4,14 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { planNamedColumns } from '../src/input/columns';
 import { parseTimes } from '../src/input/csv';
-import { openDropped } from '../src/input/drop';
-import { LammpsSource, parseLammpsFrame } from '../src/input/lammps';
+import { inspectFiles, openDropped } from '../src/input/drop';
+import { parseLammpsFrame } from '../src/input/lammps';
 import { naturalOrder } from '../src/input/natural_order';
+import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions } from '../src/input/options';
 import { RecordingSource } from '../src/input/recording';
 import { shareOf } from '../src/input/share';
 import { InputError } from '../src/input/source';
+import { nearPlane } from '../src/input/space';
 import { parseTable } from '../src/input/table';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
 import type { Particles } from '../src/protocol/particles';
@@ -41,7 +43,7 @@ test('columns are found by common names', () => {
   assert.equal(plan.id, 0);
   assert.deepEqual(plan.scalars, [{ name: 'Rhop', column: 5 }]);
   assert.ok(planNamedColumns(['id', 'xs', 'ys', 'zs']).scaled);
-  assert.throws(() => planNamedColumns(['a', 'b']), /Name them x and y/);
+  assert.throws(() => planNamedColumns(['a', 'b']), /Name the columns of x and y/);
 });
 
 const file = (name: string, text: string) => new File([text], name);
@@ -70,7 +72,7 @@ test('frames without times have their number as time', async () => {
 test('a plane is found among three axes; 3D is refused', async () => {
   const flat = await openDropped([file('a.csv', 'x,y,z\n0,7,1\n2,7,3\n')]);
   assert.deepEqual(doubles((await flat.frame(0)).positions), [0, 1, 2, 3]);
-  await assert.rejects(openDropped([file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n')]), /Extract a slice/);
+  await assert.rejects(openDropped([file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n')]), /Choose the plane/);
 });
 
 test('duplicate ids are dropped, text in numbers is refused', async () => {
@@ -89,7 +91,7 @@ const DUMP = ['ITEM: TIMESTEP', '0', 'ITEM: NUMBER OF ATOMS', '2', 'ITEM: BOX BO
   '0 10', '0 20', '-1 1', 'ITEM: ATOMS id type xs ys', '1 1 0.5 0.5', '2 1 0.1 0.2', ''].join('\n');
 
 test('a LAMMPS dump is split and unscaled', async () => {
-  const source = await LammpsSource.open(new Blob([DUMP + DUMP.replace('0.5 0.5', '0.25 0.5')]), 'd.lammpstrj');
+  const source = await openDropped([file('d.lammpstrj', DUMP + DUMP.replace('0.5 0.5', '0.25 0.5'))]);
   assert.equal(source.count, 2);
   assert.deepEqual(doubles((await source.frame(0)).positions), [5, 10, 1, 4]);
   assert.deepEqual(doubles((await source.frame(1)).positions), [2.5, 10, 1, 4]);
@@ -117,11 +119,20 @@ test('a truncated recording keeps its whole blocks', async () => {
   const cut = RecordingSource.open(bytes.slice(0, bytes.length / 2), 'cut.pemc');
   assert.ok(cut.count > 20 && cut.count < 60, `${cut.count}`);
   assert.ok((await cut.frame(cut.count - 1)).positions.length > 0);
+  assert.match(cut.notice, new RegExp(`cut\\.pemc is truncated\\. Its first ${cut.count} frames are whole`));
+  assert.equal(RecordingSource.open(bytes, 'whole.pemc').notice, '');
   assert.throws(() => RecordingSource.open(bytes.slice(100), 'x'), /not a recording/);
 });
 
-test('unreadable files are refused with the readable kinds', async () => {
-  await assert.rejects(openDropped([file('a.vtp', '<VTKFile>')]), /a\.vtp cannot be read here.*convert/);
+test('unreadable files are refused by their kind, with a remedy', async () => {
+  const refused = (name: string, text: string, message: RegExp) =>
+    assert.rejects(openDropped([file(name, text)]), message);
+  await refused('a.pvd', '<?xml version="1.0"?>\n<VTKFile type="Collection">', /a ParaView collection/);
+  await assert.rejects(openDropped([new File([Uint8Array.of(0x89, 72, 68, 70, 13, 10, 26, 10)], 'a.h5')]), /an HDF5 file/);
+  await refused('a.ply', 'ply\nformat ascii 1.0\n', /a PLY file/);
+  await refused('a.pkl', 'x', /a Python pickle.*numpy\.savez/);
+  await refused('in.txt2', '# run\nunits lj\natom_style atomic\n', /a LAMMPS input script.*Run it/);
+  await refused('a.json', '{}', /a\.json is of an unknown kind\. The page reads CSV.*extended XYZ/);
   await assert.rejects(openDropped([]), InputError);
 });
 
@@ -152,4 +163,87 @@ test('a share does not depend on the order of particles', () => {
   const chosen = (order: bigint[]) =>
     new Set(arrayOf(BigUint64Array, shareOf(cloud(1000, order), 50).ids ?? new Uint8Array()));
   assert.deepEqual([...chosen(ids)].sort(), [...chosen([...ids].reverse())].sort());
+});
+
+const options = (given: Partial<FileOptions>) => ({ ...NO_OPTIONS, ...given });
+const isAbout = (field: string, text: RegExp) => (error: unknown) =>
+  error instanceof FieldError && error.field === field && text.test(error.message);
+
+/** Particles of two types on a grid of `layers` layers, 0.1 apart. */
+function block(layers: number): string {
+  const rows = ['id,type,x,y,z,p'];
+  for (let k = 0; k < layers; ++k) {
+    for (let i = 0; i < 10; ++i) {
+      for (let j = 0; j < 10; ++j) {
+        rows.push([rows.length, 1 + (i & 1), i / 10, j / 10, k / 10, i * j].join());
+      }
+    }
+  }
+  return `${rows.join('\n')}\n`;
+}
+
+test('the defaults of options come from the file', async () => {
+  const flat = await inspectFiles([file('flat.csv', block(1))]);
+  assert.deepEqual(flat.facts, {
+    spacing: '', columns: 'x,y,z', names: ['id', 'type', 'x', 'y', 'z', 'p'], filters: ['type=1', 'type=2'], slice: '',
+  });
+  const { facts } = await inspectFiles([file('block.csv', block(5))]);
+  assert.equal(facts.slice, 'z=0.2');
+  assert.equal(facts.spacing, '0.1');
+  const unknown = await inspectFiles([file('a.csv', 'a,b,c\n1,2,3\n')]);
+  assert.deepEqual([unknown.facts.columns, unknown.facts.names], ['', ['a', 'b', 'c']]);
+  await assert.rejects(unknown.open(NO_OPTIONS), isAbout('columns', /a\.csv: No position columns in a, b, c/));
+  const whole = await inspectFiles([new File([readFileSync(recording)], 'dam_break.pemc')]);
+  assert.deepEqual(whole.facts, { spacing: '0.0303', columns: '', names: [], filters: [], slice: '' });
+});
+
+test('options choose columns, particles, spacing and plane', async () => {
+  const named = await openDropped([file('a.csv', 'a,b,c\n1,2,3\n')], options({ columns: 'c, 1' }));
+  assert.deepEqual(doubles((await named.frame(0)).positions), [3, 1]);
+  const depth = await openDropped([file('a.csv', 'x,y,z\n1,2,3\n')], options({ columns: 'x,z', spacing: '0.5' }));
+  assert.deepEqual(doubles((await depth.frame(0)).positions), [1, 3]);
+  assert.equal(depth.spacing, 0.5);
+  const bare = await openDropped([file('a.txt', '7 1 2 9\n8 3 4 9\n')], options({ columns: 'id,x,y' }));
+  assert.deepEqual(doubles((await bare.frame(0)).positions), [1, 2, 3, 4]);
+  const half = await openDropped([file('a.csv', block(1))], options({ select: 'type=2' }));
+  assert.equal((await half.frame(0)).positions.length, 50 * 16);
+  const cut = await openDropped([file('a.csv', block(5))], options({ slice: 'z=0.2; y=0.4', spacing: '0.1' }));
+  assert.deepEqual(cut.slices.map(({ origin, normal }) => [origin, normal]),
+    [[[0, 0, 0.2], [0, 0, 1]], [[0, 0.4, 0], [0, -1, 0]]]);
+  assert.equal((await cut.frame(0)).positionFormat, PositionFormat.FLOAT64_3);
+});
+
+test('a wrong option is refused by its field', async () => {
+  const flat = await inspectFiles([file('a.csv', block(1))]);
+  const solid = await inspectFiles([file('a.csv', block(5))]);
+  const refused = (input: typeof flat, given: Partial<FileOptions>, field: string, text: RegExp) =>
+    assert.rejects(input.open(options(given)), isAbout(field, text));
+  await refused(flat, { spacing: '-1' }, 'spacing', /positive length/);
+  await refused(flat, { columns: 'x' }, 'columns', /two or three columns, not 1/);
+  await refused(flat, { columns: 'x,q' }, 'columns', /no column 'q'\. The columns are id, type/);
+  await refused(flat, { select: 'type' }, 'select', /type=1/);
+  await refused(flat, { select: 'kind=1' }, 'select', /no column 'kind'/);
+  await refused(flat, { select: 'type=7' }, 'select', /No particle .* type=7/);
+  await refused(solid, {}, 'slice', /is 3D \(extents 0\.900 x 0\.900 x 0\.400\)/);
+  await refused(solid, { slice: 'z' }, 'slice', /x=C, y=C, z=C/);
+  await refused(solid, { slice: 'z=0.2' }, 'spacing', /need their spacing/);
+  const whole = await inspectFiles([new File([readFileSync(recording)], 'dam_break.pemc')]);
+  await refused(whole, { columns: 'x,y' }, 'columns', /no columns/);
+  await refused(whole, { slice: 'z=0' }, 'slice', /two coordinates/);
+  assert.equal((await whole.open(options({ spacing: '0.05' }))).spacing, 0.05);
+});
+
+test('options are kept in a link', () => {
+  const given = options({ spacing: '0.02', slice: 'z=0.5;y=1' });
+  assert.deepEqual(parseOptions(optionsText(given)), given);
+  assert.equal(optionsText(NO_OPTIONS), '');
+});
+
+test('particles beside a plane have its coordinates', async () => {
+  const solid = await openDropped([file('a.csv', block(5))], options({ slice: 'y=0.4', spacing: '0.1' }));
+  const near = nearPlane(await solid.frame(0), solid.slices[0], 0.05);
+  assert.equal(near.positions.length / 16, 50);
+  const [x, z] = doubles(near.positions.subarray(16 * 49));
+  assert.deepEqual([x, z], [0.9, 0.4]);
+  assert.equal(arrayOf(BigUint64Array, near.ids ?? new Uint8Array()).length, 50);
 });

@@ -5,7 +5,7 @@ import { bytesOf } from '../src/protocol/arrays';
 import { AttributeChannels } from '../src/protocol/channels';
 import { bareRings } from '../src/protocol/frame';
 import { angleOf, distanceOf, Measurement } from '../src/ui/measure';
-import { axisMarks } from '../src/ui/overlay';
+import { axisMarks } from '../src/ui/axes';
 import { makeFrame } from './draw_frames';
 
 test('distances and angles', () => {

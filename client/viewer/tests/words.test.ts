@@ -23,7 +23,7 @@ test('an address holds streams, frame, view, settings and look', () => {
     panes: [{ stream: 'dam', settings: { ...AS_STREAMED } },
             { stream: '', settings: { ...AS_STREAMED, fill: Fill.GRID } },
             { stream: 'other~1', settings: { ...AS_STREAMED } }],
-    file: '',
+    file: '', open: '',
     frame: 12, view: { x: 1.5, y: -2, scale: 300 }, look: 'outline,colour:p & q,width:2',
   };
   const text = addressText(address);
@@ -36,7 +36,7 @@ test('an address holds streams, frame, view, settings and look', () => {
 test('an address holds a file by its name', () => {
   const address = {
     panes: [{ stream: '', settings: { ...AS_STREAMED, fill: Fill.GRID } }, { stream: 'dam', settings: { ...AS_STREAMED } }],
-    file: 'drops 1.csv', frame: 0, view: null, look: '',
+    file: 'drops 1.csv', open: '', frame: 0, view: null, look: '',
   };
   const text = addressText(address);
   assert.equal(text, '#file=drops%201.csv&frame=0&set=fill:grid&beside=dam~');

@@ -60,6 +60,17 @@ export function shareOf({ min, max }: Range, value: number): number {
   return max > min ? (value - min) / (max - min) : 0;
 }
 
+/**
+ * The range of the colours. `from` and `to`: its ends as chosen, or null for those of the numbers. An
+ * end beyond all numbers moves the other one, so that all numbers have the colour of the nearer end.
+ */
+export function chosenRange(all: Range, from: number | null, to: number | null): Range {
+  const width = all.max - all.min || 1;
+  const min = from ?? (to !== null && to <= all.min ? to - width : all.min);
+  const max = to ?? (min >= all.max && from !== null ? min + width : all.max);
+  return min < max ? { min, max } : all;
+}
+
 /** Range of the finite numbers; null if there are none. */
 export function rangeOf(values: Float32Array): Range | null {
   let min = Infinity;

@@ -2,7 +2,7 @@ import { channelLabel } from '../protocol/channels';
 import type { Frame } from '../protocol/frame';
 import { attributeOf, DEFAULT_LOOK, type Look } from './look';
 import { RingIndex } from './pick';
-import { type Range, rampStops, rangeOf } from './ramp';
+import { chosenRange, type Range, rampStops, rangeOf } from './ramp';
 import { Selection } from './selection';
 import { SvgDrawing } from './svg_drawing';
 import { type Drawing, Renderer } from './webgl/renderer';
@@ -27,6 +27,13 @@ export interface Legend {
   max: number;
   /** Colours from the smallest to the largest number, in equal steps. */
   stops: string[];
+}
+
+/** The legend of a look; null without a channel to colour by, or without numbers of it so far. */
+export function legendOf(look: Look, range: Range | null, channels: readonly string[]): Legend | null {
+  const name = attributeOf(look);
+  if (!range || name === null) return null;
+  return { ...range, name: channelLabel(name, channels), stops: rampStops(look) };
 }
 
 /**
@@ -149,10 +156,7 @@ export class Scene {
 
   /** Legend of the attribute that the look colours by; null without one. */
   legend(): Legend | null {
-    const range = this.colourRange;
-    const name = attributeOf(this.look);
-    if (!range || name === null) return null;
-    return { ...range, name: channelLabel(name, this.channels), stops: rampStops(this.look) };
+    return legendOf(this.look, this.colourRange, this.channels);
   }
 
   /** Names of the numbers that the frame can be coloured by. */
@@ -183,9 +187,7 @@ export class Scene {
 
   private get colourRange(): Range | null {
     if (!this.range) return null;
-    const { min, max } = this.fixedRange ?? this.range;
-    const chosen = { min: this.look.from ?? min, max: this.look.to ?? max };
-    return chosen.min < chosen.max ? chosen : { min, max };
+    return chosenRange(this.fixedRange ?? this.range, this.look.from, this.look.to);
   }
 
   /** The attribute's values: of the mesh (or of the rings, without a mesh), and of the particles. */

@@ -1,5 +1,5 @@
 // Recognises table columns by their names, with the rules of client/input/base/columns.h.
-import { InputError } from './source';
+import { ALL_COLUMNS, type ColumnRequest, type Condition, FieldError } from './options';
 
 export interface ColumnPlan {
   /** Columns of x, y, z; null for a missing axis. */
@@ -11,6 +11,8 @@ export interface ColumnPlan {
   scalars: { name: string; column: number }[];
   /** Positions are fractions of the box (LAMMPS xs, ys, zs). */
   scaled: boolean;
+  /** The conditions of the request. */
+  conditions: { column: number; condition: Condition }[];
 }
 
 const AXES = ['x', 'y', 'z'];
@@ -51,6 +53,7 @@ const FAMILIES: ((axis: number) => string[])[] = [
 ];
 const FIRST_SCALED_FAMILY = 3;
 
+/** Number of axes with a column. */
 function found(axes: (number | null)[]): number {
   return axes.filter((axis) => axis !== null).length;
 }
@@ -63,32 +66,94 @@ function planVelocities(names: string[]): (number | null)[] {
   return u >= 0 && v >= 0 ? [u, v, find(names, ['w'])] : axes;  // PySPH's names.
 }
 
-/** Plans a table with named columns. Throws InputError if there are no positions. */
-export function planNamedColumns(given: string[]): ColumnPlan {
-  const names = given.map(canonical);
-  for (const [k, family] of FAMILIES.entries()) {
-    const positions = AXES.map((_, axis) => find(names, family(axis)));
-    if (found(positions) < 2) continue;
-    const velocities = planVelocities(names);
-    const id = find(names, IDS);
-    const volume = find(names, VOLUMES);
-    const used = new Set([...positions, ...velocities, id, volume]);
-    const scalars = given.map((name, column) => ({ name, column }))
-      .filter(({ column }) => !used.has(column)).slice(0, MOST_SCALARS);
-    return { positions, velocities, id, volume, scalars, scaled: k >= FIRST_SCALED_FAMILY };
-  }
-  throw new InputError(
-    `No position columns in ${given.slice(0, 12).join(', ')}. Name them x and y.`);
+const list = (names: string[]) => names.slice(0, 12).join(', ') + (names.length > 12 ? ', …' : '');
+
+/** Finds a column by its exact name, by its number from 1, or by another spelling. */
+function findAsked(given: string[], names: string[], asked: string): number | null {
+  const exact = given.indexOf(asked);
+  if (exact >= 0) return exact;
+  if (/^[1-9]\d*$/.test(asked) && Number(asked) <= given.length) return Number(asked) - 1;
+  return find(names, [canonical(asked)]);
 }
 
-/** Plans a table without names: two columns are x y, three are x y z. */
-export function planUnnamedColumns(count: number): ColumnPlan {
-  if (count !== 2 && count !== 3) {
-    throw new InputError(
-      `${count} columns without names. Add a first line with names, including x and y.`);
+interface PositionPlan { positions: (number | null)[]; scaled: boolean; isKnown: boolean }
+
+function recognisedPositions(names: string[], given: string[]): PositionPlan {
+  for (const [k, family] of FAMILIES.entries()) {
+    const positions = AXES.map((_, axis) => find(names, family(axis)));
+    if (found(positions) >= 2) return { positions, scaled: k >= FIRST_SCALED_FAMILY, isKnown: true };
   }
-  return {
-    positions: [0, 1, count === 3 ? 2 : null], velocities: [null, null, null], id: null,
-    volume: null, scalars: [], scaled: false,
-  };
+  throw new FieldError('columns', `No position columns in ${list(given)}. Name the columns of x and y.`);
+}
+
+/** The columns of the request. If their names have axes in rising order (x and z), these are their axes. */
+function askedPositions(names: string[], given: string[], asked: readonly string[]): PositionPlan {
+  if (asked.length !== 2 && asked.length !== 3) {
+    throw new FieldError('columns', `Name two or three columns, not ${asked.length}.`);
+  }
+  const columns = asked.map((name) => {
+    const column = findAsked(given, names, name);
+    if (column === null) throw new FieldError('columns', `There is no column '${name}'. The columns are ${list(given)}.`);
+    return column;
+  });
+  for (const [k, family] of FAMILIES.entries()) {
+    const positions: (number | null)[] = [null, null, null];
+    let next = 0;
+    for (let axis = 0; axis < 3 && next < columns.length; ++axis) {
+      if (find(names, family(axis)) === columns[next]) positions[axis] = columns[next++];
+    }
+    if (next === columns.length) return { positions, scaled: k >= FIRST_SCALED_FAMILY, isKnown: true };
+  }
+  return { positions: AXES.map((_, axis) => columns[axis] ?? null), scaled: false, isKnown: false };
+}
+
+/** Plans a table with named columns. Throws FieldError. */
+export function planNamedColumns(given: string[], request: ColumnRequest = ALL_COLUMNS): ColumnPlan {
+  const names = given.map(canonical);
+  const { positions, scaled, isKnown } = request.columns.length > 0
+    ? askedPositions(names, given, request.columns) : recognisedPositions(names, given);
+  const velocities = isKnown ? planVelocities(names) : [null, null, null];
+  const id = find(names, IDS);
+  const volume = find(names, VOLUMES);
+  const used = new Set([...positions, ...velocities, id, volume]);
+  const scalars = given.map((name, column) => ({ name, column }))
+    .filter(({ column }) => !used.has(column)).slice(0, MOST_SCALARS);
+  const conditions = request.conditions.map((condition) => {
+    const column = findAsked(given, names, condition.column);
+    if (column === null) {
+      throw new FieldError('select', `There is no column '${condition.column}'. The columns are ${list(given)}.`);
+    }
+    return { column, condition };
+  });
+  return { positions, velocities, id, volume, scalars, scaled, conditions };
+}
+
+/**
+ * Names for the columns of a table without names: x y of two, x y z of three. The request names more
+ * of them, by numbers (2,3) or by names in the order of the columns (id,x,y).
+ */
+export function namesOfUnnamed(count: number, request: ColumnRequest): { names: string[]; request: ColumnRequest } {
+  const { columns } = request;
+  if (columns.length === 0) {
+    if (count !== 2 && count !== 3) {
+      throw new FieldError('columns', `The file has ${count} columns without names. Write the numbers of the ` +
+        'position columns (2,3), or the names of all columns (id,x,y).');
+    }
+    return { names: AXES.slice(0, count), request };
+  }
+  if (columns.every((name) => /^\d+$/.test(name))) {
+    return { names: Array.from({ length: count }, (_, k) => String(k + 1)), request };
+  }
+  if (columns.length > count) {
+    throw new FieldError('columns', `${columns.length} names for the ${count} columns of the file.`);
+  }
+  const names = Array.from({ length: count }, (_, k) => columns[k] ?? '-');
+  return { names, request: { ...request, columns: [] } };
+}
+
+/** Plans a table. Without `names`, as namesOfUnnamed. Throws FieldError. */
+export function planColumns(names: string[], count: number, request: ColumnRequest): ColumnPlan {
+  if (names.length > 0) return planNamedColumns(names, request);
+  const named = namesOfUnnamed(count, request);
+  return planNamedColumns(named.names, named.request);
 }

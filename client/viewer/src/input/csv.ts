@@ -1,8 +1,7 @@
-import type { Particles } from '../protocol/particles';
-import { planNamedColumns, planUnnamedColumns, type ColumnPlan } from './columns';
-import { particlesOf } from './particles';
-import { InputError, type FrameSource } from './source';
+import { TextRows } from './rows';
+import { InputError } from './source';
 import { parseTable } from './table';
+import type { FrameTable, TableReader } from './table_source';
 import { textOf } from './text_file';
 
 /** Times of frames by index. The table has the columns frame and t (or time), or one column. */
@@ -19,35 +18,15 @@ export function parseTimes(text: string, name: string): Map<number, number> {
     [frameAt < 0 ? k : Number(cells[frameAt]), Number(cells[timeAt])]));
 }
 
-/** CSV files, one frame each. */
-export class CsvSource implements FrameSource {
-  readonly spacing = null;
+/** A CSV file: one frame. */
+export class CsvReader implements TableReader {
+  readonly count = 1;
 
-  private constructor(readonly title: string, private readonly files: File[],
-                      private readonly times: Map<number, number>, readonly scalars: string[]) {}
+  constructor(private readonly file: File) {}
 
-  /** Reads the first frame, whose scalars all frames have. Throws InputError. */
-  static async open(files: File[], timesFile: File | null, title: string): Promise<CsvSource> {
-    const times = timesFile ? parseTimes(await textOf(timesFile), timesFile.name)
-      : new Map<number, number>();
-    const source = new CsvSource(title, files, times, []);
-    const first = await source.frame(0);
-    source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
-    return source;
-  }
-
-  get count(): number { return this.files.length; }
-
-  async frame(index: number): Promise<Particles> {
-    const file = this.files[index];
-    const table = parseTable(await textOf(file), file.name);
-    let plan: ColumnPlan;
-    try {
-      plan = table.names.length > 0 ? planNamedColumns(table.names)
-        : planUnnamedColumns(table.columnCount);
-    } catch (error) {
-      throw new InputError(`${file.name}: ${(error as Error).message}`);
-    }
-    return particlesOf(table.rows, plan, this.times.get(index) ?? null, index, file.name);
+  async table(index: number): Promise<FrameTable> {
+    const { name } = this.file;
+    const { names, columnCount, rows } = parseTable(await textOf(this.file), name);
+    return { names, columnCount, rows: new TextRows(rows, name), time: null, index, name };
   }
 }

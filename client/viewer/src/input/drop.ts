@@ -1,9 +1,17 @@
-import { CsvSource } from './csv';
-import { LammpsSource } from './lammps';
+import { CsvReader, parseTimes } from './csv';
+import { refusalOf } from './kinds';
+import { LammpsReader } from './lammps';
 import { naturalOrder } from './natural_order';
+import { NpyReader } from './npy';
+import { NpzReader } from './npz';
+import { type FileFacts, type FileOptions, NO_OPTIONS } from './options';
 import { isRecording, RecordingSource } from './recording';
 import { InputError, type FrameSource } from './source';
-import { plainName, textOf } from './text_file';
+import { factsOf, ReaderChain, type TableReader, TableSource } from './table_source';
+import { blobOf, plainName, textOf } from './text_file';
+import { VtkLegacyReader } from './vtk_legacy';
+import { VtkXmlReader } from './vtk_xml';
+import { isXyz, XyzReader } from './xyz';
 
 /** Files of a dropped entry, including folders. */
 async function filesOfEntry(entry: FileSystemEntry): Promise<File[]> {
@@ -31,38 +39,89 @@ export async function filesOfDrop(transfer: DataTransfer): Promise<File[]> {
   return (await Promise.all(entries.map(filesOfEntry))).flat();
 }
 
+/** Bytes that show the kind of a file. */
+const HEAD_BYTES = 4096;
+
 async function headOf(file: File): Promise<Uint8Array> {
-  return new Uint8Array(await file.slice(0, 32).arrayBuffer());
+  return new Uint8Array(await file.slice(0, HEAD_BYTES).arrayBuffer());
 }
 
-const isTable = (file: File) => /\.(csv|txt|dat|tsv)$/.test(plainName(file));
-const isDump = (file: File) => /\.(lammpstrj|dump)$|^dump\./.test(plainName(file));
+/** Bytes as text with the same codes. TextDecoder reads "latin1" as Windows-1252. */
+const textOfBytes = (bytes: Uint8Array) => String.fromCharCode(...bytes);
+
 const isTimes = (file: File) => plainName(file) === 'times.csv';
 
-/** Opens dropped files as frames. Throws InputError. */
-export async function openDropped(dropped: File[]): Promise<FrameSource> {
+/** A kind of tables: which files have it, and their reader. */
+interface Kind {
+  matches(name: string, head: string): boolean;
+  open(file: File): Promise<TableReader> | TableReader;
+}
+
+const extensionOf = (name: string) => name.slice(name.lastIndexOf('.') + 1);
+
+/** The kinds in the order in which a folder is searched for them. */
+const KINDS: readonly Kind[] = [
+  { matches: (_, head) => head.startsWith('\x93NUMPY'), open: async (file) => NpyReader.open(await blobOf(file), file.name) },
+  { matches: (_, head) => /^PK(\x03\x04|\x05\x06)/.test(head), open: async (file) => new NpzReader(await blobOf(file), file.name) },
+  { matches: (_, head) => head.startsWith('# vtk DataFile'), open: async (file) => new VtkLegacyReader(await blobOf(file), file.name) },
+  {
+    matches: (name, head) => head.includes('<VTKFile') && !/\.(pvd|series)$/.test(name),
+    open: async (file) => new VtkXmlReader(await blobOf(file), file.name),
+  },
+  {
+    matches: (name, head) => isXyz(head, extensionOf(name)) || (/xyz$/.test(name) && isPacked(head)),
+    open: async (file) => XyzReader.open(await textOf(file), file.name),
+  },
+  { matches: (name, head) => /\.npy$/.test(name) && isPacked(head), open: async (file) => NpyReader.open(await blobOf(file), file.name) },
+  {
+    matches: (name, head) => /\.(lammpstrj|dump)$|^dump\./.test(name) || head.startsWith('ITEM:'),
+    open: async (file) => LammpsReader.open(await blobOf(file), file.name),
+  },
+  { matches: (name) => /\.(csv|txt|dat|tsv)$/.test(name), open: (file) => new CsvReader(file) },
+];
+
+/** Whether a file is compressed by gzip or zstd. */
+const isPacked = (head: string) => head.startsWith('\x1f\x8b') || head.startsWith('\x28\xb5\x2f\xfd');
+
+/** Dropped files of one kind, which can be opened with options. */
+export interface FileInput {
+  /** Name for the user. */
+  readonly title: string;
+  readonly facts: FileFacts;
+  /** Throws InputError, and FieldError for an option. */
+  open(options: FileOptions): Promise<FrameSource>;
+}
+
+/** Reads what dropped files are. Throws InputError. */
+export async function inspectFiles(dropped: File[]): Promise<FileInput> {
   const files = dropped.filter((file) => !file.name.startsWith('.'))
     .sort((a, b) => naturalOrder(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name));
   if (files.length === 0) throw new InputError('No readable file was dropped.');
   const first = files[0];
-  if (isRecording(await headOf(first))) {
-    return RecordingSource.open(new Uint8Array(await first.arrayBuffer()), first.name);
+  const firstHead = await headOf(first);
+  if (isRecording(firstHead)) {
+    const recording = RecordingSource.open(new Uint8Array(await first.arrayBuffer()), first.name);
+    return { title: recording.title, facts: await recording.facts(), open: (options) => recording.with(options) };
   }
-  const dump = files.find(isDump) ?? (await isDumpInside(first) ? first : undefined);
-  if (dump) {
-    const packed = dump.name !== dump.name.replace(/\.(gz|zst)$/, '');
-    return LammpsSource.open(packed ? new Blob([await textOf(dump)]) : dump, dump.name);
+  const tables = files.length > 1 ? files.filter((file) => !isTimes(file)) : files;
+  const heads = await Promise.all(tables.map(async (file) => textOfBytes(await headOf(file))));
+  for (const kind of KINDS) {
+    const own = tables.filter((file, k) => kind.matches(plainName(file), heads[k]));
+    if (own.length === 0) continue;
+    const reader = new ReaderChain(await Promise.all(own.map((file) => kind.open(file))));
+    const timesFile = files.length > 1 ? files.find(isTimes) : undefined;
+    const times = timesFile ? parseTimes(await textOf(timesFile), timesFile.name) : new Map<number, number>();
+    const title = own.length === 1 ? own[0].name
+      : `${own.length} files, ${own[0].name} to ${own[own.length - 1].name}`;
+    return {
+      title, facts: await factsOf(reader), open: (options) => TableSource.open(title, reader, times, options),
+    };
   }
-  const tables = files.filter((file) => isTable(file) && !isTimes(file));
-  if (tables.length > 0) {
-    const title = tables.length === 1 ? tables[0].name
-      : `${tables.length} files, ${tables[0].name} to ${tables[tables.length - 1].name}`;
-    return CsvSource.open(tables, files.find(isTimes) ?? null, title);
-  }
-  throw new InputError(`${first.name} cannot be read here. Drop CSV files or their folder, a LAMMPS text ` +
-                       'dump or a recording (.pemc). `partiemc convert` makes recordings of VTK and NPY files.');
+  const text = textOfBytes(firstHead);
+  throw new InputError(refusalOf(first.name, { text, extension: extensionOf(plainName(first)) }));
 }
 
-async function isDumpInside(file: File): Promise<boolean> {
-  return new TextDecoder('latin1').decode(await headOf(file)).startsWith('ITEM:');
+/** Opens dropped files as frames. Throws InputError. */
+export async function openDropped(dropped: File[], options: FileOptions = NO_OPTIONS): Promise<FrameSource> {
+  return (await inspectFiles(dropped)).open(options);
 }

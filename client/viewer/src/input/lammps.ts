@@ -1,9 +1,10 @@
 // LAMMPS text dumps of the styles atom and custom. A frame has sections that start with "ITEM:".
-import type { Particles } from '../protocol/particles';
+import type { Unscale } from './particles';
 import { planNamedColumns } from './columns';
-import { particlesOf, type Unscale } from './particles';
-import { InputError, type FrameSource } from './source';
+import { TextRows } from './rows';
+import { InputError } from './source';
 import { splitAtBlanks } from './table';
+import type { FrameTable, TableReader } from './table_source';
 
 /** A position in the box is origin + sum over axes of (fraction * edge). */
 interface Box { origin: number[]; edges: number[][] }
@@ -37,8 +38,17 @@ function unscaleIn(box: Box): Unscale {
   };
 }
 
+/** Whether the recognised positions are fractions of the box. */
+function hasScaledPositions(names: string[]): boolean {
+  try {
+    return planNamedColumns(names).scaled;
+  } catch {
+    return false;
+  }
+}
+
 /** Parses one frame. Throws InputError. */
-export function parseLammpsFrame(text: string, index: number, name: string): Particles {
+export function parseLammpsFrame(text: string, index: number, name: string): FrameTable {
   const where = `${name}, frame ${index + 1}`;
   const lines = text.split(/\r?\n/);
   let time: number | null = null;
@@ -56,14 +66,17 @@ export function parseLammpsFrame(text: string, index: number, name: string): Par
     } else if (line.startsWith('ITEM: TIME')) {
       time = Number(lines[++k]);
     } else if (line.startsWith('ITEM: ATOMS')) {
-      const plan = planNamedColumns(splitAtBlanks(line.slice('ITEM: ATOMS'.length)));
+      const names = splitAtBlanks(line.slice('ITEM: ATOMS'.length));
       const rows = lines.slice(k + 1, k + 1 + atoms).filter((row) => row !== '').map(splitAtBlanks);
-      if (rows.length !== atoms) {
+      if (rows.length !== atoms || rows.some((cells) => cells.length < names.length)) {
         throw new InputError(`${where} has ${rows.length} of ${atoms} atoms. It is truncated.`);
       }
-      if (plan.scaled && !box) throw new InputError(`${where}: scaled positions without a box.`);
-      const unscale = plan.scaled && box ? unscaleIn(box) : undefined;
-      return particlesOf(rows, plan, time, index, where, unscale);
+      const isScaled = hasScaledPositions(names);
+      if (isScaled && !box) throw new InputError(`${where}: scaled positions without a box.`);
+      return {
+        names, columnCount: names.length, rows: new TextRows(rows, where), time, index, name: where,
+        unscale: isScaled && box ? unscaleIn(box) : undefined,
+      };
     }
   }
   throw new InputError(`${where} has no atoms. Only text dumps of the styles atom and custom can be read.`);
@@ -73,26 +86,21 @@ const FRAME_MARK = 'ITEM: TIMESTEP';
 const CHUNK_BYTES = 4 << 20;
 
 /** A dump. Frames are read on demand. */
-export class LammpsSource implements FrameSource {
-  readonly spacing = null;
+export class LammpsReader implements TableReader {
+  private constructor(private readonly file: Blob, private readonly name: string,
+                      private readonly offsets: number[]) {}
 
-  private constructor(private readonly file: Blob, readonly title: string,
-                      private readonly offsets: number[], readonly scalars: string[]) {}
-
-  static async open(file: Blob, title: string): Promise<LammpsSource> {
+  static async open(file: Blob, name: string): Promise<LammpsReader> {
     const offsets = await marksOf(file);
-    if (offsets.length === 0) throw new InputError(`${title} has no frame of a LAMMPS dump.`);
-    const source = new LammpsSource(file, title, [...offsets, file.size], []);
-    const first = await source.frame(0);
-    source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
-    return source;
+    if (offsets.length === 0) throw new InputError(`${name} has no frame of a LAMMPS dump.`);
+    return new LammpsReader(file, name, [...offsets, file.size]);
   }
 
   get count(): number { return this.offsets.length - 1; }
 
-  async frame(index: number): Promise<Particles> {
+  async table(index: number): Promise<FrameTable> {
     const text = await this.file.slice(this.offsets[index], this.offsets[index + 1]).text();
-    return parseLammpsFrame(text, index, this.title);
+    return parseLammpsFrame(text, index, this.name);
   }
 }
 

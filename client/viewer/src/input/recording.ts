@@ -6,7 +6,10 @@ import { ParticleFrameSchema } from '@proto/v1/reconstruction_pb';
 import { decompress } from 'fzstd';
 import { arrayOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
+import type { SectionPlane } from '../protocol/sections';
+import { FieldError, type FileFacts, type FileOptions, NO_OPTIONS, parseSlices, parseSpacing } from './options';
 import { InputError, type FrameSource } from './source';
+import { axesOf, hasThreeCoordinates, middlePlane, spacingOf } from './space';
 
 const MARK_BYTES = 24;
 const SKIPPABLE_MAGIC = 0x184d2a50;
@@ -53,21 +56,55 @@ export class RecordingSource implements FrameSource {
   private readonly locations: Location[] = [];
   private unpacked: { block: number; messages: Uint8Array[] } | null = null;
 
+  notice = '';
+  slices: readonly SectionPlane[] = [];
+
   private constructor(private readonly bytes: Uint8Array, private readonly blocks: number[],
-                      readonly title: string, readonly spacing: number | null) {}
+                      readonly title: string, public spacing: number | null) {}
 
   /** Throws InputError. */
   static open(bytes: Uint8Array, name: string): RecordingSource {
     if (!isRecording(bytes)) throw new InputError(`${name} is not a recording.`);
-    const blocks = blocksOf(bytes);
+    const { blocks, isWhole } = blocksOf(bytes);
+    if (blocks.length < 2) throw new InputError(`${name} is truncated in its header. No frame of it is whole.`);
     const header = fromBinary(RecordingHeaderSchema, messagesOf(unpack(bytes, blocks, 0, name))[0]);
     const source = new RecordingSource(bytes, blocks, header.title || name, header.spacing ?? null);
     for (let block = 1; block + 1 < blocks.length; ++block) {
       const messages = messagesOf(unpack(bytes, blocks, block, name));
       messages.forEach((_, message) => source.locations.push({ block, message }));
     }
-    if (source.count === 0) throw new InputError(`${name} has no frame.`);
+    if (source.count === 0) throw new InputError(`${name} has no ${isWhole ? '' : 'whole '}frame.`);
+    if (!isWhole) source.notice = `${name} is truncated. Its first ${source.count} frames are whole, and later ones are lost.`;
     return source;
+  }
+
+  /** Whether the particles have three coordinates, and the defaults of the options. */
+  async facts(): Promise<FileFacts> {
+    const facts: FileFacts = { spacing: this.spacing === null ? '' : String(this.spacing), columns: '', names: [], filters: [], slice: '' };
+    const first = await this.frame(0);
+    if (!hasThreeCoordinates(first.positionFormat)) return facts;
+    const axes = axesOf(first);
+    return { ...facts, slice: middlePlane(axes), spacing: facts.spacing || spacingOf(axes) };
+  }
+
+  /** The same frames with options. Throws FieldError. */
+  async with(options: FileOptions = NO_OPTIONS): Promise<RecordingSource> {
+    const slices = parseSlices(options.slice);
+    for (const field of ['columns', 'select'] as const) {
+      if (options[field] !== '') throw new FieldError(field, 'A recording has no columns. Leave this field empty.');
+    }
+    const spacing = parseSpacing(options.spacing) ?? this.spacing;
+    const inSpace = hasThreeCoordinates((await this.frame(0)).positionFormat);
+    if (inSpace && slices.length === 0) {
+      throw new FieldError('slice', `${this.title} is 3D. Choose the plane that cuts it, for example z=0.`);
+    }
+    if (!inSpace && slices.length > 0) {
+      throw new FieldError('slice', `${this.title} has two coordinates. A plane cuts particles with x, y and z only.`);
+    }
+    if (slices.length > 0 && spacing === null) {
+      throw new FieldError('spacing', 'Particles in a plane of 3D need their spacing.');
+    }
+    return Object.assign(Object.create(RecordingSource.prototype) as RecordingSource, this, { spacing, slices });
   }
 
   get count(): number { return this.locations.length; }
@@ -86,18 +123,19 @@ export class RecordingSource implements FrameSource {
   }
 }
 
-/** Starts of the whole blocks, and the end of the last one. */
-function blocksOf(bytes: Uint8Array): number[] {
+/** Starts of the whole blocks, and the end of the last one. `isWhole`: whether the tail follows them. */
+function blocksOf(bytes: Uint8Array): { blocks: number[]; isWhole: boolean } {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const blocks = [MARK_BYTES];
   let at = MARK_BYTES;
-  while (at + 8 < bytes.length && view.getUint32(at, true) !== SKIPPABLE_MAGIC) {
+  while (at + 8 < bytes.length) {
+    if (view.getUint32(at, true) === SKIPPABLE_MAGIC) return { blocks, isWhole: true };
     const end = frameEnd(bytes, at);
     if (end === null) break;
     blocks.push(end);
     at = end;
   }
-  return blocks;
+  return { blocks, isWhole: false };
 }
 
 function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array {

@@ -32,7 +32,13 @@ export function shareOf(frame: Particles, percent: number): Particles {
     const id = ids ? ids[2 * i] ^ ids[2 * i + 1] : i;
     if (percentile(id) < percent) kept[size++] = i;
   }
-  const chosen = kept.subarray(0, size);
+  return rowsOf(frame, kept.subarray(0, size));
+}
+
+/** The particles of some rows. */
+export function rowsOf(frame: Particles, chosen: Uint32Array): Particles {
+  const rowBytes = particleBytes(frame.positionFormat);
+  const count = Math.floor(frame.positions.length / rowBytes);
   const velocityBytes = (frame.velocities?.length ?? 0) / Math.max(1, count);
   return {
     ...frame,
@@ -43,4 +49,3 @@ export function shareOf(frame: Particles, percent: number): Particles {
     scalars: frame.scalars?.map((scalar) => ({ ...scalar, values: rows(scalar.values, 4, chosen) })),
   };
 }
-

@@ -1,4 +1,5 @@
 import type { Particles } from '../protocol/particles';
+import type { SectionPlane } from '../protocol/sections';
 
 /** Dropped files as frames of particles, read on demand. */
 export interface FrameSource {
@@ -7,8 +8,12 @@ export interface FrameSource {
   readonly count: number;
   /** World units; null: to be estimated. */
   readonly spacing: number | null;
+  /** Planes that cut 3D particles: the picture, then more. Empty: the particles are 2D. */
+  readonly slices: readonly SectionPlane[];
   /** Names of scalars that every frame has. */
   readonly scalars: string[];
+  /** What the user must know about the files, such as their truncation; empty without it. */
+  readonly notice: string;
   /** Reads frame `index`, starting at 0. Throws InputError. */
   frame(index: number): Promise<Particles>;
 }

@@ -108,6 +108,14 @@ function axesOf(normal: Vector): [Vector, Vector] {
   ]];
 }
 
+/** Coordinates of a point in a plane, and its height above it. */
+export function inPlane({ origin, normal }: SectionPlane, [x, y, z]: Vector): Vector {
+  const up = unit(normal);
+  const [first, second] = axesOf(up);
+  const apart: Vector = [x - origin[0], y - origin[1], z - origin[2]];
+  return [dot(apart, first), dot(apart, second), dot(apart, up)];
+}
+
 function dot(a: Vector, b: Vector): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

@@ -140,7 +140,7 @@ class Report {
     const { player } = this.track;
     if (!this.isReady || player.mode !== 'paused' || player.sequence === null) return;
     this.ownAddress = addressText({
-      panes: [], file: '', frame: Number(this.track.labelOf(player.sequence)),
+      panes: [], file: '', open: '', frame: Number(this.track.labelOf(player.sequence)),
       view: this.pane.isFree ? null : this.pane.scene.view, look: this.look.text,
     });
     try {

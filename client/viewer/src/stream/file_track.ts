@@ -2,13 +2,14 @@ import type { ReconstructedFrame, ReconstructionParameters, StreamOpened }
   from '@proto/v1/reconstruction_pb';
 import { InputError, type FrameSource } from '../input/source';
 import { shareOf } from '../input/share';
+import { nearPlane } from '../input/space';
 import { Backoff } from './backoff';
 import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
 import { type Outline, outlinesOf } from '../protocol/sections';
-import { methodOf, outputsFor, parametersOf, type Settings } from './settings';
+import { methodOf, outputsFor, parametersOf, type Settings, withSlices } from './settings';
 import { decodeFrame } from '../protocol/decode';
 import { particleChannels, type Particles } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
@@ -53,6 +54,7 @@ export class FileTrack implements Track {
   get title(): string { return this.source.title; }
   get method(): Method | null { return methodOf(this.parameters); }
   get bounds(): null { return null; }
+  get notice(): string { return this.source.notice; }
   get outlines(): Outline[] { return outlinesOf(this.parameters); }
 
   range(): Range { return { first: 1, last: this.source.count }; }
@@ -72,7 +74,10 @@ export class FileTrack implements Track {
 
   /** The server does not return the particles of its producer. */
   async drawnParticles(sequence: number, origin: [number, number]): Promise<DrawnParticles> {
-    const particles = shareOf(await this.source.frame(sequence - 1), this.settings.share);
+    let particles = shareOf(await this.source.frame(sequence - 1), this.settings.share);
+    const [plane] = this.source.slices;
+    // The picture shows the particles within half a spacing of its plane.
+    if (plane) particles = nearPlane(particles, plane, (this.source.spacing ?? 0) / 2);
     return {
       points: relativePositions(particles.positionFormat, particles.positions, 0, origin),
       attributes: particleChannels(particles),
@@ -116,7 +121,7 @@ export class FileTrack implements Track {
 
   private open(): void {
     const producer: Producer = new Producer(this.gateway, {
-      parameters: parametersOf(this.settings, null, this.source.spacing),
+      parameters: withSlices(parametersOf(this.settings, null, this.source.spacing), this.source.slices),
       outputs: outputsFor(this.hasAttributes ? this.source.scalars : []),
       labels: { from: 'viewer' },
     }, {

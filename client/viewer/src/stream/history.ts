@@ -81,6 +81,17 @@ export class History<E extends Entry = Entry> {
     return this.entries[this.lowerBound(sequence + 1)] ?? null;
   }
 
+  /** The entry whose time is nearest; the oldest of several. */
+  nearestInTime(time: number): E | null {
+    let nearest: E | null = null;
+    let least = Infinity;
+    for (const entry of this.entries) {
+      const distance = Math.abs(entry.time - time);
+      if (distance < least) [nearest, least] = [entry, distance];
+    }
+    return nearest;
+  }
+
   clear(): void {
     this.entries = [];
     this.heldBytes = 0;

@@ -1,8 +1,9 @@
 import { create } from '@bufbuild/protobuf';
 import {
   CoordinateFormat, Fill, OutputsSchema, Placement, ReconstructionParametersSchema,
-  type ReconstructionParameters,
+  SectionSchema, SlicePlaneSchema, type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
+import type { SectionPlane } from '../protocol/sections';
 import type { Method } from './track';
 
 /** Settings of a reconstruction. Null and UNSPECIFIED: the value of the stream. Lengths in spacings. */
@@ -100,6 +101,17 @@ export function methodOf(parameters: ReconstructionParameters | null): Method | 
   return parameters && {
     placement: nameOf(PLACEMENTS, parameters.placement), fill: nameOf(FILLS, parameters.fill),
   };
+}
+
+/** Adds the planes that cut 3D particles: the stream's own, then its sections. */
+export function withSlices(parameters: ReconstructionParameters, planes: readonly SectionPlane[]) {
+  const [own, ...others] = planes.map(({ origin, normal }) => create(SlicePlaneSchema, {
+    originX: origin[0], originY: origin[1], originZ: origin[2],
+    normalX: normal[0], normalY: normal[1], normalZ: normal[2],
+  }));
+  parameters.slice = own;
+  parameters.sections.push(...others.map((slice) => create(SectionSchema, { slice })));
+  return parameters;
 }
 
 /** Parameters of a stream or frame: `base`, overridden by the settings. `spacing`: the spacing that

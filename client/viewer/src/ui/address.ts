@@ -9,6 +9,8 @@ export interface Address {
   panes: PaneAddress[];
   /** Name of the file in the panes without a stream, or empty. The user has to open it. */
   file: string;
+  /** Options of the file (input/options.ts), or empty. */
+  open: string;
   /** Null: the newest frame. */
   frame: number | null;
   view: View | null;
@@ -24,6 +26,7 @@ export function addressText(address: Address): string {
   const [first, ...others] = address.panes;
   add('stream', first?.stream ?? '');
   add('file', address.file);
+  add('open', address.open);
   add('frame', address.frame === null ? '' : String(address.frame));
   const view = address.view;
   add('view', view ? [view.x, view.y, view.scale].map((v) => Number(v.toPrecision(6))).join(',') : '');
@@ -56,6 +59,7 @@ export function parseAddress(hash: string): Address {
   });
   return {
     file,
+    open: file ? values.get('open') ?? '' : '',
     panes: [...first, ...first.length > 0 ? others : []],
     frame: Number.isInteger(frame) ? frame : null,
     view: parseView(values.get('view')),

@@ -1,4 +1,5 @@
 import { Gateway } from '../stream/gateway';
+import { NO_OPTIONS, optionsText, parseOptions } from '../input/options';
 import type { FrameSource } from '../input/source';
 import { FileTrack } from '../stream/file_track';
 import { AS_STREAMED, type Settings } from '../stream/settings';
@@ -6,9 +7,9 @@ import type { Track } from '../stream/track';
 import { WatchTrack } from '../stream/watch_track';
 import { addressText, parseAddress, type Address } from './address';
 import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
-import { button } from './dom';
+import { button, byId, input } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
-import { FilesPanel } from './files_panel';
+import { FilesPanel, type OpenFile } from './files_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
 import { Layout } from './layout';
 import { LookPanel } from './look_panel';
@@ -18,6 +19,7 @@ import { Stage } from './stage';
 import { StatusLine } from './status_line';
 import { StreamsPanel } from './streams_panel';
 import { Theme } from './theme';
+import { TimeLink } from './time_link';
 import { TimePanel } from './time_panel';
 
 const TOKEN_KEY = 'partiemc-token';
@@ -27,6 +29,7 @@ export class App {
   private readonly gateway = new Gateway(new URL(location.origin));
   private readonly layout = new Layout();
   private readonly status = new StatusLine();
+  private readonly link = new TimeLink();
   private readonly look: LookPanel;
   private readonly settings: SettingsPanel;
   private readonly stage: Stage;
@@ -34,6 +37,9 @@ export class App {
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
   private readonly exports: ExportPanel;
+  private readonly files: FilesPanel;
+  /** The files of tracks. */
+  private readonly opened = new Map<Track, OpenFile>();
   private ownAddress = '';
   /** False while the address of the link is read, which must not be overwritten. */
   private isReady = false;
@@ -48,6 +54,7 @@ export class App {
     this.stage = new Stage(this.gateway, this.look.look, {
       chosen: () => this.chosenChanged(),
       moved: () => this.writeAddress(),
+      released: (track) => this.released(track),
     });
     this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
       (cells) => this.cellSizeFor(cells));
@@ -62,9 +69,16 @@ export class App {
     });
     this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
-    new FilesPanel((source) => this.openFile(source),
-                   (text, isError) => this.status.report(text, isError));
+    this.files = new FilesPanel({
+      opened: (source, file) => this.openFile(source, file),
+      asks: () => this.layout.ask(),
+      report: (text, isError, isGone) => this.status.report(text, isError, isGone),
+      optionsOf: (title) => this.linkedFile?.file === title ? parseOptions(this.linkedFile.open) : { ...NO_OPTIONS },
+    });
     button('side-by-side').addEventListener('click', () => this.addBeside());
+    input('linked').addEventListener('change', () => {
+      this.stage.isLinked = this.link.isOn = input('linked').checked;
+    });
     button('fit').addEventListener('click', () => this.fit());
     this.listenForKeys();
     this.streams = this.openStreams();
@@ -137,29 +151,46 @@ export class App {
   }
 
   /** Shows a track in the chosen pane, or in a new first one. */
-  private show(track: Track): void {
+  private show(track: Track, settings: Settings = AS_STREAMED): void {
     const pane = this.stage.chosen;
     if (!pane) {
-      this.stage.add(track, { ...AS_STREAMED });
+      this.stage.add(track, { ...settings });
     } else {
-      pane.setSettings({ ...AS_STREAMED });
+      pane.setSettings({ ...settings });
       this.stage.replace(pane, track);
     }
     this.chosenChanged();
     this.writeAddress();
   }
 
-  /** Shows files; those of the link as the link says. */
-  private openFile(source: FrameSource): void {
-    const address = this.linkedFile;
+  /** Shows files; those of the link as the link says. Files that are shown get their new options. */
+  private openFile(source: FrameSource, file: OpenFile): void {
+    const address = this.linkedFile?.file === source.title ? this.linkedFile : null;
+    const old = [...this.opened].find(([, { input }]) => input === file.input)?.[0];
+    const settings = address?.panes[0].settings ?? old?.settings ?? file.settings ?? AS_STREAMED;
+    const track = new FileTrack(this.gateway, source, { ...settings });
+    this.opened.set(track, file);
     this.layout.chosen();
-    if (!address || address.file !== source.title) {
-      this.show(new FileTrack(this.gateway, source, { ...AS_STREAMED }));
-      return;
+    if (address) {
+      this.linkedFile = null;
+      this.showPanes(address, track);
+    } else if (old) {
+      if (old.player.mode === 'paused') track.player.seek(old.player.sequence ?? 1);
+      this.replaceTrack(old, track);
+    } else {
+      this.show(track, settings);
+      if (file.sequence != null) track.player.seek(file.sequence);
     }
-    this.linkedFile = null;
-    this.showPanes(address, new FileTrack(this.gateway, source, { ...address.panes[0].settings }));
     this.writeAddress();
+  }
+
+  /** Offers a file that no pane shows any more. */
+  private released(track: Track): void {
+    const file = this.opened.get(track);
+    this.opened.delete(track);
+    if (!file || [...this.opened.values()].some(({ input }) => input === file.input)) return;
+    const { mode, sequence } = track.player;
+    this.files.addClosed({ ...file, settings: track.settings, sequence: mode === 'paused' ? sequence : null });
   }
 
   private reportFull(): void {
@@ -198,6 +229,7 @@ export class App {
     const number = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
     const name = this.stage.panes.length > 1 ? `of picture ${number}` : '';
     this.settings.show(pane?.settings ?? AS_STREAMED, name);
+    this.files?.show((pane && this.opened.get(pane.track)) ?? null);
     this.time.refresh();
     this.streams?.setShown(this.stage.tracks.filter(({ kind }) => kind === 'watch').map(({ title }) => title));
     this.writeAddress();
@@ -209,7 +241,10 @@ export class App {
   }
 
   private fit(): void {
-    this.stage.chosen?.fit();
+    const { chosen } = this.stage;
+    if (!chosen) return;
+    chosen.fit();
+    this.stage.linkViews(chosen, true);
   }
 
   private goTo(sequence: number): void {
@@ -256,12 +291,21 @@ export class App {
     }
     this.stage.choose(this.stage.panes[0]);
     if (file) {
-      if (address.frame !== null) file.player.seek(file.sequenceOf(address.frame));
+      if (address.frame !== null) this.seekInFile(file, address.frame);
       return;
     }
     this.linkedFrame = address.frame;
     const track = this.stage.panes[0].track;
     if (address.frame !== null && track instanceof WatchTrack) track.request(address.frame);
+  }
+
+  private seekInFile(file: FileTrack, frame: number): void {
+    const sequence = file.sequenceOf(frame);
+    const { last } = file.range();
+    if (sequence > last) {
+      this.status.report(`The file has no frame ${frame} of the link. Its last frame is ${file.labelOf(last)}.`, true);
+    }
+    file.player.seek(sequence);
   }
 
   private writeAddress(): void {
@@ -271,13 +315,15 @@ export class App {
     // A link opens one file only.
     const panes = this.stage.panes.filter(({ track }) => track.kind === 'watch' || track === file);
     const player = first?.track.player;
-    const isPaused = player?.mode === 'paused';
+    const leader = first && this.link.holds(first.track) ? this.track : first?.track;
+    const isPaused = leader?.player.mode === 'paused';
     const address: Address = {
       panes: panes.map(({ track, settings }, k) => ({
         stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
       })),
       file: file?.title ?? '',
-      frame: isPaused && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
+      open: optionsText((file && this.opened.get(file)?.options) ?? NO_OPTIONS),
+      frame: isPaused && player && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
       view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,
     };
@@ -287,27 +333,38 @@ export class App {
     }
   }
 
-  /** Goes to the frame of the link once it has arrived. */
+  /** Goes to the frame of the link once it has arrived. Until then the first picture says that it waits. */
   private followLink(): void {
     const linked = this.linkedFrame;
-    const track = this.stage.panes[0]?.track;
-    if (linked === null || !track) return;
+    const [pane] = this.stage.panes;
+    if (!pane) return;
+    const { track } = pane;
+    const last = track.range()?.last;
+    pane.note = linked !== null && last !== undefined && linked > last
+      ? `Waiting for frame ${linked} of the link. The newest frame is ${last}.` : '';
+    if (linked === null) return;
     if (track.history.get(linked)) {
       track.player.seek(linked);
       this.linkedFrame = null;
     } else if (track instanceof WatchTrack && track.isGone(linked)) {
       this.status.report(`The server no longer holds frame ${linked}.`, true);
       this.linkedFrame = null;
+    } else if (track.state.kind === 'ended' && last !== undefined && linked > last) {
+      this.status.report(`The stream has ended with frame ${last}, before frame ${linked} of the link.`, true);
+      this.linkedFrame = null;
     }
+    if (this.linkedFrame === null) pane.note = '';
   }
 
   private refresh(now: number): void {
-    for (const track of this.stage.tracks) {
-      const before = track.player.mode;
+    const { tracks } = this.stage;
+    const modes = tracks.map(({ player }) => player.mode);
+    for (const track of tracks) {
       track.player.tick(now);
       track.refresh();
-      if (track.player.mode !== before) this.writeAddress();
     }
+    this.link.refresh(this.track, tracks);
+    if (tracks.some(({ player }, k) => player.mode !== modes[k])) this.writeAddress();
     this.followLink();
     for (const pane of this.stage.panes) pane.refresh(now);
     this.refreshPanels(now);
@@ -315,6 +372,7 @@ export class App {
   }
 
   private refreshPanels(now: number): void {
+    byId('linked-label', HTMLElement).hidden = this.stage.panes.length < 2;
     const pane: Pane | null = this.stage.chosen;
     const isVariant = (pane?.variantStream ?? null) !== null;
     this.look.setAttributes(pane?.scene.channels ?? [], this.track);

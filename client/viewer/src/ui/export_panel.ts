@@ -1,21 +1,29 @@
 import type { Look } from '../draw';
-import { clip, download, geojson, marksOf, png, svg } from '../export';
+import { clip, type Clip, download, geojson, marksOf, png, svg } from '../export';
 import { NO_WEBGL } from '../draw';
 import type { CurveSource } from '../stream/track';
 import { curvesCsv } from './curve_data';
 import { button, input, setText } from './dom';
 import type { Pane } from './pane';
 
-const TITLES: Record<string, string> = {
-  'export-png': 'Saves the picture with legend, scale and time in pixels.',
-  'export-clip': 'Records the picture as a video until the next click.',
-};
+const PNG_TITLE = 'Saves the picture with legend, scale and time in pixels.';
+
+/** The button that records. A running recording can always be stopped. */
+export function clipButton(isRecording: boolean, hasWebgl: boolean): { text: string; title: string; isDisabled: boolean } {
+  if (isRecording) {
+    return { text: 'Stop and save', title: 'Ends the recording and saves the video.', isDisabled: false };
+  }
+  return {
+    text: 'Record clip', isDisabled: !hasWebgl,
+    title: hasWebgl ? 'Records the picture as a video until the next click.' : `${NO_WEBGL} Save the picture as SVG.`,
+  };
+}
 
 export const NO_PICTURE = 'No picture yet. Choose a stream or drop files.';
 
 /** Exports the picture of the chosen pane, and a link to it. */
 export class ExportPanel {
-  private recording: { clip: ReturnType<typeof clip>; pane: Pane } | null = null;
+  private recording: { clip: Clip; pane: Pane } | null = null;
 
   constructor(private readonly pane: () => Pane | null, private readonly look: () => Look,
               private readonly report: (text: string, isError: boolean, isGone?: () => boolean) => void) {
@@ -33,7 +41,11 @@ export class ExportPanel {
       download(this.name(shown, 'geojson'), blob);
     });
     this.on('export-csv', async ({ track, curves }) => downloadCurves(curves, track.title));
-    this.on('export-clip', (shown) => this.toggleClip(shown));
+    button('export-clip').addEventListener('click', () => {
+      // The picture that is recorded may be closed by now.
+      if (this.recording) this.run(this.stopClip(this.recording));
+      else this.withPicture(async (shown) => this.startClip(shown));
+    });
     this.on('copy-link', async () => {
       await this.copyLink();
     });
@@ -41,10 +53,15 @@ export class ExportPanel {
 
   /** Offers only what the browser can export. */
   offer(hasWebgl: boolean): void {
-    for (const id of ['export-png', 'export-clip']) {
-      button(id).disabled = !hasWebgl;
-      button(id).title = hasWebgl ? TITLES[id] : `${NO_WEBGL} Save the picture as SVG.`;
-    }
+    const png = button('export-png');
+    png.disabled = !hasWebgl;
+    png.title = hasWebgl ? PNG_TITLE : `${NO_WEBGL} Save the picture as SVG.`;
+    const { text, title, isDisabled } = clipButton(this.recording !== null, hasWebgl);
+    const clipOf = button('export-clip');
+    clipOf.disabled = isDisabled;
+    clipOf.title = title;
+    clipOf.setAttribute('aria-pressed', String(this.recording !== null));
+    setText(clipOf, text);
   }
 
   /** Browsers allow a page to copy only by HTTPS or from this machine. */
@@ -65,41 +82,36 @@ export class ExportPanel {
   }
 
   private on(id: string, act: (pane: Pane) => Promise<void>): void {
-    button(id).addEventListener('click', () => {
-      const pane = this.pane();
-      if (!pane?.frame) {
-        this.report(NO_PICTURE, true, () => this.pane()?.frame != null);
-        return;
-      }
-      act(pane).catch((error: unknown) => {
-        this.report(error instanceof Error ? error.message : String(error), true);
-      });
+    button(id).addEventListener('click', () => this.withPicture(act));
+  }
+
+  private withPicture(act: (pane: Pane) => Promise<void>): void {
+    const pane = this.pane();
+    if (pane?.frame) this.run(act(pane));
+    else this.report(NO_PICTURE, true, () => this.pane()?.frame != null);
+  }
+
+  private run(action: Promise<void>): void {
+    action.catch((error: unknown) => {
+      this.report(error instanceof Error ? error.message : String(error), true);
     });
   }
 
-  private async toggleClip(pane: Pane): Promise<void> {
-    const running = this.recording;
-    if (running) {
-      this.recording = null;
-      this.showRecording();
-      download(this.name(running.pane, 'webm'), await running.clip.stop());
-    } else {
-      const started = clip(pane.scene, () => this.marks(pane));
-      started.start();
-      this.recording = { clip: started, pane };
-      this.showRecording();
-    }
+  private startClip(pane: Pane): void {
+    const started = clip(pane.scene, () => this.marks(pane));
+    started.start();
+    this.recording = { clip: started, pane };
   }
 
-  private showRecording(): void {
-    const isOn = this.recording !== null;
-    button('export-clip').setAttribute('aria-pressed', String(isOn));
-    setText(button('export-clip'), isOn ? 'Stop and save' : 'Record clip');
+  private async stopClip({ clip: running, pane }: { clip: Clip; pane: Pane }): Promise<void> {
+    this.recording = null;
+    download(this.name(pane, 'webm'), await running.stop());
   }
 
-  /** Caption, scale and legend of the picture. */
-  private marks({ scene, caption }: Pane) {
-    return marksOf(caption, scene.size, scene.view, scene.legend(), this.look().dark);
+  /** Caption, scale, legend, axes and measurement of the picture. */
+  private marks({ scene, caption, measured }: Pane) {
+    const { dark, axes } = this.look();
+    return marksOf(caption, scene.size, scene.view, scene.legend(), dark, { axes, ...measured });
   }
 
   private name(pane: Pane, suffix: string): string {

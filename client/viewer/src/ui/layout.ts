@@ -33,6 +33,9 @@ export class Layout {
     if (this.phone.matches) this.fold(true);
   }
 
+  /** Shows the side panel, which needs an answer of the user. */
+  ask(): void { this.fold(false); }
+
   private fold(isFolded: boolean): void {
     document.body.classList.toggle('folded', isFolded);
     button('fold').setAttribute('aria-expanded', String(!isFolded));

@@ -1,6 +1,6 @@
 import { attachNavigation, Scene, type Look, type Picked } from '../draw';
 import { valuesAt } from '../draw/values';
-import { boundsOf, fitBounds, union, type Bounds } from '../draw/view';
+import { boundsOf, fitBounds, toCss, union, type Bounds } from '../draw/view';
 import type { Frame } from '../protocol/frame';
 import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
@@ -14,7 +14,7 @@ import type { Variant } from '../stream/variant';
 import type { VariantStream } from '../stream/variant_stream';
 import { make, select, setText } from './dom';
 import { count, number } from './format';
-import { Measurement, type MeasureMode } from './measure';
+import { Measurement, type MeasureMode, type Point } from './measure';
 import { Numbers } from './numbers';
 import { Overlay } from './overlay';
 import { paneState, type PaneState, stateName } from './pane_state';
@@ -28,7 +28,9 @@ export interface PaneEvents {
   chosen(pane: Pane): void;
   closed(pane: Pane): void;
   /** The view changed, by the user or because the picture has grown. */
-  moved(pane: Pane): void;
+  moved(pane: Pane, byUser: boolean): void;
+  /** The user selected the ring at a world position, or none. */
+  selected?(pane: Pane, point: Point | null): void;
 }
 
 /** Makes the computations of a pane with other settings than those of its track. */
@@ -42,6 +44,8 @@ export class Pane {
   readonly element: HTMLElement;
   readonly scene: Scene;
   frame: Frame | null = null;
+  /** A notice of the page over the picture, or empty. */
+  note = '';
   /** Whether the view follows the content. False once the user has moved it. */
   isFree = true;
 
@@ -55,7 +59,12 @@ export class Pane {
   private readonly noticeText = make('span');
   private readonly switchButton = make('button', { type: 'button', title: 'Shows the stream that has this name now.' },
     'Switch to the new run');
-  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton);
+  private readonly hideButton = make('button', {
+    type: 'button', class: 'icon', 'aria-label': 'Hide notice', title: 'Hides this notice.',
+  }, '✕');
+  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton, this.hideButton);
+  /** The notice of the files that the user has hidden. */
+  private hiddenNotice = '';
   /** Settings and method of the frame shown. */
   private shownText = '';
   /** Why the frame of the track is refused, or empty. */
@@ -91,6 +100,7 @@ export class Pane {
       this.numbers.element);
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
+    this.hideButton.addEventListener('click', () => { this.hiddenNotice = this.track.notice ?? ''; });
     this.switchButton.addEventListener('click', () => this.track.switchRun?.());
     this.element.addEventListener('pointerdown', () => events.chosen(this));
     this.element.addEventListener('focusin', () => events.chosen(this));
@@ -98,7 +108,7 @@ export class Pane {
     this.detach = attachNavigation(this.canvas, this.scene, () => {
       this.isFree = false;
       this.dirty = true;
-      events.moved(this);
+      events.moved(this, true);
     }, track.kind === 'report');
     this.listenForRings();
     this.observer = new ResizeObserver(() => this.resize());
@@ -192,6 +202,11 @@ export class Pane {
   /** The outlines of the frame. */
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
+  /** The measurement over the picture, for exports. */
+  get measured(): { points: readonly Point[]; text: string } {
+    return { points: this.measurement.points, text: this.measurement.text((identity) => this.areaText(identity)) };
+  }
+
   /** Name, frame, time and settings, for exports. */
   get caption(): string {
     if (!this.frame) return this.track.title;
@@ -221,8 +236,7 @@ export class Pane {
     this.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
-    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement,
-      this.measurement.text((identity) => this.areaText(identity)));
+    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement, this.measured.text);
     this.updateReadout();
   }
 
@@ -252,11 +266,13 @@ export class Pane {
     this.badge.dataset.state = state.kind;
     setText(this.badge, stateName(state, this.track));
     if (this.badge.title !== state.text) this.badge.title = state.text;
-    const isNoted = this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
+    const isOfFiles = state.kind === 'doubtful' && (this.track.notice ?? '') !== '' && this.track.notice !== this.hiddenNotice;
+    const isNoted = this.note !== '' || isOfFiles || this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
       (state.kind === 'waiting' && !this.frame);
     this.notice.hidden = !isNoted || this.track.kind === 'report';
     this.switchButton.hidden = !this.track.hasNewRun;
-    if (isNoted) setText(this.noticeText, state.text);
+    this.hideButton.hidden = !isOfFiles || this.note !== '';
+    if (isNoted) setText(this.noticeText, this.note || (isOfFiles ? this.track.notice ?? '' : state.text));
   }
 
   private get isVariant(): boolean {
@@ -308,7 +324,7 @@ export class Pane {
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
-    if (!this.variant || this.track.kind === 'watch' || isFailed) return;
+    if (!this.variant || this.track.kind === 'watch' || isFailed || !this.track.parameters) return;
     this.variant.request(this.track, sequence, this.settings);
     const { result, problem } = this.variant;
     if (problem && this.frame) this.clear();
@@ -348,7 +364,7 @@ export class Pane {
     if (this.extent && sameBounds(extent, this.extent)) return;
     this.extent = extent;
     this.scene.view = fitBounds(extent, this.scene.size);
-    this.events.moved(this);
+    this.events.moved(this, false);
   }
 
   private async addParticles(frame: Frame): Promise<void> {
@@ -383,7 +399,7 @@ export class Pane {
     this.scene.resize();
     if (this.isFree && this.extent) {
       this.scene.view = fitBounds(this.extent, this.scene.size);
-      this.events.moved(this);
+      this.events.moved(this, false);
     }
     this.dirty = true;
   }
@@ -402,6 +418,7 @@ export class Pane {
       if (event.key === 'Escape') {
         this.measurement.clear();
         this.select(null);
+        this.events.selected?.(this, null);
       }
       if (event.key !== 'Enter') return;
       this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
@@ -421,10 +438,17 @@ export class Pane {
     const mode = select('measure').value as MeasureMode;
     if (mode === 'off') {
       this.select(identity);
+      this.events.selected?.(this, identity === null ? null : [x, y]);
     } else {
       this.measurement.add(mode, [x, y], identity);
       this.dirty = true;
     }
+  }
+
+  /** Selects the ring at a world position, or none. */
+  selectAt(point: Point | null): void {
+    const ring = point && this.scene.pick(...toCss(this.scene.view, this.scene.size, ...point)).ring;
+    this.select(ring === null ? null : this.frame?.rings.identities[ring] ?? null);
   }
 
   private select(identity: bigint | null): void {

@@ -30,7 +30,8 @@ export function paneState(track: Track, refusal: string, doubts: string, isShown
   if (kind === 'busy' || !isShown) {
     return { kind: 'waiting', text: kind === 'busy' ? text : 'Waiting for the frame.' };
   }
-  if (doubts) return { kind: 'doubtful', text: doubts };
+  const warnings = [track.notice ?? '', doubts].filter(Boolean).join(' ');
+  if (warnings) return { kind: 'doubtful', text: warnings };
   return { kind: kind === 'ended' ? 'ended' : 'live', text };
 }
 

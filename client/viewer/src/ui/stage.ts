@@ -5,6 +5,7 @@ import type { Track } from '../stream/track';
 import { Variant } from '../stream/variant';
 import { VariantStream } from '../stream/variant_stream';
 import { byId } from './dom';
+import type { Point } from './measure';
 import { Pane } from './pane';
 
 /** More pictures would be too small to compare. */
@@ -14,11 +15,15 @@ const MOST_PANES = 4;
 export class Stage {
   readonly panes: Pane[] = [];
   chosen: Pane | null = null;
+  /** Whether panes of different tracks share view and selection. */
+  isLinked = true;
   private readonly element = byId('stage', HTMLElement);
 
   constructor(private readonly gateway: Gateway, private look: Look, private readonly events: {
     chosen(): void;
     moved(pane: Pane): void;
+    /** No pane shows the track any more. */
+    released(track: Track): void;
   }) {}
 
   get isFull(): boolean { return this.panes.length >= MOST_PANES; }
@@ -29,7 +34,8 @@ export class Stage {
     const pane = new Pane(track, settings, {
       chosen: (chosen) => this.choose(chosen),
       closed: (closed) => this.close(closed),
-      moved: (moved) => this.linkViews(moved),
+      moved: (moved, byUser) => this.linkViews(moved, byUser),
+      selected: (source, point) => this.linkSelection(source, point),
     }, {
       frame: (changed) => new Variant(this.gateway, changed),
       stream: (of, other) => new VariantStream(this.gateway, of, other),
@@ -73,15 +79,25 @@ export class Stage {
     for (const pane of this.panes) pane.setLook(look);
   }
 
-  /** Panes of the same track share their view. */
-  linkViews(moved: Pane): void {
+  /** Panes of the same track share their view. Linked panes share it as soon as the user moves one. */
+  linkViews(moved: Pane, byUser: boolean): void {
     for (const pane of this.panes) {
-      if (pane !== moved && pane.track === moved.track) pane.setView(moved.scene.view);
+      const isShared = pane.track === moved.track || (byUser && this.isLinked);
+      if (pane !== moved && isShared) pane.setView(moved.scene.view);
     }
     this.events.moved(moved);
   }
 
+  /** Linked panes select the ring at the same place. */
+  private linkSelection(source: Pane, point: Point | null): void {
+    for (const pane of this.panes) {
+      if (pane !== source && this.isLinked) pane.selectAt(point);
+    }
+  }
+
   private release(track: Track): void {
-    if (!this.tracks.includes(track)) track.close();
+    if (this.tracks.includes(track)) return;
+    this.events.released(track);
+    track.close();
   }
 }

@@ -48,14 +48,7 @@ afterEach(async () => {
   assert.deepEqual(errors, [], 'the console has no errors');
 });
 
-/** Drops files and folders on the page. */
-async function drop(...paths) {
-  const session = await viewer.page.context().newCDPSession(viewer.page);
-  const data = { items: [], files: paths, dragOperationsMask: 1 };
-  for (const type of ['dragEnter', 'dragOver', 'drop']) {
-    await session.send('Input.dispatchDragEvent', { type, x: 700, y: 300, data });
-  }
-}
+const drop = (...paths) => viewer.drop(...paths);
 
 const isAll = () => until('all frames are here', async () => await viewer.status() === 'All frames received');
 
@@ -180,11 +173,11 @@ test('a link to a file shows it once it is opened', async () => {
 });
 
 test('unreadable files are reported', async () => {
-  const bad = path.join(world.folder, 'water.vtp');
-  writeFileSync(bad, '<VTKFile/>');
+  const bad = path.join(world.folder, 'water.ply');
+  writeFileSync(bad, 'ply\n');
   viewer = await Viewer.open(browser, world.url);
   await drop(bad);
-  await until('it is told', async () => /water\.vtp cannot be read here.*convert/.test(await viewer.status()));
+  await until('it is told', async () => /water\.ply is a PLY file.*convert/.test(await viewer.status()));
   const broken = path.join(world.folder, 'broken.csv');
   writeFileSync(broken, 'x,y\n1,2\n3\n');
   await drop(broken);

@@ -308,3 +308,17 @@ test('a clip is recorded', async () => {
   assert.equal(bytes.readUInt32BE(0), 0x1a45dfa3, 'the magic number of EBML');
   assert.ok(bytes.length > 5000, `${bytes.length} bytes`);
 });
+
+test('a clip is saved after its picture was closed', async () => {
+  await open();
+  await viewer.shows(5);
+  await viewer.button('Side by side').click();
+  await until('both are shown', async () => await viewer.frame(1) > 0);
+  await viewer.button('Record clip').click();
+  await until('it records', async () => await viewer.button('Stop and save').count() === 1);
+  await viewer.button('Close picture 2').click();
+  const [download] = await Promise.all([
+    viewer.page.waitForEvent('download'), viewer.button('Stop and save').click()]);
+  assert.match(download.suggestedFilename(), /\.webm$/);
+  await until('it can record again', async () => await viewer.button('Record clip').count() === 1);
+});

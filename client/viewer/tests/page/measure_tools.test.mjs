@@ -1,6 +1,6 @@
 // Values at the pointer, measurements and axes. Leaves a screenshot in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { launch, screenshots, until, Viewer, World } from './support.mjs';
@@ -42,6 +42,17 @@ const readout = () => viewer.pane().locator('.readout').textContent();
 const result = () => viewer.pane().locator('.overlay .result').textContent();
 const measure = (mode) => viewer.page.getByLabel('Measure', { exact: true }).selectOption(mode);
 
+/** Pixels of a PNG with the colour of measurements. */
+const blueDots = (png) => viewer.page.evaluate(async (bytes) => {
+  const image = await createImageBitmap(new Blob([new Uint8Array(bytes)], { type: 'image/png' }));
+  const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+  context.drawImage(image, 0, 0);
+  const { data } = context.getImageData(0, 0, image.width, image.height);
+  let count = 0;
+  for (let k = 0; k < data.length; k += 4) count += data[k] === 0x0b && data[k + 1] === 0x5c && data[k + 2] === 0xad;
+  return count;
+}, [...png]);
+
 test('the tooltip at the pointer has identity, values and coordinates', async () => {
   await viewer.page.mouse.move(...at(0.75, 0.5));
   await until('it has the values', async () => /ring \d+: area[^]*p 0\.7/.test(await readout()));
@@ -70,6 +81,16 @@ test('clicks measure a distance, an angle and a ring', async () => {
   await until('coordinates', async () => await viewer.pane().locator('.overlay .axis').count() >= 6);
   await viewer.page.mouse.move(...at(0.3, 0.7));
   await viewer.page.screenshot({ path: path.join(screenshots, 'measure.png') });
+  for (const name of ['SVG', 'PNG']) {
+    const [download] = await Promise.all([viewer.page.waitForEvent('download'), viewer.button(name).click()]);
+    await download.saveAs(path.join(screenshots, `measure_export.${name.toLowerCase()}`));
+  }
+  const exported = readFileSync(path.join(screenshots, 'measure_export.svg'), 'utf8');
+  assert.ok(exported.includes(`>${await result()}<`), 'the angle is in the export');
+  assert.equal(exported.match(/<circle /g).length, 3);
+  const labels = await viewer.pane().locator('.overlay text').allTextContents();
+  for (const label of labels) assert.ok(exported.includes(`>${label}</text>`), `the coordinate ${label} is in the export`);
+  assert.ok(await blueDots(readFileSync(path.join(screenshots, 'measure_export.png'))) > 100, 'the lines are in the pixels');
   await viewer.pane().locator('canvas').focus();
   await viewer.page.keyboard.press('Escape');
   await until('it is gone', async () => await viewer.pane().locator('.overlay .measure').count() === 0);

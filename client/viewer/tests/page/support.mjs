@@ -25,7 +25,7 @@ export const CHROMIUM_FLAGS = [
 ];
 
 /** Timeout of short operations. Long, because tests share their machine. */
-export const PATIENCE_MS = 60_000;
+export const PATIENCE_MS = Number(process.env.PATIENCE_MS ?? 60_000);
 
 /** Waits until `value()` is truthy, and returns it. */
 export async function until(what, value, patienceMs = PATIENCE_MS) {
@@ -196,6 +196,20 @@ export class Viewer {
   }
 
   status() { return this.page.getByRole('status').textContent(); }
+
+  /** Drops files and folders on the page. */
+  async drop(...paths) {
+    const session = await this.page.context().newCDPSession(this.page);
+    const data = { items: [], files: paths, dragOperationsMask: 1 };
+    for (const type of ['dragEnter', 'dragOver', 'drop']) {
+      await session.send('Input.dispatchDragEvent', { type, x: 300, y: 300, data });
+    }
+  }
+
+  /** Waits until all frames of dropped files are here. */
+  allFrames() {
+    return until('all frames are here', async () => /All frames received/.test(await this.pane().locator('.state').getAttribute('title')));
+  }
 
   /** Waits until a frame after `sequence` is shown. */
   async shows(sequence = 0, k = 0) {

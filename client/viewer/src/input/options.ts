@@ -1,0 +1,119 @@
+// The options of opening files: the same texts as the options of `partiemc replay`.
+import type { SectionPlane } from '../protocol/sections';
+import { InputError } from './source';
+
+export const FILE_FIELDS = ['spacing', 'columns', 'select', 'slice'] as const;
+export type FileField = typeof FILE_FIELDS[number];
+
+/** Empty: the default. */
+export type FileOptions = Record<FileField, string>;
+
+export const NO_OPTIONS: Readonly<FileOptions> = { spacing: '', columns: '', select: '', slice: '' };
+
+/** Content of files, for the defaults of their options. */
+export interface FileFacts {
+  /** World units: of the recording, or estimated for 3D particles. Empty: the server estimates it. */
+  spacing: string;
+  /** Columns that hold the positions, separated by commas. Empty: they are not recognised. */
+  columns: string;
+  /** Names of all columns. Empty: a recording. */
+  names: string[];
+  /** Filters that keep a part of the particles, such as `type=1`. */
+  filters: string[];
+  /** A plane through the middle of 3D particles. Empty: the particles are 2D. */
+  slice: string;
+}
+
+/** Error of one option. */
+export class FieldError extends InputError {
+  constructor(readonly field: FileField, message: string) { super(message); }
+}
+
+/** A condition on a column. */
+export interface Condition { column: string; text: string; number: number }
+
+/** The options that choose columns and rows. */
+export interface ColumnRequest { columns: readonly string[]; conditions: readonly Condition[] }
+
+export const ALL_COLUMNS: ColumnRequest = { columns: [], conditions: [] };
+
+/** Parses the columns `x,y` and the filter `type=1`, of which there can be several. Throws FieldError. */
+export function parseRequest({ columns, select }: FileOptions): ColumnRequest {
+  return {
+    columns: listOf(columns).map((name) => {
+      if (name === '') throw new FieldError('columns', 'Write names or numbers of columns, for example x,y or 2,3.');
+      return name;
+    }),
+    conditions: listOf(select).map((text) => {
+      const at = text.indexOf('=');
+      const [column, value] = [text.slice(0, at).trim(), text.slice(at + 1).trim()];
+      if (at < 1 || column === '' || value === '') {
+        throw new FieldError('select', 'Write a column and its value, for example type=1.');
+      }
+      return { column, text: value, number: Number(value) };
+    }),
+  };
+}
+
+function listOf(text: string): string[] {
+  return text.trim() === '' ? [] : text.split(',').map((part) => part.trim());
+}
+
+/** A length in world units; null for the default. Throws FieldError. */
+export function parseSpacing(text: string): number | null {
+  if (text.trim() === '') return null;
+  const value = Number(text);
+  if (!(Number.isFinite(value) && value > 0)) {
+    throw new FieldError('spacing', 'The spacing must be a positive length, for example 0.02.');
+  }
+  return value;
+}
+
+/** Planes `z=0.5` or `OX,OY,OZ,NX,NY,NZ`, separated by semicolons. Throws FieldError. */
+export function parseSlices(text: string): SectionPlane[] {
+  if (text.trim() === '') return [];
+  return text.split(';').map((part) => {
+    const plane = planeOf(part.trim());
+    if (!plane) {
+      throw new FieldError('slice', 'Write a plane as x=C, y=C, z=C, or as a point and a normal OX,OY,OZ,NX,NY,NZ.');
+    }
+    return plane;
+  });
+}
+
+function planeOf(text: string): SectionPlane | null {
+  const [, axis, at] = /^([xyz])\s*=\s*(\S+)$/.exec(text) ?? [];
+  if (axis) {
+    const k = 'xyz'.indexOf(axis);
+    const place = [0, 0, 0];
+    place[k] = Number(at);
+    // With this sign of the normal, the picture has the two other axes in alphabetical order.
+    const normal = [0, 0, 0];
+    normal[k] = axis === 'y' ? -1 : 1;
+    return Number.isFinite(place[k]) ? { origin: triple(place), normal: triple(normal) } : null;
+  }
+  const numbers = text.split(',').map((part) => part.trim() === '' ? NaN : Number(part));
+  const isPlane = numbers.length === 6 && numbers.every(Number.isFinite) && numbers.slice(3).some((part) => part !== 0);
+  return isPlane ? { origin: triple(numbers), normal: triple(numbers.slice(3)) } : null;
+}
+
+function triple([x, y, z]: number[]): [number, number, number] {
+  return [x, y, z];
+}
+
+/** Options in the page's address: `spacing:0.02;slice:z=0.5`. Semicolons of planes become `|`. */
+export function optionsText(options: FileOptions): string {
+  return FILE_FIELDS.filter((field) => options[field] !== '')
+    .map((field) => `${field}:${options[field].replaceAll(';', '|')}`).join(';');
+}
+
+/** The inverse of optionsText. Ignores unknown names. */
+export function parseOptions(text: string): FileOptions {
+  const options = { ...NO_OPTIONS };
+  for (const part of text.split(';')) {
+    const at = part.indexOf(':');
+    const field = FILE_FIELDS.find((name) => name === part.slice(0, at));
+    if (field) options[field] = part.slice(at + 1).replaceAll('|', ';');
+  }
+  return options;
+}

@@ -1,0 +1,73 @@
+import type { FileInput } from '../input/drop';
+import { FILE_FIELDS, type FieldError, type FileField, type FileOptions, NO_OPTIONS } from '../input/options';
+import { byId, input, setText } from './dom';
+
+const fieldOf = (field: FileField) => input(`file-${field}`);
+const errorOf = (field: FileField) => byId(`file-${field}-error`, HTMLElement);
+
+/** The options of a file: spacing, columns, filter and plane, with the defaults that the file shows. */
+export class FileForm {
+  private readonly details = byId('file-details', HTMLDetailsElement);
+  private file: FileInput | null = null;
+
+  /** `submitted`: opens the file with options, and throws FieldError. */
+  constructor(private readonly submitted: (file: FileInput, options: FileOptions) => void) {
+    byId('file-options', HTMLFormElement).addEventListener('submit', (event) => {
+      event.preventDefault();
+      this.clearErrors();
+      if (this.file) this.submitted(this.file, this.options);
+    });
+  }
+
+  /** Shows the options of a file, or nothing. */
+  show(file: FileInput | null, options: FileOptions): void {
+    this.details.open = this.details.open && file === this.file;
+    this.details.hidden = file === null;
+    this.file = file;
+    this.clearErrors();
+    if (!file) return;
+    const { facts, title } = file;
+    const isRecording = facts.names.length === 0;
+    setText(byId('file-title', HTMLElement), `Options of ${title}`);
+    setText(byId('file-names', HTMLElement), isRecording ? '' : `Columns: ${facts.names.join(', ')}`);
+    fieldOf('spacing').placeholder = facts.spacing || 'estimated';
+    fieldOf('columns').placeholder = facts.columns || 'x,y';
+    fieldOf('slice').placeholder = facts.slice || 'z=0';
+    byId('file-filters', HTMLDataListElement).replaceChildren(...facts.filters.map((filter) => new Option(filter, filter)));
+    for (const field of FILE_FIELDS) {
+      fieldOf(field).value = options[field];
+      const isOffered = field === 'spacing' || (field === 'slice' ? facts.slice !== '' || facts.columns === '' : !isRecording);
+      for (const label of fieldOf(field).labels ?? []) label.hidden = !isOffered;
+      fieldOf(field).hidden = !isOffered;
+    }
+  }
+
+  /** Asks for the option that is missing or wrong. Proposes the defaults of the file. */
+  ask({ field, message }: FieldError): void {
+    const facts = this.file?.facts;
+    this.details.open = true;
+    if (facts && facts.slice !== '') {
+      for (const name of ['slice', 'spacing'] as const) fieldOf(name).value ||= facts[name];
+    }
+    for (const label of fieldOf(field).labels ?? []) label.hidden = false;
+    fieldOf(field).hidden = false;
+    fieldOf(field).setAttribute('aria-invalid', 'true');
+    errorOf(field).hidden = false;
+    setText(errorOf(field), message);
+    fieldOf(field).focus();
+  }
+
+  private clearErrors(): void {
+    for (const field of FILE_FIELDS) {
+      fieldOf(field).removeAttribute('aria-invalid');
+      errorOf(field).hidden = true;
+      setText(errorOf(field), '');
+    }
+  }
+
+  private get options(): FileOptions {
+    const options = { ...NO_OPTIONS };
+    for (const field of FILE_FIELDS) options[field] = fieldOf(field).value.trim();
+    return options;
+  }
+}
