@@ -23,6 +23,7 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space/thinning.h"
 #include "space/vertices.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/virtual_plane.h"
@@ -40,6 +41,7 @@ struct SurfaceWorkspace::Buffers {
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
   space::Certificate certificate;
+  std::vector<space::ThinQuad> thin;  // Empty for marching cubes.
   space::MeshScratch mesh;
 };
 
@@ -117,6 +119,7 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
   space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  b.thin.clear();
   for (Vec3& position : b.positions) position = cell_size * position;
   space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
 }
@@ -146,8 +149,9 @@ bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
 
 /// Quads between vertices that leave their anchors, certified with the final coordinates. Leaves
 /// positions in world units.
-absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
+absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale& scale,
                                 SurfaceWorkspace::Buffers& b) {
+  const SurfacePlacement placement = parameters.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
   space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
@@ -167,7 +171,9 @@ absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
     if (!certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions, b.certificate)) {
       return absl::InternalError("a face is refused although its vertices are at their anchors");
     }
-    space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
+    space::FindThinEdges(bricks, b.crossings, scale.cell_size, b.certificate, b.positions,
+                         parameters.thinning_distance * scale.spacing, b.thin);
+    space::EmitQuads(bricks, b.crossings, b.certificate, b.thin, b.mesh.triangles);
     if (round == rounds || !CorrectVolumes(scale, b)) break;
   }
   return absl::OkStatus();
@@ -188,11 +194,21 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
-  const double volume = parameters.min_component_volume;
-  if (!(volume >= 0 && std::isfinite(volume))) {
+  const auto check = [](double value, const char* field, const char* rule) {
+    if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
     return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters.min_component_volume",
-                           ShortestNumber(volume), "must be 0 or more cubed spacings, and finite"});
+                          {std::string(kReasonOutOfRange), field, ShortestNumber(value), rule});
+  };
+  if (absl::Status status =
+          check(parameters.min_component_volume, "parameters.min_component_volume",
+                "must be 0 or more cubed spacings, and finite");
+      !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = check(parameters.thinning_distance, "parameters.thinning_distance",
+                                  "must be 0 or more spacings, and finite");
+      !status.ok()) {
+    return status;
   }
   return SurfaceReconstructor(parameters, limits);
 }
@@ -215,11 +231,11 @@ absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorksp
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
   if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
     PlaceByMarchingCubes(cell_size, b);
-  } else if (status = PlaceMovedVertices(parameters_.placement, scale, b); !status.ok()) {
+  } else if (status = PlaceMovedVertices(parameters_, scale, b); !status.ok()) {
     return status;
   }
-  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
-                         surface);
+  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
+                         b.mesh, surface);
   surface.statistics = statistics;
   return absl::OkStatus();
 }

@@ -88,6 +88,10 @@ struct SurfaceParameters {
   /// `kVirtualPlane`, off for the other placements.
   std::optional<bool> clean = std::nullopt;
 
+  /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
+  /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
+  double thinning_distance = .02;
+
   /// Spray: drops bodies whose particles have less volume than this, in cubed spacings, or are
   /// fewer than this. At least 0; 0 keeps all.
   double min_component_volume = 0;

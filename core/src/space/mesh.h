@@ -14,6 +14,14 @@
 
 namespace partiemc::space {
 
+/// A quad of cell vertices that replaces the vertex of an edge (thinning.h): counter-clockwise as
+/// seen from outside, cut from the first corner to the third.
+struct ThinQuad {
+  std::array<std::uint32_t, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
+
+  bool IsEmpty() const { return corners[0] == kNoIndex; }
+};
+
 /// What the assembly of a surface needs.
 struct MeshInput {
   const BrickDirectory& bricks;
@@ -22,6 +30,7 @@ struct MeshInput {
   const Bodies& bodies;
   std::span<const Vec3> positions;  ///< By vertex, world units.
   std::span<const Vec3> normals;    ///< By vertex, unit length.
+  std::span<const ThinQuad> thin;   ///< By vertex on an edge; empty: all stay.
 };
 
 using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertices of SpaceCrossings.

@@ -1,7 +1,10 @@
 // Surfaces of random signs and of random particles keep S1 to S5.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <span>
 #include <utility>
@@ -14,6 +17,7 @@
 #include "space/crossings.h"
 #include "space/mesh.h"
 #include "space/space_particles.h"
+#include "space/thinning.h"
 #include "space/vertices.h"
 
 namespace partiemc {
@@ -125,7 +129,7 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
     space::AverageNormals(positions, scratch.triangles, normals);
     Surface surface;
     space::AssembleSurface(
-        {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
+        {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals, {}},
         scratch, surface);
     const absl::Status status = Validate(surface);
     ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
@@ -135,12 +139,16 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
 struct Moved {
   absl::Status status;         // Of Validate.
   std::uint32_t returned = 0;  // Vertices that were moved back.
+  std::size_t dropped = 0;     // Vertices that thinning dropped.
 };
 
-/// Moves vertices at random, certifies, and checks the surface. Without the certificate all quads
-/// are cut along faces.
+// Drops every vertex that the certificate allows to drop.
+constexpr double kAnyDistance = 1e9;
+
+/// Moves vertices at random, certifies, drops vertices on edges, and checks the surface. Without
+/// the certificate all quads are cut along faces, and no vertex is dropped.
 Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random& random,
-                   bool is_certified = true) {
+                   double thinning_distance, bool is_certified = true) {
   std::vector<Vec3> anchors, normals;
   const space::BrickDirectory& bricks = signs.bins.bricks;
   space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
@@ -173,39 +181,55 @@ Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random
     EXPECT_EQ(refused(), 0u);
   }
   space::MeshScratch scratch;
-  space::EmitQuads(bricks, signs.crossings, certificate, scratch.triangles);
+  std::vector<space::ThinQuad> thin;
+  space::FindThinEdges(bricks, signs.crossings, 1, certificate, positions, thinning_distance, thin);
+  space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
   space::AverageNormals(positions, scratch.triangles, normals);
   Surface surface;
-  space::AssembleSurface({bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
-                         scratch, surface);
-  return {Validate(surface), certificate.returned};
+  space::AssembleSurface(
+      {bricks, signs.field, signs.crossings, signs.bodies, positions, normals, thin}, scratch,
+      surface);
+  const auto dropped = std::count_if(thin.begin(), thin.end(),
+                                     [](const space::ThinQuad& quad) { return !quad.IsEmpty(); });
+  return {Validate(surface), certificate.returned, static_cast<std::size_t>(dropped)};
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
   const std::uint64_t frames = Frames(60);
   int intersections = 0;
+  std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const RandomSigns signs(seed);
     Random random(seed);
     // No face is refused at the anchors.
-    const Moved anchored = MoveVertices(signs, 0, 1, random);
+    const Moved anchored = MoveVertices(signs, 0, 1, random, kAnyDistance);
     ASSERT_TRUE(anchored.status.ok()) << anchored.status.message() << ", seed " << seed;
     ASSERT_EQ(anchored.returned, 0u);
     for (const auto& [amount, share] : {std::pair(.3, 1.0), {1.5, .2}, {3.0, .05}}) {
-      Random same = random;
-      const Moved moved = MoveVertices(signs, amount, share, random);
-      ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
-      intersections += !MoveVertices(signs, amount, share, same, false).status.ok();
+      for (const double distance : {0.0, .1, kAnyDistance}) {
+        Random same = random;
+        const Moved moved = MoveVertices(signs, amount, share, same, distance);
+        ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
+        (distance == kAnyDistance ? dropped_anyhow : dropped) += moved.dropped;
+        if (distance == 0) {
+          ASSERT_EQ(moved.dropped, 0u);
+        }
+      }
+      intersections += !MoveVertices(signs, amount, share, random, 0, false).status.ok();
     }
   }
   // The same vertices do intersect without the certificate.
   EXPECT_GT(intersections, static_cast<int>(frames));
+  EXPECT_GT(dropped, 10 * frames);
+  EXPECT_GT(dropped_anyhow, 2 * dropped);
 }
 
 class SpaceFrames : public ::testing::TestWithParam<SurfacePlacement> {};
 
 TEST_P(SpaceFrames, KeepS1ToS5) {
   const auto plain = SurfaceReconstructor::Create({.placement = GetParam(), .clean = false});
+  const auto thin = SurfaceReconstructor::Create(
+      {.placement = GetParam(), .clean = false, .thinning_distance = kAnyDistance});
   const auto cleaned = SurfaceReconstructor::Create(
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
@@ -217,13 +241,13 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
     Frame frame = particles.AsFrame();
     const std::vector<float> floats(particles.xyz.begin(), particles.xyz.end());
     if (seed % 4 == 1) frame.positions = std::span<const float>(floats);
-    const auto& reconstructor = seed % 3 == 0 ? cleaned : plain;
+    const auto& reconstructor = seed % 3 == 0 ? cleaned : seed % 3 == 1 ? plain : thin;
     ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
     const absl::Status status = Validate(surface);
     ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
     triangles += surface.TriangleCount();
   }
-  EXPECT_GT(triangles, 500 * frames);
+  EXPECT_GT(triangles, 400 * frames);
 }
 
 TEST_P(SpaceFrames, HaveTheSameBitsForAnyOrderAndHistory) {
@@ -250,6 +274,9 @@ TEST(SurfaceReconstructor, RefusesBadInput) {
   EXPECT_FALSE(SurfaceReconstructor::Create({.spacing = 0}).ok());
   EXPECT_FALSE(SurfaceReconstructor::Create({.kernel_radius = 9}).ok());
   EXPECT_FALSE(SurfaceReconstructor::Create({.cell_size = .1}).ok());
+  for (const double distance : {-.01, std::nan(""), HUGE_VAL}) {
+    EXPECT_FALSE(SurfaceReconstructor::Create({.thinning_distance = distance}).ok());
+  }
   const auto reconstructor = SurfaceReconstructor::Create({});
   ASSERT_TRUE(reconstructor.ok());
   SurfaceWorkspace workspace;
