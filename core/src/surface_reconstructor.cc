@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
 #include "base/vec3.h"
 #include "frame/calibration.h"
@@ -23,6 +24,7 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space/surface_bytes.h"
 #include "space/thinning.h"
 #include "space/vertices.h"
 #include "space_vertices/qef.h"
@@ -103,6 +105,7 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
         space::FillCavities(b.bins.bricks, most_nodes, b.cleaning, b.field);
   }
   const double h = parameters.spacing;
+  ThrowIfCancelled();
   space::FindBodies(frame, b.bins, b.field, h, b.bodies);
   const space::DroppedBodies dropped =
       space::DropBodies({.drops_empty = is_cleaned,
@@ -112,6 +115,18 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
   statistics.dropped_components = dropped.empty;
   statistics.dropped_spray = dropped.spray;
   return statistics;
+}
+
+/// RESOURCE_EXHAUSTED if the guard refuses the memory of a surface.
+absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
+  const std::uint64_t bytes = space::SurfaceBytes(size);
+  if (guard == nullptr || guard->Reserve(bytes)) return absl::OkStatus();
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonOutOfMemory), "positions",
+       absl::StrCat(size.bricks, " bricks of 8 x 8 x 8 nodes"),
+       absl::StrCat("must fit into the memory budget, but needs ", (bytes >> 20) + 1,
+                    " MiB: reach fewer bricks, or try again later")});
 }
 
 /// Triangles between the crossings of the edges. Leaves positions in world units.
@@ -167,6 +182,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
   const int rounds = placement == SurfacePlacement::kVirtualPlane ? kVolumeRounds : 0;
   for (int round = 0;; ++round) {
+    ThrowIfCancelled();
     const auto certify = round == 0 ? space::Certify : space::CertifyAgain;
     if (!certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions, b.certificate)) {
       return absl::InternalError("a face is refused although its vertices are at their anchors");
@@ -214,26 +230,58 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
 }
 
 absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorkspace& workspace,
-                                               Surface& surface) const {
+                                               Surface& surface,
+                                               const FrameControl& control) const {
+  const CancellationScope scope(control.cancelled);
   surface.Clear();
-  SurfaceWorkspace::Buffers& b = workspace.buffers();
+  absl::Status status;
+  try {
+    status = ReconstructOrThrow(frame, workspace.buffers(), surface, control.memory);
+  } catch (...) {
+    // The buffers may be in any state.
+    workspace = SurfaceWorkspace();
+    surface.Clear();
+    try {
+      throw;
+    } catch (const Cancelled&) {
+      return absl::CancelledError("the frame was cancelled");
+    }
+  }
+  if (!status.ok()) surface.Clear();
+  return status;
+}
+
+absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
+                                                      SurfaceWorkspace::Buffers& b,
+                                                      Surface& surface, MemoryGuard* memory) const {
   absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
   if (!status.ok() || frame.ParticleCount() == 0) return status;
+  ThrowIfCancelled();
+  const SurfacePlacement placement = parameters_.placement;
   const double cell_size = parameters_.cell_size * parameters_.spacing;
   const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
                                 LightestVolume(frame, parameters_.spacing));
-  status = space::BinParticles(frame, scale, limits_, b.bins);
+  status = space::FindBricks(frame, scale, limits_, b.bins);
   if (!status.ok()) return status;
   const space::BrickDirectory& bricks = b.bins.bricks;
+  space::SurfaceSize size{.particles = frame.ParticleCount(), .bricks = bricks.size()};
+  if (status = Reserve(size, memory); !status.ok()) return status;
+  ThrowIfCancelled();
+  space::SortParticles(frame, scale, b.bins);
   space::SampleField(b.bins, scale, b.field);
   const SurfaceStatistics statistics = FindCleanBodies(frame, parameters_, b);
   space::FindCrossings(bricks, b.field, b.crossings);
+  size.edges = b.crossings.edge_count;
+  if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
+  size.has_windows = placement == SurfacePlacement::kVirtualPlane;
+  if (status = Reserve(size, memory); !status.ok()) return status;
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
-  if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
+  if (placement == SurfacePlacement::kMarchingCubes) {
     PlaceByMarchingCubes(cell_size, b);
   } else if (status = PlaceMovedVertices(parameters_, scale, b); !status.ok()) {
     return status;
   }
+  ThrowIfCancelled();
   space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
                          b.mesh, surface);
   surface.statistics = statistics;

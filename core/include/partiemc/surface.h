@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
 
 namespace partiemc {
 
@@ -126,13 +127,18 @@ class SurfaceReconstructor {
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
   /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// Errors with a Violation: as Reconstructor, but there is no memory guard and no cancellation.
-  /// `surface` is then empty. After an exception (std::bad_alloc) surface and workspace must be
-  /// replaced.
-  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
+  /// `control.memory` is asked twice: for the bricks, then with the full estimate. No stage is
+  /// reported to `control.observer`.
+  /// Errors as Reconstructor. On an error or exception (std::bad_alloc) `surface` is empty. After
+  /// CANCELLED or an exception `workspace` is empty, too.
+  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface,
+                           const FrameControl& control = {}) const;
 
  private:
   SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
+
+  absl::Status ReconstructOrThrow(const Frame& frame, SurfaceWorkspace::Buffers& buffers,
+                                  Surface& surface, MemoryGuard* memory) const;
 
   SurfaceParameters parameters_;
   ReconstructionParameters in_space_;  // Resolved, as the stages take them.

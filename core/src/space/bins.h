@@ -44,11 +44,23 @@ struct SpaceBins {
   void Clear();
 };
 
-/// Sorts particles; bricks exist wherever a node lies within the kernel radius and one cell of a
-/// particle. Requires: CheckFrame has passed the frame for a slice, three components.
+/// Finds the home bricks of particles, and adds the other bricks: they exist wherever a node lies
+/// within the kernel radius and one cell of a particle. Nothing is stored on bricks yet. Requires:
+/// CheckFrame has passed the frame for a slice, three components.
 /// Errors with a Violation: OUT_OF_RANGE positions beyond 2^30 cells from the origin;
 /// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
-absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                          SpaceBins& bins);
+absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                        SpaceBins& bins);
+
+/// Sorts the particles. Requires: FindBricks.
+void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);
+
+/// Both.
+inline absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                                 SpaceBins& bins) {
+  absl::Status status = FindBricks(frame, scale, limits, bins);
+  if (status.ok()) SortParticles(frame, scale, bins);
+  return status;
+}
 
 }  // namespace partiemc::space
