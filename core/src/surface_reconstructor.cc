@@ -22,6 +22,7 @@
 #include "space/certificate.h"
 #include "space/cleaning.h"
 #include "space/crossings.h"
+#include "space/drops.h"
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/surface_bytes.h"
@@ -44,6 +45,7 @@ struct SurfaceWorkspace::Buffers {
   space::VirtualPlaneScratch virtual_plane;
   space::Certificate certificate;
   std::vector<space::ThinQuad> thin;  // Empty for marching cubes.
+  space::Drops drops;
   space::MeshScratch mesh;
 };
 
@@ -282,8 +284,22 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
     return status;
   }
   ThrowIfCancelled();
+  const double h = parameters_.spacing;
+  b.drops.drops.clear();
+  if (placement == SurfacePlacement::kVirtualPlane) {
+    space::ReplaceDrops(
+        {frame, b.bins, scale, b.bodies, b.certificate.nodes, b.virtual_plane.volumes.body_of},
+        {.most_particles = parameters_.max_drop_particles,
+         .least_particles = parameters_.min_component_particles,
+         .least_volume = parameters_.min_component_volume * h * h * h},
+        b.drops, b.positions, b.normals, b.mesh.triangles);
+  }
   space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
                          b.mesh, surface);
+  for (const space::Drops::Drop& drop : b.drops.drops) {
+    if (!drop.is_taken) continue;
+    surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
+  }
   surface.statistics = statistics;
   return absl::OkStatus();
 }

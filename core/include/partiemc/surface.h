@@ -93,6 +93,10 @@ struct SurfaceParameters {
   /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
   double thinning_distance = .02;
 
+  /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
+  /// particles, where nothing else is near. 0: none. Only for `kVirtualPlane`.
+  std::uint64_t max_drop_particles = 30;
+
   /// Spray: drops bodies whose particles have less volume than this, in cubed spacings, or are
   /// fewer than this. At least 0; 0 keeps all.
   double min_component_volume = 0;

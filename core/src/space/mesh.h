@@ -28,7 +28,7 @@ struct MeshInput {
   const SpaceField& field;
   const SpaceCrossings& crossings;
   const Bodies& bodies;
-  std::span<const Vec3> positions;  ///< By vertex, world units.
+  std::span<const Vec3> positions;  ///< By vertex, then of drops (drops.h). World units.
   std::span<const Vec3> normals;    ///< By vertex, unit length.
   std::span<const ThinQuad> thin;   ///< By vertex on an edge; empty: all stay.
 };
