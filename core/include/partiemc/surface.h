@@ -91,7 +91,7 @@ struct SurfaceParameters {
 
   /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
   /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
-  double thinning_distance = .02;
+  double thinning_distance = .03;
 
   /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
   /// particles, where nothing else is near. 0: none. Only for `kVirtualPlane`.
