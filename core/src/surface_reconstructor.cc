@@ -22,12 +22,12 @@
 #include "space/certificate.h"
 #include "space/cleaning.h"
 #include "space/crossings.h"
-#include "space/drops.h"
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/surface_bytes.h"
 #include "space/thinning.h"
 #include "space/vertices.h"
+#include "space_vertices/drops.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/virtual_plane.h"
 

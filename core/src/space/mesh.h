@@ -28,9 +28,10 @@ struct MeshInput {
   const SpaceField& field;
   const SpaceCrossings& crossings;
   const Bodies& bodies;
-  std::span<const Vec3> positions;  ///< By vertex, then of drops (drops.h). World units.
-  std::span<const Vec3> normals;    ///< By vertex, unit length.
-  std::span<const ThinQuad> thin;   ///< By vertex on an edge; empty: all stay.
+  std::span<const Vec3>
+      positions;  ///< By vertex, then of drops (space_vertices/drops.h). World units.
+  std::span<const Vec3> normals;   ///< By vertex, unit length.
+  std::span<const ThinQuad> thin;  ///< By vertex on an edge; empty: all stay.
 };
 
 using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertices of SpaceCrossings.

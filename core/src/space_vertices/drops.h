@@ -1,9 +1,9 @@
 // Replaces the surfaces of drops by ellipsoids, which keep their volume and follow their particles.
 //
 // The level set of a few particles encloses few nodes or none. The surface of such a drop depends
-// on its place in the lattice, its volume is wrong, and it trembles as it moves. An ellipsoid with
-// the moments of its particles does not. It is taken where nothing else is near: its box and that
-// of the former surface together touch no other triangle (core/SURFACES.md, "Drops").
+// on its place in the lattice. Its volume is wrong, and it trembles as it moves. An ellipsoid with
+// the moments of its particles does not. A drop keeps its surface where others are near: the box of
+// the ellipsoid and of the former surface must touch no other triangle (core/SURFACES.md, "Drops").
 #pragma once
 
 #include <array>
@@ -23,9 +23,10 @@
 namespace partiemc::space {
 
 struct DropLimits {
-  std::uint64_t most_particles = 0;   ///< Of a drop.
-  std::uint64_t least_particles = 0;  ///< Of a particle without a body, as of bodies.
-  double least_volume = 0;            ///< Likewise, world units cubed.
+  std::uint64_t most_particles = 0;  ///< Larger bodies keep their surfaces.
+  /// A particle without a body stays without a surface if these exclude bodies of one particle.
+  std::uint64_t least_particles = 0;
+  double least_volume = 0;  ///< World units cubed.
 };
 
 struct DropsInput {
@@ -46,12 +47,12 @@ struct Drops {
     std::uint64_t particles = 0;
     double volume = 0;   ///< Cells cubed; as its moments.
     Vec3 origin, first;  ///< First moment relative to the origin.
-    /// Second moments xx, xy, xz, yy, yz, zz, with those of the particles as balls.
+    /// Second moments xx, xy, xz, yy, yz, zz. They include those of each particle as a ball.
     std::array<double, 6> second{};
-    Box box;  ///< Of the ellipsoid and of the former surface, world units.
+    Box box;  ///< Holds the ellipsoid and the former surface. World units.
     bool is_taken = false;
     std::uint32_t first_point = 0;   ///< In `points`.
-    std::uint32_t first_vertex = 0;  ///< Of the surface, if it is taken.
+    std::uint32_t first_vertex = 0;  ///< The first vertex of the surface, if it is taken.
   };
   std::vector<Drop> drops;
 

@@ -1,4 +1,4 @@
-#include "space/drops.h"
+#include "space_vertices/drops.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ constexpr double kSmallRadius = .75;
 // Bent or hollow drops, and those that have come apart, fill less of the ellipsoid with their
 // moments.
 constexpr double kLeastFilling = .5;
-// Of an ellipsoid, in cells.
+// Half axes of an ellipsoid are longer, in cells.
 constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
 
 constexpr double kPi = 3.14159265358979323846;
@@ -53,7 +53,7 @@ Polyhedron Icosahedron() {
       all.corners.push_back(Normalised(corner));
     }
   }
-  // Its triangles are those of corners that are next to each other.
+  // Three corners that are next to each other have a triangle.
   const auto are_near = [&](std::uint32_t a, std::uint32_t b) {
     return Dot(all.corners[a], all.corners[b]) > .4;
   };
