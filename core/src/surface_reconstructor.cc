@@ -143,7 +143,7 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
 
 // The certificate and the cuts of the quads change the volumes of small bodies. In spacings.
 constexpr int kVolumeRounds = 4;
-constexpr double kVolumeTolerance = .01;
+constexpr double kVolumeTolerance = .001;
 constexpr double kVolumeLimit = .4;
 
 void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
