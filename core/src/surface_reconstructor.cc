@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
 #include "base/vec3.h"
 #include "frame/calibration.h"
@@ -23,7 +24,10 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space/surface_bytes.h"
+#include "space/thinning.h"
 #include "space/vertices.h"
+#include "space_vertices/drops.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/virtual_plane.h"
 
@@ -40,6 +44,8 @@ struct SurfaceWorkspace::Buffers {
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
   space::Certificate certificate;
+  std::vector<space::ThinQuad> thin;  // Empty for marching cubes.
+  space::Drops drops;
   space::MeshScratch mesh;
 };
 
@@ -104,6 +110,7 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
         space::FillCavities(b.bins.bricks, most_nodes, b.cleaning, b.field);
   }
   const double h = parameters.spacing;
+  ThrowIfCancelled();
   space::FindBodies(frame, b.bins, b.field, h, b.bodies);
   const space::DroppedBodies dropped =
       space::DropBodies({.drops_empty = is_cleaned,
@@ -115,12 +122,25 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
   return statistics;
 }
 
+/// RESOURCE_EXHAUSTED if the guard refuses the memory of a surface.
+absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
+  const std::uint64_t bytes = space::SurfaceBytes(size);
+  if (guard == nullptr || guard->Reserve(bytes)) return absl::OkStatus();
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonOutOfMemory), "positions",
+       absl::StrCat(size.bricks, " bricks of 8 x 8 x 8 nodes"),
+       absl::StrCat("must fit into the memory budget, but needs ", (bytes >> 20) + 1,
+                    " MiB: reach fewer bricks, or try again later")});
+}
+
 /// Places vertices on the crossed edges and connects them by triangles. Positions are in world
 /// units afterwards.
 void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
   space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  b.thin.clear();
   for (Vec3& position : b.positions) position = cell_size * position;
   space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
 }
@@ -129,7 +149,7 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
 // corrected again afterwards: at most kVolumeRounds times, if they are wrong by more than the
 // tolerance. kVolumeLimit is in spacings.
 constexpr int kVolumeRounds = 4;
-constexpr double kVolumeTolerance = .01;
+constexpr double kVolumeTolerance = .001;
 constexpr double kVolumeLimit = .4;
 
 void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
@@ -153,8 +173,9 @@ bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
 
 /// Places vertices away from their anchors and connects them by quads that the certificate accepts.
 /// The certificate checks the final coordinates, so positions are in world units.
-absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
+absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale& scale,
                                 SurfaceWorkspace::Buffers& b) {
+  const SurfacePlacement placement = parameters.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
   space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
@@ -170,11 +191,14 @@ absl::Status PlaceMovedVertices(SurfacePlacement placement, const Scale& scale,
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
   const int rounds = placement == SurfacePlacement::kVirtualPlane ? kVolumeRounds : 0;
   for (int round = 0;; ++round) {
+    ThrowIfCancelled();
     const auto certify = round == 0 ? space::Certify : space::CertifyAgain;
     if (!certify(bricks, b.crossings, scale.cell_size, b.anchors, b.positions, b.certificate)) {
       return absl::InternalError("a face is refused although its vertices are at their anchors");
     }
-    space::EmitQuads(bricks, b.crossings, b.certificate, b.mesh.triangles);
+    space::FindThinEdges(bricks, b.crossings, scale.cell_size, b.certificate, b.positions,
+                         parameters.thinning_distance * scale.spacing, b.thin);
+    space::EmitQuads(bricks, b.crossings, b.certificate, b.thin, b.mesh.triangles);
     if (round == rounds || !CorrectVolumes(scale, b)) break;
   }
   return absl::OkStatus();
@@ -195,38 +219,94 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
-  const double volume = parameters.min_component_volume;
-  if (!(volume >= 0 && std::isfinite(volume))) {
+  const auto check = [](double value, const char* field, const char* rule) {
+    if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
     return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters.min_component_volume",
-                           ShortestNumber(volume), "must be 0 or more cubed spacings, and finite"});
+                          {std::string(kReasonOutOfRange), field, ShortestNumber(value), rule});
+  };
+  if (absl::Status status =
+          check(parameters.min_component_volume, "parameters.min_component_volume",
+                "must be 0 or more cubed spacings, and finite");
+      !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = check(parameters.thinning_distance, "parameters.thinning_distance",
+                                  "must be 0 or more spacings, and finite");
+      !status.ok()) {
+    return status;
   }
   return SurfaceReconstructor(parameters, limits);
 }
 
 absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorkspace& workspace,
-                                               Surface& surface) const {
+                                               Surface& surface,
+                                               const FrameControl& control) const {
+  const CancellationScope scope(control.cancelled);
   surface.Clear();
-  SurfaceWorkspace::Buffers& b = workspace.buffers();
+  absl::Status status;
+  try {
+    status = ReconstructOrThrow(frame, workspace.buffers(), surface, control.memory);
+  } catch (...) {
+    // The buffers may be in any state.
+    workspace = SurfaceWorkspace();
+    surface.Clear();
+    try {
+      throw;
+    } catch (const Cancelled&) {
+      return absl::CancelledError("the frame was cancelled");
+    }
+  }
+  if (!status.ok()) surface.Clear();
+  return status;
+}
+
+absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
+                                                      SurfaceWorkspace::Buffers& b,
+                                                      Surface& surface, MemoryGuard* memory) const {
   absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
   if (!status.ok() || frame.ParticleCount() == 0) return status;
+  ThrowIfCancelled();
+  const SurfacePlacement placement = parameters_.placement;
   const double cell_size = parameters_.cell_size * parameters_.spacing;
   const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
                                 LightestVolume(frame, parameters_.spacing));
-  status = space::BinParticles(frame, scale, limits_, b.bins);
+  status = space::FindBricks(frame, scale, limits_, b.bins);
   if (!status.ok()) return status;
   const space::BrickDirectory& bricks = b.bins.bricks;
+  space::SurfaceSize size{.particles = frame.ParticleCount(), .bricks = bricks.size()};
+  if (status = Reserve(size, memory); !status.ok()) return status;
+  ThrowIfCancelled();
+  space::SortParticles(frame, scale, b.bins);
   space::SampleField(b.bins, scale, b.field);
   const SurfaceStatistics statistics = FindCleanBodies(frame, parameters_, b);
   space::FindCrossings(bricks, b.field, b.crossings);
+  size.edges = b.crossings.edge_count;
+  if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
+  size.has_windows = placement == SurfacePlacement::kVirtualPlane;
+  if (status = Reserve(size, memory); !status.ok()) return status;
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
-  if (parameters_.placement == SurfacePlacement::kMarchingCubes) {
+  if (placement == SurfacePlacement::kMarchingCubes) {
     PlaceByMarchingCubes(cell_size, b);
-  } else if (status = PlaceMovedVertices(parameters_.placement, scale, b); !status.ok()) {
+  } else if (status = PlaceMovedVertices(parameters_, scale, b); !status.ok()) {
     return status;
   }
-  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals}, b.mesh,
-                         surface);
+  ThrowIfCancelled();
+  const double h = parameters_.spacing;
+  b.drops.drops.clear();
+  if (placement == SurfacePlacement::kVirtualPlane) {
+    space::ReplaceDrops(
+        {frame, b.bins, scale, b.bodies, b.certificate.nodes, b.virtual_plane.volumes.body_of},
+        {.most_particles = parameters_.max_drop_particles,
+         .least_particles = parameters_.min_component_particles,
+         .least_volume = parameters_.min_component_volume * h * h * h},
+        b.drops, b.positions, b.normals, b.mesh.triangles);
+  }
+  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
+                         b.mesh, surface);
+  for (const space::Drops::Drop& drop : b.drops.drops) {
+    if (!drop.is_taken) continue;
+    surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
+  }
   surface.statistics = statistics;
   return absl::OkStatus();
 }

@@ -369,5 +369,96 @@ TEST(MemoryGuard, RefusesAFrameBeforeItsTilesTakeMemory) {
   EXPECT_EQ(result, drop_result);
 }
 
+struct SurfaceCase {
+  std::string name;
+  std::vector<double> xyz;
+  SurfaceParameters parameters;
+};
+
+// Frames in space that differ in their largest consumer of memory.
+std::vector<SurfaceCase> SurfaceCases() {
+  std::vector<SurfaceCase> cases;
+  const auto spread = [](int side, double distance, double x0 = 0) {
+    std::vector<double> xyz;
+    for (int p = 0; p < side * side * side; ++p) {
+      for (const int at : {p % side, p / side % side, p / side / side}) {
+        xyz.push_back(x0 + distance * at);
+      }
+    }
+    return xyz;
+  };
+  support::Random random(3);
+  std::vector<double> noise;
+  for (int p = 0; p < 30'000; ++p) noise.push_back(random.Uniform(0, 30));
+  for (const SurfacePlacement placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                                           SurfacePlacement::kVirtualPlane}) {
+    const SurfaceParameters parameters{.placement = placement};
+    SurfaceParameters fine = parameters, whole = parameters;
+    fine.cell_size = .5;
+    whole.thinning_distance = 0;
+    const std::string suffix = absl::StrCat(", placement ", static_cast<int>(placement));
+    cases.push_back({"corners of bricks" + suffix, spread(10, 16), parameters});
+    cases.push_back({"middles of bricks" + suffix, spread(10, 24, 4), parameters});
+    cases.push_back({"one body" + suffix, spread(50, 1), parameters});
+    cases.push_back({"one body of a fine lattice" + suffix, spread(28, 1), fine});
+    cases.push_back({"drops" + suffix, spread(16, 5), parameters});
+    cases.push_back({"noise" + suffix, noise, parameters});
+    cases.push_back({"noise, all vertices" + suffix, noise, whole});
+  }
+  return cases;
+}
+
+TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
+  for (const SurfaceCase& tested : SurfaceCases()) {
+    SCOPED_TRACE(tested.name);
+    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
+    ASSERT_TRUE(reconstructor.ok());
+    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const std::size_t before = live_bytes;
+    Guard guard(2);
+    SurfaceWorkspace workspace;
+    Surface surface;
+    const absl::Status status =
+        reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
+    ASSERT_TRUE(status.ok()) << status;
+    const std::size_t held = live_bytes - before;
+    EXPECT_LE(held, guard.last());
+    EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
+  }
+}
+
+TEST(MemoryGuard, RefusesASurfaceBeforeItsBricksTakeMemory) {
+  const SurfaceCase tested = SurfaceCases().front();
+  const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  const std::vector<double> drop = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1};
+  const Frame small{.positions = std::span<const double>(drop), .components = 3};
+  SurfaceWorkspace workspace;
+  Surface surface;
+  ASSERT_TRUE(reconstructor->Reconstruct(small, workspace, surface).ok());
+  const Surface drop_surface = surface;
+  for (const int granted : {0, 1}) {
+    SCOPED_TRACE(granted);
+    const std::size_t live = live_bytes;
+    Guard guard(granted);
+    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const absl::Status status =
+        reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
+    EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
+    const auto violation = FindViolation(status);
+    ASSERT_TRUE(violation.has_value());
+    EXPECT_EQ(violation->reason, kReasonOutOfMemory);
+    EXPECT_EQ(violation->field, "positions");
+    EXPECT_EQ(violation->value, "8000 bricks of 8 x 8 x 8 nodes");
+    EXPECT_EQ(surface, Surface());
+    // The directory of the bricks and the particles' places in it, but nothing stored on bricks.
+    if (granted == 0) {
+      EXPECT_LE(live_bytes - live, 8'000 * 250u);
+    }
+  }
+  ASSERT_TRUE(reconstructor->Reconstruct(small, workspace, surface).ok());
+  EXPECT_EQ(surface, drop_surface);
+}
+
 }  // namespace
 }  // namespace partiemc

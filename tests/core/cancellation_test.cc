@@ -13,6 +13,7 @@
 
 #include "base/parallel.h"
 #include "partiemc/partiemc.h"
+#include "partiemc/surface.h"
 #include "support/particles.h"
 #include "support/random.h"
 
@@ -195,7 +196,107 @@ TEST_P(Cancellation, ATaskThatIsGivenUpDoesNotGoOnWithHalfOfItsParts) {
   EXPECT_FALSE(went_on_with_half);
 }
 
+// Grants all memory, and cancels the frame when it is asked for the last of `requests`.
+class CancelAtRequest final : public MemoryGuard {
+ public:
+  CancelAtRequest(int requests, std::atomic<bool>& flag) : left_(requests), flag_(flag) {}
+  bool Reserve(std::uint64_t) override {
+    if (--left_ == 0) flag_ = true;
+    return true;
+  }
+  int left() const { return left_; }
+
+ private:
+  int left_;
+  std::atomic<bool>& flag_;
+};
+
+class SurfaceCancellation : public testing::TestWithParam<unsigned> {
+ protected:
+  SurfaceCancellation() {
+    support::Random random(5);
+    for (int p = 0; p < 16 * 16 * 16; ++p) {
+      for (const int at : {p % 16, p / 16 % 16, p / 256}) xyz_.push_back(at + random.Unit());
+    }
+    SurfaceWorkspace workspace;
+    EXPECT_TRUE(Reconstruct(workspace, expected_, {}).ok());
+    EXPECT_GT(expected_.TriangleCount(), 1000u);
+  }
+
+  absl::Status Reconstruct(SurfaceWorkspace& workspace, Surface& surface,
+                           const FrameControl& control) {
+    const Frame frame{.positions = std::span<const double>(xyz_), .components = 3};
+    absl::Status status;
+    arena_.Execute(
+        [&] { status = reconstructor_->Reconstruct(frame, workspace, surface, control); });
+    return status;
+  }
+
+  // A surface that was asked for after one that was cancelled.
+  void ExpectNext(SurfaceWorkspace& workspace) {
+    Surface surface;
+    ASSERT_TRUE(Reconstruct(workspace, surface, {}).ok());
+    EXPECT_EQ(surface, expected_);
+  }
+
+  const tbb::global_control control_{tbb::global_control::max_allowed_parallelism, GetParam()};
+  Arena arena_{GetParam()};
+  const absl::StatusOr<SurfaceReconstructor> reconstructor_ =
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+  std::vector<double> xyz_;
+  Surface expected_;
+};
+
+TEST_P(SurfaceCancellation, BetweenStagesLeavesNoTrace) {
+  SurfaceWorkspace workspace;
+  for (const int requests : {0, 1, 2}) {
+    SCOPED_TRACE(testing::Message() << requests << " requests");
+    std::atomic<bool> flag = requests == 0;
+    CancelAtRequest guard(requests, flag);
+    Surface surface = expected_;
+    const absl::Status status =
+        Reconstruct(workspace, surface, {.memory = &guard, .cancelled = &flag});
+    EXPECT_TRUE(absl::IsCancelled(status)) << status;
+    EXPECT_EQ(guard.left(), 0) << "it went on";
+    EXPECT_EQ(surface, Surface());
+    ExpectNext(workspace);
+  }
+}
+
+/// From another thread, at whatever moment that has.
+TEST_P(SurfaceCancellation, AtAnyMomentLeavesNoTrace) {
+  SurfaceWorkspace workspace;
+  support::Random random(GetParam());
+  int cancelled = 0;
+  for (int round = 0; round < 20; ++round) {
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    std::atomic<bool> flag = false, has_begun = false;
+    const std::uint64_t wait = random.Below(4'000'000);
+    std::thread canceller([&] {
+      while (!has_begun.load(std::memory_order_relaxed)) std::this_thread::yield();
+      for (std::uint64_t k = 0; k < wait; ++k) has_begun.load(std::memory_order_relaxed);
+      flag.store(true, std::memory_order_relaxed);
+    });
+    Surface surface;
+    has_begun.store(true, std::memory_order_relaxed);
+    const absl::Status status = Reconstruct(workspace, surface, {.cancelled = &flag});
+    canceller.join();
+    if (status.ok()) {
+      EXPECT_EQ(surface, expected_);
+    } else {
+      ++cancelled;
+      EXPECT_TRUE(absl::IsCancelled(status)) << status;
+      EXPECT_EQ(surface, Surface());
+      ExpectNext(workspace);
+    }
+  }
+  EXPECT_GT(cancelled, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Threads, Cancellation, testing::Values(1u, 2u, 5u),
+                         [](const auto& tested) { return std::to_string(tested.param); });
+
+INSTANTIATE_TEST_SUITE_P(Threads, SurfaceCancellation, testing::Values(1u, 2u, 5u),
                          [](const auto& tested) { return std::to_string(tested.param); });
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
 
 namespace partiemc {
 
@@ -88,6 +89,14 @@ struct SurfaceParameters {
   /// `kVirtualPlane`, off for the other placements.
   std::optional<bool> clean = std::nullopt;
 
+  /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
+  /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
+  double thinning_distance = .03;
+
+  /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
+  /// particles, where nothing else is near. 0: none. Only for `kVirtualPlane`.
+  std::uint64_t max_drop_particles = 30;
+
   /// Spray: drops bodies whose particles have less volume than `min_component_volume`, in cubed
   /// spacings, or number fewer than `min_component_particles`. At least 0; 0 keeps all.
   double min_component_volume = 0;
@@ -121,14 +130,19 @@ class SurfaceReconstructor {
 
   /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
   /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
-  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes. Errors with a
-  /// Violation: as Reconstructor, but there is no memory guard and no cancellation. After an error
-  /// `surface` is empty. After an exception (std::bad_alloc) surface and workspace must be
-  /// replaced.
-  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface) const;
+  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
+  /// `control.memory` is asked twice: for the bricks, then with the full estimate. No stage is
+  /// reported to `control.observer`.
+  /// Errors as Reconstructor. On an error or exception (std::bad_alloc) `surface` is empty. After
+  /// CANCELLED or an exception `workspace` is empty, too.
+  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface,
+                           const FrameControl& control = {}) const;
 
  private:
   SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
+
+  absl::Status ReconstructOrThrow(const Frame& frame, SurfaceWorkspace::Buffers& buffers,
+                                  Surface& surface, MemoryGuard* memory) const;
 
   SurfaceParameters parameters_;
   ReconstructionParameters in_space_;  // Resolved, in the form for the stages.

@@ -144,7 +144,35 @@ void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBin
   bins.cells[brick][kBrickNodes] = static_cast<std::uint32_t>(last);
 }
 
-/// Sorts the particles by brick, cell and position.
+}  // namespace
+
+void SpaceBins::Clear() {
+  bricks.Clear();
+  cells.clear();
+  x.clear();
+  y.clear();
+  z.clear();
+  weight.clear();
+  source.clear();
+}
+
+absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                        SpaceBins& bins) {
+  bins.Clear();
+  absl::Status status = std::visit(
+      [&](auto positions) { return FindHomes(positions, scale, limits.max_tiles, bins); },
+      frame.positions);
+  if (!status.ok()) return status;
+  // Inside nodes are within the kernel radius of a particle, and the other corners of their cells
+  // at most one cell farther. 1/64 of a cell is for the rounding of positions.
+  constexpr double kMargin = 1 + 1.0 / 64;
+  if (!AddReachedBricks(scale.kernel_radius + kMargin, limits.max_tiles, bins)) {
+    return TooManyBricks(scale, limits.max_tiles);
+  }
+  bins.bricks.Seal();
+  return absl::OkStatus();
+}
+
 void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   const std::size_t count = bins.keys.size();
   const std::size_t bricks = bins.bricks.size();
@@ -184,36 +212,6 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
       bins.weight[p] = static_cast<float>(frame.volumes[particle.source] * weight_per_world_volume);
     }
   });
-}
-
-}  // namespace
-
-void SpaceBins::Clear() {
-  bricks.Clear();
-  cells.clear();
-  x.clear();
-  y.clear();
-  z.clear();
-  weight.clear();
-  source.clear();
-}
-
-absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                          SpaceBins& bins) {
-  bins.Clear();
-  absl::Status status = std::visit(
-      [&](auto positions) { return FindHomes(positions, scale, limits.max_tiles, bins); },
-      frame.positions);
-  if (!status.ok()) return status;
-  // Inside nodes are within the kernel radius of a particle, and the other corners of their cells
-  // at most one cell farther. 1/64 of a cell is for the rounding of positions.
-  constexpr double kMargin = 1 + 1.0 / 64;
-  if (!AddReachedBricks(scale.kernel_radius + kMargin, limits.max_tiles, bins)) {
-    return TooManyBricks(scale, limits.max_tiles);
-  }
-  bins.bricks.Seal();
-  SortParticles(frame, scale, bins);
-  return absl::OkStatus();
 }
 
 }  // namespace partiemc::space

@@ -44,12 +44,23 @@ struct SpaceBins {
   void Clear();
 };
 
-/// Sorts the particles of a frame. Bricks exist where a node is at most the kernel radius plus one
-/// cell away from a particle. Requires: CheckFrame has passed the frame as for a slice, with three
-/// components.
+/// Finds the bricks of a frame: they exist where a node is at most the kernel radius plus one cell
+/// away from a particle. Sorts no particle yet. Requires: CheckFrame has passed the frame as for a
+/// slice, with three components.
 /// Errors with a Violation: INVALID_ARGUMENT for positions beyond 2^30 cells from the origin;
 /// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
-absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                          SpaceBins& bins);
+absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                        SpaceBins& bins);
+
+/// Sorts the particles. Requires: FindBricks.
+void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);
+
+/// Both.
+inline absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
+                                 SpaceBins& bins) {
+  absl::Status status = FindBricks(frame, scale, limits, bins);
+  if (status.ok()) SortParticles(frame, scale, bins);
+  return status;
+}
 
 }  // namespace partiemc::space

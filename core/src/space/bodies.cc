@@ -142,6 +142,7 @@ BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::ui
 void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField& field,
                     double spacing, Bodies& bodies) {
   const double usual = spacing * spacing * spacing;
+  bodies.body_of_particle.assign(bins.x.size(), kNoIndex);
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
     for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
       BrickPlace node{kNoIndex, 0, 0, 0};
@@ -149,7 +150,7 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
         node = NearestInside(bins, field, brick, p, layers);
       }
       if (node.brick == kNoIndex) continue;
-      Body& body = bodies.bodies[bodies.BodyOf(node)];
+      Body& body = bodies.bodies[bodies.body_of_particle[p] = bodies.BodyOf(node)];
       ++body.particles;
       body.volume += frame.volumes.empty() ? usual : frame.volumes[bins.source[p]];
     }

@@ -21,6 +21,9 @@ struct Body {
   double volume = 0;            ///< Volume of these particles, world units cubed.
 };
 
+/// The body of particles whose body was dropped.
+inline constexpr std::uint32_t kDroppedBody = kNoIndex - 1;
+
 struct Bodies {
   std::vector<Body> bodies;
 
@@ -33,6 +36,9 @@ struct Bodies {
   std::vector<Part> parts;             ///< By brick.
   std::vector<std::uint32_t> first;    ///< Per brick: its first part, and the number of all parts.
   std::vector<std::int64_t> lowest_z;  ///< Scratch: by body.
+
+  /// By particle of SpaceBins: its body, kDroppedBody, or kNoIndex if no inside node is near.
+  std::vector<std::uint32_t> body_of_particle;
 
   /// The body of an inside node.
   std::uint32_t BodyOf(const BrickPlace& node) const {

@@ -107,12 +107,9 @@ class Checker {
                      cell[2] + (corner >> 2));
   }
   Vec3 NodeAt(std::uint32_t brick, const std::array<int, 3>& cell, int corner) const {
-    const Vec3 origin = OriginOf(bricks_[brick]);
-    const Vec3 rest{cell_size_ * (origin.x + (cell[0] + (corner & 1))),
-                    cell_size_ * (origin.y + (cell[1] + (corner >> 1 & 1))),
-                    cell_size_ * (origin.z + (cell[2] + (corner >> 2)))};
-    const std::uint32_t node = nodes_.IndexOf(NodeOf(brick, cell, corner));
-    return node == kNoIndex ? rest : rest + nodes_.moves[node];
+    return space::NodeAt(
+        bricks_, nodes_, cell_size_, brick,
+        {cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)});
   }
   /// The vertex of a cell with one loop; if the cell has no vertex, the mean of its corners.
   Vec3 ApexOf(std::uint32_t brick, const Side& side) const;
@@ -437,39 +434,6 @@ std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossin
     });
   }
   return refused;
-}
-
-void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-               const Certificate& certificate, std::vector<VertexTriangle>& triangles) {
-  triangles.clear();
-  for (std::uint32_t index = 0; index < crossings.cells.size(); ++index) {
-    const ActiveCell& cell = crossings.cells[index];
-    const CellLoops& loops = LoopsOf(cell.corners);
-    for (int step = 0; step < loops.Steps(); ++step) {
-      const int face = loops.face[step];
-      if ((face & 1) == 0) continue;
-      const int to_edge = loops.edge[loops.Next(step)];
-      const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
-      const CellLoops& across = LoopsOf(other.corners);
-      // In the other cell, the curve runs in the opposite direction.
-      int reversed = 0;
-      while (across.edge[reversed] != EdgeAcross(to_edge, face) ||
-             across.face[reversed] != (face ^ 1)) {
-        ++reversed;
-      }
-      const std::uint32_t from = EdgeVertexOf(bricks, crossings, cell, loops.edge[step]);
-      const std::uint32_t to = EdgeVertexOf(bricks, crossings, cell, to_edge);
-      const std::uint32_t low = cell.first_loop + loops.loop_of[step];
-      const std::uint32_t high = other.first_loop + across.loop_of[reversed];
-      if (certificate.modes[index][face / 2] == QuadMode::kAlongFace) {
-        triangles.push_back({low, from, to});
-        triangles.push_back({high, to, from});
-      } else {
-        triangles.push_back({low, from, high});
-        triangles.push_back({low, high, to});
-      }
-    }
-  }
 }
 
 }  // namespace partiemc::space

@@ -23,7 +23,6 @@
 #include "base/vec3.h"
 #include "space/crossings.h"
 #include "space/lattice.h"
-#include "space/mesh.h"
 #include "space/moved_nodes.h"
 
 namespace partiemc::space {
@@ -64,9 +63,5 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate);
-
-/// The triangles of all quads in their modes.
-void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-               const Certificate& certificate, std::vector<VertexTriangle>& triangles);
 
 }  // namespace partiemc::space

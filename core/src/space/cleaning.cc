@@ -105,6 +105,11 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
   }
   if (kept == bodies.bodies.size()) return dropped;
   bodies.bodies.resize(kept);
+  for (std::uint32_t& body : bodies.body_of_particle) {
+    if (body == kNoIndex) continue;
+    const std::uint32_t index = scratch.new_index[body];
+    body = index == kNoIndex ? kDroppedBody : index;
+  }
   std::uint32_t kept_parts = 0;
   for (std::size_t brick = 0; brick + 1 < bodies.first.size(); ++brick) {
     const std::uint32_t begin = bodies.first[brick], end = bodies.first[brick + 1];

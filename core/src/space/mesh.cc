@@ -88,10 +88,14 @@ void CopyTriangles(std::uint32_t shells, MeshScratch& scratch, Surface& surface)
 void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scratch,
                 Surface& surface) {
   const SpaceCrossings& crossings = input.crossings;
+  const auto shell_of = [&](std::uint32_t v) {
+    const bool is_dropped = !input.thin.empty() && !input.thin[v].IsEmpty();
+    return scratch.shell_of[is_dropped ? input.thin[v].corners[0] : v];
+  };
   surface.outer_of.assign(shells, kNoIndex);
   for (std::uint32_t brick = 0; brick < input.bricks.size(); ++brick) {
     ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
-      const std::uint32_t shell = scratch.shell_of[v];
+      const std::uint32_t shell = shell_of(v);
       if (shell == kNoIndex || surface.outer_of[shell] != kNoIndex) return;
       BrickPlace node{brick, i, j, k};
       if (!input.field.IsInside(node)) {
@@ -100,7 +104,7 @@ void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scrat
       const Body& body = input.bodies.bodies[input.bodies.BodyOf(node)];
       const BrickPlace below = Normalise(input.bricks, body.lowest.brick, body.lowest.i,
                                          body.lowest.j, body.lowest.k - 1);
-      surface.outer_of[shell] = scratch.shell_of[crossings.EdgeVertex(below, 2)];
+      surface.outer_of[shell] = shell_of(crossings.EdgeVertex(below, 2));
       if (surface.outer_of[shell] == shell) surface.measures[shell].particles = body.particles;
     });
   }
@@ -160,7 +164,7 @@ void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& cross
 }
 
 void AssembleSurface(const MeshInput& input, MeshScratch& scratch, Surface& surface) {
-  const std::uint32_t shells = FindShells(input.crossings.VertexCount(), scratch);
+  const std::uint32_t shells = FindShells(static_cast<std::uint32_t>(input.positions.size()), scratch);
   surface.measures.assign(shells, {});
   CopyPoints(input, shells, scratch, surface);
   CopyTriangles(shells, scratch, surface);

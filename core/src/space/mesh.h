@@ -14,14 +14,24 @@
 
 namespace partiemc::space {
 
+/// A quad of cell vertices that replaces the vertex of an edge (thinning.h): counter-clockwise as
+/// seen from outside, cut from the first corner to the third.
+struct ThinQuad {
+  std::array<std::uint32_t, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
+
+  bool IsEmpty() const { return corners[0] == kNoIndex; }
+};
+
 /// The input of AssembleSurface.
 struct MeshInput {
   const BrickDirectory& bricks;
   const SpaceField& field;
   const SpaceCrossings& crossings;
   const Bodies& bodies;
-  std::span<const Vec3> positions;  ///< By vertex, world units.
-  std::span<const Vec3> normals;    ///< By vertex, unit length.
+  /// By vertex, then of drops (space_vertices/drops.h). World units.
+  std::span<const Vec3> positions;
+  std::span<const Vec3> normals;   ///< By vertex, unit length.
+  std::span<const ThinQuad> thin;  ///< By vertex on an edge; empty: all stay.
 };
 
 using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertex numbers of SpaceCrossings.

@@ -58,6 +58,17 @@ void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceC
                  double cell_size, const std::vector<Vec3>& anchors,
                  const std::vector<Vec3>& positions, MovedNodes& nodes);
 
+/// The position of the node (i, j, k) relative to a brick, in the unit of `cell_size` and the
+/// moves.
+inline Vec3 NodeAt(const BrickDirectory& bricks, const MovedNodes& nodes, double cell_size,
+                   std::uint32_t brick, const std::array<int, 3>& at) {
+  const Vec3 origin = OriginOf(bricks[brick]);
+  const Vec3 rest{cell_size * (origin.x + at[0]), cell_size * (origin.y + at[1]),
+                  cell_size * (origin.z + at[2])};
+  const std::uint32_t node = nodes.IndexOf(Normalise(bricks, brick, at[0], at[1], at[2]));
+  return node == kNoIndex ? rest : rest + nodes.moves[node];
+}
+
 /// Calls visit(index, i, j, k) for each node of a brick that may move.
 template <typename Visit>
 void ForEachMovedNode(const MovedNodes& nodes, std::uint32_t brick, Visit visit) {

@@ -1,7 +1,10 @@
 // Surfaces of random signs and of random particles keep S1 to S5.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <span>
 #include <utility>
@@ -14,6 +17,7 @@
 #include "space/crossings.h"
 #include "space/mesh.h"
 #include "space/space_particles.h"
+#include "space/thinning.h"
 #include "space/vertices.h"
 
 namespace partiemc {
@@ -76,15 +80,16 @@ TEST(CellLoops, MatchAcrossFaces) {
   }
 }
 
-/// Bricks with random values at their inner nodes.
-struct RandomSigns {
+/// Eight bricks with given values at their nodes.
+struct Signs {
   space::SpaceBins bins;
   space::SpaceField field;
   space::SpaceCrossings crossings;
   space::Bodies bodies;
 
-  explicit RandomSigns(std::uint64_t seed) {
-    Random random(seed);
+  /// `value_at(x, y, z)`: negative inside, for 0 <= x, y, z < 16.
+  template <typename ValueAt>
+  explicit Signs(const ValueAt& value_at) {
     for (int z = 0; z < 2; ++z) {
       for (int y = 0; y < 2; ++y) {
         for (int x = 0; x < 2; ++x) bins.bricks.Insert({z, y, x});
@@ -94,18 +99,13 @@ struct RandomSigns {
     bins.cells.assign(8, {});
     field.values.resize(8);
     field.inside.resize(8);
-    const double density = random.Uniform(.05, .95);
-    const bool is_even = random.Chance(.2);
     for (std::uint32_t brick = 0; brick < 8; ++brick) {
       const auto [bz, by, bx] = bins.bricks[brick];
       for (int node = 0; node < space::kBrickNodes; ++node) {
         const space::BrickPlace at{brick, node % 8, node / 8 % 8, node / 64};
-        const int x = 8 * bx + at.i, y = 8 * by + at.j, z = 8 * bz + at.k;
-        const bool is_inner = x > 3 && x < 12 && y > 3 && y < 12 && z > 3 && z < 12;
-        const bool is_inside = is_inner && random.Chance(density);
-        const double size = is_even ? 1 : random.Chance(.1) ? 0 : random.Unit();
-        field.values[brick][node] = static_cast<float>(is_inside ? -size - 1e-3 : size);
-        field.inside[brick][at.k] |= std::uint64_t{is_inside} << at.Bit();
+        const double value = value_at(8 * bx + at.i, 8 * by + at.j, 8 * bz + at.k);
+        field.values[brick][node] = static_cast<float>(value);
+        field.inside[brick][at.k] |= std::uint64_t{value < 0} << at.Bit();
       }
     }
     FindCrossings(bins.bricks, field, crossings);
@@ -113,10 +113,23 @@ struct RandomSigns {
   }
 };
 
+/// Random values at the inner nodes.
+Signs RandomSigns(std::uint64_t seed) {
+  Random random(seed);
+  const double density = random.Uniform(.05, .95);
+  const bool is_even = random.Chance(.2);
+  return Signs([&](int x, int y, int z) {
+    const bool is_inner = x > 3 && x < 12 && y > 3 && y < 12 && z > 3 && z < 12;
+    const bool is_inside = is_inner && random.Chance(density);
+    const double size = is_even ? 1 : random.Chance(.1) ? 0 : random.Unit();
+    return is_inside ? -size - 1e-3 : size;
+  });
+}
+
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
   const std::uint64_t frames = Frames(300);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
-    const RandomSigns signs(seed);
+    const Signs signs = RandomSigns(seed);
     std::vector<Vec3> positions, normals;
     space::PlaceOnCrossings(signs.bins.bricks, signs.field, signs.crossings, space::kEdgeMargin,
                             positions);
@@ -125,7 +138,7 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
     space::AverageNormals(positions, scratch.triangles, normals);
     Surface surface;
     space::AssembleSurface(
-        {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
+        {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals, {}},
         scratch, surface);
     const absl::Status status = Validate(surface);
     ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
@@ -135,12 +148,16 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
 struct Moved {
   absl::Status status;         // Of Validate.
   std::uint32_t returned = 0;  // Vertices that were moved back.
+  std::size_t dropped = 0;     // Vertices that thinning dropped.
 };
 
-/// Moves vertices at random, certifies, and checks the surface. Without the certificate all quads
-/// are cut along faces.
-Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random& random,
-                   bool is_certified = true) {
+// Drops every vertex that the certificate allows to drop.
+constexpr double kAnyDistance = 1e9;
+
+/// Moves vertices at random, certifies, drops vertices on edges, and checks the surface. Without
+/// the certificate all quads are cut along faces, and no vertex is dropped.
+Moved MoveVertices(const Signs& signs, double amount, double share, Random& random,
+                   double thinning_distance, bool is_certified = true) {
   std::vector<Vec3> anchors, normals;
   const space::BrickDirectory& bricks = signs.bins.bricks;
   space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
@@ -173,39 +190,135 @@ Moved MoveVertices(const RandomSigns& signs, double amount, double share, Random
     EXPECT_EQ(refused(), 0u);
   }
   space::MeshScratch scratch;
-  space::EmitQuads(bricks, signs.crossings, certificate, scratch.triangles);
+  std::vector<space::ThinQuad> thin;
+  space::FindThinEdges(bricks, signs.crossings, 1, certificate, positions, thinning_distance, thin);
+  space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
   space::AverageNormals(positions, scratch.triangles, normals);
   Surface surface;
-  space::AssembleSurface({bricks, signs.field, signs.crossings, signs.bodies, positions, normals},
-                         scratch, surface);
-  return {Validate(surface), certificate.returned};
+  space::AssembleSurface(
+      {bricks, signs.field, signs.crossings, signs.bodies, positions, normals, thin}, scratch,
+      surface);
+  const auto dropped = std::count_if(thin.begin(), thin.end(),
+                                     [](const space::ThinQuad& quad) { return !quad.IsEmpty(); });
+  return {Validate(surface), certificate.returned, static_cast<std::size_t>(dropped)};
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
   const std::uint64_t frames = Frames(60);
   int intersections = 0;
+  std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
-    const RandomSigns signs(seed);
+    const Signs signs = RandomSigns(seed);
     Random random(seed);
     // No face is refused at the anchors.
-    const Moved anchored = MoveVertices(signs, 0, 1, random);
+    const Moved anchored = MoveVertices(signs, 0, 1, random, kAnyDistance);
     ASSERT_TRUE(anchored.status.ok()) << anchored.status.message() << ", seed " << seed;
     ASSERT_EQ(anchored.returned, 0u);
     for (const auto& [amount, share] : {std::pair(.3, 1.0), {1.5, .2}, {3.0, .05}}) {
-      Random same = random;
-      const Moved moved = MoveVertices(signs, amount, share, random);
-      ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
-      intersections += !MoveVertices(signs, amount, share, same, false).status.ok();
+      for (const double distance : {0.0, .1, kAnyDistance}) {
+        Random same = random;
+        const Moved moved = MoveVertices(signs, amount, share, same, distance);
+        ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
+        (distance == kAnyDistance ? dropped_anyhow : dropped) += moved.dropped;
+        if (distance == 0) {
+          ASSERT_EQ(moved.dropped, 0u);
+        }
+      }
+      intersections += !MoveVertices(signs, amount, share, random, 0, false).status.ok();
     }
   }
   // The same vertices do intersect without the certificate.
   EXPECT_GT(intersections, static_cast<int>(frames));
+  EXPECT_GT(dropped, 10 * frames);
+  EXPECT_GT(dropped_anyhow, 2 * dropped);
+}
+
+/// The surface of vertices at their anchors, moved along x by `shift(anchor)`.
+template <typename Shift>
+Surface ThinSurface(const Signs& signs, double thinning_distance, const Shift& shift) {
+  const space::BrickDirectory& bricks = signs.bins.bricks;
+  std::vector<Vec3> anchors, normals;
+  space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
+  std::vector<Vec3> positions = anchors;
+  for (Vec3& position : positions) position.x += shift(position);
+  space::Certificate certificate;
+  EXPECT_TRUE(space::Certify(bricks, signs.crossings, 1, anchors, positions, certificate));
+  EXPECT_EQ(certificate.returned, 0u);
+  std::vector<space::ThinQuad> thin;
+  space::FindThinEdges(bricks, signs.crossings, 1, certificate, positions, thinning_distance, thin);
+  space::MeshScratch scratch;
+  space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
+  space::AverageNormals(positions, scratch.triangles, normals);
+  Surface surface;
+  space::AssembleSurface(
+      {bricks, signs.field, signs.crossings, signs.bodies, positions, normals, thin}, scratch,
+      surface);
+  const absl::Status status = Validate(surface);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return surface;
+}
+
+double NoShift(const Vec3&) { return 0; }
+
+TEST(Thinning, LeavesACubeOfOneNode) {
+  const Signs signs([](int x, int y, int z) { return x == 7 && y == 8 && z == 7 ? -1.0 : 1.0; });
+  const Surface whole = ThinSurface(signs, 0, NoShift);
+  EXPECT_EQ(whole.PointCount(), 14u);
+  EXPECT_EQ(whole.TriangleCount(), 24u);
+  const Surface cube = ThinSurface(signs, kAnyDistance, NoShift);
+  EXPECT_EQ(cube.PointCount(), 8u);
+  EXPECT_EQ(cube.TriangleCount(), 12u);
+  EXPECT_EQ(cube.outer_of, std::vector<std::uint32_t>{kNoShell});
+}
+
+TEST(Thinning, FindsTheBodyOfACavityWithoutVerticesOnEdges) {
+  const Signs signs([](int x, int y, int z) {
+    const auto is_within = [&](int reach) {
+      return std::abs(x - 7) <= reach && std::abs(y - 7) <= reach && std::abs(z - 7) <= reach;
+    };
+    return is_within(2) && !is_within(0) ? -1.0 : 1.0;
+  });
+  const Surface surface = ThinSurface(signs, kAnyDistance, NoShift);
+  ASSERT_EQ(surface.ShellCount(), 2u);
+  const int cavity = surface.measures[0].volume < 0 ? 0 : 1;
+  EXPECT_EQ(surface.outer_of[cavity], static_cast<std::uint32_t>(1 - cavity));
+  EXPECT_EQ(surface.outer_of[1 - cavity], kNoShell);
+  EXPECT_EQ(surface.triangle_offsets[cavity + 1] - surface.triangle_offsets[cavity], 12u);
+}
+
+TEST(Thinning, KeepsVerticesFartherThanTheDistance) {
+  // A slab whose upper side is level at x = 8.5: vertices on edges inside of it can go. Then those
+  // in one column of edges rise.
+  const Signs signs([](int x, int y, int z) {
+    const bool is_inside = x > 5 && x < 9 && y > 3 && y < 12 && z > 3 && z < 12;
+    return is_inside ? -1.0 : 1.0;
+  });
+  const auto rise = [](const Vec3& at) {
+    const bool is_raised = at.x == 8.5 && at.y == 8 && (at.z == 6 || at.z == 8 || at.z == 10);
+    return is_raised ? .05 : 0;
+  };
+  const auto points = [&](double distance) {
+    const Surface surface = ThinSurface(signs, distance, rise);
+    std::size_t raised = 0, level = 0;
+    for (std::size_t k = 0; k < surface.PointCount(); ++k) {
+      const Vec3 at = Vec3At(surface.points, k);
+      const bool is_on_edge = std::round(at.y) == at.y && std::round(at.z) == at.z;
+      raised += is_on_edge && at.x == 8.5 + .05;
+      level += is_on_edge && at.x == 8.5 && at.y > 4 && at.y < 11 && at.z > 4 && at.z < 11;
+    }
+    return std::pair(raised, level);
+  };
+  EXPECT_EQ(points(0), std::pair(std::size_t{3}, std::size_t{33}));
+  EXPECT_EQ(points(.04), std::pair(std::size_t{3}, std::size_t{0}));
+  EXPECT_EQ(points(.06), std::pair(std::size_t{0}, std::size_t{0}));
 }
 
 class SpaceFrames : public ::testing::TestWithParam<SurfacePlacement> {};
 
 TEST_P(SpaceFrames, KeepS1ToS5) {
   const auto plain = SurfaceReconstructor::Create({.placement = GetParam(), .clean = false});
+  const auto thin = SurfaceReconstructor::Create(
+      {.placement = GetParam(), .clean = false, .thinning_distance = kAnyDistance});
   const auto cleaned = SurfaceReconstructor::Create(
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
@@ -217,13 +330,13 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
     Frame frame = particles.AsFrame();
     const std::vector<float> floats(particles.xyz.begin(), particles.xyz.end());
     if (seed % 4 == 1) frame.positions = std::span<const float>(floats);
-    const auto& reconstructor = seed % 3 == 0 ? cleaned : plain;
+    const auto& reconstructor = seed % 3 == 0 ? cleaned : seed % 3 == 1 ? plain : thin;
     ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
     const absl::Status status = Validate(surface);
     ASSERT_TRUE(status.ok()) << status.message() << ", seed " << seed;
     triangles += surface.TriangleCount();
   }
-  EXPECT_GT(triangles, 500 * frames);
+  EXPECT_GT(triangles, 400 * frames);
 }
 
 TEST_P(SpaceFrames, HaveTheSameBitsForAnyOrderAndHistory) {
@@ -250,6 +363,9 @@ TEST(SurfaceReconstructor, RefusesBadInput) {
   EXPECT_FALSE(SurfaceReconstructor::Create({.spacing = 0}).ok());
   EXPECT_FALSE(SurfaceReconstructor::Create({.kernel_radius = 9}).ok());
   EXPECT_FALSE(SurfaceReconstructor::Create({.cell_size = .1}).ok());
+  for (const double distance : {-.01, std::nan(""), HUGE_VAL}) {
+    EXPECT_FALSE(SurfaceReconstructor::Create({.thinning_distance = distance}).ok());
+  }
   const auto reconstructor = SurfaceReconstructor::Create({});
   ASSERT_TRUE(reconstructor.ok());
   SurfaceWorkspace workspace;

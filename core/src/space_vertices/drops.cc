@@ -1,0 +1,330 @@
+#include "space_vertices/drops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <utility>
+
+#include "base/cancellation.h"
+
+namespace partiemc::space {
+namespace {
+
+// More drops in one brick keep their surfaces: bounds the pairs that are compared.
+constexpr std::uint32_t kMostDropsOfBrick = 256;
+// A drop that reaches more bricks keeps its surface.
+constexpr double kMostBricksAlong = 4;
+// In spacings: smaller drops become icosahedra, whose edges are as long as the cells by default.
+constexpr double kSmallRadius = .75;
+
+// Bent or hollow drops, and those that have come apart, fill less of the ellipsoid with their
+// moments.
+constexpr double kLeastFilling = .5;
+// Half axes of an ellipsoid are longer, in cells.
+constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// The radius of a ball.
+double RadiusOf(double volume) { return std::cbrt(3 / (4 * kPi) * volume); }
+
+/// A polyhedron with its corners on the unit sphere.
+struct Polyhedron {
+  std::vector<Vec3> corners;
+  std::vector<VertexTriangle> triangles;
+  double volume = 0;
+
+  void Measure() {
+    volume = 0;
+    for (const auto& [a, b, c] : triangles) {
+      volume += Dot(corners[a], Cross(corners[b], corners[c])) / 6;
+    }
+  }
+};
+
+Polyhedron Icosahedron() {
+  const double golden = (1 + std::sqrt(5.0)) / 2;
+  Polyhedron all;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int signs = 0; signs < 4; ++signs) {
+      const double u = (signs & 1) != 0 ? -1 : 1, v = (signs & 2) != 0 ? -golden : golden;
+      const Vec3 corner = axis == 0 ? Vec3{0, u, v} : axis == 1 ? Vec3{v, 0, u} : Vec3{u, v, 0};
+      all.corners.push_back(Normalised(corner));
+    }
+  }
+  // Three corners that are next to each other have a triangle.
+  const auto are_near = [&](std::uint32_t a, std::uint32_t b) {
+    return Dot(all.corners[a], all.corners[b]) > .4;
+  };
+  for (std::uint32_t a = 0; a < 12; ++a) {
+    for (std::uint32_t b = a + 1; b < 12; ++b) {
+      for (std::uint32_t c = b + 1; c < 12; ++c) {
+        if (!are_near(a, b) || !are_near(b, c) || !are_near(a, c)) continue;
+        const bool is_outward = Dot(all.corners[a], Cross(all.corners[b], all.corners[c])) > 0;
+        all.triangles.push_back(is_outward ? VertexTriangle{a, b, c} : VertexTriangle{a, c, b});
+      }
+    }
+  }
+  all.Measure();
+  return all;
+}
+
+/// Each triangle cut into four.
+Polyhedron Divided(const Polyhedron& from) {
+  Polyhedron all{from.corners, {}, 0};
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+    const auto [at, is_new] =
+        middles.try_emplace({std::min(a, b), std::max(a, b)}, all.corners.size());
+    if (is_new) all.corners.push_back(Normalised(from.corners[a] + from.corners[b]));
+    return at->second;
+  };
+  for (const auto& [a, b, c] : from.triangles) {
+    const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    all.triangles.insert(all.triangles.end(),
+                         {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
+  }
+  all.Measure();
+  return all;
+}
+
+const Polyhedron& PolyhedronFor(double radius) {
+  static const Polyhedron small = Icosahedron(), large = Divided(small);
+  return radius < kSmallRadius ? small : large;
+}
+
+void Include(const Vec3& point, Drops::Box& box) {
+  box.low = {std::min(box.low.x, point.x), std::min(box.low.y, point.y),
+             std::min(box.low.z, point.z)};
+  box.high = {std::max(box.high.x, point.x), std::max(box.high.y, point.y),
+              std::max(box.high.z, point.z)};
+}
+
+bool Touch(const Drops::Box& a, const Drops::Box& b) {
+  return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
+         a.low.z <= b.high.z && b.low.z <= a.high.z;
+}
+
+/// Adds a particle at a place in cells.
+void AddParticle(const Vec3& at, double volume, Drops::Drop& drop) {
+  if (drop.particles == 0) drop.origin = at;
+  const Vec3 from = at - drop.origin;
+  ++drop.particles;
+  drop.volume += volume;
+  drop.first = drop.first + volume * from;
+  const double radius = RadiusOf(volume), own = radius * radius / 5;
+  const std::array<double, 6> products = {from.x * from.x + own, from.x * from.y,
+                                          from.x * from.z,       from.y * from.y + own,
+                                          from.y * from.z,       from.z * from.z + own};
+  for (int k = 0; k < 6; ++k) drop.second[k] += volume * products[k];
+}
+
+/// Finds the drops and their moments.
+void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) {
+  const Bodies& bodies = input.bodies;
+  const double cell = input.scale.cell_size;
+  const double unit = 1 / (cell * cell * cell);
+  drops.drops.clear();
+  drops.drop_of.assign(bodies.bodies.size(), kNoIndex);
+  for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
+    const std::uint64_t particles = bodies.bodies[body].particles;
+    if (particles == 0 || particles > limits.most_particles) continue;
+    drops.drop_of[body] = static_cast<std::uint32_t>(drops.drops.size());
+    drops.drops.emplace_back().body = body;
+  }
+  const double h = input.scale.spacing, usual = h * h * h;
+  const bool takes_lone = limits.least_particles <= 1;
+  for (std::uint32_t brick = 0; brick < input.bins.bricks.size(); ++brick) {
+    const Vec3 origin = OriginOf(input.bins.bricks[brick]);
+    const auto& cells = input.bins.cells[brick];
+    for (std::uint32_t p = cells.front(); p < cells.back(); ++p) {
+      const std::uint32_t body = bodies.body_of_particle[p];
+      if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
+      const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
+      const Vec3 at = origin + within;
+      const double volume =
+          input.frame.volumes.empty() ? usual : unit * input.frame.volumes[input.bins.source[p]];
+      if (body != kNoIndex) {
+        AddParticle(at, volume, drops.drops[drops.drop_of[body]]);
+        continue;
+      }
+      const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
+                                    static_cast<int>(within.z)};
+      const bool is_free = input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
+      if (!takes_lone || volume < unit * limits.least_volume || !is_free) continue;
+      Drops::Drop& drop = drops.drops.emplace_back();
+      AddParticle(at, volume, drop);
+      // An outside node that no surface has passed.
+      const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
+      drop.box = {corner, corner};
+    }
+  }
+}
+
+/// Sets the points and normals of an ellipsoid with the moments of the drop, and its volume.
+/// Returns false if the moments have none.
+bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
+  if (!(drop.volume > 0)) return false;
+  const double inverse = 1 / drop.volume;
+  const Vec3 centre = inverse * drop.first;
+  const auto moment = [&](int k, double a, double b) {
+    return 5 * (inverse * drop.second[k] - a * b);
+  };
+  const double xx = moment(0, centre.x, centre.x), xy = moment(1, centre.x, centre.y),
+               xz = moment(2, centre.x, centre.z), yy = moment(3, centre.y, centre.y),
+               yz = moment(4, centre.y, centre.z), zz = moment(5, centre.z, centre.z);
+  // The lower triangular root L of the matrix: L times the unit sphere is the ellipsoid.
+  const double a = std::sqrt(xx), b = xy / a, c = xz / a;
+  const double d = std::sqrt(yy - b * b), e = (yz - b * c) / d;
+  const double f = std::sqrt(zz - c * c - e * e);
+  const double determinant = a * d * f;
+  if (!(determinant > 0) || !std::isfinite(determinant)) return false;
+  const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / scale.spacing);
+  const double factor = std::cbrt(drop.volume / (determinant * of.volume));
+  if (!(drop.volume > kLeastFilling * (4 * kPi / 3) * determinant)) return false;
+  // Its shortest half axis at least, in cells: rounding must not fold the triangles.
+  const double shortest = factor * determinant / (xx + yy + zz);
+  const double farthest =
+      std::max({std::abs(drop.origin.x), std::abs(drop.origin.y), std::abs(drop.origin.z)});
+  if (!(shortest > kLeastAxis + kLeastAxisByDistance * farthest)) return false;
+  drop.first_point = static_cast<std::uint32_t>(drops.points.size());
+  for (const Vec3& u : of.corners) {
+    const Vec3 from = factor * Vec3{a * u.x, b * u.x + d * u.y, c * u.x + e * u.y + f * u.z};
+    const Vec3 point = scale.cell_size * (drop.origin + centre + from);
+    if (drop.body == kNoIndex || drops.points.size() > drop.first_point) {
+      Include(point, drop.box);
+    } else {
+      drop.box = {point, point};
+    }
+    drops.points.push_back(point);
+    // The transposed inverse of L.
+    const double z = u.z / f, y = (u.y - e * z) / d;
+    drops.normals.push_back(Normalised({(u.x - b * y - c * z) / a, y, z}));
+  }
+  return true;
+}
+
+/// Calls visit(coordinate) for the bricks that a box reaches. Returns false if they are many.
+template <typename Visit>
+bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit) {
+  const double unit = 1 / (kBrickSize * cell_size);
+  const auto floor = [unit](const Vec3& at) {
+    return Vec3{std::floor(unit * at.x), std::floor(unit * at.y), std::floor(unit * at.z)};
+  };
+  const Vec3 low = floor(box.low), high = floor(box.high);
+  const Vec3 along = high - low;
+  if (!(std::max({along.x, along.y, along.z}) < kMostBricksAlong)) return false;
+  const auto at = [](double value) { return static_cast<std::int32_t>(value); };
+  for (std::int32_t z = at(low.z); z <= at(high.z); ++z) {
+    for (std::int32_t y = at(low.y); y <= at(high.y); ++y) {
+      for (std::int32_t x = at(low.x); x <= at(high.x); ++x) visit(BrickCoordinate{z, y, x});
+    }
+  }
+  return true;
+}
+
+/// Lists the drops by brick.
+void ListDrops(double cell_size, Drops& drops) {
+  drops.bricks.Clear();
+  drops.reaches.clear();
+  for (std::uint32_t index = 0; index < drops.drops.size(); ++index) {
+    Drops::Drop& drop = drops.drops[index];
+    if (!drop.is_taken) continue;
+    drop.is_taken = ForEachBrickOf(drop.box, cell_size, [&](const BrickCoordinate& at) {
+      drops.reaches.push_back({drops.bricks.Insert(at), index});
+    });
+  }
+  std::sort(drops.reaches.begin(), drops.reaches.end());
+  drops.first.assign(drops.bricks.size() + 1, 0);
+  for (const Drops::Reach& reach : drops.reaches) ++drops.first[reach.brick + 1];
+  for (std::size_t k = 1; k < drops.first.size(); ++k) drops.first[k] += drops.first[k - 1];
+}
+
+/// Drops whose boxes touch each other keep their surfaces.
+void CompareDrops(Drops& drops) {
+  for (std::size_t brick = 0; brick + 1 < drops.first.size(); ++brick) {
+    const std::uint32_t first = drops.first[brick], last = drops.first[brick + 1];
+    for (std::uint32_t k = first; k < last; ++k) {
+      Drops::Drop& drop = drops.drops[drops.reaches[k].drop];
+      if (last - first > kMostDropsOfBrick) {
+        drop.is_taken = false;
+        continue;
+      }
+      for (std::uint32_t m = first; m < k; ++m) {
+        Drops::Drop& other = drops.drops[drops.reaches[m].drop];
+        if (Touch(drop.box, other.box)) drop.is_taken = other.is_taken = false;
+      }
+    }
+  }
+}
+
+/// Drops whose boxes touch triangles of others keep their surfaces.
+void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
+                      std::span<const VertexTriangle> triangles, Drops& drops) {
+  for (const VertexTriangle& triangle : triangles) {
+    const std::uint32_t body = input.body_of[triangle[0]];
+    Drops::Box box{positions[triangle[0]], positions[triangle[0]]};
+    Include(positions[triangle[1]], box);
+    Include(positions[triangle[2]], box);
+    const auto compare = [&](std::uint32_t first, std::uint32_t last) {
+      for (std::uint32_t k = first; k < last; ++k) {
+        Drops::Drop& drop = drops.drops[drops.reaches[k].drop];
+        if (drop.body != body && Touch(drop.box, box)) drop.is_taken = false;
+      }
+    };
+    const bool is_small =
+        ForEachBrickOf(box, input.scale.cell_size, [&](const BrickCoordinate& at) {
+          const std::uint32_t brick = drops.bricks.Find(at);
+          if (brick != kNoIndex) compare(drops.first[brick], drops.first[brick + 1]);
+        });
+    if (!is_small) compare(0, static_cast<std::uint32_t>(drops.reaches.size()));
+  }
+}
+
+/// Exchanges the surfaces of the drops that are taken.
+void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positions,
+               std::vector<Vec3>& normals, std::vector<VertexTriangle>& triangles) {
+  std::erase_if(triangles, [&](const VertexTriangle& triangle) {
+    const std::uint32_t drop = drops.drop_of[input.body_of[triangle[0]]];
+    return drop != kNoIndex && drops.drops[drop].is_taken;
+  });
+  for (Drops::Drop& drop : drops.drops) {
+    if (!drop.is_taken) continue;
+    const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / input.scale.spacing);
+    drop.first_vertex = static_cast<std::uint32_t>(positions.size());
+    for (std::size_t k = 0; k < of.corners.size(); ++k) {
+      positions.push_back(drops.points[drop.first_point + k]);
+      normals.push_back(drops.normals[drop.first_point + k]);
+    }
+    for (const auto& [a, b, c] : of.triangles) {
+      triangles.push_back({drop.first_vertex + a, drop.first_vertex + b, drop.first_vertex + c});
+    }
+  }
+}
+
+}  // namespace
+
+void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
+                  std::vector<Vec3>& positions, std::vector<Vec3>& normals,
+                  std::vector<VertexTriangle>& triangles) {
+  drops.drops.clear();
+  if (limits.most_particles == 0) return;
+  FindDrops(input, limits, drops);
+  if (drops.drops.empty()) return;
+  drops.points.clear();
+  drops.normals.clear();
+  for (Drops::Drop& drop : drops.drops) drop.is_taken = MakeEllipsoid(input.scale, drop, drops);
+  for (const VertexTriangle& triangle : triangles) {
+    const std::uint32_t index = drops.drop_of[input.body_of[triangle[0]]];
+    if (index == kNoIndex) continue;
+    for (const std::uint32_t v : triangle) Include(positions[v], drops.drops[index].box);
+  }
+  ThrowIfCancelled();
+  ListDrops(input.scale.cell_size, drops);
+  CompareDrops(drops);
+  CompareTriangles(input, positions, triangles, drops);
+  TakeDrops(input, drops, positions, normals, triangles);
+}
+
+}  // namespace partiemc::space
