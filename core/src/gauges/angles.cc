@@ -49,7 +49,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
   if (arc.empty()) return {};
   // Of the points next to the wall, finds the outermost point on this side.
   const double lowest = std::ranges::min(arc, {}, &Point::y).y;
-  Point side{first * INFINITY, 0};
+  Point side{static_cast<float>(first) * INFINITY, 0};
   for (const Point& p : arc) {
     if (p.y <= lowest + rounded && first * p.x < first * side.x) side = p;
   }

@@ -164,7 +164,8 @@ void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& cross
 }
 
 void AssembleSurface(const MeshInput& input, MeshScratch& scratch, Surface& surface) {
-  const std::uint32_t shells = FindShells(static_cast<std::uint32_t>(input.positions.size()), scratch);
+  const std::uint32_t shells =
+      FindShells(static_cast<std::uint32_t>(input.positions.size()), scratch);
   surface.measures.assign(shells, {});
   CopyPoints(input, shells, scratch, surface);
   CopyTriangles(shells, scratch, surface);

@@ -111,7 +111,8 @@ void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceC
       }
     }
     double share = nodes.setbacks[index] < kMostSetbacks ? 1 : 0;
-    for (int k = kSmoothings; k < nodes.setbacks[index]; ++k) share *= kKeptOfMove;
+    for (int setback = kSmoothings; setback < nodes.setbacks[index]; ++setback)
+      share *= kKeptOfMove;
     nodes.moves[index] = total > 0 ? (share / total) * sum : Vec3{};
   });
 }
