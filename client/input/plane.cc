@@ -95,8 +95,8 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
     for (std::size_t i = 0; i < rows.count; ++i) frame.positions[components * i + c] = along[i];
   }
   if (HasThreeAxes(rows) && components == 2) {
-    // If the dropped coordinate of a particle is not finite, it replaces x. The particle then still
-    // counts as non-finite.
+    // If the dropped coordinate of a particle is not finite, it replaces the first kept one. The
+    // particle then still counts as non-finite.
     const std::vector<double>& off_plane = rows.positions[3 - (*axes)[0] - (*axes)[1]];
     for (std::size_t i = 0; i < rows.count; ++i) {
       if (!std::isfinite(off_plane[i])) frame.positions[2 * i] = off_plane[i];

@@ -34,8 +34,9 @@ class FairShare {
   Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const {
     return FitsInto(room_ + beyond_, caller, amount, most);
   }
-  /// Whether the amount that `caller` holds still fits if the amount permitted beyond the room
-  /// (AddBeyond) decreases by `beyond`.
+  /// Whether the amounts of all callers would still fit into the room, and that of `caller` into
+  /// its share and `most`, if the amount permitted beyond the room (AddBeyond) decreased by
+  /// `beyond`.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller, std::uint64_t most) const {
     return FitsInto(room_ + beyond_ - beyond, caller, 0, most) == Fit::kYes;
   }

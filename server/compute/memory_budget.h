@@ -123,8 +123,8 @@ class MemoryBudget {
   void Unplan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   // Changes the bytes that are permitted beyond the budget: removes `before` and adds `after`.
   void ChangeBeyond(std::uint64_t before, std::uint64_t after) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether the caller's bytes still fit if the amount permitted beyond the budget decreases by
-  // `beyond`.
+  // Whether all held and planned bytes would still fit into the budget, and those of the caller
+  // into its quota and share, if `beyond` fewer bytes were permitted beyond the budget.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Returns an error if all counted bytes, which include `bytes`, exceed the budget or the caller's

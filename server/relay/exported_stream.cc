@@ -9,8 +9,8 @@
 namespace partiemc::server {
 namespace {
 
-// Maximum bytes of the response to one fetch, so that the relay does not send a replica a whole
-// history at once.
+// Maximum bytes of the results in the response to one fetch, so that the relay does not send a
+// replica a whole history at once. The first result is sent even if it is larger.
 constexpr std::size_t kMaxFetchedBytes = std::size_t{4} << 20;
 
 }  // namespace

@@ -44,7 +44,7 @@ constexpr seconds kFirstConnection(2);
 // A drain waits until the results of this server's streams are sent: at most kDrainPatience since
 // the last one, and at most kSendPatience in total.
 constexpr milliseconds kDrainPatience(300), kSendPatience(900);
-// Maximum time of a drain, even if the bus blocks.
+// Maximum time for which Drain waits, even if the bus blocks.
 constexpr seconds kLongestDrain(2);
 // Capacities of the relay's queue in bytes: for news (which contain results), and for fetches.
 constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20};

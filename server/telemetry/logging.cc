@@ -35,8 +35,8 @@ RateLimit refusals(kRefusalsPerSecond);
 // The writer of the log, set by SetUpLogging. Never destroyed, because abandoned threads may log
 // until the process ends.
 std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
-// The logger. Never destroyed, unlike spdlog's default logger, which is destroyed at the end of
-// main.
+// The logger. Never destroyed, unlike spdlog's default logger, which is destroyed after
+// main has returned.
 std::shared_ptr<spdlog::logger>& logger =
     *new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
 

@@ -77,8 +77,8 @@ class ResultBroadcaster final : public Dispatched {
   /// Returns the first frame of the history whose result number is at least `number`; empty if all
   /// are older.
   Published Held(std::uint64_t number) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Returns the first frame of the history whose sequence number is at least `sequence`; empty if
-  /// all are older.
+  /// Returns the first frame whose sequence number is at least `sequence`, of the history or, if it
+  /// has none, the newest one; empty if all are older.
   Published HeldFrom(std::uint64_t sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The newest frame, if it is kept.
   Published Newest() ABSL_LOCKS_EXCLUDED(mutex_);

@@ -122,9 +122,9 @@ std::optional<std::size_t> FindAsked(const Names& names, const Names& canonical,
   return FindFirst(canonical, {Canonical(asked)});
 }
 
-// Plans positions in the listed columns. If the names contain axes in rising order (such as x and
-// z), the positions have these axes, and velocities too. Otherwise the first column is x, and there
-// are no velocities.
+// Plans positions in the listed columns. If all of them are axes in rising order (such as x and z),
+// the positions have these axes, and recognised velocities stay. Otherwise the columns count as x,
+// y and z in the listed order, and there are no velocities.
 absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
                                 const ColumnRequest& request, ColumnPlan& plan) {
   const Names& asked = request.columns;

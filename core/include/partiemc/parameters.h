@@ -107,8 +107,8 @@ struct ReconstructionParameters {
   /// alone. Used by `farthest-particle` and `qef` only.
   bool normal_memory = true;
 
-  /// Closes holes smaller than 2 h^2 and drops components without particles. Absent: on for
-  /// `virtual-plane` without an isovalue, else off.
+  /// Closes holes with an area below 2 squared spacings, with everything inside them, and drops
+  /// components without particles. Absent: on for `virtual-plane` without an isovalue, else off.
   std::optional<bool> clean = std::nullopt;
 
   /// Spray: drops components that enclose less area than `min_component_area`, in squared spacings

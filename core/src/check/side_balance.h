@@ -98,7 +98,7 @@ class SideBalance {
   }
 
   /// Walks along each line. The sides on a line cancel if and only if the changes at each position
-  /// sum to 0. A position lies inside the sides that begin before it and do not end at it.
+  /// sum to 0. A position lies inside the sides that begin before it and end after it.
   void WalkSteps(Finding& finding) {
     std::sort(steps_.begin(), steps_.end(),
               [](const Step& a, const Step& b) { return Place(a) < Place(b); });

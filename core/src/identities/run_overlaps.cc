@@ -77,8 +77,8 @@ void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b
       }
       const NodeRun& b = b_runs[k];
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
-      // Usually a ring overlaps the same ring as in the previous row, so its newest pair is tried
-      // first.
+      // Usually a ring overlaps the same ring as in the previous row, so only its newest pair is
+      // tried. Pairs that are added repeatedly are summed at the end.
       if (a.ring >= newest.size()) newest.resize(a.ring + 1, kNoIndex);
       std::uint32_t& pair = newest[a.ring];
       if (pair != kNoIndex && shared[pair].b == b.ring) {

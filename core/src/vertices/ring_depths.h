@@ -15,12 +15,12 @@ namespace partiemc {
 /// Nesting of rings.
 ///
 /// Method: one sweep from bottom to top in the order of SweepsBefore. The sweep line crosses
-/// chains, the rising pieces of rings. Chains begin in pairs at the local minima of a ring and end
-/// in pairs at its local maxima. In between, the order of the chains on the line stays the same,
-/// because rings do not cross. Each chain stores the winding number of the region directly left of
-/// it.
+/// chains: the pieces of a ring between a local minimum and a local maximum. Chains begin in pairs
+/// at the local minima of a ring and end in pairs at its local maxima. In between, the order of the
+/// chains on the line stays the same, because rings do not cross. Each chain stores the winding
+/// number of the region directly left of it.
 ///
-/// Keeps its memory warm. Use one object per thread.
+/// The next call reuses the memory. Use one object per thread.
 class RingDepths {
  public:
   /// Computes the nesting. Ring k has the points [offsets[k], offsets[k + 1]) of the interleaved

@@ -81,8 +81,8 @@ struct WatchedFrame {
   std::vector<std::uint64_t> particle_ids;
   std::vector<float> particle_volumes, particle_velocities;
   std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
-  /// Set for the first frame after a loss: one line with the lost address, the cause and the
-  /// duration. Otherwise empty.
+  /// Set for the first frame after a loss: one line with the lost address, the cause, the address
+  /// where the watch continues, and the duration. Otherwise empty.
   std::string rejoined;
   /// Set together with `rejoined`: number of sequence numbers between the previous frame and this
   /// one. They belong to missed results and to refused frames, and `dropped` is then 0.
