@@ -106,7 +106,8 @@ class Server {
   /// problem, place, remedy.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
-  /// Stops at once, unless Drain has already stopped the server.
+  /// Unless Drain has already stopped the server: stops it without a grace time and cancels its
+  /// calls. With NATS, the last results are first sent to the other replicas, for at most 2 s.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -1,4 +1,5 @@
-// Writes `--stats FILE`: one row of numbers per frame and section.
+// Writes `--stats FILE`: for each frame, one row of numbers for its own outline, and one for each
+// of its sections (ReconstructionParameters::sections).
 #pragma once
 
 #include <filesystem>

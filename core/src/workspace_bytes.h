@@ -34,8 +34,10 @@ inline constexpr std::uint64_t kBytesPerValueOfGridCell = 8;
 inline constexpr std::uint64_t kBytesPerBlockCell = kBytesPerGridCell + 24;
 inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
 
-/// If the mesh has blocks: sums over the particles in the windows of a tile with interior cells. A
-/// vector of two components counts as three values.
+/// If the mesh has blocks: bytes for each tile with interior cells. They hold sums over the
+/// particles of each of the tile's 64 windows (mesh/blocks.cc): moments, and the values of
+/// attributes. A vector of two components has a third sum, of its length, so each value is allowed
+/// one and a half.
 inline constexpr std::uint64_t kBytesPerBlockTile = 2'048;
 inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
 

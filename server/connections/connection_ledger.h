@@ -17,9 +17,9 @@ struct ConnectionRules {
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
-  /// Maximum number of HTTP/2 streams. The limit applies to open streams, and to streams that have
-  /// not become calls, such as streams that the client resets at once. Each stream needs 10 to 16
-  /// kB. 0: no limit.
+  /// Maximum number of open HTTP/2 streams. The same limit applies to the number of streams that
+  /// have not become calls, such as streams that the client resets at once; this number decays by
+  /// `max_streams` in five seconds. Each stream needs 10 to 22 kB. 0: no limit.
   std::uint64_t max_streams = 1'000;
 };
 

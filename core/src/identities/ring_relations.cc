@@ -18,8 +18,9 @@ constexpr std::uint64_t kSmallestPart = 4;
 // splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 
-// If samples of other rings account for this part of a ring, in quarters, a ring that only shares
-// nodes with it is not its parent.
+// A ring of the last frame that shares nodes with a ring of this frame, but has no samples in it,
+// is not its parent if the samples of other rings account for at least this many quarters of the
+// new ring's nodes.
 constexpr std::uint64_t kAccountedQuarters = 3;
 
 // Largest movement within a frame, in cells, because lattice coordinates have 32 bits.

@@ -53,8 +53,9 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
 
-/// Certifies again after vertices have moved from their certified positions. Vertices keep the
-/// number of their setbacks. Cost: linear in bricks, and in the faces around moved vertices.
+/// Certifies again after vertices have moved from their certified positions. The setbacks of
+/// vertices and nodes count on. Cost: linear in vertices and bricks, and in the faces of the bricks
+/// in which something has moved and of the bricks around them.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);

@@ -33,8 +33,8 @@ struct Offsets {
   }
 };
 
-// Calls add(offsets, index of the first particle) for each vector of particles that is added to the
-// partial sums from `lane` on.
+// A vector of particles is added to the partial sums [lane, lane + kLanes). Calls add(offsets, k)
+// for each vector of these sums, where k is the index of its first particle.
 template <class Add>
 HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, float inverse_square,
                               int lane, Add add) {

@@ -229,7 +229,8 @@ void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t in
   }
 }
 
-/// Sets `finds_pair` of all blocks; returns whether there is any pair.
+/// Sets `finds_pair` of each block: whether ForEachPair finds a pair for it. Only one of the two
+/// blocks of a pair finds it. Returns whether any block finds one.
 bool FindPairs(Search& s, const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(s.buffers.blocks.size()), [&](std::uint32_t index) {

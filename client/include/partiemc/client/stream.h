@@ -37,8 +37,8 @@ struct Outputs {
   bool relative_float32 = false;
   bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
   /// Attributes to interpolate to the vertices (Result::attributes), by the names of
-  /// Frame::attributes; at most 16. "velocity" names Frame::velocities. A frame that lacks one is
-  /// refused.
+  /// Frame::attributes; at most 16. "velocity" names Frame::velocities. A frame with
+  /// particles that lacks one is refused.
   std::vector<std::string> attributes = {};
 };
 

@@ -49,6 +49,8 @@ struct WatcherOptions {
   /// because WatchedFrame reports a loss.
   ReconnectPolicy rejoin = {.give_up_after = kShortPatience};
   /// Maximum time to reach the server. It includes the wait for a server that is still starting.
+  /// The first connection divides it among the addresses; when the watch rejoins, each attempt has
+  /// all of it.
   std::chrono::milliseconds connect_timeout{2000};
   /// Time for the server to accept the watcher. There is no timeout for frames: they depend on the
   /// producer.
