@@ -43,18 +43,18 @@ Vec3 AnyPlace(Random& random) {
 TEST(SpaceDrops, LoneParticlesHaveTheirVolumeWhereverTheyAre) {
   Random random(1);
   SpaceParticles particles;
-  for (int k = 0; k < 300; ++k) {
+  for (int k = 0; k < 60; ++k) {
     particles.Add(Vec3{5.0 * (k % 20), 5.0 * (k / 20), 0} + AnyPlace(random));
   }
   const Surface surface = Reconstruct(particles);
-  ASSERT_EQ(surface.ShellCount(), 300u);
-  for (std::size_t shell = 0; shell < 300; ++shell) {
+  ASSERT_EQ(surface.ShellCount(), 60u);
+  for (std::size_t shell = 0; shell < 60; ++shell) {
     const ShellMeasures& measures = surface.measures[shell];
     EXPECT_EQ(surface.outer_of[shell], kNoShell);
     EXPECT_EQ(measures.particles, 1u);
     EXPECT_NEAR(measures.volume, 1, 1e-9);
     double nearest = 9;
-    for (std::size_t k = 0; k < 300; ++k) {
+    for (std::size_t k = 0; k < 60; ++k) {
       nearest = std::min(nearest, Length(CentroidOf(measures) - particles.At(k)));
     }
     EXPECT_LT(nearest, 1e-4);
@@ -100,17 +100,17 @@ TEST(SpaceDrops, FollowTheMomentsOfTheirParticles) {
 TEST(SpaceDrops, KeepTheirSurfaceNearOthersAndWhereTheyAreBent) {
   Random random(3);
   // Over a slab, from touching it to far away from it.
-  const SpaceParticles slab = testing::Box({-8, -8, -4}, {8, 8, 0}, .1, random);
+  const SpaceParticles slab = testing::Box({-5, -5, -4}, {5, 5, 0}, .1, random);
   int ellipsoids = 0, joined = 0;
-  for (int step = 0; step < 40; ++step) {
+  for (int step = 0; step < 20; ++step) {
     SpaceParticles particles = slab;
-    particles.Add(Vec3{.2, .3, .1 * step + .5});
+    particles.Add(Vec3{.2, .3, .2 * step + .5});
     const Surface surface = Reconstruct(particles);
     ellipsoids += surface.ShellCount() == 2 && std::abs(surface.measures[1].volume - 1) < 1e-9;
     joined += surface.ShellCount() == 1;
   }
-  EXPECT_GT(ellipsoids, 10);
-  EXPECT_GT(joined, 5);
+  EXPECT_GT(ellipsoids, 5);
+  EXPECT_GT(joined, 2);
   // Half a circle.
   SpaceParticles bow;
   for (int k = 0; k < 14; ++k) {
@@ -122,7 +122,7 @@ TEST(SpaceDrops, KeepTheirSurfaceNearOthersAndWhereTheyAreBent) {
 
 /// Drops that touch each other, near walls and in cavities; also of tiny particles, and far away.
 TEST(SpaceDrops, KeepS1ToS5) {
-  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
     Random random(seed);
     SpaceParticles particles;
     const double side = random.Uniform(6, 30);
