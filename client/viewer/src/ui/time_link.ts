@@ -4,15 +4,15 @@ import type { Track } from '../stream/track';
 export class TimeLink {
   isOn = true;
   private leader: Track | null = null;
-  /** Tracks that this link has moved, and paused. */
-  private readonly held = new Set<Track>();
+  /** Tracks that this link has moved, and paused at this frame. */
+  private readonly held = new Map<Track, number>();
 
   /** Whether a track shows the time of another one. */
   holds(track: Track): boolean { return this.held.has(track); }
 
   /** Called once per refresh of the screen. `chosen`: the track that the user moves in time. */
   refresh(chosen: Track | null, tracks: readonly Track[]): void {
-    for (const track of this.held) {
+    for (const track of this.held.keys()) {
       if (!this.isOn || !tracks.includes(track)) this.held.delete(track);
     }
     if (chosen !== this.leader) this.lead(chosen);
@@ -29,11 +29,14 @@ export class TimeLink {
     }
   }
 
-  /** Playing goes on if the user chooses another track. */
+  /** Playing goes on if the user chooses another track, unless the user has moved it since. */
   private lead(chosen: Track | null): void {
     const former = this.leader;
     this.leader = chosen;
-    if (!chosen || !this.held.delete(chosen) || former?.player.mode !== 'playing') return;
+    const heldAt = chosen ? this.held.get(chosen) : undefined;
+    if (!chosen || heldAt === undefined) return;
+    this.held.delete(chosen);
+    if (former?.player.mode !== 'playing' || chosen.player.sequence !== heldAt) return;
     chosen.player.speed = former.player.speed;
     chosen.player.play();
   }
@@ -41,14 +44,14 @@ export class TimeLink {
   private move(track: Track, time: number): void {
     const entry = track.history.nearestInTime(time);
     if (!entry) return;
-    this.held.add(track);
+    this.held.set(track, entry.sequence);
     const { mode, sequence } = track.player;
     if (mode !== 'paused' || sequence !== entry.sequence) track.player.seek(entry.sequence);
   }
 
   /** Streams follow their newest frame again. */
   private release(): void {
-    for (const track of this.held) track.player.follow();
+    for (const track of this.held.keys()) track.player.follow();
     this.held.clear();
   }
 }
