@@ -204,7 +204,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
-  const std::uint64_t frames = Frames(15);
+  const std::uint64_t frames = Frames(8);
   int intersections = 0;
   std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
@@ -323,7 +323,7 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
   Surface surface;
-  const std::uint64_t frames = Frames(60);
+  const std::uint64_t frames = Frames(40);
   std::size_t triangles = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const SpaceParticles particles = RandomSpaceScene(seed);
