@@ -232,7 +232,7 @@ class SurfaceCancellation : public testing::TestWithParam<unsigned> {
     return status;
   }
 
-  // A surface that was asked for after one that was cancelled.
+  // The next surface after a cancelled one is right.
   void ExpectNext(SurfaceWorkspace& workspace) {
     Surface surface;
     ASSERT_TRUE(Reconstruct(workspace, surface, {}).ok());

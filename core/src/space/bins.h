@@ -55,7 +55,7 @@ absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimit
 /// Sorts the particles. Requires: FindBricks.
 void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);
 
-/// Both.
+/// Calls FindBricks, then SortParticles.
 inline absl::Status BinParticles(const Frame& frame, const Scale& scale, const FrameLimits& limits,
                                  SpaceBins& bins) {
   absl::Status status = FindBricks(frame, scale, limits, bins);

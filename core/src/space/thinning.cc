@@ -12,7 +12,7 @@
 namespace partiemc::space {
 namespace {
 
-/// The distance of the origin from the segment a b.
+/// Returns the distance of the origin from the segment a b.
 double DistanceToSegment(const Vec3& a, const Vec3& b) {
   const Vec3 along = b - a;
   const double square = Dot(along, along);
@@ -20,7 +20,7 @@ double DistanceToSegment(const Vec3& a, const Vec3& b) {
   return Length(a + t * along);
 }
 
-/// The distance of the origin from the triangle a b c.
+/// Returns the distance of the origin from the triangle a b c.
 double DistanceToTriangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 normal = Cross(b - a, c - a);
   const bool is_above =
@@ -49,7 +49,8 @@ class Thinner {
   /// Whether all quads at an edge are cut across cells; sets its star.
   bool FindStar(const BrickPlace& node, int axis, EdgeStar& star) const;
 
-  /// The nearest valid quad instead of a vertex, if it is at most `distance` cells from it.
+  /// Returns the nearest valid quad that can replace a vertex, if it is at most `distance` cells
+  /// from the vertex; otherwise an empty one.
   ThinQuad FindQuad(std::uint32_t vertex, const EdgeStar& star, double distance) const;
 
  private:
@@ -141,7 +142,7 @@ void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
       const int to_edge = loops.edge[loops.Next(step)];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
       const CellLoops& across = LoopsOf(other.corners);
-      // The curve runs the other way there.
+      // In the other cell, the curve runs in the opposite direction.
       int reversed = 0;
       while (across.edge[reversed] != EdgeAcross(to_edge, face) ||
              across.face[reversed] != (face ^ 1)) {

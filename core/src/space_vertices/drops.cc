@@ -11,17 +11,20 @@
 namespace partiemc::space {
 namespace {
 
-// More drops in one brick keep their surfaces: bounds the pairs that are compared.
+// If a brick has more drops, all of them keep their surfaces. This limits the pairs of drops that
+// are compared.
 constexpr std::uint32_t kMostDropsOfBrick = 256;
 // A drop that reaches more bricks keeps its surface.
 constexpr double kMostBricksAlong = 4;
-// In spacings: smaller drops become icosahedra, whose edges are as long as the cells by default.
+// Radius in spacings. Smaller drops become icosahedra: their edges are about as long as a cell of
+// the default size.
 constexpr double kSmallRadius = .75;
 
 // Bent or hollow drops, and those that have come apart, fill less of the ellipsoid with their
 // moments.
 constexpr double kLeastFilling = .5;
-// Half axes of an ellipsoid are longer, in cells.
+// Least length of the half axes of an ellipsoid, in cells, and its part that grows with the
+// distance from the origin.
 constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
 
 constexpr double kPi = 3.14159265358979323846;

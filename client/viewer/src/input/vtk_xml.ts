@@ -132,7 +132,7 @@ class Document {
     const count = this.number(raw ?? fromBase64(letters, headerBytes), 0);
     const head = (3 + count) * headerBytes;
     const header = raw ?? fromBase64(letters, head);
-    // In base64 the blocks are a text of their own.
+    // In base64, header and blocks are encoded separately.
     const blocks = raw?.subarray(head) ?? fromBase64(letters.slice(4 * Math.ceil(head / 3)), Infinity);
     const parts: Uint8Array[] = [];
     let at = 0;
