@@ -14,6 +14,7 @@
 #include "partiemc/result.h"
 #include "support/level_sets.h"
 #include "support/stages.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -178,7 +179,7 @@ TEST(Bilinear, RingsAreTheBordersOfItsRegionsAndLieInEachOtherAsThoseDo) {
   Stages stages;
   Saddles total;
   std::size_t compared = 0, rings = 0, holes = 0;
-  for (std::uint64_t seed = 1; seed <= 2'000; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(2'000u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     Random random(seed);
     const LevelSetPatch patch = support::RandomPatch(random, kNodes, kNodes);

@@ -8,6 +8,7 @@
 #include "base/id_hash.h"
 #include "support/chosen_ids.h"
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -33,7 +34,7 @@ TEST(DistinctIds, TheFirstRepetitionIsFoundInAnyRange) {
   ExpectAsByMap({kLargest}, scratch);
   ExpectAsByMap({0, kLargest, 0}, scratch);
   ExpectAsByMap({kLargest, kLargest}, scratch);
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(200u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     support::Random random(seed);
     const std::size_t count = 1 + random.Below(200);

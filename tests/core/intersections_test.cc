@@ -11,6 +11,7 @@
 
 #include "base/predicates.h"
 #include "region_shapes.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -93,7 +94,7 @@ TEST(CountTouchingPairs, ListsThePairsThatTouch) {
 
 TEST(CountTouchingPairs, AgreesWithAllPairsOnDegenerateLattices) {
   Random random(8);
-  for (int round = 0; round < 20'000; ++round) {
+  for (int round = 0; round < support::Tries(20'000); ++round) {
     const Region indexed = testing::RandomGarbage(random, 2 + round % 9, 4, 9);
     Region rings;
     for (std::size_t k = 0; k < indexed.LoopCount(); ++k) rings.AddLoop(indexed.Loop(k));
@@ -102,7 +103,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsOnDegenerateLattices) {
 }
 
 TEST(CountTouchingPairs, AgreesWithAllPairsForMixedLengths) {
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(100u); ++seed) {
     Random random(seed);
     Region rings;
     for (int k = 0; k < 20; ++k) {
@@ -137,7 +138,7 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForDistantRings) {
 
 /// Segments as long as cells, with ends on the borders of cells: where indices are rounded.
 TEST(CountTouchingPairs, AgreesWithAllPairsAtBordersOfCells) {
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(100u); ++seed) {
     Random random(seed);
     const testing::Cells cells = testing::RandomCells(random, 12, 12, 0.5);
     const Region staircases = testing::Staircases(cells, random, seed % 2 == 0);

@@ -12,6 +12,7 @@
 
 #include "region_cover.h"
 #include "region_shapes.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -90,7 +91,7 @@ TEST(LoopStrip, ManyPointsOnOneSideAndFewOnTheOther) {
 
 TEST(LoopStrip, WobblyRingsAreCoveredAtAnyScaleAndPlace) {
   Random random(4);
-  for (int round = 0; round < 100; ++round) {
+  for (int round = 0; round < support::Tries(100); ++round) {
     SCOPED_TRACE("seed 4, round " + std::to_string(round));
     const auto count = [&] { return static_cast<std::size_t>(Uniform(random, 30, 200)); };
     const Region region =
@@ -111,7 +112,7 @@ TEST(LoopStrip, TouchingRingIsCoveredOrRefused) {
 
 TEST(LoopStrip, AcceptedBandsAreCovered) {
   std::size_t strips = 0, bands = 0;
-  for (std::uint64_t seed = 0; seed < 600; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(600u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
     const Region band = testing::RandomBand(random, 8 + seed % 12);
@@ -131,7 +132,7 @@ TEST(LoopStrip, AcceptedRandomLoopsKeepTheirSides) {
   Random random(5);
   LoopStrip strip;
   std::size_t taken = 0;
-  for (int round = 0; round < 200'000; ++round) {
+  for (int round = 0; round < support::Tries(200'000); ++round) {
     const Region region = testing::RandomGarbage(random, 3 + round % 3, 2, 3 + round % 6);
     if (region.LoopCount() != 2) continue;
     const auto triangles = Strip(region, strip);
@@ -146,7 +147,7 @@ TEST(LoopStrip, AcceptedRandomLoopsKeepTheirSides) {
 TEST(LoopStrip, RingWithOnePointMovedIsCoveredOrRefused) {
   Random random(9);
   std::size_t taken = 0;
-  for (int round = 0; round < 2'000; ++round) {
+  for (int round = 0; round < support::Tries(2'000); ++round) {
     SCOPED_TRACE("seed 9, round " + std::to_string(round));
     Region region = RegionOf(Wobbly(random, 10, 30), Reversed(Wobbly(random, 7, 25)));
     region.points[random() % region.points.size()] += Uniform(random, -6, 6);

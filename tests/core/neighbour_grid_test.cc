@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -14,7 +15,7 @@ constexpr double kStep = NeighbourGrid::kStep;
 
 TEST(GridAxis, DividesATileAndItsNeighboursAlike) {
   support::Random random(1);
-  for (int round = 0; round < 2000; ++round) {
+  for (int round = 0; round < support::Tries(2000); ++round) {
     const GridAxis axis(random.Uniform(0, 40));
     // Some on the sides of cells.
     const double at = random.Uniform(-kTileSize, 2 * kTileSize);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -52,7 +53,7 @@ bool IsNear(std::int64_t units, double reach) {
 }
 
 TEST(PeriodicRings, MarginsHoldEveryVertexOfAWindow) {
-  for (unsigned seed = 1; seed <= 300; ++seed) {
+  for (unsigned seed = 1; seed <= support::Tries(300u); ++seed) {
     support::Random random(seed);
     const double reach = random.Uniform(3, 18);
     const std::vector<Point> ring = CrowdedSquare(random, reach);

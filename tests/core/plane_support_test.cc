@@ -12,6 +12,7 @@
 
 #include "support/instruction_sets.h"
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -100,7 +101,7 @@ BentPlane RandomPlane(support::Random& random) {
 }
 
 TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
     support::Random random(seed);
     const Rows rows(random);
     const BentPlane plane = RandomPlane(random);

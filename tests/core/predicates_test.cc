@@ -9,6 +9,8 @@
 #include <random>
 #include <vector>
 
+#include "support/tries.h"
+
 namespace partiemc {
 namespace {
 
@@ -50,7 +52,7 @@ TEST(Orientation, IsRightOnAllTriplesOfASmallLattice) {
 TEST(Orientation, AgreesWithIntegersForPointsThatAreNearlyCollinear) {
   Random random(1);
   int collinear = 0;
-  for (int round = 0; round < 300'000; ++round) {
+  for (int round = 0; round < support::Tries(300'000); ++round) {
     const LatticePoint step{Below(random, 1 << 20) - (1 << 19), Below(random, 1 << 20) - (1 << 19)};
     const LatticePoint start{Below(random, std::int64_t{1} << 51),
                              Below(random, std::int64_t{1} << 51)};
@@ -85,7 +87,7 @@ TEST(Orientation, AgreesWithIntegersForCoordinatesOfDifferentMagnitudes) {
     const std::int64_t shifted = value << (random() % static_cast<std::uint64_t>(61 - bits));
     return random() % 2 == 0 ? shifted : -shifted;
   };
-  for (int round = 0; round < 500'000; ++round) {
+  for (int round = 0; round < support::Tries(500'000); ++round) {
     const LatticePoint a{coordinate(), coordinate()};
     LatticePoint b{coordinate(), coordinate()};
     LatticePoint c{coordinate(), coordinate()};
@@ -113,7 +115,7 @@ TEST(Orientation, SeesTheLastBitOverTheWholeRangeOfMagnitudes) {
 
 TEST(Orientation, IsConsistentUnderPermutationForNeighbouringDoubles) {
   Random random(3);
-  for (int round = 0; round < 100'000; ++round) {
+  for (int round = 0; round < support::Tries(100'000); ++round) {
     const double x = 0.5 + static_cast<double>(random() % 1000) / 7;
     const auto near = [&](double value) {
       for (std::uint64_t steps = random() % 3; steps > 0; --steps) {
@@ -160,7 +162,7 @@ bool TrulyTouch(const LatticePoint& a, const LatticePoint& b, const LatticePoint
 TEST(SegmentsTouch, AgreesWithIntegersOnASmallLatticeWithAllItsDegeneracies) {
   Random random(4);
   int touching = 0;
-  for (int round = 0; round < 500'000; ++round) {
+  for (int round = 0; round < support::Tries(500'000); ++round) {
     std::array<LatticePoint, 4> p;
     for (LatticePoint& point : p) point = {Below(random, 5), Below(random, 5)};
     const bool expected = TrulyTouch(p[0], p[1], p[2], p[3]);

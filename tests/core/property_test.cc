@@ -16,6 +16,7 @@
 #include "partiemc/status.h"
 #include "partiemc/validate.h"
 #include "support/particles.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -162,7 +163,7 @@ void CheckPlacement(const Trial& trial, Placement placement, Tally& tally) {
 }
 
 TEST(Guarantees, HoldForRandomFramesAllPlacementsAndAllFills) {
-  const std::uint64_t frames = NumberFromEnvironment("PARTIEMC_FRAMES", 200);
+  const std::uint64_t frames = NumberFromEnvironment("PARTIEMC_FRAMES", support::Tries(200u));
   const std::uint64_t first = NumberFromEnvironment("PARTIEMC_SEED", 1);
   std::map<Placement, Tally> tallies;
   for (std::uint64_t seed = first; seed < first + frames; ++seed) {

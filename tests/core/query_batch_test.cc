@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -54,7 +55,7 @@ std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t
 }
 
 TEST(QueryBatch, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
     support::Random random(seed);
     const Points points(random);
     std::vector<std::size_t> segment_of;
@@ -88,7 +89,7 @@ TEST(QueryBatch, HoldEachPointOnceInOrderWithNeighboursOfItsTileOnly) {
 
 // Tasks begin anywhere in a ring.
 TEST(QueryBatch, AreTheSameWhereverCollectingBegins) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
     support::Random random(seed);
     const Points points(random);
     const std::size_t last = points.count_of.size();

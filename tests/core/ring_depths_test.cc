@@ -9,6 +9,7 @@
 
 #include "base/predicates.h"
 #include "region_shapes.h"
+#include "support/tries.h"
 #include "vertices/intersections.h"
 
 namespace partiemc {
@@ -104,7 +105,7 @@ TEST(RingDepths, RingIsFoundAtItsLowestPoint) {
 
 /// Staircases have many points at one height, and horizontal sides: ties of the sweep.
 TEST(RingDepths, AgreeWithWindingNumbersOfStaircases) {
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
     Random random(seed);
     const testing::Cells cells = testing::RandomCells(random, 14, 14, 0.6);
     const Region staircases = testing::Staircases(cells, random, seed % 2 == 0);
@@ -120,7 +121,7 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStaircases) {
 TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
   int nested = 0;
   RingDepths warm;
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
     Random random(seed);
     Region region;
     TouchingPairsBuffers buffers;

@@ -12,6 +12,7 @@
 #include "partiemc/validate.h"
 #include "support/level_sets.h"
 #include "support/stages.h"
+#include "support/tries.h"
 #include "vertices/placement.h"
 #include "vertices/repair.h"
 #include "vertices/virtual_plane.h"
@@ -144,7 +145,7 @@ TEST(Roots, RingsAreSimpleAndNestedForAnyLevelSet) {
   Stages stages;
   Result result;
   std::size_t rings = 0, saddles = 0, thinned = 0;
-  for (std::uint64_t seed = 1; seed <= 20'000; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(20'000u); ++seed) {
     Random random(seed);
     TraceRandomPatch(random, stages);
     RingsThroughRoots(random, stages, Clamping::kWhole, result.rings);
@@ -167,7 +168,7 @@ TEST_P(RootsWithout, AnyClampCrossOrTouch) {
   Stages stages;
   Result result;
   std::size_t broken = 0;
-  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(500u); ++seed) {
     Random random(seed);
     TraceRandomPatch(random, stages);
     RingsThroughRoots(random, stages, GetParam(), result.rings);
@@ -194,7 +195,7 @@ TEST(Roots, RepairReturnsFromAnywhere) {
   Result result;
   RepairScratch scratch;
   std::size_t crossing = 0;
-  for (std::uint64_t seed = 1; seed <= 2'000; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(2'000u); ++seed) {
     Random random(seed);
     TraceRandomPatch(random, stages);
     RingsThroughRoots(random, stages, Clamping::kWhole, result.rings);
@@ -219,7 +220,7 @@ TEST(Roots, RepairReturnsFromAnywhere) {
 TEST(Roots, PlacementIsSimpleWithAnyEdgeVertices) {
   Stages stages;
   std::size_t points = 0;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(200u); ++seed) {
     Random random(seed);
     const support::LevelSetPatch patch = support::RandomPatch(random, 24, 24);
     const support::Particles particles = support::Shifted(

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -56,7 +57,7 @@ Shared Found(const std::vector<NodeRun>& a_runs, const std::vector<NodeRun>& b_r
 }
 
 TEST(RunOverlaps, AgreeWithNodesAlsoIfMovedRingsOverlap) {
-  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(100u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     support::Random random(seed);
     constexpr std::uint32_t kRings = 6;

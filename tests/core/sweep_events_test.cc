@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "region_shapes.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -57,7 +58,7 @@ std::vector<Passage> Collected(const Region& region, SweepEvents& events) {
 TEST(SweepEvents, AgreeWithSort) {
   Random random(21);
   SweepEvents events;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < support::Tries(300); ++round) {
     SCOPED_TRACE("seed 21, round " + std::to_string(round));
     // Lattices have many points of equal height, and some points occur several times.
     Region region = testing::RandomGarbage(random, 2 + round % 30, 6, 60);

@@ -12,6 +12,7 @@
 #include "partiemc/validate.h"
 #include "support/particles.h"
 #include "support/reconstruct.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -96,7 +97,7 @@ TEST(TJunctions, FilledResultNeedsAMesh) {
 // both counts agree.
 TEST(TJunctions, AgreeWithBruteForceInRandomFrames) {
   std::size_t greedy_total = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(40u); ++seed) {
     support::Random random(seed);
     const support::Particles particles = support::Blob(random, 4 + 0.2 * static_cast<double>(seed));
     for (const Placement placement :

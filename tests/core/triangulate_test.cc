@@ -14,6 +14,7 @@
 #include "base/predicates.h"
 #include "region_cover.h"
 #include "region_shapes.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -170,7 +171,7 @@ std::size_t ExpectedCount(const Region& staircases, const Cells& cells) {
 }
 
 TEST(Triangulator, UnionsOfRandomLatticeCellsWithPinchesAreCovered) {
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
     const Cells cells = testing::RandomCells(random, 3 + seed % 17, 3 + seed % 13,
@@ -307,7 +308,7 @@ bool IsRegion(const Region& region) {
 TEST(Triangulator, AcceptsRandomLoopsExactlyWhenTheyBoundARegion) {
   Random random(7);
   std::size_t accepted = 0;
-  for (int round = 0; round < 200'000; ++round) {
+  for (int round = 0; round < support::Tries(200'000); ++round) {
     const Region region =
         testing::RandomGarbage(random, 3 + round % 3, 1 + round % 3, 3 + round % 6);
     const auto triangles = Triangulate(region);
@@ -321,7 +322,7 @@ TEST(Triangulator, AcceptsRandomLoopsExactlyWhenTheyBoundARegion) {
 }
 
 TEST(Triangulator, LargeGarbageIsRefused) {
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
     Random random(seed);
     EXPECT_FALSE(Triangulate(testing::RandomGarbage(random, 2 + seed, 20, 1000)))
         << "seed " << seed;
@@ -329,7 +330,7 @@ TEST(Triangulator, LargeGarbageIsRefused) {
 }
 
 TEST(Triangulator, RegionWithOnePointMovedIsCoveredOrRefused) {
-  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(500u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
     Region region = testing::RandomContours(random, 8 + seed % 20);

@@ -13,6 +13,7 @@
 #include "check/side_balance.h"
 #include "mesh/triangulate.h"
 #include "region_shapes.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -278,7 +279,7 @@ TEST(Validate, M3FindsMissingAndChangedPoint) {
 
 TEST(Validate, RefusesGarbage) {
   Random random(12);
-  for (int round = 0; round < 20'000; ++round) {
+  for (int round = 0; round < support::Tries(20'000); ++round) {
     Result result = GoodResult();
     Rings& rings = result.rings;
     Mesh& mesh = result.mesh;

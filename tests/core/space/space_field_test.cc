@@ -13,6 +13,7 @@
 #include "space/level_set.h"
 #include "space/point_sampler.h"
 #include "space/space_particles.h"
+#include "support/tries.h"
 
 namespace partiemc::space {
 namespace {
@@ -166,7 +167,7 @@ TEST(SpaceBins, RefusesTooManyBricksAndFarPositions) {
 TEST(PointSampler, GradientsAgreeWithDifferences) {
   Random random(5);
   int terms[4] = {};
-  for (int trial = 0; trial < 400; ++trial) {
+  for (int trial = 0; trial < support::Tries(400); ++trial) {
     SpaceParticles particles = Ball({0, 0, 0}, random.Uniform(2, 4), .3, random);
     // Dense particles saturate.
     if (trial % 4 == 0) {
@@ -210,7 +211,7 @@ TEST(PointSampler, GradientsAgreeWithDifferences) {
 
 TEST(LargestEigenvalue, AgreesWithPowerIteration) {
   Random random(6);
-  for (int trial = 0; trial < 2'000; ++trial) {
+  for (int trial = 0; trial < support::Tries(2'000); ++trial) {
     // A sum of squares of random vectors, some of them parallel or in a plane.
     Symmetric a;
     const double flat = trial % 3 == 0 ? 1 : trial % 3 == 1 ? 1e-3 : 0;

@@ -13,6 +13,7 @@
 #include "space/point_sums.h"
 #include "space/space_particles.h"
 #include "support/instruction_sets.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -104,7 +105,7 @@ struct PlainSums {
 TEST(PointSums, HaveTheBitsOfScalarLoops) {
   Random random(1);
   const auto coordinate = [&] { return static_cast<float>(random.Uniform(-4, 4)); };
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < support::Tries(200); ++trial) {
     space::NearBlock block;
     block.count = static_cast<int>(random.Below(space::NearBlock::kCapacity));
     for (int p = 0; p < block.count; ++p) {

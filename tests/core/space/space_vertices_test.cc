@@ -22,6 +22,7 @@
 #include "space_vertices/loop_windows.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/roots.h"
+#include "support/tries.h"
 
 namespace partiemc::space {
 namespace {
@@ -240,7 +241,7 @@ TEST(Roots, LieOnTheLevelSet) {
 
 TEST(Qef, FindsTheCornerOfThreePlanes) {
   Random random(4);
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < support::Tries(200); ++trial) {
     const auto along = [&] { return random.Uniform(-1, 1); };
     const auto vector = [&] {
       const double x = along(), y = along();

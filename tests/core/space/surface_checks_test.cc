@@ -12,6 +12,7 @@
 #include "check/triangle_contact.h"
 #include "partiemc/surface.h"
 #include "space/shells.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -260,7 +261,7 @@ TEST(SideOfPlane, DecidesLastBit) {
 TEST(SideOfPlane, ChangesSignWithEverySwap) {
   std::mt19937 random(5);
   int zeros = 0;
-  for (int trial = 0; trial < 20'000; ++trial) {
+  for (int trial = 0; trial < support::Tries(20'000); ++trial) {
     // Nearly or exactly coplanar, with coordinates whose differences are not exact.
     const auto value = [&] { return .1 * static_cast<double>(random() % 7) + 1e-3 / 3; };
     Vec3 p[4];
@@ -278,7 +279,7 @@ TEST(SideOfPlane, ChangesSignWithEverySwap) {
 // Integer arithmetic decides small lattice tetrahedra.
 TEST(SideOfPlane, AgreesWithIntegers) {
   std::mt19937 random(6);
-  for (int trial = 0; trial < 50'000; ++trial) {
+  for (int trial = 0; trial < support::Tries(50'000); ++trial) {
     long long v[4][3];
     Vec3 p[4];
     for (int k = 0; k < 4; ++k) {
