@@ -191,15 +191,15 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate) {
   MovedNodes& nodes = certificate.nodes;
-  const FaceChecker checker(bricks, crossings, cell_size, positions, nodes);
   for (;;) {
     MoveNodes(bricks, crossings, cell_size, anchors, positions, certificate);
     std::atomic<bool> is_refused = false;
     ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
       if (!HasMovedAround(bricks, brick, certificate.has_moved)) return;
+      FaceChecker checker(bricks, crossings, cell_size, positions, nodes, brick);
       ForEachFace(bricks, nodes, certificate.changed, brick,
                   [&](const std::array<int, 3>& cell, int side) {
-                    const Face face = checker.FaceOf(brick, cell, side);
+                    const Face face = checker.FaceOf(cell, side);
                     QuadMode mode;
                     const bool is_valid = checker.FindMode(face, mode);
                     if (face.crossed > 0) certificate.modes[face.low.active][face.axis] = mode;
@@ -284,15 +284,15 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate) {
-  const FaceChecker checker(bricks, crossings, cell_size, positions, certificate.nodes);
   BrickBits all_cells;
   all_cells.fill(~std::uint64_t{0});
   const std::vector<BrickBits> all(bricks.size(), all_cells);
   std::uint32_t refused = 0;
   for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
+    FaceChecker checker(bricks, crossings, cell_size, positions, certificate.nodes, brick);
     ForEachFace(bricks, certificate.nodes, all, brick,
                 [&](const std::array<int, 3>& cell, int side) {
-                  const Face face = checker.FaceOf(brick, cell, side);
+                  const Face face = checker.FaceOf(cell, side);
                   QuadMode mode;
                   const bool is_valid = checker.FindMode(face, mode);
                   const bool is_as_cut =

@@ -1,6 +1,7 @@
 #include "space/face_checker.h"
 
 #include <algorithm>
+#include <cstddef>
 
 #include "base/predicates_in_space.h"
 
@@ -42,27 +43,59 @@ double Along(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y
 
 }  // namespace
 
-Face FaceChecker::FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, int face) const {
-  Face of;
-  of.brick = brick;
-  of.axis = face / 2;
-  of.low.at = of.high.at = cell;
-  ((face & 1) != 0 ? of.high : of.low).at[of.axis] += (face & 1) != 0 ? 1 : -1;
-  for (Side* side : {&of.low, &of.high}) {
-    const BrickPlace place = Normalise(bricks_, brick, side->at[0], side->at[1], side->at[2]);
+const FaceChecker::Node& FaceChecker::CornerOf(const std::array<int, 3>& cell, int corner) {
+  const std::array<int, 3> at{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1),
+                              cell[2] + (corner >> 2)};
+  const auto index =
+      static_cast<std::size_t>(((at[2] + 1) * kNodesAlong + at[1] + 1) * kNodesAlong + at[0] + 1);
+  Node& node = node_[index];
+  if (has_node_[index]) return node;
+  has_node_[index] = true;
+  const std::uint32_t moved = nodes_.IndexOf(Normalise(bricks_, brick_, at[0], at[1], at[2]));
+  const Vec3 position = NodeAt(bricks_, nodes_, cell_size_, brick_, at);
+  node = {position.x, position.y, position.z,
+          moved == kNoIndex ? kNoIndex : crossings_.VertexCount() + moved};
+  return node;
+}
+
+Side FaceChecker::SideAt(const std::array<int, 3>& at) {
+  const auto index =
+      static_cast<std::size_t>(((at[2] + 1) * kCellsAlong + at[1] + 1) * kCellsAlong + at[0] + 1);
+  Cell& cell = cell_[index];
+  if (!has_cell_[index]) {
+    has_cell_[index] = true;
+    const BrickPlace place = Normalise(bricks_, brick_, at[0], at[1], at[2]);
     const bool is_active = place.brick != kNoIndex &&
                            (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
-    if (is_active) side->active = crossings_.CellAt(place);
+    Vec3 apex;
+    cell.active = is_active ? crossings_.CellAt(place) : kNoIndex;
+    if (is_active) {
+      apex = positions_[crossings_.cells[cell.active].first_loop];
+    } else {
+      for (int corner = 0; corner < 8; ++corner) apex = apex + CornerOf(at, corner).At();
+      apex = .125 * apex;
+    }
+    cell.x = apex.x, cell.y = apex.y, cell.z = apex.z;
   }
+  return {at, cell.active, {cell.x, cell.y, cell.z}};
+}
+
+Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
+  Face of;
+  of.axis = face / 2;
+  std::array<int, 3> beside = cell;
+  beside[of.axis] += (face & 1) != 0 ? 1 : -1;
+  of.low = SideAt((face & 1) != 0 ? cell : beside);
+  of.high = SideAt((face & 1) != 0 ? beside : cell);
   // The corners as seen from above: they are the corners of the upper face of the cell below.
   const std::array<int, 4> corners = CornersOfFace(2 * of.axis + 1);
   const bool has_crossings = of.low.active != kNoIndex && of.high.active != kNoIndex;
   for (int k = 0; k < 4; ++k) {
     const int a = corners[k], b = corners[(k + 1) & 3];
-    const std::uint32_t node = nodes_.IndexOf(NodeOf(brick, of.low.at, a));
-    of.around[of.count] = NodeAt(brick, of.low.at, a);
+    const Node& node = CornerOf(of.low.at, a);
+    of.around[of.count] = node.At();
     of.is_vertex[of.count] = false;
-    of.item[of.count++] = node == kNoIndex ? kNoIndex : crossings_.VertexCount() + node;
+    of.item[of.count++] = node.item;
     if (!has_crossings) continue;
     const ActiveCell& low = crossings_.cells[of.low.active];
     if (((low.corners >> a ^ low.corners >> b) & 1) == 0) continue;
@@ -73,13 +106,6 @@ Face FaceChecker::FaceOf(std::uint32_t brick, const std::array<int, 3>& cell, in
     ++of.crossed;
   }
   return of;
-}
-
-Vec3 FaceChecker::ApexOf(std::uint32_t brick, const Side& side) const {
-  if (side.active != kNoIndex) return positions_[crossings_.cells[side.active].first_loop];
-  Vec3 sum;
-  for (int corner = 0; corner < 8; ++corner) sum = sum + NodeAt(brick, side.at, corner);
-  return .125 * sum;
 }
 
 bool FaceChecker::IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const {
@@ -140,8 +166,7 @@ bool FaceChecker::FindMode(const Face& face, QuadMode& mode) const {
   mode = QuadMode::kAlongFace;
   const bool is_low_fixed = IsFixed(face.low), is_high_fixed = IsFixed(face.high);
   if (is_low_fixed && is_high_fixed) return true;
-  const Vec3 below = is_low_fixed ? Vec3{} : ApexOf(face.brick, face.low);
-  const Vec3 above = is_high_fixed ? Vec3{} : ApexOf(face.brick, face.high);
+  const Vec3 &below = face.low.apex, &above = face.high.apex;
   // A face of a fixed cell is flat. The vertex of the other cell must be on its own side of the
   // face.
   const double level = Along(face.around[0], face.axis);
