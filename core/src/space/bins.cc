@@ -191,11 +191,11 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
     bins.sorted[next[bins.home[p]]++] = {bins.keys[p], static_cast<std::uint32_t>(p)};
   }
   bins.cells.resize(bricks);
-  bins.x.resize(count);
-  bins.y.resize(count);
-  bins.z.resize(count);
+  bins.x.resize(count + kBinPadding);
+  bins.y.resize(count + kBinPadding);
+  bins.z.resize(count + kBinPadding);
   bins.source.resize(count);
-  bins.weight.resize(frame.volumes.empty() ? 0 : count);
+  bins.weight.resize(frame.volumes.empty() ? 0 : count + kBinPadding);
   const double weight_per_world_volume =
       scale.weight_per_volume / scale.cell_size / scale.cell_size / scale.cell_size;
   ParallelFor(static_cast<std::uint32_t>(bricks), [&](std::uint32_t brick) {

@@ -16,14 +16,17 @@
 
 namespace partiemc::space {
 
+inline constexpr std::size_t kBinPadding = 8;
+
 /// Particles by brick, cell (layer, row, column), position and weight. Positions are in cells
 /// relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
   /// Per brick: the first particle of each cell, then the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
+  /// kBinPadding values follow the last particle, so that vectors may read beyond it.
   std::vector<float> x, y, z;
-  std::vector<float> weight;          ///< Empty if uniform.
+  std::vector<float> weight;          ///< Empty if uniform; else padded, too.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
 
   struct Keyed {

@@ -142,7 +142,7 @@ BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::ui
 void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField& field,
                     double spacing, Bodies& bodies) {
   const double usual = spacing * spacing * spacing;
-  bodies.body_of_particle.assign(bins.x.size(), kNoIndex);
+  bodies.body_of_particle.assign(bins.source.size(), kNoIndex);
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
     for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
       BrickPlace node{kNoIndex, 0, 0, 0};

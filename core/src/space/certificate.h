@@ -35,9 +35,13 @@ struct Certificate {
   std::uint32_t returned = 0;                  ///< Vertices that were moved back at least once.
 
   MovedNodes nodes;
-  std::vector<std::uint8_t> setbacks;   ///< By vertex.
-  std::vector<std::uint8_t> is_bad;     ///< By vertex, then by node: on a refused face.
-  std::vector<std::uint8_t> has_moved;  ///< By brick: in the last round.
+  std::vector<std::uint8_t> setbacks;  ///< By vertex.
+  std::vector<std::uint8_t> is_bad;    ///< By vertex, then by node: on a refused face.
+  /// Cells by brick. Moved: with a vertex or node that moved, or with a refused face. Changed:
+  /// moved cells, and cells with a node that followed them. Their faces are tested.
+  std::vector<BrickBits> moved, changed;
+  std::vector<BrickBits> moved_nodes;   ///< Nodes by brick, in the last round.
+  std::vector<std::uint8_t> has_moved;  ///< By brick: has moved cells.
   std::vector<Vec3> certified;          ///< Positions of the vertices, once certified.
 };
 
@@ -54,8 +58,8 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
              Certificate& certificate);
 
 /// Certifies again after vertices have moved from their certified positions. The setbacks of
-/// vertices and nodes count on. Cost: linear in vertices and bricks, and in the faces of the bricks
-/// in which something has moved and of the bricks around them.
+/// vertices and nodes count on. Cost: linear in vertices and bricks, and in the faces of cells in
+/// which something has moved.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);

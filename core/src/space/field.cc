@@ -6,34 +6,13 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "space/brick_blocks.h"
 #include "space/near_particles.h"
 #include "space/point_sampler.h"
 #include "space/point_sums.h"
 
 namespace partiemc::space {
 namespace {
-
-/// Calls visit(i, j, k) for each marked node of a brick, in blocks of 2 x 2 x 2 nodes. Before each
-/// block, calls move_to(i, j, k) with the lowest node of the block.
-template <typename MoveTo, typename Visit>
-void ForEachInBlocks(const BrickBits& nodes, MoveTo move_to, Visit visit) {
-  for (int k = 0; k < kBrickSize; k += 2) {
-    for (int j = 0; j < kBrickSize; j += 2) {
-      for (int i = 0; i < kBrickSize; i += 2) {
-        constexpr std::uint64_t kSquare = 0x303;
-        const std::uint64_t square = kSquare << (j * kBrickSize + i);
-        if (((nodes[k] | nodes[k + 1]) & square) == 0) continue;
-        move_to(i, j, k);
-        for (int layer = k; layer < k + 2; ++layer) {
-          for (std::uint64_t bits = nodes[layer] & square; bits != 0; bits &= bits - 1) {
-            const int bit = std::countr_zero(bits);
-            visit(bit % kBrickSize, bit / kBrickSize, layer);
-          }
-        }
-      }
-    }
-  }
-}
 
 NearBox BoxOfBlock(int i, int j, int k) {
   const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);

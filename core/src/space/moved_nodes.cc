@@ -1,19 +1,9 @@
 #include "space/moved_nodes.h"
 
 #include "base/parallel.h"
-#include "space/brick_layers.h"
 
 namespace partiemc::space {
 namespace {
-
-/// The nodes of a layer that are corners of cells among `cells`.
-std::uint64_t CornersOf(const BrickLayers& cells, int k) {
-  std::uint64_t nodes = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    nodes |= cells(k - (corner >> 2), -(corner & 1), -(corner >> 1 & 1));
-  }
-  return nodes;
-}
 
 /// The nodes of a layer next to bricks that do not exist.
 std::uint64_t AtTheEnd(const BrickDirectory& bricks, std::uint32_t brick, int k) {
@@ -33,6 +23,14 @@ constexpr double kLeastSquare = 1e-3;
 bool HasOneLoop(const ActiveCell& cell) { return LoopsOf(cell.corners).loops == 1; }
 
 }  // namespace
+
+std::uint64_t CornersOf(const BrickLayers& cells, int k) {
+  std::uint64_t nodes = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    nodes |= cells(k - (corner >> 2), -(corner & 1), -(corner >> 1 & 1));
+  }
+  return nodes;
+}
 
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                     MovedNodes& nodes) {
@@ -80,12 +78,16 @@ void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossing
   nodes.setbacks.assign(nodes.count, 0);
 }
 
-void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 double cell_size, const std::vector<Vec3>& anchors,
-                 const std::vector<Vec3>& positions, MovedNodes& nodes) {
+BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDirectory& bricks,
+                      const SpaceCrossings& crossings, double cell_size,
+                      const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
+                      MovedNodes& nodes) {
+  BrickBits changed{};
   const Vec3 origin = OriginOf(bricks[brick]);
   const double least = kLeastSquare * cell_size * cell_size;
   ForEachMovedNode(nodes, brick, [&](std::uint32_t index, int i, int j, int k) {
+    const std::uint64_t bit = std::uint64_t{1} << (j * kBrickSize + i);
+    if ((which[k] & bit) == 0) return;
     Vec3 sum;
     double total = 0;
     const Vec3 node = cell_size * (origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k});
@@ -113,8 +115,12 @@ void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceC
     double share = nodes.setbacks[index] < kMostSetbacks ? 1 : 0;
     for (int setback = kSmoothings; setback < nodes.setbacks[index]; ++setback)
       share *= kKeptOfMove;
-    nodes.moves[index] = total > 0 ? (share / total) * sum : Vec3{};
+    const Vec3 move = total > 0 ? (share / total) * sum : Vec3{};
+    if (move == nodes.moves[index]) return;
+    nodes.moves[index] = move;
+    changed[k] |= bit;
   });
+  return changed;
 }
 
 }  // namespace partiemc::space

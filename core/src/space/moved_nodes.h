@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/vec3.h"
+#include "space/brick_layers.h"
 #include "space/crossings.h"
 #include "space/lattice.h"
 
@@ -53,10 +54,15 @@ inline constexpr double kKeptOfMove = .7;
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                     MovedNodes& nodes);
 
-/// Sets the moves of the nodes of a brick. Anchors and positions in world units.
-void MoveNodesOf(std::uint32_t brick, const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 double cell_size, const std::vector<Vec3>& anchors,
-                 const std::vector<Vec3>& positions, MovedNodes& nodes);
+/// The nodes of a layer that are corners of cells among `cells`.
+std::uint64_t CornersOf(const BrickLayers& cells, int k);
+
+/// Sets the moves of those nodes of a brick that are in `which` and may move. Returns the nodes
+/// whose moves changed. Anchors and positions in world units.
+BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDirectory& bricks,
+                      const SpaceCrossings& crossings, double cell_size,
+                      const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
+                      MovedNodes& nodes);
 
 /// The position of the node (i, j, k) relative to a brick, in the unit of `cell_size` and the
 /// moves.

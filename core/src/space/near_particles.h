@@ -16,6 +16,13 @@ struct NearBox {
   std::array<float, 3> low, high;
 };
 
+/// The particles that lie in a row of cells: indices [first, last) of the bins, and the shift to
+/// add to their coordinates.
+struct NearRun {
+  std::uint32_t first, last;
+  float shift_x, shift_y, shift_z;
+};
+
 /// A block of particles, in cells relative to a brick. Dummies that are too far away to count fill
 /// the block up to a multiple of kLanes.
 struct NearBlock {
@@ -24,10 +31,28 @@ struct NearBlock {
   template <typename Value>
   using PerParticle = std::array<Value, kCapacity + kLanes>;
 
+  static_assert(kLanes <= kBinPadding);
+
   alignas(64) PerParticle<float> x, y, z;
   alignas(64) PerParticle<float> weight;  ///< 1 if uniform.
-  PerParticle<std::uint32_t> particle;    ///< Index into SpaceBins.
   int count = 0;
+
+  /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Vectors
+  /// also copy what follows them in the bins, which counts for nothing.
+  std::uint32_t Append(const SpaceBins& bins, const NearRun& run, std::uint32_t first) {
+    const auto most = static_cast<std::uint32_t>(std::min(kLanes, kCapacity - count));
+    const std::uint32_t added = std::min(run.last - first, most);
+    Shift(bins.x.data() + first, run.shift_x, x.data() + count);
+    Shift(bins.y.data() + first, run.shift_y, y.data() + count);
+    Shift(bins.z.data() + first, run.shift_z, z.data() + count);
+    if (bins.weight.empty()) {
+      std::fill_n(weight.data() + count, kLanes, 1.0f);
+    } else {
+      std::copy_n(bins.weight.data() + first, kLanes, weight.data() + count);
+    }
+    count += static_cast<int>(added);
+    return added;
+  }
 
   void Pad() {
     for (int k = count; k % kLanes != 0; ++k) {
@@ -35,13 +60,11 @@ struct NearBlock {
       weight[k] = 0;
     }
   }
-};
 
-/// The particles that lie in a row of cells: indices [first, last) of the bins, and the shift to
-/// add to their coordinates.
-struct NearRun {
-  std::uint32_t first, last;
-  float shift_x, shift_y, shift_z;
+ private:
+  static void Shift(const float* from, float by, float* to) {
+    for (int k = 0; k < kLanes; ++k) to[k] = from[k] + by;
+  }
 };
 
 /// Calls visit(NearRun) for runs that contain all particles within `radius` of the box, in the
@@ -98,19 +121,13 @@ template <typename Visit>
 void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
                       NearBlock& block, Visit visit) {
   block.count = 0;
-  const bool is_uniform = bins.weight.empty();
   ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
-    for (std::uint32_t p = run.first; p < run.last; ++p) {
+    for (std::uint32_t p = run.first; p < run.last;) {
       if (block.count == NearBlock::kCapacity) {
         visit(block);
         block.count = 0;
       }
-      const int k = block.count++;
-      block.x[k] = bins.x[p] + run.shift_x;
-      block.y[k] = bins.y[p] + run.shift_y;
-      block.z[k] = bins.z[p] + run.shift_z;
-      block.weight[k] = is_uniform ? 1.0f : bins.weight[p];
-      block.particle[k] = p;
+      p += block.Append(bins, run, p);
     }
   });
   if (block.count == 0) return;

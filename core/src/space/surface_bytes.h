@@ -14,8 +14,8 @@ struct SurfaceSize {
   bool has_windows = false;  ///< Of `kVirtualPlane`.
 };
 
-/// Bytes per item, with a margin for vectors that grow by doubling. A window has at most
-/// LoopWindows::kMostLoopsOfWindow loops.
+/// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
+/// bounds the windows.
 inline constexpr std::uint64_t kBytesPerParticle = 60;
 inline constexpr std::uint64_t kBytesPerBrick = 6'000;
 inline constexpr std::uint64_t kBytesPerEdge = 300;

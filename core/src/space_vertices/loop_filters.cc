@@ -5,30 +5,46 @@
 #include <cstdint>
 
 #include "base/parallel.h"
+#include "space_vertices/window_sums.h"
 
 namespace partiemc::space {
 namespace {
 
-double Square(double value) { return value * value; }
-
-double WindowWeight(const Vec3& to, double reach_square) {
-  return Square(std::max(0.0, 1 - Dot(to, to) / reach_square));
+/// Copies the loops near a chunk. Loops that fill the last vector have no area. Without bases,
+/// these stay as they are.
+void LoadNear(const LoopSurface& surface, std::span<const Vec3> normals,
+              std::span<const double> bases, const std::vector<std::uint32_t>& near,
+              NearLoops& loops) {
+  const auto as_float = [](double value) { return static_cast<float>(value); };
+  const Vec3 origin = surface.centres[near[0]];
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const Vec3 centre = surface.centres[near[k]] - origin;
+    const Vec3& normal = normals[near[k]];
+    loops.x[k] = as_float(centre.x), loops.y[k] = as_float(centre.y),
+    loops.z[k] = as_float(centre.z);
+    loops.area[k] = as_float(surface.areas[near[k]]);
+    loops.normal_x[k] = as_float(normal.x), loops.normal_y[k] = as_float(normal.y);
+    loops.normal_z[k] = as_float(normal.z);
+    if (!bases.empty()) loops.base[k] = as_float(bases[near[k]]);
+  }
+  for (std::size_t k = near.size(); k % 8 != 0; ++k) {
+    loops.x[k] = loops.y[k] = loops.z[k] = loops.area[k] = loops.base[k] = 0;
+    loops.normal_x[k] = loops.normal_y[k] = loops.normal_z[k] = 0;
+  }
 }
 
-/// max(0, cosine)^32.
-double Agreement(double cosine) {
-  double power = std::max(0.0, cosine);
-  for (int k = 0; k < 5; ++k) power *= power;
-  return power;
-}
-
+/// Calls body(loop, near loops, window) for each loop, in parallel over chunks.
 template <typename Body>
-void ForEachLoop(const LoopSurface& surface, const Body& body) {
-  ParallelFor(surface.windows.ChunkCount(), [&](std::size_t chunk) {
-    const std::size_t first = chunk * LoopWindows::kLoopsAtOnce;
-    const std::size_t last =
-        std::min(first + LoopWindows::kLoopsAtOnce, surface.windows.loop_count);
-    for (std::size_t loop = first; loop < last; ++loop) body(loop);
+void ForEachWindow(const LoopSurface& surface, std::span<const Vec3> normals,
+                   std::span<const double> bases, double reach, const Body& body) {
+  const auto inverse_square = static_cast<float>(1 / (reach * reach));
+  ParallelFor(surface.windows.chunk_count, [&](std::size_t index) {
+    const LoopWindows::Chunk& chunk = surface.windows.chunks[index];
+    NearLoops loops;
+    LoadNear(surface, normals, bases, chunk.near, loops);
+    for (std::uint32_t loop = chunk.begin; loop < chunk.end; ++loop) {
+      body(loop, loops, Window{chunk.Of(loop), chunk.self[loop - chunk.begin], inverse_square});
+    }
   });
 }
 
@@ -36,51 +52,30 @@ void ForEachLoop(const LoopSurface& surface, const Body& body) {
 
 void SmoothNormals(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                    Stop stop, std::span<Vec3> smooth) {
-  const double square = reach * reach;
-  ForEachLoop(surface, [&](std::size_t i) {
-    Vec3 sum;
-    for (const std::uint32_t j : surface.windows.Of(i)) {
-      double weight =
-          surface.areas[j] * WindowWeight(surface.centres[j] - surface.centres[i], square);
-      if (stop == Stop::kAtEdges) weight *= Agreement(Dot(normals[i], normals[j]));
-      sum = sum + weight * normals[j];
-    }
-    const Vec3 normal = Normalised(sum);
-    smooth[i] = normal == Vec3{} ? normals[i] : normal;
-  });
+  ForEachWindow(surface, normals, {}, reach,
+                [&](std::size_t i, const NearLoops& loops, const Window& window) {
+                  const Vec3 normal = Normalised(SumNormals(loops, window, stop == Stop::kAtEdges));
+                  smooth[i] = normal == Vec3{} ? normals[i] : normal;
+                });
 }
 
 void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                double limit, std::span<double> bends) {
-  const double square = reach * reach;
-  ForEachLoop(surface, [&](std::size_t i) {
-    double turn = 0, way = 0;
-    for (const std::uint32_t j : surface.windows.Of(i)) {
-      const Vec3 to = surface.centres[j] - surface.centres[i];
-      const double weight = surface.areas[j] * WindowWeight(to, square);
-      const Vec3 tangent = to - Dot(to, normals[i]) * normals[i];
-      turn += weight * Dot(normals[j] - normals[i], tangent);
-      way += weight * Dot(tangent, tangent);
-    }
-    bends[i] = way > 0 ? std::clamp(2 * turn / way, -limit, limit) : 0;
-  });
+  ForEachWindow(surface, normals, {}, reach,
+                [&](std::size_t i, const NearLoops& loops, const Window& window) {
+                  const auto [turn, way] = SumBends(loops, window);
+                  bends[i] = way > 0 ? std::clamp(2 * turn / way, -limit, limit) : 0;
+                });
 }
 
 void SmoothOnPlanes(const LoopSurface& surface, std::span<const Vec3> normals,
                     std::span<const double> bases, double reach, std::span<Vec3> smooth) {
-  const double square = reach * reach;
-  ForEachLoop(surface, [&](std::size_t i) {
-    double height = 0, total = 0;
-    for (const std::uint32_t j : surface.windows.Of(i)) {
-      const Vec3 to = surface.centres[j] - surface.centres[i];
-      const double weight =
-          surface.areas[j] * WindowWeight(to, square) * Agreement(Dot(normals[i], normals[j]));
-      height += weight * (.5 * Dot(normals[i] + normals[j], to) + bases[j]);
-      total += weight;
-    }
-    const double by = total > 0 ? height / total : bases[i];
-    smooth[i] = surface.centres[i] + by * normals[i];
-  });
+  ForEachWindow(surface, normals, bases, reach,
+                [&](std::size_t i, const NearLoops& loops, const Window& window) {
+                  const auto [height, total] = SumPlanes(loops, window);
+                  const double by = total > 0 ? height / total : bases[i];
+                  smooth[i] = surface.centres[i] + by * normals[i];
+                });
 }
 
 }  // namespace partiemc::space

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "base/parallel.h"
+#include "space_vertices/window_sums.h"
 
 namespace partiemc::space {
 namespace {
@@ -39,53 +41,173 @@ void LinkLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   });
 }
 
-/// Breadth-first search from loop to loop.
-class WindowSearch {
- public:
-  WindowSearch(const LoopWindows& windows, std::span<const Vec3> centres, double reach,
-               LoopWindows::Chunk& chunk)
-      : windows_(windows), centres_(centres), square_(reach * reach), chunk_(chunk) {
-    chunk_.slots.assign(kSlots, kNoIndex);
-  }
-
-  /// Appends the window of a loop.
-  void Append(std::uint32_t loop) {
-    std::vector<std::uint32_t>& found = chunk_.loops;
-    const std::size_t first = found.size();
-    Visit(loop);
-    for (std::size_t k = first; k < found.size(); ++k) {
-      const std::uint32_t from = found[k];
-      for (std::uint32_t n = windows_.link_first[from]; n < windows_.link_first[from + 1]; ++n) {
-        const Vec3 to = centres_[windows_.links[n]] - centres_[loop];
-        if (!(Dot(to, to) < square_)) continue;
-        if (found.size() - first < LoopWindows::kMostLoopsOfWindow) Visit(windows_.links[n]);
-      }
+/// Splits the loops of each brick into chunks.
+void SplitLoops(const SpaceCrossings& crossings, LoopWindows& windows) {
+  windows.chunk_count = 0;
+  std::uint32_t begin = 0;
+  const auto cells = static_cast<std::uint32_t>(crossings.cells.size());
+  for (std::size_t brick = 1; brick <= crossings.bricks.size(); ++brick) {
+    const std::uint32_t next =
+        brick < crossings.bricks.size() ? crossings.bricks[brick].first_cell : cells;
+    const std::uint32_t end = next < cells ? crossings.cells[next].first_loop - crossings.edge_count
+                                           : crossings.loop_count;
+    while (begin < end) {
+      if (windows.chunk_count == windows.chunks.size()) windows.chunks.emplace_back();
+      LoopWindows::Chunk& chunk = windows.chunks[windows.chunk_count++];
+      chunk.begin = begin;
+      chunk.end = begin = std::min(begin + LoopWindows::kMostLoopsOfChunk, end);
     }
-    for (int k = 0; k < used_count_; ++k) chunk_.slots[used_[k]] = kNoIndex;
-    used_count_ = 0;
+  }
+}
+
+struct Box {
+  Vec3 low, high;
+
+  void Include(const Vec3& at) {
+    low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
+    high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
+  }
+  double SquareTo(const Vec3& at) const {
+    const Vec3 to{std::max({0.0, low.x - at.x, at.x - high.x}),
+                  std::max({0.0, low.y - at.y, at.y - high.y}),
+                  std::max({0.0, low.z - at.z, at.z - high.z})};
+    return Dot(to, to);
+  }
+};
+
+/// Finds the windows of the loops of a chunk: those within reach to which links lead.
+class ChunkSearch {
+ public:
+  ChunkSearch(const LoopWindows& windows, std::span<const Vec3> centres, double reach,
+              LoopWindows::Chunk& chunk)
+      : windows_(windows), centres_(centres), square_(reach * reach), chunk_(chunk) {}
+
+  void Find() {
+    FindNear();
+    FindLinks();
+    LoadPlaces();
+    const std::size_t bytes = chunk_.Bytes();
+    chunk_.self.clear();
+    chunk_.bits.assign((chunk_.end - chunk_.begin) * bytes, 0);
+    for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
+      chunk_.self.push_back(static_cast<std::uint16_t>(IndexOf(loop)));
+      FindWindow(chunk_.self.back(), chunk_.bits.data() + (loop - chunk_.begin) * bytes);
+    }
   }
 
  private:
-  static constexpr std::size_t kSlots = 1024;
-  static_assert(kSlots > 2 * LoopWindows::kMostLoopsOfWindow);
+  static constexpr std::size_t kSlots = 4096;
+  static_assert(kSlots >= 2 * LoopWindows::kMostNear);
+  static constexpr std::uint16_t kFree = 0xffff;
 
-  void Visit(std::uint32_t loop) {
-    std::size_t slot = (loop * 0x9e3779b1u) >> 22;
-    while (chunk_.slots[slot] != kNoIndex) {
-      if (chunk_.slots[slot] == loop) return;
-      slot = (slot + 1) % kSlots;
+  /// The slot of a loop, or the free slot where it belongs.
+  std::size_t SlotOf(std::uint32_t loop) const {
+    std::size_t slot = (loop * 0x9e3779b1u) >> 20;
+    while (slots_[slot] != kFree && chunk_.near[slots_[slot]] != loop) slot = (slot + 1) % kSlots;
+    return slot;
+  }
+  std::uint16_t IndexOf(std::uint32_t loop) const { return slots_[SlotOf(loop)]; }
+
+  /// Finds the loops within reach of the box around the chunk.
+  void FindNear() {
+    std::vector<std::uint32_t>& near = chunk_.near;
+    near.clear();
+    slots_.fill(kFree);
+    Box box{centres_[chunk_.begin], centres_[chunk_.begin]};
+    for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
+      box.Include(centres_[loop]);
+      Add(loop);
     }
-    chunk_.slots[slot] = loop;
-    used_[used_count_++] = static_cast<std::uint16_t>(slot);
-    chunk_.loops.push_back(loop);
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      for (std::uint32_t n = windows_.link_first[near[k]]; n < windows_.link_first[near[k] + 1];
+           ++n) {
+        const std::uint32_t to = windows_.links[n];
+        if (near.size() < LoopWindows::kMostNear && box.SquareTo(centres_[to]) < square_) Add(to);
+      }
+    }
+    std::sort(near.begin(), near.end());
+    slots_.fill(kFree);
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      slots_[SlotOf(near[k])] = static_cast<std::uint16_t>(k);
+    }
+  }
+  void Add(std::uint32_t loop) {
+    std::uint16_t& slot = slots_[SlotOf(loop)];
+    if (slot != kFree) return;
+    slot = static_cast<std::uint16_t>(chunk_.near.size());
+    chunk_.near.push_back(loop);
+  }
+
+  /// Finds the links between near loops.
+  void FindLinks() {
+    chunk_.first.clear();
+    chunk_.links.clear();
+    for (const std::uint32_t loop : chunk_.near) {
+      const std::size_t first = chunk_.links.size();
+      chunk_.first.push_back(static_cast<std::uint16_t>(first));
+      for (std::uint32_t n = windows_.link_first[loop]; n < windows_.link_first[loop + 1]; ++n) {
+        const std::uint16_t to = IndexOf(windows_.links[n]);
+        if (to == kFree) continue;
+        std::size_t k = first;
+        while (k < chunk_.links.size() && chunk_.links[k].byte != to / 8) ++k;
+        if (k == chunk_.links.size())
+          chunk_.links.push_back({static_cast<std::uint16_t>(to / 8), 0});
+        chunk_.links[k].bits |= static_cast<std::uint8_t>(1 << to % 8);
+      }
+    }
+    chunk_.first.push_back(static_cast<std::uint16_t>(chunk_.links.size()));
+  }
+
+  void LoadPlaces() {
+    const Vec3 origin = centres_[chunk_.begin];
+    std::size_t k = 0;
+    for (const std::uint32_t loop : chunk_.near) {
+      const Vec3 at = centres_[loop] - origin;
+      places_.x[k] = static_cast<float>(at.x);
+      places_.y[k] = static_cast<float>(at.y);
+      places_.z[k++] = static_cast<float>(at.z);
+    }
+    constexpr float kFar = 1e9f;
+    for (; k % 8 != 0; ++k) places_.x[k] = places_.y[k] = places_.z[k] = kFar;
+  }
+
+  /// Sets the bits of the window of a near loop. Requires: they are 0.
+  void FindWindow(std::uint16_t loop, std::uint8_t* found) {
+    const std::size_t bytes = chunk_.Bytes();
+    FindWithin(places_, bytes, loop, static_cast<float>(square_), within_.data());
+    std::fill_n(done_.begin(), bytes, std::uint8_t{0});
+    found[loop / 8] |= static_cast<std::uint8_t>(1 << loop % 8);
+    // Alternate directions reach all loops in few passes.
+    for (bool is_up = true, has_new = true; has_new; is_up = !is_up) {
+      has_new = false;
+      for (std::size_t k = 0; k < bytes; ++k) {
+        const std::size_t byte = is_up ? k : bytes - 1 - k;
+        while (found[byte] != done_[byte]) {
+          has_new = true;
+          Follow(byte, found);
+        }
+      }
+    }
+  }
+
+  /// Follows the links from a found loop of a byte.
+  void Follow(std::size_t byte, std::uint8_t* found) {
+    const unsigned fresh = found[byte] & ~unsigned{done_[byte]};
+    done_[byte] |= static_cast<std::uint8_t>(fresh & -fresh);
+    const std::size_t from = 8 * byte + static_cast<std::size_t>(std::countr_zero(fresh));
+    for (std::size_t n = chunk_.first[from]; n < chunk_.first[from + 1]; ++n) {
+      const LoopWindows::Link& link = chunk_.links[n];
+      found[link.byte] |= static_cast<std::uint8_t>(link.bits & within_[link.byte]);
+    }
   }
 
   const LoopWindows& windows_;
   std::span<const Vec3> centres_;
   const double square_;
   LoopWindows::Chunk& chunk_;
-  std::array<std::uint16_t, LoopWindows::kMostLoopsOfWindow> used_;
-  int used_count_ = 0;
+  std::array<std::uint16_t, kSlots> slots_;
+  NearLoops places_;  // Centres only.
+  std::array<std::uint8_t, LoopWindows::kMostNear / 8> within_, done_;
 };
 
 }  // namespace
@@ -94,20 +216,9 @@ void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                  std::span<const Vec3> centres, double reach, LoopWindows& windows) {
   windows.loop_count = crossings.loop_count;
   LinkLoops(bricks, crossings, windows);
-  const std::size_t count = windows.ChunkCount();
-  if (windows.chunks.size() < count) windows.chunks.resize(count);
-  ParallelFor(count, [&](std::size_t index) {
-    LoopWindows::Chunk& chunk = windows.chunks[index];
-    chunk.first.clear();
-    chunk.loops.clear();
-    WindowSearch search(windows, centres, reach, chunk);
-    const std::size_t first = index * LoopWindows::kLoopsAtOnce;
-    const std::size_t last = std::min(first + LoopWindows::kLoopsAtOnce, windows.loop_count);
-    for (std::size_t loop = first; loop < last; ++loop) {
-      chunk.first.push_back(static_cast<std::uint32_t>(chunk.loops.size()));
-      search.Append(static_cast<std::uint32_t>(loop));
-    }
-    chunk.first.push_back(static_cast<std::uint32_t>(chunk.loops.size()));
+  SplitLoops(crossings, windows);
+  ParallelFor(windows.chunk_count, [&](std::size_t index) {
+    ChunkSearch(windows, centres, reach, windows.chunks[index]).Find();
   });
 }
 

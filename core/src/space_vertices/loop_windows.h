@@ -17,28 +17,39 @@
 namespace partiemc::space {
 
 struct LoopWindows {
-  /// Most loops of a window: the first ones that the search reaches. This bounds the memory if
+  /// Most loops per chunk.
+  static constexpr std::uint32_t kMostLoopsOfChunk = 64;
+  /// Most loops near a chunk: those with the fewest steps from its loops. This bounds the memory if
   /// cells are small.
-  static constexpr std::size_t kMostLoopsOfWindow = 320;
-  /// Loops per task.
-  static constexpr std::size_t kLoopsAtOnce = 256;
+  static constexpr std::size_t kMostNear = 2048;
 
-  /// The windows of kLoopsAtOnce loops, each with its own loop first.
-  struct Chunk {
-    std::vector<std::uint32_t> first, loops;
-    std::vector<std::uint32_t> slots;  ///< Scratch: open addressing.
+  /// Loops that are linked with a loop: bits of one byte.
+  struct Link {
+    std::uint16_t byte;
+    std::uint8_t bits;
   };
-  std::vector<Chunk> chunks;  ///< The first ones are in use; later ones keep their memory.
+
+  /// The windows of consecutive loops of a brick, as bits for the loops near them.
+  struct Chunk {
+    std::uint32_t begin = 0, end = 0;  ///< The loops.
+    std::vector<std::uint32_t> near;   ///< The union of the windows and more; sorted.
+    std::vector<std::uint8_t> bits;    ///< By loop: bit k % 8 of byte k / 8 is loop near[k].
+    std::vector<std::uint16_t> self;   ///< By loop: its index in `near`.
+
+    /// Scratch: the links of near loop k are [first[k], first[k + 1]).
+    std::vector<std::uint16_t> first;
+    std::vector<Link> links;
+
+    std::size_t Bytes() const { return (near.size() + 7) / 8; }
+    std::span<const std::uint8_t> Of(std::uint32_t loop) const {
+      return std::span(bits).subspan((loop - begin) * Bytes(), Bytes());
+    }
+  };
+  std::vector<Chunk> chunks;  ///< The first `chunk_count` are in use; others keep their memory.
+  std::size_t chunk_count = 0;
   std::size_t loop_count = 0;
 
   std::vector<std::uint32_t> link_first, links;  ///< By loop: loops across its faces.
-
-  std::size_t ChunkCount() const { return (loop_count + kLoopsAtOnce - 1) / kLoopsAtOnce; }
-  std::span<const std::uint32_t> Of(std::size_t loop) const {
-    const Chunk& chunk = chunks[loop / kLoopsAtOnce];
-    const std::size_t at = loop % kLoopsAtOnce;
-    return std::span(chunk.loops).subspan(chunk.first[at], chunk.first[at + 1] - chunk.first[at]);
-  }
 };
 
 /// Finds the window of each loop, the loops within `reach` cells. `centres` by loop. Deterministic,

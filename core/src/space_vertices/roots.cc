@@ -1,8 +1,9 @@
 #include "space_vertices/roots.h"
 
-#include <cstddef>
+#include <cstdint>
 
 #include "base/parallel.h"
+#include "space/brick_blocks.h"
 #include "space/point_sampler.h"
 #include "space/vertices.h"
 
@@ -11,32 +12,28 @@ namespace {
 
 // A smaller squared gradient has no direction.
 constexpr double kWeakGradient = 1e-3;
-// Cells per task: enough that the cost of a sampler does not matter.
-constexpr std::size_t kCellsAtOnce = 64;
-
 class RootFinder {
  public:
   RootFinder(const SpaceBins& bins, const Scale& scale, const RootConstants& constants)
       : constants_(constants), sampler_(bins, scale) {}
 
-  void MoveTo(const ActiveCell& cell, const Vec3& origin) {
-    const auto x = static_cast<float>(cell.i), y = static_cast<float>(cell.j),
-               z = static_cast<float>(cell.k);
+  /// Moves to a block of 2 x 2 x 2 cells.
+  void MoveTo(std::uint32_t brick, const Vec3& origin, int i, int j, int k) {
+    const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
     origin_ = origin;
-    low_ = origin + Vec3{1.0 * cell.i, 1.0 * cell.j, 1.0 * cell.k};
-    sampler_.MoveTo(cell.brick, {{x, y, z}, {x + 1, y + 1, z + 1}});
+    sampler_.MoveTo(brick, {{x, y, z}, {x + 2, y + 2, z + 2}});
   }
 
-  /// Takes one step, which ends at the sides of the cell. If the gradient is weak, position and
-  /// normal stay as they are.
-  void Step(Vec3& position, Vec3& normal) {
+  /// Takes one step, which ends at the sides of the cell with the lowest node `low`. If the
+  /// gradient is weak, position and normal stay as they are.
+  void Step(const Vec3& low, Vec3& position, Vec3& normal) {
     const PointSample sample = sampler_.Sample(position - origin_);
     const double square = Dot(sample.gradient, sample.gradient);
     if (square < kWeakGradient) return;
     Vec3 step = (-sample.value / square) * sample.gradient;
     const double length = Length(step);
     if (length > constants_.newton_step) step = (constants_.newton_step / length) * step;
-    const Vec3 moved = ClampedToCell(position + step, low_);
+    const Vec3 moved = ClampedToCell(position + step, low);
     Vec3 gradient = sample.gradient;
     if (Length(moved - position) > constants_.long_step) {
       const PointSample again = sampler_.Sample(moved - origin_);
@@ -49,7 +46,7 @@ class RootFinder {
  private:
   const RootConstants& constants_;
   PointSampler sampler_;
-  Vec3 origin_, low_;
+  Vec3 origin_;
 };
 
 /// The area normal of a loop, which is used if the gradient is weak.
@@ -74,18 +71,21 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
                std::vector<Vec3>& normals) {
   const BrickDirectory& bricks = bins.bricks;
   normals.resize(positions.size());
-  ParallelForRanges(crossings.cells.size(), kCellsAtOnce, [&](std::size_t first, std::size_t last) {
+  ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
     RootFinder finder(bins, scale, constants);
-    for (std::size_t index = first; index < last; ++index) {
-      const ActiveCell& cell = crossings.cells[index];
-      const Vec3 origin = OriginOf(bricks[cell.brick]);
-      finder.MoveTo(cell, origin);
-      for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
-        const std::uint32_t v = cell.first_loop + loop;
-        normals[v] = NormalOfLoop(bricks, crossings, cell, loop, positions);
-        finder.Step(positions[v], normals[v]);
-      }
-    }
+    const Vec3 origin = OriginOf(bricks[brick]);
+    ForEachInBlocks(
+        crossings.bricks[brick].active,
+        [&](int i, int j, int k) { finder.MoveTo(brick, origin, i, j, k); },
+        [&](int i, int j, int k) {
+          const ActiveCell& cell = crossings.cells[crossings.CellAt({brick, i, j, k})];
+          const Vec3 low = origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k};
+          for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
+            const std::uint32_t v = cell.first_loop + loop;
+            normals[v] = NormalOfLoop(bricks, crossings, cell, loop, positions);
+            finder.Step(low, positions[v], normals[v]);
+          }
+        });
   });
 }
 

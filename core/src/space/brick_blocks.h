@@ -1,0 +1,33 @@
+// Visits the nodes or cells of a brick in small blocks, which share the particles around them.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+#include "space/lattice.h"
+
+namespace partiemc::space {
+
+/// Calls visit(i, j, k) for each marked node or cell of a brick, in blocks of 2 x 2 x 2. Before
+/// each block, calls move_to(i, j, k) with the lowest place of the block.
+template <typename MoveTo, typename Visit>
+void ForEachInBlocks(const BrickBits& marked, MoveTo move_to, Visit visit) {
+  for (int k = 0; k < kBrickSize; k += 2) {
+    for (int j = 0; j < kBrickSize; j += 2) {
+      for (int i = 0; i < kBrickSize; i += 2) {
+        constexpr std::uint64_t kSquare = 0x303;
+        const std::uint64_t square = kSquare << (j * kBrickSize + i);
+        if (((marked[k] | marked[k + 1]) & square) == 0) continue;
+        move_to(i, j, k);
+        for (int layer = k; layer < k + 2; ++layer) {
+          for (std::uint64_t bits = marked[layer] & square; bits != 0; bits &= bits - 1) {
+            const int bit = std::countr_zero(bits);
+            visit(bit % kBrickSize, bit / kBrickSize, layer);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace partiemc::space

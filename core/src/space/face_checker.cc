@@ -1,0 +1,185 @@
+#include "space/face_checker.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/predicates_in_space.h"
+
+namespace partiemc::space {
+namespace {
+
+/// All triangulations of a polygon with n corners, three indices for each triangle.
+using Triangulations = std::vector<std::vector<std::array<std::uint8_t, 3>>>;
+
+Triangulations TriangulationsOf(int first, int last) {
+  if (last - first < 2) return {{}};
+  Triangulations all;
+  for (int middle = first + 1; middle < last; ++middle) {
+    for (const auto& left : TriangulationsOf(first, middle)) {
+      for (const auto& right : TriangulationsOf(middle, last)) {
+        auto& triangulation = all.emplace_back(left);
+        triangulation.insert(triangulation.end(), right.begin(), right.end());
+        triangulation.push_back({static_cast<std::uint8_t>(first),
+                                 static_cast<std::uint8_t>(middle),
+                                 static_cast<std::uint8_t>(last)});
+      }
+    }
+  }
+  return all;
+}
+
+/// All triangulations of a polygon with 3 to 6 corners. The part between the curves of an ambiguous
+/// face has six.
+const Triangulations& TriangulationsOf(int corners) {
+  static const std::array<Triangulations, 7> all = [] {
+    std::array<Triangulations, 7> table;
+    for (int n = 3; n < 7; ++n) table[n] = TriangulationsOf(0, n - 1);
+    return table;
+  }();
+  return all[corners];
+}
+
+double Along(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+}  // namespace
+
+const FaceChecker::Node& FaceChecker::CornerOf(const std::array<int, 3>& cell, int corner) {
+  const std::array<int, 3> at{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1),
+                              cell[2] + (corner >> 2)};
+  const auto index =
+      static_cast<std::size_t>(((at[2] + 1) * kNodesAlong + at[1] + 1) * kNodesAlong + at[0] + 1);
+  Node& node = node_[index];
+  if (has_node_[index]) return node;
+  has_node_[index] = true;
+  const std::uint32_t moved = nodes_.IndexOf(Normalise(bricks_, brick_, at[0], at[1], at[2]));
+  const Vec3 position = NodeAt(bricks_, nodes_, cell_size_, brick_, at);
+  node = {position.x, position.y, position.z,
+          moved == kNoIndex ? kNoIndex : crossings_.VertexCount() + moved};
+  return node;
+}
+
+Side FaceChecker::SideAt(const std::array<int, 3>& at) {
+  const auto index =
+      static_cast<std::size_t>(((at[2] + 1) * kCellsAlong + at[1] + 1) * kCellsAlong + at[0] + 1);
+  Cell& cell = cell_[index];
+  if (!has_cell_[index]) {
+    has_cell_[index] = true;
+    const BrickPlace place = Normalise(bricks_, brick_, at[0], at[1], at[2]);
+    const bool is_active = place.brick != kNoIndex &&
+                           (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
+    Vec3 apex;
+    cell.active = is_active ? crossings_.CellAt(place) : kNoIndex;
+    if (is_active) {
+      apex = positions_[crossings_.cells[cell.active].first_loop];
+    } else {
+      for (int corner = 0; corner < 8; ++corner) apex = apex + CornerOf(at, corner).At();
+      apex = .125 * apex;
+    }
+    cell.x = apex.x, cell.y = apex.y, cell.z = apex.z;
+  }
+  return {at, cell.active, {cell.x, cell.y, cell.z}};
+}
+
+Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
+  Face of;
+  of.axis = face / 2;
+  std::array<int, 3> beside = cell;
+  beside[of.axis] += (face & 1) != 0 ? 1 : -1;
+  of.low = SideAt((face & 1) != 0 ? cell : beside);
+  of.high = SideAt((face & 1) != 0 ? beside : cell);
+  // The corners as seen from above: they are the corners of the upper face of the cell below.
+  const std::array<int, 4> corners = CornersOfFace(2 * of.axis + 1);
+  const bool has_crossings = of.low.active != kNoIndex && of.high.active != kNoIndex;
+  for (int k = 0; k < 4; ++k) {
+    const int a = corners[k], b = corners[(k + 1) & 3];
+    const Node& node = CornerOf(of.low.at, a);
+    of.around[of.count] = node.At();
+    of.is_vertex[of.count] = false;
+    of.item[of.count++] = node.item;
+    if (!has_crossings) continue;
+    const ActiveCell& low = crossings_.cells[of.low.active];
+    if (((low.corners >> a ^ low.corners >> b) & 1) == 0) continue;
+    const std::uint32_t v = EdgeVertexOf(bricks_, crossings_, low, EdgeBetween(a, b));
+    of.around[of.count] = positions_[v];
+    of.is_vertex[of.count] = true;
+    of.item[of.count++] = v;
+    ++of.crossed;
+  }
+  return of;
+}
+
+bool FaceChecker::IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const {
+  for (int k = 0; k < face.count; ++k) {
+    const Vec3& next = face.around[k + 1 < face.count ? k + 1 : 0];
+    if (SideOfPlane(face.around[k], next, below, above) <= 0) return false;
+  }
+  return true;
+}
+
+/// Whether a triangulation of a part of the face has positive tetrahedra on both sides.
+bool FaceChecker::CanTriangulate(const Face& face, std::span<const std::uint8_t> polygon,
+                                 const Vec3& below, const Vec3& above) const {
+  for (const auto& triangulation : TriangulationsOf(static_cast<int>(polygon.size()))) {
+    const bool is_valid = std::all_of(
+        triangulation.begin(), triangulation.end(), [&](const std::array<std::uint8_t, 3>& t) {
+          const Vec3 &a = face.around[polygon[t[0]]], &b = face.around[polygon[t[1]]],
+                     &c = face.around[polygon[t[2]]];
+          return SideOfPlane(a, b, c, above) > 0 && SideOfPlane(a, b, c, below) < 0;
+        });
+    if (is_valid) return true;
+  }
+  return false;
+}
+
+/// Whether kAlongFace is valid. The curves cut the face into parts; each part is triangulated
+/// alone.
+bool FaceChecker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const {
+  if (face.crossed == 0) {
+    return CanTriangulate(face, std::array<std::uint8_t, 4>{0, 1, 2, 3}, below, above);
+  }
+  std::array<std::uint8_t, 8> part;
+  const auto check = [&](int first, int last) {  // The part from one vertex to the next.
+    int size = 0;
+    for (int k = first;; k = k + 1 < face.count ? k + 1 : 0) {
+      part[size++] = static_cast<std::uint8_t>(k);
+      if (k == last) break;
+    }
+    return CanTriangulate(face, std::span(part).first(size), below, above);
+  };
+  std::array<int, 4> vertices{};
+  int count = 0;
+  for (int k = 0; k < face.count; ++k) {
+    if (face.is_vertex[k]) vertices[count++] = k;
+  }
+  if (count == 2) return check(vertices[0], vertices[1]) && check(vertices[1], vertices[0]);
+  // The face is ambiguous: its vertices are at 1, 3, 5, 7. The curves cut off the two inside
+  // corners, which are opposite.
+  const int first = CornersOfFace(2 * face.axis + 1)[0];
+  const bool is_inside = (crossings_.cells[face.low.active].corners >> first & 1) != 0;
+  // The part between the curves has the four vertices and the two other corners.
+  constexpr std::array<std::uint8_t, 6> kEven{0, 1, 3, 4, 5, 7}, kOdd{1, 2, 3, 5, 6, 7};
+  return is_inside ? check(7, 1) && check(3, 5) && CanTriangulate(face, kOdd, below, above)
+                   : check(1, 3) && check(5, 7) && CanTriangulate(face, kEven, below, above);
+}
+
+bool FaceChecker::FindMode(const Face& face, QuadMode& mode) const {
+  mode = QuadMode::kAlongFace;
+  const bool is_low_fixed = IsFixed(face.low), is_high_fixed = IsFixed(face.high);
+  if (is_low_fixed && is_high_fixed) return true;
+  const Vec3 &below = face.low.apex, &above = face.high.apex;
+  // A face of a fixed cell is flat. The vertex of the other cell must be on its own side of the
+  // face.
+  const double level = Along(face.around[0], face.axis);
+  if (is_low_fixed) return Along(above, face.axis) > level;
+  if (is_high_fixed) return Along(below, face.axis) < level;
+  if (face.crossed == 0) {
+    return IsValidAlong(face, below, above) || IsValidAcross(face, below, above);
+  }
+  if (face.crossed == 2 && IsValidAcross(face, below, above)) {
+    mode = QuadMode::kAcrossCells;
+    return true;
+  }
+  return IsValidAlong(face, below, above);
+}
+
+}  // namespace partiemc::space

@@ -1,0 +1,193 @@
+#include "space_vertices/window_sums.h"
+
+// Highway compiles the rest of this file once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "space_vertices/window_sums.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace partiemc::space {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kAtOnce = 8;  // Loops for each byte of a window.
+using Lanes = hn::CappedTag<float, kAtOnce>;
+using Vector = hn::Vec<Lanes>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
+
+template <int kQuantities>
+using Partial = std::array<std::array<float, kAtOnce>, kQuantities>;
+
+template <int kQuantities>
+double TotalOf(const Partial<kQuantities>& sums, int quantity) {
+  const auto& part = sums[quantity];
+  return ((double{part[0]} + double{part[4]}) + (double{part[2]} + double{part[6]})) +
+         ((double{part[1]} + double{part[5]}) + (double{part[3]} + double{part[7]}));
+}
+
+// The loop of a window and some near loops.
+struct Pairs {
+  Vector x, y, z;                         // c_j - c_i
+  Vector normal_x, normal_y, normal_z;    // n_j
+  Vector self_x, self_y, self_z, weight;  // n_i, w
+
+  HWY_INLINE Vector AlongSelf() const {
+    return hn::Add(hn::Add(hn::Mul(x, self_x), hn::Mul(y, self_y)), hn::Mul(z, self_z));
+  }
+  HWY_INLINE Vector Cosine() const {
+    return hn::Add(hn::Add(hn::Mul(normal_x, self_x), hn::Mul(normal_y, self_y)),
+                   hn::Mul(normal_z, self_z));
+  }
+  HWY_INLINE void StopAtEdges() {
+    Vector power = hn::Max(hn::Zero(Lanes()), Cosine());
+    for (int k = 0; k < 5; ++k) power = hn::Mul(power, power);
+    weight = hn::Mul(weight, power);
+  }
+};
+
+// Calls add(pairs, first near loop) for the vectors of the partial sums [lane, lane + kLanes).
+template <class Add>
+HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int lane, Add add) {
+  const Lanes d;
+  const std::size_t self = window.self;
+  const Vector x = hn::Set(d, loops.x[self]), y = hn::Set(d, loops.y[self]),
+               z = hn::Set(d, loops.z[self]);
+  const Vector inverse = hn::Set(d, window.inverse_square), one = hn::Set(d, 1.0f);
+  Pairs pairs;
+  pairs.self_x = hn::Set(d, loops.normal_x[self]);
+  pairs.self_y = hn::Set(d, loops.normal_y[self]);
+  pairs.self_z = hn::Set(d, loops.normal_z[self]);
+  for (std::size_t byte = 0; byte < window.bits.size(); ++byte) {
+    const auto bits = static_cast<std::uint8_t>(window.bits[byte] >> lane);
+    if (bits == 0) continue;
+    const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
+    pairs.x = hn::Sub(hn::Load(d, loops.x.data() + k), x);
+    pairs.y = hn::Sub(hn::Load(d, loops.y.data() + k), y);
+    pairs.z = hn::Sub(hn::Load(d, loops.z.data() + k), z);
+    const Vector square = hn::Add(hn::Add(hn::Mul(pairs.x, pairs.x), hn::Mul(pairs.y, pairs.y)),
+                                  hn::Mul(pairs.z, pairs.z));
+    const Vector t = hn::Max(hn::Zero(d), hn::Sub(one, hn::Mul(square, inverse)));
+    pairs.normal_x = hn::Load(d, loops.normal_x.data() + k);
+    pairs.normal_y = hn::Load(d, loops.normal_y.data() + k);
+    pairs.normal_z = hn::Load(d, loops.normal_z.data() + k);
+    pairs.weight = hn::IfThenElseZero(hn::LoadMaskBits(d, &bits),
+                                      hn::Mul(hn::Mul(t, t), hn::Load(d, loops.area.data() + k)));
+    add(pairs, k);
+  }
+}
+
+void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
+                std::uint8_t* bits) {
+  const Lanes d;
+  const Vector x = hn::Set(d, loops.x[self]), y = hn::Set(d, loops.y[self]),
+               z = hn::Set(d, loops.z[self]);
+  const Vector most = hn::Set(d, square);
+  for (std::size_t byte = 0; byte < bytes; ++byte) {
+    unsigned found = 0;
+    for (int lane = 0; lane < kAtOnce; lane += kLanes) {
+      const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
+      const Vector dx = hn::Sub(hn::Load(d, loops.x.data() + k), x);
+      const Vector dy = hn::Sub(hn::Load(d, loops.y.data() + k), y);
+      const Vector dz = hn::Sub(hn::Load(d, loops.z.data() + k), z);
+      const Vector to = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
+      std::uint8_t part[8] = {};
+      hn::StoreMaskBits(d, hn::Lt(to, most), part);
+      found |= unsigned{part[0]} << lane;
+    }
+    bits[byte] = static_cast<std::uint8_t>(found);
+  }
+}
+
+Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges) {
+  const Lanes d;
+  alignas(64) Partial<3> sums;
+  for (int lane = 0; lane < kAtOnce; lane += kLanes) {
+    Vector sx = hn::Zero(d), sy = hn::Zero(d), sz = hn::Zero(d);
+    ForEachPair(loops, window, lane, [&](Pairs& pairs, std::size_t) HWY_ATTR {
+      if (stops_at_edges) pairs.StopAtEdges();
+      sx = hn::Add(sx, hn::Mul(pairs.weight, pairs.normal_x));
+      sy = hn::Add(sy, hn::Mul(pairs.weight, pairs.normal_y));
+      sz = hn::Add(sz, hn::Mul(pairs.weight, pairs.normal_z));
+    });
+    hn::Store(sx, d, sums[0].data() + lane);
+    hn::Store(sy, d, sums[1].data() + lane);
+    hn::Store(sz, d, sums[2].data() + lane);
+  }
+  return {TotalOf<3>(sums, 0), TotalOf<3>(sums, 1), TotalOf<3>(sums, 2)};
+}
+
+BendSums SumBends(const NearLoops& loops, const Window& window) {
+  const Lanes d;
+  alignas(64) Partial<2> sums;
+  for (int lane = 0; lane < kAtOnce; lane += kLanes) {
+    Vector turn = hn::Zero(d), way = hn::Zero(d);
+    ForEachPair(loops, window, lane, [&](const Pairs& pairs, std::size_t) HWY_ATTR {
+      const Vector along = pairs.AlongSelf();
+      const Vector x = hn::Sub(pairs.x, hn::Mul(along, pairs.self_x));
+      const Vector y = hn::Sub(pairs.y, hn::Mul(along, pairs.self_y));
+      const Vector z = hn::Sub(pairs.z, hn::Mul(along, pairs.self_z));
+      const Vector turned = hn::Add(hn::Add(hn::Mul(hn::Sub(pairs.normal_x, pairs.self_x), x),
+                                            hn::Mul(hn::Sub(pairs.normal_y, pairs.self_y), y)),
+                                    hn::Mul(hn::Sub(pairs.normal_z, pairs.self_z), z));
+      const Vector square = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
+      turn = hn::Add(turn, hn::Mul(pairs.weight, turned));
+      way = hn::Add(way, hn::Mul(pairs.weight, square));
+    });
+    hn::Store(turn, d, sums[0].data() + lane);
+    hn::Store(way, d, sums[1].data() + lane);
+  }
+  return {TotalOf<2>(sums, 0), TotalOf<2>(sums, 1)};
+}
+
+PlaneSums SumPlanes(const NearLoops& loops, const Window& window) {
+  const Lanes d;
+  const Vector half = hn::Set(d, .5f);
+  alignas(64) Partial<2> sums;
+  for (int lane = 0; lane < kAtOnce; lane += kLanes) {
+    Vector height = hn::Zero(d), total = hn::Zero(d);
+    ForEachPair(loops, window, lane, [&](Pairs& pairs, std::size_t k) HWY_ATTR {
+      pairs.StopAtEdges();
+      const Vector along =
+          hn::Add(hn::Add(hn::Mul(pairs.x, pairs.normal_x), hn::Mul(pairs.y, pairs.normal_y)),
+                  hn::Mul(pairs.z, pairs.normal_z));
+      const Vector mean = hn::Mul(half, hn::Add(along, pairs.AlongSelf()));
+      const Vector plane = hn::Add(mean, hn::Load(d, loops.base.data() + k));
+      height = hn::Add(height, hn::Mul(pairs.weight, plane));
+      total = hn::Add(total, pairs.weight);
+    });
+    hn::Store(height, d, sums[0].data() + lane);
+    hn::Store(total, d, sums[1].data() + lane);
+  }
+  return {TotalOf<2>(sums, 0), TotalOf<2>(sums, 1)};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace partiemc::space
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace partiemc::space {
+
+HWY_EXPORT(FindWithin);
+HWY_EXPORT(SumNormals);
+HWY_EXPORT(SumBends);
+HWY_EXPORT(SumPlanes);
+
+void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
+                std::uint8_t* bits) {
+  HWY_DYNAMIC_DISPATCH(FindWithin)(loops, bytes, self, square, bits);
+}
+Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges) {
+  return HWY_DYNAMIC_DISPATCH(SumNormals)(loops, window, stops_at_edges);
+}
+BendSums SumBends(const NearLoops& loops, const Window& window) {
+  return HWY_DYNAMIC_DISPATCH(SumBends)(loops, window);
+}
+PlaneSums SumPlanes(const NearLoops& loops, const Window& window) {
+  return HWY_DYNAMIC_DISPATCH(SumPlanes)(loops, window);
+}
+
+}  // namespace partiemc::space
+#endif  // HWY_ONCE

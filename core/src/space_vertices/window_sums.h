@@ -1,0 +1,53 @@
+// Weighted sums over windows of loops, in vectors. Every instruction set gives the same bits: terms
+// go to eight partial sums by their index, and the partial sums are added by halves.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/vec3.h"
+#include "space_vertices/loop_windows.h"
+
+namespace partiemc::space {
+
+/// The loops near a chunk of LoopWindows. About 64 kB.
+struct NearLoops {
+  static constexpr std::size_t kMost = LoopWindows::kMostNear;
+
+  alignas(64) std::array<float, kMost> x, y,
+      z;  ///< Centres, from a common origin.
+  std::array<float, kMost> area;
+  std::array<float, kMost> normal_x, normal_y, normal_z;
+  std::array<float, kMost> base;  ///< Of SumPlanes.
+};
+
+/// Sets bit k % 8 of byte k / 8 if the squared distance of near loops k and `self` is below
+/// `square`. Reads 8 * `bytes` centres.
+void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
+                std::uint8_t* bits);
+
+/// A loop and its window: one bit for each near loop.
+struct Window {
+  std::span<const std::uint8_t> bits;
+  std::size_t self;      ///< Its index among the near loops.
+  float inverse_square;  ///< 1 / reach^2.
+};
+
+/// sum w n_j, where w = area_j B(d, reach), times max(0, n_i . n_j)^32 if `stops_at_edges`.
+Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges);
+
+struct BendSums {
+  double turn = 0;  ///< sum w (n_j - n_i) . t, with the tangential part t of c_j - c_i.
+  double way = 0;   ///< sum w t . t
+};
+BendSums SumBends(const NearLoops& loops, const Window& window);
+
+struct PlaneSums {
+  double height = 0;  ///< sum w ((n_i + n_j) / 2 . (c_j - c_i) + base_j), stopped at edges.
+  double total = 0;   ///< sum w
+};
+PlaneSums SumPlanes(const NearLoops& loops, const Window& window);
+
+}  // namespace partiemc::space
