@@ -5,16 +5,19 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "attributes/plane_fit.h"
 #include "base/cancellation.h"
 #include "base/vec3.h"
 #include "frame/calibration.h"
 #include "frame/distinct_ids.h"
 #include "frame/frame_view.h"
 #include "frame/scale.h"
+#include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "partiemc/surface.h"
 #include "space/bins.h"
@@ -27,7 +30,9 @@
 #include "space/surface_bytes.h"
 #include "space/thinning.h"
 #include "space/vertices.h"
+#include "space_identities/shell_identities.h"
 #include "space_vertices/drops.h"
+#include "space_vertices/point_attributes.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/virtual_plane.h"
 
@@ -47,6 +52,8 @@ struct SurfaceWorkspace::Buffers {
   std::vector<space::ThinQuad> thin;  // Empty for marching cubes.
   space::Drops drops;
   space::MeshScratch mesh;
+  space::ShellIdentityScratch identities;
+  ShellHistory next_history;
 };
 
 namespace {
@@ -134,6 +141,19 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
                     " MiB: reach fewer bricks, or try again later")});
 }
 
+/// Sets the counts that identities and attributes require.
+void AddBodies(const Frame& frame, const space::Bodies& bodies, space::SurfaceSize& size) {
+  std::uint64_t in_bodies = 0;
+  for (const space::Body& body : bodies.bodies) {
+    in_bodies += body.particles;
+    size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
+  }
+  const std::uint64_t alone = frame.ParticleCount() - in_bodies;
+  size.bodies = bodies.bodies.size() + alone;
+  size.samples = frame.ids.empty() ? 0 : size.samples + alone;
+  for (const Attribute& attribute : frame.attributes) size.attribute_values += attribute.components;
+}
+
 /// Places vertices on the crossed edges and connects them by triangles. Positions are in world
 /// units afterwards.
 void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
@@ -204,6 +224,31 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   return absl::OkStatus();
 }
 
+/// CORRUPT_STATE if the nodes of the state are those of another lattice.
+absl::Status CheckCellSize(const SurfaceState& state, double cell_size) {
+  if (state.cell_size.value_or(cell_size) == cell_size) return absl::OkStatus();
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonCorruptState), "state.cell_size", ShortestNumber(*state.cell_size),
+       absl::StrCat("must be ", ShortestNumber(cell_size), ", the cell size of the parameters")});
+}
+
+/// Empties a surface, but keeps the buffers of points and triangles.
+void MakeEmpty(Surface& surface) {
+  surface.Clear();
+  surface.attributes.clear();
+}
+
+/// The history after a frame without particles: no shell, no identity given.
+void EndIdentities(const Frame& frame, const ShellHistory& previous, ShellHistory& next) {
+  next.identities_given = previous.identities_given;
+  next.time.reset();
+  if (std::isfinite(frame.time)) next.time = frame.time;
+  next.shells.clear();
+  next.runs.clear();
+  next.samples.clear();
+}
+
 }  // namespace
 
 SurfaceWorkspace::SurfaceWorkspace() : buffers_(std::make_unique<Buffers>()) {}
@@ -238,36 +283,60 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
   return SurfaceReconstructor(parameters, limits);
 }
 
+absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceState& state,
+                                               SurfaceWorkspace& workspace, Surface& surface,
+                                               const FrameControl& control) const {
+  return ReconstructFrame(frame, &state, workspace, surface, control);
+}
+
 absl::Status SurfaceReconstructor::Reconstruct(const Frame& frame, SurfaceWorkspace& workspace,
                                                Surface& surface,
                                                const FrameControl& control) const {
+  return ReconstructFrame(frame, nullptr, workspace, surface, control);
+}
+
+absl::Status SurfaceReconstructor::ReconstructFrame(const Frame& frame, SurfaceState* state,
+                                                    SurfaceWorkspace& workspace, Surface& surface,
+                                                    const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
   surface.Clear();
+  ResizeValues(frame.attributes, 0, surface.attributes);
   absl::Status status;
   try {
-    status = ReconstructOrThrow(frame, workspace.buffers(), surface, control.memory);
+    status = ReconstructOrThrow(frame, state, workspace.buffers(), surface, control.memory);
   } catch (...) {
     // The buffers may be in any state.
     workspace = SurfaceWorkspace();
-    surface.Clear();
+    MakeEmpty(surface);
     try {
       throw;
     } catch (const Cancelled&) {
       return absl::CancelledError("the frame was cancelled");
     }
   }
-  if (!status.ok()) surface.Clear();
+  if (!status.ok()) {
+    MakeEmpty(surface);
+  } else if (state != nullptr) {
+    // Buffers are swapped, so that both histories keep their memory.
+    state->cell_size = parameters_.cell_size * parameters_.spacing;
+    std::swap(state->history, workspace.buffers().next_history);
+  }
   return status;
 }
 
-absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
+absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
                                                       SurfaceWorkspace::Buffers& b,
                                                       Surface& surface, MemoryGuard* memory) const {
-  absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
-  if (!status.ok() || frame.ParticleCount() == 0) return status;
-  ThrowIfCancelled();
-  const SurfacePlacement placement = parameters_.placement;
   const double cell_size = parameters_.cell_size * parameters_.spacing;
+  absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
+  if (status.ok() && state != nullptr) status = CheckCellSize(*state, cell_size);
+  if (!status.ok()) return status;
+  ThrowIfCancelled();
+  if (frame.ParticleCount() == 0) {
+    if (state != nullptr) EndIdentities(frame, state->history, b.next_history);
+    return absl::OkStatus();
+  }
+  const SurfacePlacement placement = parameters_.placement;
   const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
                                 LightestVolume(frame, parameters_.spacing));
   status = space::FindBricks(frame, scale, limits_, b.bins);
@@ -283,6 +352,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
   size.edges = b.crossings.edge_count;
   if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
   size.has_windows = placement == SurfacePlacement::kVirtualPlane;
+  AddBodies(frame, b.bodies, size);
+  size.has_state = state != nullptr;
   if (status = Reserve(size, memory); !status.ok()) return status;
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
   if (placement == SurfacePlacement::kMarchingCubes) {
@@ -306,6 +377,16 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame,
   for (const space::Drops::Drop& drop : b.drops.drops) {
     if (!drop.is_taken) continue;
     surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
+  }
+  if (state != nullptr) {
+    ThrowIfCancelled();
+    space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
+                           b.mesh.shell_of, cell_size},
+                          state->history, b.identities, b.next_history, surface);
+  }
+  if (!frame.attributes.empty()) {
+    ThrowIfCancelled();
+    space::InterpolateInSpace(frame, b.bins, scale, surface.points, surface.attributes);
   }
   surface.statistics = statistics;
   return absl::OkStatus();

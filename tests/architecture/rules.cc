@@ -181,7 +181,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         "core/src/",
         {"base", "frame", "state", "bins", "field", "crossings", "rings", "sampler", "normals",
          "vertices", "identities", "mesh", "attributes", "gauges", "space", "space_vertices",
-         "check"},
+         "space_identities", "check"},
         {"frame_lengths", "reconstructor", "surface_reconstructor", "workspace",
          "workspace_bytes"}},
        {"server/",

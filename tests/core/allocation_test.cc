@@ -174,10 +174,42 @@ TEST(WarmSlice, AllocatesNothing) {
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
 
-class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int>> {};
+// Frames in space with ids, velocities and an attribute.
+class TrackedFrames {
+ public:
+  explicit TrackedFrames(const std::vector<std::vector<double>>& frames) : frames_(frames) {
+    for (const std::vector<double>& xyz : frames) {
+      velocities_.emplace_back(xyz.size(), 1.0f);
+      ids_.emplace_back();
+      for (std::size_t k = 0; k < xyz.size() / 3; ++k) ids_.back().push_back(k);
+    }
+    for (const std::vector<float>& velocities : velocities_) {
+      attributes_.push_back({"velocity", 3, velocities});
+    }
+  }
+
+  // Frame k; with positions only unless it is tracked.
+  Frame At(std::size_t k, bool is_tracked = true) const {
+    Frame frame{.positions = std::span<const double>(frames_[k]), .components = 3};
+    if (!is_tracked) return frame;
+    frame.ids = ids_[k];
+    frame.velocities = velocities_[k];
+    frame.attributes = std::span(&attributes_[k], 1);
+    frame.time = static_cast<double>(k);
+    return frame;
+  }
+
+ private:
+  const std::vector<std::vector<double>>& frames_;
+  std::vector<std::vector<float>> velocities_;
+  std::vector<std::vector<std::uint64_t>> ids_;
+  std::vector<Attribute> attributes_;
+};
+
+class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int, bool>> {};
 
 TEST_P(WarmSurface, AllocatesNothing) {
-  const auto [placement, threads] = GetParam();
+  const auto [placement, threads, is_tracked] = GetParam();
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   tbb::task_arena arena(threads);
   const auto reconstructor = SurfaceReconstructor::Create(
@@ -198,16 +230,21 @@ TEST_P(WarmSurface, AllocatesNothing) {
   }
   frames.push_back({0, 0, 0, 1, 0, 0});
   frames.emplace_back();
+  const TrackedFrames tracked(frames);
   SurfaceWorkspace workspace;
   Surface surface;
+  SurfaceState state;
   std::size_t before = 0;
   for (int round = 0; round < 3; ++round) {
     before = allocations;
-    for (const std::vector<double>& xyz : frames) {
+    for (std::size_t k = 0; k < frames.size(); ++k) {
       arena.execute([&] {
-        const Frame frame{.positions = std::span<const double>(xyz), .components = 3};
-        ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
-        ASSERT_EQ(surface.TriangleCount() > 0, !xyz.empty());
+        const Frame frame = tracked.At(k, is_tracked);
+        const absl::Status status =
+            is_tracked ? reconstructor->Reconstruct(frame, state, workspace, surface)
+                       : reconstructor->Reconstruct(frame, workspace, surface);
+        ASSERT_TRUE(status.ok());
+        ASSERT_EQ(surface.TriangleCount() > 0, !frames[k].empty());
       });
     }
     if (round == 0) {
@@ -221,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
                          testing::Combine(testing::Values(SurfacePlacement::kMarchingCubes,
                                                           SurfacePlacement::kQef,
                                                           SurfacePlacement::kVirtualPlane),
-                                          testing::Values(1, 2)));
+                                          testing::Values(1, 2), testing::Bool()));
 
 // The memory of a fill does not depend on the placement, so only the default is tried with all
 // fills.
@@ -427,6 +464,54 @@ TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
     const std::size_t held = live_bytes - before;
     EXPECT_LE(held, guard.last());
     EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
+  }
+}
+
+// The bound for two frames of a stream with ids, velocities and an attribute.
+TEST(MemoryGuard, IsToldNoLessThanAStreamOfSurfacesTakes) {
+  std::vector<SurfaceCase> cases;
+  std::vector<double> plates, lone, cube;
+  for (int p = 0; p < 4 * 30 * 30; ++p) {  // Plates whose edges are along x.
+    for (const int at : {p % 4 * 6, p / 4 % 30, p / 120}) plates.push_back(at);
+  }
+  for (int p = 0; p < 1000; ++p) {
+    for (const int at : {p % 10, p / 10 % 10, p / 100}) lone.push_back(7 * at + .4);
+  }
+  for (int p = 0; p < 24 * 24 * 24; ++p) {
+    for (const int at : {p % 24, p / 24 % 24, p / 576}) cube.push_back(at);
+  }
+  support::Random random(3);
+  std::vector<double> noise;
+  for (int p = 0; p < 6'000; ++p) noise.push_back(random.Uniform(0, 18));
+  for (const SurfacePlacement placement :
+       {SurfacePlacement::kMarchingCubes, SurfacePlacement::kVirtualPlane}) {
+    cases.push_back({"plates", plates, {.placement = placement}});
+    cases.push_back({"lone particles", lone, {.placement = placement}});
+    cases.push_back({"one body", cube, {.placement = placement}});
+    cases.push_back({"noise", noise, {.placement = placement}});
+  }
+  for (const SurfaceCase& tested : cases) {
+    SCOPED_TRACE(tested.name);
+    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
+    ASSERT_TRUE(reconstructor.ok());
+    const std::vector<std::vector<double>> frames = {tested.xyz};
+    const TrackedFrames tracked(frames);
+    const std::size_t before = live_bytes;
+    std::uint64_t told = 0;
+    SurfaceWorkspace workspace;
+    Surface surface;
+    SurfaceState state;
+    for (int frame = 0; frame < 2; ++frame) {
+      Guard guard(2);
+      const absl::Status status =
+          reconstructor->Reconstruct(tracked.At(0), state, workspace, surface, {.memory = &guard});
+      ASSERT_TRUE(status.ok()) << status;
+      told = guard.last();
+    }
+    const std::size_t held = live_bytes - before;
+    RecordProperty("ratio", std::to_string(static_cast<double>(told) / static_cast<double>(held)));
+    EXPECT_LE(held, told);
+    EXPECT_GE(2.6 * static_cast<double>(held), static_cast<double>(told));
   }
 }
 

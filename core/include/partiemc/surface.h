@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -13,17 +13,19 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"
+#include "partiemc/result.h"
+#include "partiemc/surface_state.h"
 
 namespace partiemc {
-
-/// The value of Surface::outer_of for a shell that is not a cavity.
-inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::max();
 
 struct ShellMeasures {
   double area = 0;    ///< World units squared.
   double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
   double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Of the enclosed volume.
   std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
+  /// The shell that continues this shell in the next frame has the same identity. Distinct within a
+  /// frame, never reused in a stream (core/SURFACES.md, "Identities").
+  std::uint64_t identity = 0;  ///< 0: not tracked.
 
   friend bool operator==(const ShellMeasures&, const ShellMeasures&) = default;
 };
@@ -54,11 +56,25 @@ struct Surface {
   std::vector<std::uint32_t> triangle_offsets = {0};  ///< The same for triangles.
   std::vector<std::uint32_t> outer_of;                ///< Per shell: its outer shell, or kNoShell.
   std::vector<ShellMeasures> measures;                ///< Per shell.
+  /// Parents of shell k, [parent_offsets[k], parent_offsets[k + 1]): the identities, ascending, of
+  /// the shells of the last frame that shell k continues. A new shell has no parent, a body after a
+  /// merge has several. After a split, several bodies have the same parent.
+  std::vector<std::uint64_t> parents;
+  std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
+  /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
+  /// values per point.
+  std::vector<AttributeValues> attributes;
   SurfaceStatistics statistics;
 
   std::size_t ShellCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 3; }
   std::size_t TriangleCount() const { return triangles.size() / 3; }
+  std::span<const std::uint64_t> ParentsOf(std::size_t shell) const {
+    if (shell + 1 >= parent_offsets.size()) return {};
+    return std::span(parents).subspan(parent_offsets[shell],
+                                      parent_offsets[shell + 1] - parent_offsets[shell]);
+  }
+  /// Empties everything. The elements of `attributes` remain, without contents.
   void Clear();
   friend bool operator==(const Surface&, const Surface&) = default;
 };
@@ -128,21 +144,32 @@ class SurfaceReconstructor {
   static absl::StatusOr<SurfaceReconstructor> Create(const SurfaceParameters& parameters,
                                                      const FrameLimits& limits = {});
 
-  /// Reconstructs one frame; `frame.components` is 3, volumes are in world units cubed. Runs in the
-  /// caller's Arena. The bits of `surface` depend neither on the number of threads nor on the order
-  /// of the particles. Limits: `max_tiles` counts bricks of 8 x 8 x 8 nodes.
-  /// `control.memory` is asked twice: for the bricks, then with the full estimate. No stage is
-  /// reported to `control.observer`.
-  /// Errors as Reconstructor. On an error or exception (std::bad_alloc) `surface` is empty. After
-  /// CANCELLED or an exception `workspace` is empty, too.
+  /// Reconstructs one frame and updates `state`; `frame.components` is 3, volumes are in world
+  /// units cubed. Runs in the caller's Arena. The bits of `surface` and `state` depend neither on
+  /// the number of threads nor on the order of the particles. Limits: `max_tiles` counts bricks of
+  /// 8 x 8 x 8 nodes. `control.memory` is asked twice: for the bricks, then with the full estimate.
+  /// No stage is reported to `control.observer`.
+  /// Errors: as Reconstructor; INVALID_ARGUMENT (CORRUPT_STATE) for the state of a stream with
+  /// another cell size. On an error or exception (std::bad_alloc) `state` is unchanged and
+  /// `surface` is empty. After CANCELLED or an exception `workspace` is empty, too.
+  absl::Status Reconstruct(const Frame& frame, SurfaceState& state, SurfaceWorkspace& workspace,
+                           Surface& surface, const FrameControl& control = {}) const;
+
+  /// Reconstructs a frame that belongs to no stream. Shells have no identities and no parents; all
+  /// else is the same.
   absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface,
                            const FrameControl& control = {}) const;
 
  private:
   SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
 
-  absl::Status ReconstructOrThrow(const Frame& frame, SurfaceWorkspace::Buffers& buffers,
-                                  Surface& surface, MemoryGuard* memory) const;
+  // `state` is null for a frame that belongs to no stream.
+  absl::Status ReconstructFrame(const Frame& frame, SurfaceState* state,
+                                SurfaceWorkspace& workspace, Surface& surface,
+                                const FrameControl& control) const;
+  absl::Status ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
+                                  SurfaceWorkspace::Buffers& buffers, Surface& surface,
+                                  MemoryGuard* memory) const;
 
   SurfaceParameters parameters_;
   ReconstructionParameters in_space_;  // Resolved, in the form for the stages.

@@ -1,11 +1,10 @@
 #include "attributes/attributes.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
+#include "attributes/plane_fit.h"
 #include "base/parallel.h"
 #include "base/point.h"
 #include "bins/lattice.h"
@@ -13,14 +12,7 @@
 namespace partiemc {
 namespace {
 
-// Added to the second moments, in squared kernel radii, to damp the slope. For comparison, the
-// second moment of particles around a vertex is .1 along each axis inside a body and .03 across a
-// straight rim.
-constexpr double kSlopeRidge = 1e-3;
-
 constexpr std::size_t kVerticesAtOnce = 256;
-
-constexpr double kLargest = std::numeric_limits<float>::max();
 
 // Divides a tile into square buckets. Their side is a power of two of cells, at most the radius,
 // but at least one cell.
@@ -39,50 +31,6 @@ class Buckets {
 
  private:
   int shift_ = 0;
-};
-
-// Sums over particles for one component of an attribute: of the weighted value, and of the weighted
-// value times D_x, D_y and D_z.
-using Carried = std::array<double, 4>;
-
-// Fits a plane by least squares and evaluates it at a vertex x. D = (x_i - x) / kernel radius.
-class PlaneFit {
- public:
-  void Add(double weight, double dx, double dy, double dz) {
-    sum_ += weight;
-    z_ += weight * dz;
-    xz_ += weight * dx * dz;
-    yz_ += weight * dy * dz;
-    zz_ += weight * dz * dz;
-    x_ += weight * dx;
-    y_ += weight * dy;
-    xx_ += weight * dx * dx;
-    xy_ += weight * dx * dy;
-    yy_ += weight * dy * dy;
-  }
-
-  // The value at the vertex is a linear combination of the four sums of `Carried`. Returns its
-  // coefficients, the first row of the inverse moment matrix. The height is eliminated first;
-  // without a slice its moments are 0.
-  Carried Coefficients() const {
-    if (sum_ == 0) return {};
-    const double zz = zz_ + kSlopeRidge * sum_;
-    const double sum = sum_ - z_ * z_ / zz;
-    const double x = x_ - z_ * xz_ / zz, y = y_ - z_ * yz_ / zz;
-    const double xx = xx_ + kSlopeRidge * sum_ - xz_ * xz_ / zz;
-    const double yy = yy_ + kSlopeRidge * sum_ - yz_ * yz_ / zz;
-    const double xy = xy_ - xz_ * yz_ / zz;
-    const double determinant = xx * yy - xy * xy;
-    const double along_x = (x * yy - y * xy) / determinant;
-    const double along_y = (y * xx - x * xy) / determinant;
-    const double constant = 1 / (sum - x * along_x - y * along_y);
-    const double along_z = (z_ - along_x * xz_ - along_y * yz_) / zz;
-    return {constant, -along_x * constant, -along_y * constant, -along_z * constant};
-  }
-
- private:
-  double sum_ = 0, x_ = 0, y_ = 0, z_ = 0;
-  double xx_ = 0, xy_ = 0, yy_ = 0, xz_ = 0, yz_ = 0, zz_ = 0;
 };
 
 class Interpolation {
@@ -199,10 +147,7 @@ class Interpolation {
 
   void AtVertex(std::size_t vertex, Point world, std::vector<AttributeValues>& values) const {
     PlaneFit fit;
-    std::array<Carried, kMostAttributeValues> carried;
-    std::size_t count = 0;
-    for (const Attribute& attribute : frame_.attributes) count += attribute.components;
-    std::fill_n(carried.begin(), count, Carried{});
+    CarriedSums carried(frame_.attributes);
     if (const std::uint32_t tile = scratch_.tile_of[vertex]; tile != kNoTile) {
       const TileCoordinate& at = bins_.tiles[tile];
       const Point point{world.x / scale_.cell_size - double{kTileSize} * at.x,
@@ -211,30 +156,10 @@ class Interpolation {
           tile, point,
           [&](const CarryingParticle& particle, double weight, double dx, double dy, double dz) {
             fit.Add(weight, dx, dy, dz);
-            Carried* sums = carried.data();
-            for (const Attribute& attribute : frame_.attributes) {
-              const float* value =
-                  &attribute.values[particle.source * std::size_t(attribute.components)];
-              for (int c = 0; c < attribute.components; ++c, ++sums) {
-                const double weighted = weight * value[c];
-                (*sums)[0] += weighted;
-                (*sums)[1] += weighted * dx;
-                (*sums)[2] += weighted * dy;
-                (*sums)[3] += weighted * dz;
-              }
-            }
+            carried.Add(frame_.attributes, particle.source, weight, dx, dy, dz);
           });
     }
-    const auto [constant, along_x, along_y, along_z] = fit.Coefficients();
-    const Carried* sums = carried.data();
-    for (AttributeValues& attribute : values) {
-      for (int c = 0; c < attribute.components; ++c, ++sums) {
-        const double value = constant * (*sums)[0] + along_x * (*sums)[1] + along_y * (*sums)[2] +
-                             along_z * (*sums)[3];
-        attribute.values[vertex * attribute.components + c] =
-            static_cast<float>(std::clamp(value, -kLargest, kLargest));
-      }
-    }
+    carried.Evaluate(fit, vertex, values);
   }
 
   const Frame& frame_;
@@ -254,13 +179,7 @@ std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
                            std::span<const double> vertices, AttributeScratch& scratch,
                            std::vector<AttributeValues>& values) {
-  values.resize(frame.attributes.size());
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    const Attribute& attribute = frame.attributes[k];
-    values[k].name = attribute.name;
-    values[k].components = attribute.components;
-    values[k].values.resize(vertices.size() / 2 * attribute.components);
-  }
+  ResizeValues(frame.attributes, vertices.size() / 2, values);
   Interpolation interpolation(frame, bins, scale, scratch);
   interpolation.FindTiles(vertices);
   interpolation.SortParticles();

@@ -36,6 +36,9 @@ void Surface::Clear() {
   triangle_offsets.assign(1, 0);
   outer_of.clear();
   measures.clear();
+  parents.clear();
+  parent_offsets.assign(1, 0);
+  for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
 }
 

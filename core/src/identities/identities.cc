@@ -4,7 +4,8 @@
 #include <cmath>
 #include <numeric>
 #include <span>
-#include <tuple>
+
+#include "base/bits.h"
 
 namespace partiemc {
 namespace {
@@ -61,38 +62,25 @@ void FillNumberedRings(const IdentityInput& input, IdentityScratch& s) {
   }
 }
 
-// Passes on identities, along the largest relations first. Assigns new identities to the other
-// rings.
+// Passes on identities along the largest relations first. Gives new identities to the other rings.
 void AssignIdentities(const RingHistory& previous, IdentityScratch& s, RingHistory& next) {
-  std::sort(s.relations.begin(), s.relations.end(),
-            [](const RingRelation& x, const RingRelation& y) {
-              return std::tie(y.nodes, x.before, x.now) < std::tie(x.nodes, y.before, y.now);
-            });
-  std::vector<std::uint8_t>& is_continued = s.is_continued;
-  is_continued.assign(previous.rings.size(), 0);
-  for (const RingRelation& pair : s.relations) {
-    if (is_continued[pair.before] || s.rings[pair.now].identity != 0) continue;
-    is_continued[pair.before] = 1;
-    s.rings[pair.now].identity = previous.rings[pair.before].identity;
-  }
+  FindContinued(previous.rings.size(), s.rings.size(), s.is_continued, s.relations, s.continues);
   next.identities_given = previous.identities_given;
-  for (KnownRing& ring : s.rings) {
-    if (ring.identity == 0) ring.identity = ++next.identities_given;
+  for (std::size_t number = 0; number < s.rings.size(); ++number) {
+    const std::uint32_t before = s.continues[number];
+    s.rings[number].identity =
+        before != kNoIndex ? previous.rings[before].identity : ++next.identities_given;
   }
 }
 
 // Writes identities and parents to the result.
 void WriteResult(const RingHistory& previous, std::span<const std::uint32_t> kept_as,
                  IdentityScratch& s, Rings& rings) {
-  std::sort(s.relations.begin(), s.relations.end(),
-            [](const RingRelation& x, const RingRelation& y) {
-              return std::tie(x.now, x.before) < std::tie(y.now, y.before);
-            });
   for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {
     if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
     rings.measures[kept_as[ring]].identity = s.rings[number].identity;
-    auto relation = std::ranges::lower_bound(s.relations, number, {}, &RingRelation::now);
+    auto relation = std::ranges::lower_bound(s.relations, number, {}, &Relation::now);
     for (; relation != s.relations.end() && relation->now == number; ++relation) {
       rings.parents.push_back(previous.rings[relation->before].identity);
     }

@@ -7,6 +7,7 @@
 #include "bins/bins.h"
 #include "crossings/crossings.h"
 #include "crossings/scanlines.h"
+#include "identities/relations.h"
 #include "identities/ring_relations.h"
 #include "identities/ring_tracks.h"
 #include "partiemc/frame.h"
@@ -29,8 +30,9 @@ struct IdentityScratch {
   std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;
   RelationScratch relation_scratch;
-  std::vector<RingRelation> relations;
+  std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By ring of the last frame.
+  std::vector<std::uint32_t> continues;    // By number: index of the ring that it continues.
   std::vector<std::uint32_t> by_identity;  // Numbers, by ascending identity.
   std::vector<std::uint32_t> rank;         // By number: index in `by_identity`.
 };

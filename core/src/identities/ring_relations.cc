@@ -9,20 +9,6 @@
 namespace partiemc {
 namespace {
 
-// Two rings that share fewer than a quarter of the nodes of the smaller one are neighbours: one of
-// them moved to where the other was.
-constexpr std::uint64_t kSmallestPart = 4;
-
-// For a full set of 16 samples: the largest difference between the share of the samples and the
-// share of the nodes, in samples. This is three standard deviations of the samples of a ring that
-// splits in halves.
-constexpr std::uint64_t kTolerance = 6;
-
-// A ring of the last frame that shares nodes with a ring of this frame, but has no samples in it,
-// is not its parent if the samples of other rings account for at least this many quarters of the
-// new ring's nodes.
-constexpr std::uint64_t kAccountedQuarters = 3;
-
 // Largest movement within a frame, in cells, because lattice coordinates have 32 bits.
 constexpr double kMaxShift = 1u << 31;
 
@@ -88,26 +74,6 @@ bool AnyMoves(const std::vector<CellShift>& shifts) {
                      [](const CellShift& shift) { return shift != CellShift{}; });
 }
 
-// Merges the relations of each pair into one, with the maximum of each count.
-void Unite(std::vector<RingRelation>& relations) {
-  std::sort(relations.begin(), relations.end(), [](const RingRelation& x, const RingRelation& y) {
-    return std::tie(x.before, x.now) < std::tie(y.before, y.now);
-  });
-  std::size_t kept = 0;
-  for (const RingRelation& relation : relations) {
-    if (kept > 0 && relations[kept - 1].before == relation.before &&
-        relations[kept - 1].now == relation.now) {
-      RingRelation& same = relations[kept - 1];
-      same.nodes = std::max(same.nodes, relation.nodes);
-      same.samples = std::max(same.samples, relation.samples);
-      same.counts = same.counts || relation.counts;
-    } else {
-      relations[kept++] = relation;
-    }
-  }
-  relations.resize(kept);
-}
-
 bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_t before,
                   std::uint32_t number) {
   return previous.rings[before].is_hole == now.rings[number].is_hole;
@@ -116,7 +82,7 @@ bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_
 // Relates rings by the nodes that they share after moving the last frame's rings forward, or this
 // frame's rings backward.
 void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                   std::vector<RingRelation>& relations) {
+                   std::vector<Relation>& relations) {
   const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
     if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
   };
@@ -131,97 +97,22 @@ void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScr
   Unite(relations);
 }
 
-void AddFoundSamples(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                     std::vector<RingRelation>& relations) {
-  s.sample_count.assign(previous.rings.size(), 0);
-  for (const ParticleSample& sample : previous.samples) ++s.sample_count[sample.ring];
-  const std::span<const FoundSample> found = now.found;
-  for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
-    while (last < found.size() && found[last].before == found[first].before &&
-           found[last].now == found[first].now) {
-      ++last;
-    }
-    relations.push_back({.before = found[first].before,
-                         .now = found[first].now,
-                         .samples = static_cast<std::uint32_t>(last - first)});
-  }
-  Unite(relations);
-}
-
-// Estimates the nodes that a ring passed to another ring: its number of nodes, times the share of
-// its samples that are in the other ring.
-std::uint64_t NodesBySamples(const RingRelation& relation, const RelationScratch& s) {
-  const std::uint64_t nodes = s.nodes_before[relation.before];
-  const std::uint64_t count = s.sample_count[relation.before];
-  const std::uint64_t carried =
-      nodes / count * relation.samples + nodes % count * relation.samples / count;
-  return std::min(carried, s.nodes_now[relation.now]);
-}
-
-// Whether the samples of a ring agree with its nodes, within the statistical error. False for an
-// incomplete set: such a set has all particles of the ring, so it is exact and decides alone.
-bool SamplesAgree(std::span<const RingRelation> of_one_ring, const RelationScratch& s) {
-  const std::uint32_t ring = of_one_ring.front().before;
-  if (s.sample_count[ring] < kMaxSamples) return false;
-  const std::uint64_t nodes = s.nodes_before[ring];
-  return std::all_of(of_one_ring.begin(), of_one_ring.end(), [&](const RingRelation& relation) {
-    const std::uint64_t by_nodes = relation.nodes * kMaxSamples;
-    const std::uint64_t by_samples = relation.samples * nodes;
-    const std::uint64_t difference =
-        std::max(by_nodes, by_samples) - std::min(by_nodes, by_samples);
-    return difference <= kTolerance * nodes;
-  });
-}
-
-// Corrects the shared nodes of all relations of one ring of the last frame by its samples.
-void CorrectBySamples(std::span<RingRelation> of_one_ring, const RelationScratch& s) {
-  const bool sampled = s.sample_count[of_one_ring.front().before] > 0;
-  // If samples and nodes agree, the nodes are more accurate than the estimate from samples.
-  const bool by_nodes = !sampled || SamplesAgree(of_one_ring, s);
-  for (RingRelation& relation : of_one_ring) {
-    if (relation.samples > 0) {
-      if (!by_nodes || relation.nodes == 0) relation.nodes = NodesBySamples(relation, s);
-    } else if (!by_nodes ||
-               4 * s.accounted[relation.now] >= kAccountedQuarters * s.nodes_now[relation.now]) {
-      relation.nodes = 0;
-    }
-  }
-}
-
-// Applies the samples of all outer rings to their relations.
-void ApplySamples(const RingHistory& previous, RelationScratch& s,
-                  std::vector<RingRelation>& relations) {
-  s.accounted.assign(s.nodes_now.size(), 0);
-  for (const RingRelation& relation : relations) {
-    if (relation.samples > 0) s.accounted[relation.now] += NodesBySamples(relation, s);
-  }
-  for (std::size_t first = 0, last = 0; first < relations.size(); first = last) {
-    while (last < relations.size() && relations[last].before == relations[first].before) ++last;
-    if (previous.rings[relations[first].before].is_hole) continue;
-    CorrectBySamples(std::span(relations).subspan(first, last - first), s);
-  }
-  std::erase_if(relations, [](const RingRelation& relation) { return relation.nodes == 0; });
-}
-
-void MarkCounting(RelationScratch& s, std::vector<RingRelation>& relations) {
-  for (RingRelation& relation : relations) {
-    const std::uint64_t smaller =
-        std::min(s.nodes_before[relation.before], s.nodes_now[relation.now]);
-    relation.counts = relation.nodes >= smaller / kSmallestPart + (smaller % kSmallestPart != 0);
-    if (relation.counts) s.linked_before[relation.before] = s.linked_now[relation.now] = 1;
-  }
+void CountSamples(const RingHistory& previous, Evidence& evidence) {
+  evidence.sample_count.assign(previous.rings.size(), 0);
+  for (const ParticleSample& sample : previous.samples) ++evidence.sample_count[sample.ring];
 }
 
 // Relates two rings by their nodes at the original positions, if moving found no relation for
 // either ring: a hole may not follow the body around it, and velocities may be wrong. Skips outer
 // rings with samples.
 void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                std::vector<RingRelation>& relations) {
+                std::vector<Relation>& relations) {
+  const Evidence& e = s.evidence;
   FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) {
     if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
-    if (s.linked_before[pair.a] || s.linked_now[pair.b]) continue;
-    if (!s.sample_count.empty() && s.sample_count[pair.a] > 0) continue;
+    if (e.linked_before[pair.a] || e.linked_now[pair.b]) continue;
+    if (!e.sample_count.empty() && e.sample_count[pair.a] > 0) continue;
     relations.push_back({pair.a, pair.b, pair.nodes});
   }
   Unite(relations);
@@ -230,13 +121,14 @@ void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratc
 }  // namespace
 
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                 std::vector<RingRelation>& relations) {
+                 std::vector<Relation>& relations) {
+  Evidence& e = s.evidence;
   relations.clear();
-  CountNodes(previous.runs, previous.rings.size(), s.nodes_before);
-  CountNodes(now.runs, now.rings.size(), s.nodes_now);
+  CountNodes(previous.runs, previous.rings.size(), e.nodes_before);
+  CountNodes(now.runs, now.rings.size(), e.nodes_now);
   s.shift_before.assign(previous.rings.size(), {});
   s.shift_now.assign(now.rings.size(), {});
-  s.sample_count.clear();
+  e.sample_count.clear();
   const bool by_samples = now.has_ids && !previous.samples.empty();
   if (by_samples) ShiftBySamples(now.found, s);
   ShiftByVelocities(previous, now, by_samples, s);
@@ -245,19 +137,18 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
 
   RelateByNodes(previous, now, s, relations);
   if (by_samples) {
-    AddFoundSamples(previous, now, s, relations);
-    ApplySamples(previous, s, relations);
+    CountSamples(previous, e);
+    AddFoundSamples(now.found, relations);
+    ApplySamples(e, relations);
   }
-  s.linked_before.assign(previous.rings.size(), 0);
-  s.linked_now.assign(now.rings.size(), 0);
-  MarkCounting(s, relations);
+  e.linked_before.assign(previous.rings.size(), 0);
+  e.linked_now.assign(now.rings.size(), 0);
+  MarkCounting(e, relations);
   if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
     AddUnmoved(previous, now, s, relations);
-    MarkCounting(s, relations);
+    MarkCounting(e, relations);
   }
-  std::erase_if(relations, [&](const RingRelation& relation) {
-    return !relation.counts && (s.linked_before[relation.before] || s.linked_now[relation.now]);
-  });
+  DropNeighbours(e, relations);
 }
 
 }  // namespace partiemc

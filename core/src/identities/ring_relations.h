@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "identities/relations.h"
 #include "identities/ring_samples.h"
 #include "identities/run_overlaps.h"
 #include "partiemc/state.h"
@@ -21,15 +22,6 @@ struct RingsNow {
   double cell_size = 1;  ///< World units.
 };
 
-/// A ring of the last frame and a ring of this frame that may continue it. Either both are outer
-/// rings or both are holes.
-struct RingRelation {
-  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number now.
-  std::uint64_t nodes = 0;            ///< Shared nodes, counted or estimated from samples.
-  std::uint32_t samples = 0;          ///< Samples of `before` that are in `now`.
-  bool counts = false;                ///< Shares at least a quarter of the smaller ring's nodes.
-};
-
 /// Warm buffers of RelateRings.
 struct RelationScratch {
   std::vector<CellShift> shift_before, shift_now;
@@ -37,10 +29,7 @@ struct RelationScratch {
   std::vector<NodeRun> moved;
   std::vector<SharedNodes> shared;
   std::vector<std::uint32_t> newest;  // For FindSharedNodes.
-  std::vector<std::uint64_t> nodes_before, nodes_now;
-  std::vector<std::uint32_t> sample_count;  // By ring of the last frame.
-  std::vector<std::uint64_t> accounted;     // By number: nodes that the samples account for.
-  std::vector<std::uint8_t> linked_before, linked_now;
+  Evidence evidence;
 };
 
 /// Finds the related rings (core/IDENTITIES.md). Rings move by the displacement of their samples,
@@ -49,6 +38,6 @@ struct RelationScratch {
 /// particular order.
 /// Cost: n log n in runs, rings and samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,
-                 std::vector<RingRelation>& relations);
+                 std::vector<Relation>& relations);
 
 }  // namespace partiemc

@@ -1,12 +1,12 @@
 #include "identities/ring_samples.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 #include <tuple>
 
 #include "base/id_hash.h"
 #include "base/parallel.h"
+#include "identities/smallest_hashes.h"
 #include "partiemc/result.h"
 
 namespace partiemc {
@@ -18,8 +18,6 @@ constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 // a ring expects 32 such particles. One ring of 1,500 finds fewer than 16 and needs the second
 // pass. A larger value would cost time for every ring.
 constexpr std::uint64_t kSurplus = 2;
-
-bool HasLessHash(const ParticleSample& a, const ParticleSample& b) { return a.hash < b.hash; }
 
 ParticleSample SampleAt(const TileCoordinate& tile, float x, float y, std::uint64_t id,
                         std::uint32_t ring) {
@@ -41,44 +39,10 @@ void ReserveSamples(std::span<const std::uint64_t> particle_count, RingSamples& 
   s.sample_count.assign(particle_count.size(), 0);
 }
 
-// Adds a sample to its ring. The samples of a ring are a heap with the largest hash on top; a full
-// heap drops its top.
+// Adds a sample to its ring.
 void TakeSample(const ParticleSample& sample, RingSamples& s) {
-  ParticleSample* const first = s.samples.data() + s.first_sample[sample.ring];
-  std::uint32_t& count = s.sample_count[sample.ring];
-  if (count == kMaxSamples) {
-    if (!HasLessHash(sample, *first)) return;
-    std::pop_heap(first, first + count, HasLessHash);
-    --count;
-  }
-  first[count++] = sample;
-  std::push_heap(first, first + count, HasLessHash);
+  AddToHeap(sample, s.samples.data() + s.first_sample[sample.ring], s.sample_count[sample.ring]);
 }
-
-// A filter for the hashes of samples: one bit for each value of their leading bits. Of all other
-// hashes, at most one in 32 passes, and one in thousands if there are few samples.
-class KnownHashes {
- public:
-  KnownHashes(std::span<const ParticleSample> samples, std::vector<std::uint64_t>& bits)
-      : shift_(64 - std::max(kMinBits, static_cast<int>(std::bit_width(32 * samples.size())))) {
-    bits.assign(std::size_t{1} << (64 - shift_ - 6), 0);
-    for (const ParticleSample& sample : samples) {
-      const std::uint64_t bit = sample.hash >> shift_;
-      bits[bit / 64] |= std::uint64_t{1} << (bit % 64);
-    }
-    bits_ = bits.data();
-  }
-
-  bool MayHave(std::uint64_t hash) const {
-    const std::uint64_t bit = hash >> shift_;
-    return (bits_[bit / 64] >> (bit % 64) & 1) != 0;
-  }
-
- private:
-  static constexpr int kMinBits = 15;  // 4 kB fit into the first-level cache.
-  int shift_;
-  const std::uint64_t* bits_;
-};
 
 // The largest hash that the first pass accepts for a ring.
 std::uint64_t LimitOf(std::uint64_t particles) {

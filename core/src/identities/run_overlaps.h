@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "identities/shared_nodes.h"
 #include "partiemc/state.h"
 
 namespace partiemc {
@@ -15,11 +16,8 @@ struct CellShift {
   friend bool operator==(const CellShift&, const CellShift&) = default;
 };
 
-/// Number of nodes that ring `a` of one set of runs shares with ring `b` of another set.
-struct SharedNodes {
-  std::uint32_t a = 0, b = 0;
-  std::uint64_t nodes = 0;
-};
+inline std::int32_t RowOf(const NodeRun& run) { return run.row; }
+inline std::uint32_t PieceOf(const NodeRun& run) { return run.ring; }
 
 /// Writes `runs`, moved by the shifts of their rings, to `moved`, sorted by row, then column. Moved
 /// runs may overlap. Drops runs that leave the range of rows and columns.
@@ -34,10 +32,5 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
 /// Cost: linear in runs, rings and overlaps, n log n in pairs of rings.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);
-
-/// Nodes of a run.
-inline std::uint64_t NodeCount(std::int32_t first, std::int32_t last) {
-  return static_cast<std::uint64_t>(std::int64_t{last} - first + 1);
-}
 
 }  // namespace partiemc

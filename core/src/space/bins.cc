@@ -125,13 +125,29 @@ bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
   return true;
 }
 
+/// Compares the attributes of two particles at one position, so that sums over their values do not
+/// depend on the order of the frame.
+bool HasLessAttributes(const Frame& frame, std::size_t a, std::size_t b) {
+  for (const Attribute& attribute : frame.attributes) {
+    const auto count = static_cast<std::size_t>(attribute.components);
+    const auto of_a = attribute.values.subspan(a * count, count),
+               of_b = attribute.values.subspan(b * count, count);
+    if (std::ranges::equal(of_a, of_b)) continue;
+    return std::ranges::lexicographical_compare(of_a, of_b);
+  }
+  return false;
+}
+
 /// Sorts the particles of a brick, [first, last) of `sorted`, and finds the first particle of each
 /// cell.
 void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBins& bins,
                std::uint32_t brick) {
   const auto before = [&](const SpaceBins::Keyed& a, const SpaceBins::Keyed& b) {
-    if (a.key != b.key || frame.volumes.empty()) return a.key < b.key;
-    return frame.volumes[a.source] < frame.volumes[b.source];
+    if (a.key != b.key) return a.key < b.key;
+    if (!frame.volumes.empty() && frame.volumes[a.source] != frame.volumes[b.source]) {
+      return frame.volumes[a.source] < frame.volumes[b.source];
+    }
+    return !frame.attributes.empty() && HasLessAttributes(frame, a.source, b.source);
   };
   std::sort(bins.sorted.begin() + first, bins.sorted.begin() + last, before);
   std::size_t p = first;

@@ -9,9 +9,13 @@ namespace partiemc::space {
 struct SurfaceSize {
   std::uint64_t particles = 0;
   std::uint64_t bricks = 0;
-  std::uint64_t edges = 0;   ///< Crossed edges.
-  std::uint64_t loops = 0;   ///< Loops of cells, if vertices leave their anchors; else 0.
-  bool has_windows = false;  ///< Of `kVirtualPlane`.
+  std::uint64_t edges = 0;             ///< Crossed edges.
+  std::uint64_t loops = 0;             ///< Loops of cells, if vertices leave their anchors; else 0.
+  bool has_windows = false;            ///< Of `kVirtualPlane`.
+  std::uint64_t bodies = 0;            ///< Bodies, and particles that may become one.
+  std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
+  bool has_state = false;              ///< Of a stream.
+  std::uint64_t samples = 0;           ///< Particles that a state may store; 0 without ids.
 };
 
 /// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
@@ -22,15 +26,35 @@ inline constexpr std::uint64_t kBytesPerEdge = 300;
 inline constexpr std::uint64_t kBytesPerLoop = 450;
 inline constexpr std::uint64_t kBytesPerWindow = 1'100;
 
+/// Bytes of identities: runs of nodes, of which two edges along x make one or two; histories of two
+/// frames and their relations.
+inline constexpr std::uint64_t kBytesPerTrackedEdge = 120;
+inline constexpr std::uint64_t kBytesPerTrackedBody = 500;
+inline constexpr std::uint64_t kBytesPerTrackedParticle = 4;
+inline constexpr std::uint64_t kBytesPerSample = 200;
+
+/// Bytes of one value of an attribute at a point. An ellipsoid has up to 42 points.
+inline constexpr std::uint64_t kBytesPerValue = 8;
+inline constexpr std::uint64_t kMostPointsOfDrop = 42;
+
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
-/// Upper bound of the memory of a new SurfaceWorkspace and Surface after frames of this size
+/// Upper bound of the memory of a new SurfaceWorkspace, Surface and SurfaceState after frames of
+/// this size
 /// (tests/core/allocation_test.cc).
 inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   const std::uint64_t per_loop = kBytesPerLoop + (size.has_windows ? kBytesPerWindow : 0);
-  return kBytesAtLeast + kBytesPerParticle * size.particles + kBytesPerBrick * size.bricks +
-         kBytesPerEdge * size.edges + per_loop * size.loops;
+  std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
+                        kBytesPerBrick * size.bricks + kBytesPerEdge * size.edges +
+                        per_loop * size.loops;
+  const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
+  bytes += kBytesPerValue * size.attribute_values * (size.edges + size.loops + drop_points);
+  if (size.has_state) {
+    bytes += kBytesPerTrackedEdge * size.edges + kBytesPerTrackedBody * size.bodies +
+             kBytesPerTrackedParticle * size.particles + kBytesPerSample * size.samples;
+  }
+  return bytes;
 }
 
 }  // namespace partiemc::space

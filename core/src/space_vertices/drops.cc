@@ -157,6 +157,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       const bool is_free = input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
       if (!takes_lone || volume < unit * limits.least_volume || !is_free) continue;
       Drops::Drop& drop = drops.drops.emplace_back();
+      drop.particle = p;
       AddParticle(at, volume, drop);
       // An outside node that no surface has passed.
       const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);

@@ -43,7 +43,8 @@ struct Drops {
     Vec3 low, high;
   };
   struct Drop {
-    std::uint32_t body = kNoIndex;  ///< kNoIndex: a particle without a body.
+    std::uint32_t body = kNoIndex;      ///< kNoIndex: a particle without a body.
+    std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
     double volume = 0;   ///< Cells cubed; as its moments.
     Vec3 origin, first;  ///< First moment relative to the origin.

@@ -20,6 +20,7 @@
 #include "core/internal/byte_string.h"
 #include "partiemc/parameters.h"
 #include "partiemc/status.h"
+#include "state/state_bytes.h"
 
 namespace partiemc {
 namespace {
@@ -27,17 +28,9 @@ namespace {
 constexpr std::uint32_t kMagic = 0x53504d45;          // "EMPS"
 constexpr std::uint32_t kSectionsMagic = 0x4d504d45;  // "EMPM"
 constexpr std::uint32_t kVersion = 5;
-constexpr std::uint64_t kAbsent = 0x7ff8000000000000;             // Not a number.
-constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream reaches it.
-constexpr std::size_t kChecksumBytes = 8;
-constexpr char kAsWritten[] = "must be what Serialize wrote";
 
-// The arrays of a state in the order of the layout, and the number of bytes of one element.
-struct Kind {
-  const char* name;
-  std::size_t bytes;
-};
-constexpr std::array<Kind, 4> kKinds = {
+// The arrays of a state in the order of the layout.
+constexpr std::array<ArrayKind, 4> kKinds = {
     {{"normals", 16}, {"rings", 32}, {"runs", 16}, {"samples", 20}}};
 using Counts = std::array<std::uint64_t, kKinds.size()>;
 
@@ -62,12 +55,6 @@ auto NumbersOf(auto& item) {
 
 constexpr std::size_t kHeaderBytes = 4 + 4 + 5 * 8 + 8 * kKinds.size();
 constexpr std::size_t kSectionsHeaderBytes = 4 + 4 + 8;
-
-absl::Status Corrupt(std::string value, std::string rule) {
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
-}
 
 absl::Status CheckLengths(const State& state) {
   const auto is_length = [](double value) { return value >= 1e-62 && value <= 1e62; };
@@ -167,82 +154,13 @@ absl::Status CheckContents(const State& state) {
   return status;
 }
 
-// Checks the last 8 bytes: the checksum of all bytes before them. Requires: at least 8 bytes.
-absl::Status CheckSum(std::string_view bytes) {
-  const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
-  std::string_view tail = bytes.substr(body.size());
-  if (TakeNumber<std::uint64_t>(tail) == ChecksumOf(body)) return absl::OkStatus();
-  return Corrupt("a wrong checksum", kAsWritten);
-}
-
-absl::Status CheckVersion(std::string_view& rest) {
-  const auto version = TakeNumber<std::uint32_t>(rest);
-  if (version == kVersion) return absl::OkStatus();
-  return Corrupt(absl::StrCat("version ", version), absl::StrCat("must be version ", kVersion));
-}
-
 Counts CountsOf(const State& state) {
   return std::apply([](const auto&... arrays) { return Counts{arrays.size()...}; },
                     ArraysOf(state));
 }
 
-std::uint64_t BytesOf(const Counts& counts) {
-  std::uint64_t bytes = 0;
-  for (std::size_t k = 0; k < kKinds.size(); ++k) bytes += counts[k] * kKinds[k].bytes;
-  return bytes;
-}
-
-// Reads the sizes of the arrays, which fill the rest of the bytes. Each size is bounded before it
-// is multiplied, so that the product cannot overflow.
-absl::StatusOr<Counts> TakeCounts(std::string_view& rest) {
-  Counts counts;
-  for (std::uint64_t& count : counts) count = TakeNumber<std::uint64_t>(rest);
-  bool is_possible = true;
-  for (std::size_t k = 0; k < kKinds.size(); ++k) {
-    is_possible = is_possible && counts[k] <= rest.size() / kKinds[k].bytes;
-  }
-  if (is_possible && BytesOf(counts) == rest.size()) return counts;
-  std::string value = absl::StrCat(rest.size(), " bytes"), rule = "must consist of";
-  for (std::size_t k = 0; k < kKinds.size(); ++k) {
-    absl::StrAppend(&value, k == 0 ? " for " : ", ", counts[k], " ", kKinds[k].name);
-    absl::StrAppend(&rule, k == 0 ? " " : ", ", kKinds[k].name, " of ", kKinds[k].bytes);
-  }
-  return Corrupt(std::move(value), absl::StrCat(rule, " bytes"));
-}
-
-std::optional<double> TakeOptional(std::string_view& rest) {
-  const auto bits = TakeNumber<std::uint64_t>(rest);
-  if (bits == kAbsent) return std::nullopt;
-  return std::bit_cast<double>(bits);
-}
-
-void PutOptional(std::optional<double> value, std::string& bytes) {
-  PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
-}
-
-// Reads a number. A bool is stored as a number of 4 bytes; returns false if this is not 0 or 1.
-template <typename Number>
-bool TakeNumberOrFlag(std::string_view& rest, Number& number) {
-  if constexpr (std::is_same_v<Number, bool>) {
-    const auto flag = TakeNumber<std::uint32_t>(rest);
-    number = flag == 1;
-    return flag <= 1;
-  } else {
-    number = TakeNumber<Number>(rest);
-    return true;
-  }
-}
-
-void PutNumberOrFlag(auto number, std::string& bytes) {
-  if constexpr (std::is_same_v<decltype(number), bool>) {
-    PutNumber(std::uint32_t{number}, bytes);
-  } else {
-    PutNumber(number, bytes);
-  }
-}
-
 std::size_t OwnBytes(const State& state) {
-  return kHeaderBytes + BytesOf(CountsOf(state)) + kChecksumBytes;
+  return kHeaderBytes + BytesOf(kKinds, CountsOf(state)) + kChecksumBytes;
 }
 
 // Appends the state of one outline, without the states of its sections.
@@ -256,13 +174,8 @@ void PutOwn(const State& state, std::string& bytes) {
   PutOptional(state.history.time, bytes);
   PutNumber(state.history.identities_given, bytes);
   for (const std::uint64_t count : CountsOf(state)) PutNumber(count, bytes);
-  const auto put = [&](const auto& numbers) {
-    std::apply([&](const auto&... number) { (PutNumberOrFlag(number, bytes), ...); }, numbers);
-  };
-  const auto put_all = [&](const auto& array) {
-    for (const auto& item : array) put(NumbersOf(item));
-  };
-  std::apply([&](const auto&... arrays) { (put_all(arrays), ...); }, ArraysOf(state));
+  PutArrays(
+      ArraysOf(state), [](const auto& item) { return NumbersOf(item); }, bytes);
   PutNumber(ChecksumOf(std::string_view(bytes).substr(start)), bytes);
 }
 
@@ -275,7 +188,7 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   if (TakeNumber<std::uint32_t>(rest) != kMagic) {
     return Corrupt("another kind of data", "must be a state");
   }
-  if (absl::Status status = CheckVersion(rest); !status.ok()) return status;
+  if (absl::Status status = TakeVersion(rest, kVersion); !status.ok()) return status;
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   State state;
   if (const auto cell_size = TakeNumber<double>(rest); cell_size != 0) state.cell_size = cell_size;
@@ -283,20 +196,12 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   state.area_offset = TakeOptional(rest);
   state.history.time = TakeOptional(rest);
   state.history.identities_given = TakeNumber<std::uint64_t>(rest);
-  const auto counts = TakeCounts(rest);
+  const auto counts = TakeCounts(kKinds, rest);
   if (!counts.ok()) return counts.status();
-  bool has_flags = true;
-  const auto take = [&](auto numbers) {
-    std::apply([&](auto&... number) { ((has_flags &= TakeNumberOrFlag(rest, number)), ...); },
-               numbers);
-  };
-  std::size_t kind = 0;
-  const auto take_all = [&](auto& array) {
-    array.resize((*counts)[kind++]);
-    for (auto& item : array) take(NumbersOf(item));
-  };
-  std::apply([&](auto&... arrays) { (take_all(arrays), ...); }, ArraysOf(state));
-  if (!has_flags) return Corrupt("a ring of another kind", "must be of kind 0 or 1");
+  const auto numbers_of = [](auto& item) { return NumbersOf(item); };
+  if (!TakeArrays(*counts, numbers_of, rest, ArraysOf(state))) {
+    return Corrupt("a ring of another kind", "must be of kind 0 or 1");
+  }
   if (absl::Status status = CheckContents(state); !status.ok()) return status;
   return state;
 }
@@ -308,7 +213,7 @@ absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
   }
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   std::string_view rest = bytes.substr(4, bytes.size() - 4 - kChecksumBytes);
-  if (absl::Status status = CheckVersion(rest); !status.ok()) return status;
+  if (absl::Status status = TakeVersion(rest, kVersion); !status.ok()) return status;
   const auto count = TakeNumber<std::uint64_t>(rest);
   if (count < 2 || count > kMostStates) {
     return Corrupt(absl::StrCat(count, " states"), absl::StrCat("must be 2 to ", kMostStates));

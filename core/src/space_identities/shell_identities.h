@@ -1,0 +1,37 @@
+// Shells of two successive frames -> identities and parents (core/SURFACES.md, "Identities").
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "identities/relations.h"
+#include "partiemc/surface.h"
+#include "space_identities/shell_relations.h"
+#include "space_identities/shell_runs.h"
+#include "space_identities/shell_tracks.h"
+
+namespace partiemc::space {
+
+/// Warm buffers of ContinueShells.
+struct ShellIdentityScratch {
+  NumberedShells shells;
+  ShellTracks tracks;
+  ShellRelationScratch relation_scratch;
+  std::vector<Relation> relations;
+  std::vector<std::uint8_t> is_continued;  // By shell of the last frame.
+  std::vector<std::uint32_t> continues;    // By number: index of the shell that it continues.
+  std::vector<std::uint32_t> by_identity;  // Numbers, by ascending identity.
+  std::vector<std::uint32_t> rank;         // By number: index in `by_identity`.
+};
+
+/// Gives an identity and parents to every shell of `surface`, and writes `next`, the history for
+/// the next frame. The rules are those for rings (core/IDENTITIES.md).
+///
+/// Ties: if pairs of shells share equally large numbers of nodes, the older identity comes first,
+/// then the shell with the earlier first run. New identities are given in the order of first runs.
+/// The result depends neither on the order of particles nor on the number of threads.
+/// Cost: n log n in the crossed edges along x, shells and their relations; linear in particles.
+void ContinueShells(const ShellInput& input, const ShellHistory& previous,
+                    ShellIdentityScratch& scratch, ShellHistory& next, Surface& surface);
+
+}  // namespace partiemc::space

@@ -1,0 +1,181 @@
+#include "space_identities/shell_relations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <tuple>
+
+namespace partiemc::space {
+namespace {
+
+// Largest movement within a frame, in cells, because lattice coordinates have 32 bits.
+constexpr double kMaxShift = 1u << 31;
+
+void CountNodes(std::span<const ShellRun> runs, std::size_t shells,
+                std::vector<std::uint64_t>& nodes) {
+  nodes.assign(shells, 0);
+  for (const ShellRun& run : runs) nodes[run.shell] += NodeCount(run.first, run.last);
+}
+
+/// Moves cavities with their outer shells.
+void MoveCavitiesAlong(std::span<const KnownShell> shells, std::vector<NodeShift>& shifts) {
+  for (std::size_t shell = 0; shell < shifts.size(); ++shell) {
+    if (shells[shell].outer != kNoShell) shifts[shell] = shifts[shells[shell].outer];
+  }
+}
+
+/// The lower median: a few stray particles do not change it much. Requires: not empty.
+std::int64_t MedianOf(std::vector<std::int64_t>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Moves each body by the median displacement of its samples.
+void ShiftBySamples(std::span<const FoundShellSample> found, ShellRelationScratch& s) {
+  for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
+    while (last < found.size() && found[last].before == found[first].before) ++last;
+    const auto median = [&](std::int64_t NodeShift::*part) {
+      s.displacements.clear();
+      for (std::size_t k = first; k < last; ++k) {
+        s.displacements.push_back(found[k].displacement.*part);
+      }
+      return MedianOf(s.displacements);
+    };
+    s.shift_before[found[first].before] = {median(&NodeShift::x), median(&NodeShift::y),
+                                           median(&NodeShift::z)};
+  }
+}
+
+/// The shift by a velocity over a time in units of one cell per velocity.
+NodeShift ShiftOf(const KnownShell& shell, double cells) {
+  const auto is_possible = [](double value) { return std::abs(value) <= kMaxShift; };
+  const auto rounded = [](double value) {
+    return static_cast<std::int64_t>(std::floor(value + 0.5));
+  };
+  const double x = shell.velocity_x * cells, y = shell.velocity_y * cells,
+               z = shell.velocity_z * cells;
+  if (!is_possible(x) || !is_possible(y) || !is_possible(z)) return {};
+  return {rounded(x), rounded(y), rounded(z)};
+}
+
+/// Moves the bodies of the last frame forward by their velocities, unless samples move them, and
+/// the bodies of this frame backward by their velocities.
+void ShiftByVelocities(const ShellHistory& previous, const ShellsNow& now, bool by_samples,
+                       ShellRelationScratch& s) {
+  if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
+  const double cells = (now.time - *previous.time) / now.cell_size;
+  for (std::size_t shell = 0; shell < previous.shells.size() && !by_samples; ++shell) {
+    s.shift_before[shell] = ShiftOf(previous.shells[shell], cells);
+  }
+  for (std::size_t shell = 0; shell < now.shells.size(); ++shell) {
+    s.shift_now[shell] = ShiftOf(now.shells[shell], -cells);
+  }
+}
+
+bool AnyMoves(const std::vector<NodeShift>& shifts) {
+  return std::any_of(shifts.begin(), shifts.end(),
+                     [](const NodeShift& shift) { return shift != NodeShift{}; });
+}
+
+bool ComesBefore(const ShellRun& a, const ShellRun& b) {
+  return std::tie(a.layer, a.row, a.first, a.shell) < std::tie(b.layer, b.row, b.first, b.shell);
+}
+
+/// Writes `runs`, moved by the shifts of their shells, to `moved`, sorted by row, then node. Moved
+/// runs may overlap. Drops runs that leave the range of coordinates.
+void MoveRuns(std::span<const ShellRun> runs, std::span<const NodeShift> shift_of_shell,
+              std::vector<ShellRun>& moved) {
+  const auto fits = [](std::int64_t value) {
+    return value >= std::numeric_limits<std::int32_t>::min() &&
+           value <= std::numeric_limits<std::int32_t>::max();
+  };
+  moved.clear();
+  for (const ShellRun& run : runs) {
+    const NodeShift& shift = shift_of_shell[run.shell];
+    const std::int64_t layer = run.layer + shift.z, row = run.row + shift.y;
+    const std::int64_t first = run.first + shift.x, last = run.last + shift.x;
+    if (!fits(layer) || !fits(row) || !fits(first) || !fits(last)) continue;
+    moved.push_back({static_cast<std::int32_t>(layer), static_cast<std::int32_t>(row),
+                     static_cast<std::int32_t>(first), static_cast<std::int32_t>(last), run.shell});
+  }
+  // Usually the runs are still sorted, because all of them move alike or not at all.
+  if (std::is_sorted(moved.begin(), moved.end(), ComesBefore)) return;
+  std::sort(moved.begin(), moved.end(), ComesBefore);
+}
+
+bool AreOfOneKind(const ShellHistory& previous, const ShellsNow& now, std::uint32_t before,
+                  std::uint32_t number) {
+  return previous.shells[before].is_cavity == now.shells[number].is_cavity;
+}
+
+/// Relates shells by the nodes that they share after moving the last frame's shells forward, or
+/// this frame's shells backward.
+void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
+                   std::vector<Relation>& relations) {
+  const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
+    if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
+  };
+  MoveRuns(previous.runs, s.shift_before, s.moved);
+  SweepSharedNodes<ShellRun>(s.moved, now.runs, s.newest, s.shared);
+  for (const SharedNodes& pair : s.shared) add(pair.a, pair.b, pair.nodes);
+  if (AnyMoves(s.shift_now)) {
+    MoveRuns(now.runs, s.shift_now, s.moved);
+    SweepSharedNodes<ShellRun>(s.moved, previous.runs, s.newest, s.shared);
+    for (const SharedNodes& pair : s.shared) add(pair.b, pair.a, pair.nodes);
+  }
+  Unite(relations);
+}
+
+/// Relates two shells by their nodes at the original positions, if moving found no relation for
+/// either: a cavity may not follow the body around it, and velocities may be wrong. Skips bodies
+/// with samples.
+void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
+                std::vector<Relation>& relations) {
+  const Evidence& e = s.evidence;
+  SweepSharedNodes<ShellRun>(previous.runs, now.runs, s.newest, s.shared);
+  for (const SharedNodes& pair : s.shared) {
+    if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
+    if (e.linked_before[pair.a] || e.linked_now[pair.b]) continue;
+    if (!e.sample_count.empty() && e.sample_count[pair.a] > 0) continue;
+    relations.push_back({pair.a, pair.b, pair.nodes});
+  }
+  Unite(relations);
+}
+
+}  // namespace
+
+void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
+                  std::vector<Relation>& relations) {
+  Evidence& e = s.evidence;
+  relations.clear();
+  CountNodes(previous.runs, previous.shells.size(), e.nodes_before);
+  CountNodes(now.runs, now.shells.size(), e.nodes_now);
+  s.shift_before.assign(previous.shells.size(), {});
+  s.shift_now.assign(now.shells.size(), {});
+  e.sample_count.clear();
+  const bool by_samples = now.has_ids && !previous.samples.empty();
+  if (by_samples) ShiftBySamples(now.found, s);
+  ShiftByVelocities(previous, now, by_samples, s);
+  MoveCavitiesAlong(previous.shells, s.shift_before);
+  MoveCavitiesAlong(now.shells, s.shift_now);
+
+  RelateByNodes(previous, now, s, relations);
+  if (by_samples) {
+    e.sample_count.assign(previous.shells.size(), 0);
+    for (const ShellSample& sample : previous.samples) ++e.sample_count[sample.shell];
+    AddFoundSamples(now.found, relations);
+    ApplySamples(e, relations);
+  }
+  e.linked_before.assign(previous.shells.size(), 0);
+  e.linked_now.assign(now.shells.size(), 0);
+  MarkCounting(e, relations);
+  if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
+    AddUnmoved(previous, now, s, relations);
+    MarkCounting(e, relations);
+  }
+  DropNeighbours(e, relations);
+}
+
+}  // namespace partiemc::space

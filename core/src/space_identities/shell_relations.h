@@ -1,0 +1,43 @@
+// Finds the pairs of related shells of two successive frames, and the number of nodes they share.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "identities/relations.h"
+#include "identities/shared_nodes.h"
+#include "partiemc/surface_state.h"
+#include "space_identities/shell_tracks.h"
+
+namespace partiemc::space {
+
+/// The shells of this frame, by number.
+struct ShellsNow {
+  std::span<const ShellRun> runs;           ///< `shell` is a number.
+  std::span<const KnownShell> shells;       ///< `outer` is a number.
+  std::span<const FoundShellSample> found;  ///< By `before`, then `now`.
+  bool has_ids = false;
+  double time = 0;
+  double cell_size = 1;  ///< World units.
+};
+
+/// Warm buffers of RelateShells.
+struct ShellRelationScratch {
+  std::vector<NodeShift> shift_before, shift_now;
+  std::vector<std::int64_t> displacements;
+  std::vector<ShellRun> moved;
+  std::vector<SharedNodes> shared;
+  std::vector<std::uint32_t> newest;  // For SweepSharedNodes.
+  Evidence evidence;
+};
+
+/// Finds the related shells by the rules for rings (core/IDENTITIES.md). Shells move by the
+/// displacement of their samples, else by their velocities, else not at all; then the nodes that
+/// they share are counted. If samples contradict the nodes, the samples decide. `relations` has
+/// each pair once, in no particular order.
+/// Cost: n log n in runs, shells and samples.
+void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& scratch,
+                  std::vector<Relation>& relations);
+
+}  // namespace partiemc::space

@@ -1,0 +1,138 @@
+#include "space_identities/shell_runs.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <tuple>
+
+namespace partiemc::space {
+namespace {
+
+/// The shell of a vertex, or kNoIndex if an ellipsoid has replaced its body.
+std::uint32_t ShellOfVertex(const ShellInput& input, std::uint32_t vertex) {
+  const bool is_dropped = !input.thin.empty() && !input.thin[vertex].IsEmpty();
+  return input.shell_of[is_dropped ? input.thin[vertex].corners[0] : vertex];
+}
+
+/// Finds the outer shell of each body.
+void FindShellsOfBodies(const ShellInput& input, NumberedShells& shells) {
+  const Bodies& bodies = input.bodies;
+  shells.shell_of_body.assign(bodies.bodies.size(), kNoShell);
+  for (const Drops::Drop& drop : input.drops.drops) {
+    if (!drop.is_taken || drop.body == kNoIndex) continue;
+    shells.shell_of_body[drop.body] = input.shell_of[drop.first_vertex];
+  }
+  for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
+    if (shells.shell_of_body[body] != kNoShell) continue;
+    const BrickPlace& lowest = bodies.bodies[body].lowest;
+    const BrickPlace below =
+        Normalise(input.bins.bricks, lowest.brick, lowest.i, lowest.j, lowest.k - 1);
+    shells.shell_of_body[body] = ShellOfVertex(input, input.crossings.EdgeVertex(below, 2));
+  }
+}
+
+/// Lists the crossed edges along x, and around a node of each particle without a body that is an
+/// ellipsoid.
+void ListEdges(const ShellInput& input, NumberedShells& shells) {
+  const BrickDirectory& bricks = input.bins.bricks;
+  shells.edges.clear();
+  for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
+    const BrickCoordinate at = bricks[brick];
+    // Along x come first among the vertices of a brick.
+    std::uint32_t vertex = input.crossings.bricks[brick].first_edge;
+    for (int k = 0; k < kBrickSize; ++k) {
+      for (std::uint64_t bits = input.crossings.bricks[brick].crossed[0][k]; bits != 0;
+           bits &= bits - 1, ++vertex) {
+        const int bit = std::countr_zero(bits);
+        const BrickPlace low{brick, bit % kBrickSize, bit / kBrickSize, k};
+        const bool begins_inside = input.field.IsInside(low);
+        std::uint32_t shell = ShellOfVertex(input, vertex);
+        if (shell == kNoIndex) {
+          const BrickPlace inside =
+              begins_inside ? low : Normalise(bricks, brick, low.i + 1, low.j, low.k);
+          shell = shells.shell_of_body[input.bodies.BodyOf(inside)];
+        }
+        shells.edges.push_back({at.z * kBrickSize + k, at.y * kBrickSize + low.j,
+                                at.x * kBrickSize + low.i, shell, begins_inside});
+      }
+    }
+  }
+  for (const Drops::Drop& drop : input.drops.drops) {
+    if (!drop.is_taken || drop.body != kNoIndex) continue;
+    const auto node = [](double cells) { return static_cast<std::int32_t>(std::floor(cells)); };
+    const std::int32_t x = node(drop.origin.x), y = node(drop.origin.y), z = node(drop.origin.z);
+    const std::uint32_t shell = input.shell_of[drop.first_vertex];
+    shells.edges.push_back({z, y, x - 1, shell, false});
+    shells.edges.push_back({z, y, x, shell, true});
+  }
+  // Two ellipsoids at neighbouring nodes: the first one ends before the second one begins.
+  std::sort(shells.edges.begin(), shells.edges.end(),
+            [](const NumberedShells::Edge& a, const NumberedShells::Edge& b) {
+              return std::tie(a.layer, a.row, a.node, b.begins_inside, a.shell) <
+                     std::tie(b.layer, b.row, b.node, a.begins_inside, b.shell);
+            });
+}
+
+std::uint32_t NumberOf(std::uint32_t shell, NumberedShells& shells) {
+  if (shells.number[shell] == kNoShell) {
+    shells.number[shell] = static_cast<std::uint32_t>(shells.surface_shell.size());
+    shells.surface_shell.push_back(shell);
+  }
+  return shells.number[shell];
+}
+
+void CollectRuns(const Surface& surface, NumberedShells& shells, std::vector<ShellRun>& runs) {
+  runs.clear();
+  shells.number.assign(surface.ShellCount(), kNoShell);
+  shells.surface_shell.clear();
+  for (std::size_t k = 1; k < shells.edges.size(); ++k) {
+    const NumberedShells::Edge &from = shells.edges[k - 1], &to = shells.edges[k];
+    if (from.layer != to.layer || from.row != to.row || from.node == to.node) continue;
+    std::uint32_t shell = to.shell;
+    if (!to.begins_inside) {  // The nodes of the run are outside.
+      if (surface.outer_of[shell] == kNoShell) shell = from.shell;
+      if (surface.outer_of[shell] == kNoShell) continue;
+    } else if (surface.outer_of[shell] != kNoShell) {
+      shell = surface.outer_of[shell];
+    }
+    runs.push_back({to.layer, to.row, from.node + 1, to.node, NumberOf(shell, shells)});
+  }
+  // Each shell has a run, so this numbers no other shells unless that is wrong.
+  for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) NumberOf(shell, shells);
+}
+
+void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
+  const std::vector<std::uint32_t>& body_of = input.bodies.body_of_particle;
+  shells.of_particle.assign(body_of.size(), kNoShell);
+  shells.particles.assign(shells.shells.size(), 0);
+  for (std::size_t p = 0; p < body_of.size(); ++p) {
+    if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
+    const std::uint32_t number = shells.number[shells.shell_of_body[body_of[p]]];
+    shells.of_particle[p] = number;
+    ++shells.particles[number];
+  }
+  for (const Drops::Drop& drop : input.drops.drops) {
+    if (!drop.is_taken || drop.body != kNoIndex) continue;
+    const std::uint32_t number = shells.number[input.shell_of[drop.first_vertex]];
+    shells.of_particle[drop.particle] = number;
+    ++shells.particles[number];
+  }
+}
+
+}  // namespace
+
+void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
+                  std::vector<ShellRun>& runs) {
+  FindShellsOfBodies(input, shells);
+  ListEdges(input, shells);
+  CollectRuns(surface, shells, runs);
+  shells.shells.clear();
+  for (const std::uint32_t shell : shells.surface_shell) {
+    const std::uint32_t outer = surface.outer_of[shell];
+    shells.shells.push_back({.is_cavity = outer != kNoShell,
+                             .outer = outer == kNoShell ? kNoShell : shells.number[outer]});
+  }
+  FindShellsOfParticles(input, shells);
+}
+
+}  // namespace partiemc::space

@@ -1,0 +1,70 @@
+// The shells of a frame as sets of lattice nodes, and the shell that each particle belongs to.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "identities/shared_nodes.h"
+#include "partiemc/frame.h"
+#include "partiemc/surface.h"
+#include "space/bins.h"
+#include "space/bodies.h"
+#include "space/crossings.h"
+#include "space/field.h"
+#include "space/mesh.h"
+#include "space_vertices/drops.h"
+
+namespace partiemc {
+
+/// The row of a run. Rows are ordered by layer, then row.
+inline std::pair<std::int32_t, std::int32_t> RowOf(const ShellRun& run) {
+  return {run.layer, run.row};
+}
+inline std::uint32_t PieceOf(const ShellRun& run) { return run.shell; }
+
+namespace space {
+
+/// Results of the earlier stages.
+struct ShellInput {
+  const Frame& frame;
+  const SpaceBins& bins;
+  const SpaceField& field;
+  const SpaceCrossings& crossings;
+  const Bodies& bodies;
+  const Drops& drops;
+  std::span<const ThinQuad> thin;           ///< As for AssembleSurface.
+  std::span<const std::uint32_t> shell_of;  ///< By vertex, also of drops (MeshScratch).
+  double cell_size;                         ///< World units.
+};
+
+/// The shells of a frame, numbered from 0 in the order of their first runs: by layer, row, node.
+struct NumberedShells {
+  std::vector<KnownShell> shells;            ///< By number; `outer` is a number.
+  std::vector<std::uint64_t> particles;      ///< By number.
+  std::vector<std::uint32_t> number;         ///< By shell of the surface.
+  std::vector<std::uint32_t> of_particle;    ///< By particle of the bins: number, or kNoShell.
+  std::vector<std::uint32_t> surface_shell;  ///< By number.
+
+  struct Edge {
+    std::int32_t layer, row, node;  // The lower node.
+    std::uint32_t shell;            // Of the surface.
+    bool begins_inside;
+  };
+  std::vector<Edge> edges;                   ///< Scratch: the crossed edges along x.
+  std::vector<std::uint32_t> shell_of_body;  ///< Scratch: the outer shell.
+};
+
+/// Collects the runs of the shells and numbers the shells. `surface` has shells.
+///
+/// A run lies between two crossed edges of a row. The run of a body belongs to its outer shell. A
+/// run of outside nodes belongs to a cavity if an end of it is on the shell of the cavity. An
+/// ellipsoid has the nodes of its body; one that replaces a particle without a body has one node,
+/// the lowest of the particle's cell (space_vertices/drops.h).
+/// Cost: n log n in the crossed edges along x, linear in particles and shells.
+void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
+                  std::vector<ShellRun>& runs);
+
+}  // namespace space
+}  // namespace partiemc

@@ -1,0 +1,168 @@
+// The bytes of the state of surfaces. Little-endian layout: magic, version, cell size and time
+// (kAbsent: none), largest identity, the numbers of shells, runs and samples, these arrays,
+// checksum.
+#include "partiemc/surface_state.h"
+
+#include <cmath>
+#include <tuple>
+#include <type_traits>
+
+#include "partiemc/state.h"
+#include "state/state_bytes.h"
+
+namespace partiemc {
+namespace {
+
+constexpr std::uint32_t kSurfaceMagic = 0x42504d45;  // "EMPB"
+constexpr std::uint32_t kSurfaceVersion = 1;
+
+// The arrays of a state in the order of the layout.
+constexpr std::array<ArrayKind, 3> kSurfaceKinds = {
+    {{"shells", 40}, {"runs", 20}, {"samples", 24}}};
+using SurfaceCounts = std::array<std::uint64_t, kSurfaceKinds.size()>;
+constexpr std::size_t kSurfaceHeaderBytes = 4 + 4 + 3 * 8 + 8 * kSurfaceKinds.size();
+
+auto ShellArraysOf(auto& state) {
+  auto& history = state.history;
+  return std::tie(history.shells, history.runs, history.samples);
+}
+
+// The members of an element in the order of the layout.
+auto ShellNumbersOf(auto& item) {
+  using Item = std::remove_cvref_t<decltype(item)>;
+  if constexpr (std::is_same_v<Item, KnownShell>) {
+    return std::tie(item.identity, item.is_cavity, item.outer, item.velocity_x, item.velocity_y,
+                    item.velocity_z);
+  } else if constexpr (std::is_same_v<Item, ShellRun>) {
+    return std::tie(item.layer, item.row, item.first, item.last, item.shell);
+  } else {
+    return std::tie(item.hash, item.x, item.y, item.z, item.shell);
+  }
+}
+
+absl::Status CheckShells(const ShellHistory& history) {
+  for (std::size_t k = 0; k < history.shells.size(); ++k) {
+    const KnownShell& shell = history.shells[k];
+    const std::uint64_t after = k == 0 ? 0 : history.shells[k - 1].identity;
+    if (shell.identity <= after || shell.identity > history.identities_given) {
+      return Corrupt(
+          absl::StrCat("identity ", shell.identity),
+          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
+    }
+    if (shell.outer != kNoShell && (!shell.is_cavity || shell.outer >= history.shells.size() ||
+                                    history.shells[shell.outer].is_cavity)) {
+      return Corrupt(absl::StrCat("shell ", k, " in shell ", shell.outer),
+                     "must be a cavity in an outer shell, or stand alone");
+    }
+    if (!std::isfinite(shell.velocity_x) || !std::isfinite(shell.velocity_y) ||
+        !std::isfinite(shell.velocity_z)) {
+      return Corrupt(absl::StrCat("velocity of shell ", k), "must be finite");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckShellRuns(const ShellHistory& history) {
+  for (std::size_t k = 0; k < history.runs.size(); ++k) {
+    const ShellRun& run = history.runs[k];
+    if (run.first > run.last || run.shell >= history.shells.size()) {
+      return Corrupt(absl::StrCat("run ", k), "must have nodes and a shell");
+    }
+    if (k == 0) continue;
+    const ShellRun& before = history.runs[k - 1];
+    if (std::tie(before.layer, before.row, before.last) >=
+        std::tie(run.layer, run.row, run.first)) {
+      return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckShellSamples(const ShellHistory& history) {
+  std::vector<std::uint32_t> count(history.shells.size());
+  for (std::size_t k = 0; k < history.samples.size(); ++k) {
+    const ShellSample& sample = history.samples[k];
+    if (sample.shell >= history.shells.size() || history.shells[sample.shell].is_cavity ||
+        ++count[sample.shell] > kMaxSamples) {
+      return Corrupt(absl::StrCat("sample ", k),
+                     absl::StrCat("must be one of at most ", kMaxSamples, " of an outer shell"));
+    }
+    if (k > 0 && history.samples[k - 1].hash >= sample.hash) {
+      return Corrupt(absl::StrCat("sample ", k), "must come after the one before it");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSurfaceState(const SurfaceState& state) {
+  const ShellHistory& history = state.history;
+  const double cell_size = state.cell_size.value_or(1);
+  if (!(cell_size >= 1e-62 && cell_size <= 1e62)) {
+    return Corrupt(absl::StrCat("cell size ", ShortestNumber(cell_size)),
+                   "must be absent or a length");
+  }
+  if (history.identities_given > kMaxIdentities) {
+    return Corrupt(absl::StrCat(history.identities_given, " identities"),
+                   absl::StrCat("must be at most ", kMaxIdentities));
+  }
+  if (history.time && !std::isfinite(*history.time)) {
+    return Corrupt(absl::StrCat("time ", ShortestNumber(*history.time)),
+                   "must be absent or finite");
+  }
+  absl::Status status = CheckShells(history);
+  if (status.ok()) status = CheckShellRuns(history);
+  if (status.ok()) status = CheckShellSamples(history);
+  return status;
+}
+
+SurfaceCounts SurfaceCountsOf(const SurfaceState& state) {
+  return {state.history.shells.size(), state.history.runs.size(), state.history.samples.size()};
+}
+
+}  // namespace
+
+std::size_t SerializedBytes(const SurfaceState& state) {
+  return kSurfaceHeaderBytes + BytesOf(kSurfaceKinds, SurfaceCountsOf(state)) + kChecksumBytes;
+}
+
+std::string Serialize(const SurfaceState& state) {
+  std::string bytes;
+  bytes.reserve(SerializedBytes(state));
+  PutNumber(kSurfaceMagic, bytes);
+  PutNumber(kSurfaceVersion, bytes);
+  PutOptional(state.cell_size, bytes);
+  PutOptional(state.history.time, bytes);
+  PutNumber(state.history.identities_given, bytes);
+  for (const std::uint64_t count : SurfaceCountsOf(state)) PutNumber(count, bytes);
+  PutArrays(
+      ShellArraysOf(state), [](const auto& item) { return ShellNumbersOf(item); }, bytes);
+  PutNumber(ChecksumOf(bytes), bytes);
+  return bytes;
+}
+
+absl::StatusOr<SurfaceState> ParseSurfaceState(std::string_view bytes) {
+  if (bytes.size() < kSurfaceHeaderBytes + kChecksumBytes) {
+    return Corrupt(absl::StrCat(bytes.size(), " bytes"),
+                   absl::StrCat("must have at least ", kSurfaceHeaderBytes + kChecksumBytes));
+  }
+  std::string_view rest = bytes.substr(0, bytes.size() - kChecksumBytes);
+  if (TakeNumber<std::uint32_t>(rest) != kSurfaceMagic) {
+    return Corrupt("another kind of data", "must be the state of a stream of surfaces");
+  }
+  if (absl::Status status = TakeVersion(rest, kSurfaceVersion); !status.ok()) return status;
+  if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
+  SurfaceState state;
+  state.cell_size = TakeOptional(rest);
+  state.history.time = TakeOptional(rest);
+  state.history.identities_given = TakeNumber<std::uint64_t>(rest);
+  const auto counts = TakeCounts(kSurfaceKinds, rest);
+  if (!counts.ok()) return counts.status();
+  const auto numbers_of = [](auto& item) { return ShellNumbersOf(item); };
+  if (!TakeArrays(*counts, numbers_of, rest, ShellArraysOf(state))) {
+    return Corrupt("a shell of another kind", "must be of kind 0 or 1");
+  }
+  if (absl::Status status = CheckSurfaceState(state); !status.ok()) return status;
+  return state;
+}
+
+}  // namespace partiemc
