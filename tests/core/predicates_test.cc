@@ -74,7 +74,7 @@ TEST(Orientation, AgreesWithIntegersForPointsThatAreNearlyCollinear) {
       ASSERT_EQ(OrientationExact(c, a, b), expected) << "seed 1, round " << round;
     }
   }
-  EXPECT_GT(collinear, 1000);
+  EXPECT_GT(collinear, support::Tries(1000));
 }
 
 /// Differences that are not exact, so that the whole expansion is needed.
@@ -178,7 +178,7 @@ TEST(SegmentsTouch, AgreesWithIntegersOnASmallLatticeWithAllItsDegeneracies) {
       ASSERT_EQ(SegmentsTouch(q[3], q[2], q[0], q[1]), expected) << "seed 4, round " << round;
     }
   }
-  EXPECT_GT(touching, 100'000);
+  EXPECT_GT(touching, support::Tries(100'000));
   EXPECT_LT(touching, 400'000);
 }
 

@@ -156,8 +156,8 @@ TEST(Roots, RingsAreSimpleAndNestedForAnyLevelSet) {
     thinned += 2 * stages.topology.segments.size() - result.rings.PointCount();
   }
   // The test covered the cases of the argument.
-  EXPECT_GT(rings, 100'000u);
-  EXPECT_GT(saddles, 100'000u);
+  EXPECT_GT(rings, support::Tries(100'000u));
+  EXPECT_GT(saddles, support::Tries(100'000u));
   EXPECT_GT(thinned, 100'000u);
 }
 
@@ -175,7 +175,7 @@ TEST_P(RootsWithout, AnyClampCrossOrTouch) {
     broken += !Validate(result, Fill::kNone).ok();
   }
 
-  EXPECT_GT(broken, 100u);  // Seen: 490, 346, 428 and 208.
+  EXPECT_GT(broken, support::Tries(100u));  // Seen: 490, 346, 428 and 208.
 }
 
 std::string NameOf(const testing::TestParamInfo<Clamping>& tested) {
@@ -212,7 +212,7 @@ TEST(Roots, RepairReturnsFromAnywhere) {
     const absl::Status valid = Validate(result, Fill::kNone);
     ASSERT_TRUE(valid.ok()) << "seed " << seed << ": " << valid;
   }
-  EXPECT_GT(crossing, 1'000u);
+  EXPECT_GT(crossing, support::Tries(1'000u));
 }
 
 // The placement itself, on level sets that contradict the particles, so that gradients are

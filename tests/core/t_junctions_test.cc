@@ -117,7 +117,7 @@ TEST(TJunctions, AgreeWithBruteForceInRandomFrames) {
       }
     }
   }
-  EXPECT_GT(greedy_total, 1000u);
+  EXPECT_GT(greedy_total, support::Tries(1000u));
 }
 
 // A vertex planted in the middle of one side of a conforming mesh. Only the triangle on one side is

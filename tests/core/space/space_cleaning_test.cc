@@ -14,6 +14,7 @@
 #include "space/cleaning.h"
 #include "space/field.h"
 #include "space/space_particles.h"
+#include "support/tries.h"
 
 namespace partiemc::space {
 namespace {
@@ -88,7 +89,7 @@ std::uint64_t FillByFlood(std::size_t most, Sides& sides) {
 TEST(SpaceCleaning, FillsTheCavitiesThatAFloodFinds) {
   CleaningScratch scratch;
   std::uint64_t total = 0;
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(60u); ++seed) {
     Random random(seed);
     Sides sides;
     const double density = random.Uniform(.7, .97);
@@ -103,7 +104,7 @@ TEST(SpaceCleaning, FillsTheCavitiesThatAFloodFinds) {
       total += count;
     }
   }
-  EXPECT_GT(total, 1000u);
+  EXPECT_GT(total, support::Tries(1000u));
 }
 
 TEST(SpaceCleaning, DropsBodiesWithoutParticles) {

@@ -9,6 +9,7 @@
 
 #include "partiemc/surface.h"
 #include "space/space_particles.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -122,7 +123,7 @@ TEST(SpaceDrops, KeepTheirSurfaceNearOthersAndWhereTheyAreBent) {
 
 /// Drops that touch each other, near walls and in cavities; also of tiny particles, and far away.
 TEST(SpaceDrops, KeepS1ToS5) {
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(10u); ++seed) {
     Random random(seed);
     SpaceParticles particles;
     const double side = random.Uniform(6, 30);

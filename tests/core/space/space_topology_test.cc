@@ -19,6 +19,7 @@
 #include "space/space_particles.h"
 #include "space/thinning.h"
 #include "space/vertices.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -31,7 +32,7 @@ using testing::SpaceParticles;
 /// More frames than usual, for a longer run: PARTIEMC_SPACE_FRAMES.
 std::uint64_t Frames(std::uint64_t usual) {
   const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
-  return wanted == nullptr ? usual : std::strtoull(wanted, nullptr, 10);
+  return wanted == nullptr ? support::Tries(usual) : std::strtoull(wanted, nullptr, 10);
 }
 
 TEST(CellLoops, CoverEveryCrossingOnce) {
