@@ -1,4 +1,4 @@
-#include "space/thinning.h"
+#include "space_vertices/thinning.h"
 
 #include <algorithm>
 #include <array>
