@@ -28,12 +28,12 @@
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/surface_bytes.h"
-#include "space/vertices.h"
 #include "space_identities/shell_identities.h"
 #include "space_vertices/drops.h"
 #include "space_vertices/point_attributes.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/thinning.h"
+#include "space_vertices/vertices.h"
 #include "space_vertices/virtual_plane.h"
 
 namespace partiemc {

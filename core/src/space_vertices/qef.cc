@@ -7,7 +7,7 @@
 #include "base/parallel.h"
 #include "space/level_set.h"
 #include "space/point_sampler.h"
-#include "space/vertices.h"
+#include "space_vertices/vertices.h"
 
 namespace partiemc::space {
 namespace {

@@ -5,7 +5,7 @@
 #include "base/parallel.h"
 #include "space/brick_blocks.h"
 #include "space/point_sampler.h"
-#include "space/vertices.h"
+#include "space_vertices/vertices.h"
 
 namespace partiemc::space {
 namespace {

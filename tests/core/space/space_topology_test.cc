@@ -17,8 +17,8 @@
 #include "space/crossings.h"
 #include "space/mesh.h"
 #include "space/space_particles.h"
-#include "space/vertices.h"
 #include "space_vertices/thinning.h"
+#include "space_vertices/vertices.h"
 #include "support/tries.h"
 
 namespace partiemc {

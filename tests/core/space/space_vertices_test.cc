@@ -15,13 +15,13 @@
 #include "space/field.h"
 #include "space/point_sampler.h"
 #include "space/space_particles.h"
-#include "space/vertices.h"
 #include "space_vertices/body_volumes.h"
 #include "space_vertices/edge_vertices.h"
 #include "space_vertices/loop_filters.h"
 #include "space_vertices/loop_windows.h"
 #include "space_vertices/qef.h"
 #include "space_vertices/roots.h"
+#include "space_vertices/vertices.h"
 #include "support/tries.h"
 
 namespace partiemc::space {

@@ -1,4 +1,4 @@
-#include "space/vertices.h"
+#include "space_vertices/vertices.h"
 
 #include <algorithm>
 
