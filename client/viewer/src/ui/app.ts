@@ -40,7 +40,8 @@ export class App {
   private readonly files: FilesPanel;
   /** The files of tracks. */
   private readonly opened = new Map<Track, OpenFile>();
-  private ownAddress = '';
+  /** The address that was read or written last. */
+  private address = '';
   /** False while the address of the link is read, which must not be overwritten. */
   private isReady = false;
   /** Frame of the link, until it is shown. */
@@ -85,7 +86,7 @@ export class App {
     this.readAddress();
     this.isReady = true;
     addEventListener('hashchange', () => {
-      if (location.hash !== this.ownAddress) this.readAddress();
+      if (location.hash !== this.address) this.readAddress();
     });
     this.chosenChanged();
     requestAnimationFrame((now) => this.refresh(now));
@@ -271,7 +272,8 @@ export class App {
   }
 
   private readAddress(): void {
-    const address = parseAddress(location.hash);
+    this.address = location.hash;
+    const address = parseAddress(this.address);
     this.look.text = address.look;
     this.linkedFile = address.file ? address : null;
     if (address.file) {
@@ -310,6 +312,7 @@ export class App {
 
   private writeAddress(): void {
     if (!this.isReady || this.linkedFrame !== null || this.linkedFile) return;
+    if (location.hash !== this.address) return;  // The event of a new address has not arrived yet.
     const first = this.stage.panes[0];
     const file = first?.track.kind === 'file' ? first.track : null;
     // A link opens one file only.
@@ -327,10 +330,10 @@ export class App {
       view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
       look: this.look.text,
     };
-    this.ownAddress = addressText(address);
-    if (location.hash !== this.ownAddress) {
-      history.replaceState(null, '', this.ownAddress || location.pathname + location.search);
-    }
+    const text = addressText(address);
+    if (text === this.address) return;
+    history.replaceState(null, '', text || location.pathname + location.search);
+    this.address = location.hash;
   }
 
   /** Goes to the frame of the link once it has arrived. Until then the first picture says that it waits. */

@@ -99,8 +99,8 @@ test('a link waits for a frame that has not arrived', async () => {
 });
 
 test('a link to a frame that never comes says so', async () => {
-  world.replayOf(recording, 'short', '--rate', '60');
   viewer = await Viewer.open(browser, world.url, { hash: '#stream=short&frame=900' });
+  world.replayOf(recording, 'short', '--rate', '10');  // The page asks for it every two seconds.
   await until('the reason', async () => /The stream has ended with frame 75, before frame 900 of the link/.test(await viewer.status()));
   await until('no notice', async () => !await viewer.pane().locator('.notice').isVisible());
 });

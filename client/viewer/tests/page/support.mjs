@@ -199,6 +199,8 @@ export class Viewer {
 
   /** Drops files and folders on the page. */
   async drop(...paths) {
+    // A page takes drag events after its first picture only.
+    await this.page.evaluate(() => new Promise((shown) => requestAnimationFrame(() => requestAnimationFrame(shown))));
     const session = await this.page.context().newCDPSession(this.page);
     const data = { items: [], files: paths, dragOperationsMask: 1 };
     for (const type of ['dragEnter', 'dragOver', 'drop']) {
