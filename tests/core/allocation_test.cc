@@ -209,7 +209,9 @@ class TrackedFrames {
 class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int, bool>> {};
 
 TEST_P(WarmSurface, AllocatesNothing) {
-  const auto [placement, threads, is_tracked] = GetParam();
+  const auto placement = std::get<SurfacePlacement>(GetParam());
+  const int threads = std::get<int>(GetParam());
+  const bool is_tracked = std::get<bool>(GetParam());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   tbb::task_arena arena(threads);
   const auto reconstructor = SurfaceReconstructor::Create(
