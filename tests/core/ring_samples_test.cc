@@ -14,6 +14,7 @@
 #include "support/chosen_ids.h"
 #include "support/random.h"
 #include "support/stages.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -120,7 +121,7 @@ std::vector<ParticleSample> ByHash(std::vector<ParticleSample> samples) {
 TEST(RingSamples, HaveTheSmallestHashesForAnyIds) {
   constexpr std::uint64_t kLargest = std::numeric_limits<std::uint64_t>::max();
   RingSamples samples;  // Reused: one call must not affect the next.
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(4u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const Traced traced(Bodies(seed));
     const std::size_t count = traced.stages.particles.size();

@@ -15,6 +15,7 @@
 #include "partiemc/partiemc.h"
 #include "support/ring_stream.h"
 #include "support/tracked_scene.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -86,7 +87,7 @@ TEST(TrackedTurmoilOf100Discs, IdsAndVelocitiesChangeNoOutline) {
 }
 
 TEST_P(TrackedTurmoil, OrderThreadsAndRestartsHaveNoEffect) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(3u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     RingStream stream, permuted, restored;
     support::Random random(seed);
@@ -175,7 +176,7 @@ struct Parentage {
 
 Parentage CompareParents(Known known) {
   Parentage sum;
-  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(2u); ++seed) {
     RingStream stream;
     std::map<std::uint64_t, std::set<std::uint64_t>> before;
     for (int frame = 0; frame < 8; ++frame) {
