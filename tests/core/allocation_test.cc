@@ -97,8 +97,8 @@ TEST_P(WarmFrame, AllocatesNothing) {
   std::vector<Particles> frames;
   for (int k = 0; k < 4; ++k) {
     support::Random random(static_cast<std::uint64_t>(k));
-    Particles frame = support::Disc(104);
-    frame.Add(support::Shifted(support::Blob(random, 12), 102 + 6 * k, 5));
+    Particles frame = support::Disc(120);
+    frame.Add(support::Shifted(support::Blob(random, 12), 118 + 6 * k, 5));
     frame.Add(support::Shifted(support::Noise(random, 200, 60), -200, 150));
     if (tested.volumes) frame.volumes.assign(frame.size(), 1.0f);
     for (std::size_t id = 0; tested.ids && id < frame.size(); ++id) {
@@ -262,13 +262,10 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
                                                           SurfacePlacement::kVirtualPlane),
                                           testing::Values(1, 2), testing::Bool()));
 
-// The memory of a fill does not depend on the placement, so only the default is tried with all
-// fills.
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {
     for (const Fill fill : AllFills()) {
-      if (placement != Placement::kVirtualPlane && fill != Fill::kGreedy) continue;
       for (const int threads : {1, 2}) {
         cases.push_back({placement, fill, threads, threads == 1, threads == 2});
       }
