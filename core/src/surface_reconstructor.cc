@@ -224,7 +224,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   return absl::OkStatus();
 }
 
-/// CORRUPT_STATE if the nodes of the state are those of another lattice.
+/// CORRUPT_STATE if the state belongs to a lattice with another cell size.
 absl::Status CheckCellSize(const SurfaceState& state, double cell_size) {
   if (state.cell_size.value_or(cell_size) == cell_size) return absl::OkStatus();
   return ViolationError(

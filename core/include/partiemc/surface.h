@@ -21,7 +21,7 @@ namespace partiemc {
 struct ShellMeasures {
   double area = 0;    ///< World units squared.
   double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
-  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Of the enclosed volume.
+  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the enclosed volume.
   std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
   /// The shell that continues this shell in the next frame has the same identity. Distinct within a
   /// frame, never reused in a stream (core/SURFACES.md, "Identities").
@@ -147,7 +147,8 @@ class SurfaceReconstructor {
   /// Reconstructs one frame and updates `state`; `frame.components` is 3, volumes are in world
   /// units cubed. Runs in the caller's Arena. The bits of `surface` and `state` depend neither on
   /// the number of threads nor on the order of the particles. Limits: `max_tiles` counts bricks of
-  /// 8 x 8 x 8 nodes. `control.memory` is asked twice: for the bricks, then with the full estimate.
+  /// 8 x 8 x 8 nodes. Reserves from
+  /// `control.memory` twice: the bricks, then the full estimate.
   /// No stage is reported to `control.observer`.
   /// Errors: as Reconstructor; INVALID_ARGUMENT (CORRUPT_STATE) for the state of a stream with
   /// another cell size. On an error or exception (std::bad_alloc) `state` is unchanged and

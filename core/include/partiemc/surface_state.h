@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::ma
 struct KnownShell {
   std::uint64_t identity = 0;
   bool is_cavity = false;
-  std::uint32_t outer = kNoShell;  ///< Of a cavity: the index of its outer shell, if known.
+  std::uint32_t outer = kNoShell;  ///< Index of a cavity's outer shell, if known.
   /// Mean velocity of its particles, world units per time; 0: unknown.
   double velocity_x = 0, velocity_y = 0, velocity_z = 0;
 
@@ -54,7 +54,7 @@ struct ShellHistory {
   std::optional<double> time;          ///< Time of the last frame, finite.
   std::vector<KnownShell> shells;      ///< Sorted by identity.
   std::vector<ShellRun> runs;  ///< Disjoint, by layer, row, node. Each shell has at least one run.
-  /// Sorted by hash. Of each outer shell, the kMaxSamples particles with the lowest hashes.
+  /// Sorted by hash. Each outer shell has its kMaxSamples particles with the lowest hashes.
   std::vector<ShellSample> samples;
 
   friend bool operator==(const ShellHistory&, const ShellHistory&) = default;

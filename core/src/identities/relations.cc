@@ -1,6 +1,7 @@
 #include "identities/relations.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <tuple>
 
 #include "base/bits.h"
@@ -18,9 +19,9 @@ constexpr std::uint64_t kSmallestPart = 4;
 // splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 
-// A piece of the last frame that shares nodes with a piece of this frame, but has no samples in it,
-// is not its parent if the samples of other pieces account for at least this many quarters of the
-// new piece's nodes.
+// A piece of the last frame may share nodes with a new piece, but have no samples in it. It is then
+// not a parent if the samples of other pieces account for at least three quarters of the new
+// piece's nodes.
 constexpr std::uint64_t kAccountedQuarters = 3;
 
 // Estimates the nodes that a piece passed to another piece: its number of nodes, times the share of
@@ -64,6 +65,12 @@ void CorrectBySamples(std::span<Relation> of_one, const Evidence& s) {
 }
 
 }  // namespace
+
+std::int64_t MedianOf(std::vector<std::int64_t>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 void Unite(std::vector<Relation>& relations) {
   std::sort(relations.begin(), relations.end(), [](const Relation& x, const Relation& y) {

@@ -10,6 +10,13 @@
 
 namespace partiemc {
 
+/// Largest movement of a piece within a frame, in cells, because lattice coordinates have 32 bits.
+inline constexpr double kMaxShift = 1u << 31;
+
+/// The lower median: a few stray particles do not change it much. Sorts `values` in part. Requires:
+/// not empty.
+std::int64_t MedianOf(std::vector<std::int64_t>& values);
+
 /// A piece of the last frame and a piece of this frame that may continue it. Either both are outer
 /// or both are holes (cavities).
 struct Relation {

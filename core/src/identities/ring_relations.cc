@@ -9,9 +9,6 @@
 namespace partiemc {
 namespace {
 
-// Largest movement within a frame, in cells, because lattice coordinates have 32 bits.
-constexpr double kMaxShift = 1u << 31;
-
 void CountNodes(std::span<const NodeRun> runs, std::size_t rings,
                 std::vector<std::uint64_t>& nodes) {
   nodes.assign(rings, 0);
@@ -23,13 +20,6 @@ void MoveHolesAlong(std::span<const KnownRing> rings, std::vector<CellShift>& sh
   for (std::size_t ring = 0; ring < shifts.size(); ++ring) {
     if (rings[ring].outer != kNoRing) shifts[ring] = shifts[rings[ring].outer];
   }
-}
-
-// The lower median: a few stray particles do not change it much. Requires: not empty.
-std::int64_t MedianOf(std::vector<std::int64_t>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Moves each outer ring by the median displacement of its samples.

@@ -11,7 +11,7 @@ struct SurfaceSize {
   std::uint64_t bricks = 0;
   std::uint64_t edges = 0;             ///< Crossed edges.
   std::uint64_t loops = 0;             ///< Loops of cells, if vertices leave their anchors; else 0.
-  bool has_windows = false;            ///< Of `kVirtualPlane`.
+  bool has_windows = false;            ///< True for `kVirtualPlane`.
   std::uint64_t bodies = 0;            ///< Bodies, and particles that may become one.
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
   bool has_state = false;              ///< Of a stream.

@@ -9,9 +9,6 @@
 namespace partiemc::space {
 namespace {
 
-// Largest movement within a frame, in cells, because lattice coordinates have 32 bits.
-constexpr double kMaxShift = 1u << 31;
-
 void CountNodes(std::span<const ShellRun> runs, std::size_t shells,
                 std::vector<std::uint64_t>& nodes) {
   nodes.assign(shells, 0);
@@ -23,13 +20,6 @@ void MoveCavitiesAlong(std::span<const KnownShell> shells, std::vector<NodeShift
   for (std::size_t shell = 0; shell < shifts.size(); ++shell) {
     if (shells[shell].outer != kNoShell) shifts[shell] = shifts[shells[shell].outer];
   }
-}
-
-/// The lower median: a few stray particles do not change it much. Requires: not empty.
-std::int64_t MedianOf(std::vector<std::int64_t>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Moves each body by the median displacement of its samples.

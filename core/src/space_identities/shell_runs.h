@@ -49,7 +49,7 @@ struct NumberedShells {
 
   struct Edge {
     std::int32_t layer, row, node;  // The lower node.
-    std::uint32_t shell;            // Of the surface.
+    std::uint32_t shell;            // Index in the surface.
     bool begins_inside;
   };
   std::vector<Edge> edges;                   ///< Scratch: the crossed edges along x.
