@@ -1,5 +1,5 @@
 // partiemc-bench: the core and its peers under Google Benchmark. Its flags are Google Benchmark's
-// own, and --quick, which leaves out the scene of four million particles.
+// own, and --quick, which leaves out the scene of four million particles and the surfaces.
 #include <benchmark/benchmark.h>
 
 #include <string_view>
@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   const auto scenes = partiemc::bench::Require(partiemc::bench::MakeScenes(quick));
   partiemc::bench::RegisterCore(scenes);
   partiemc::bench::RegisterPeers(scenes);
+  if (!quick) partiemc::bench::RegisterSurfaces();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }

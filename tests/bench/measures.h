@@ -31,6 +31,9 @@ void Register(const std::string& name, int iterations, Body body) {
 ///   machine
 void RegisterCore(const Scenes& scenes);
 
+/// Registers "surface/SCENE/PLACEMENT/THREADS": a warm frame in space. Counter: triangles.
+void RegisterSurfaces();
+
 /// Registers VTK and our stages that do the same work: "vtk_sph/1m"; "contours/1024",
 /// "linear_contours/1024", "vtk_contours/1024"; "fill/1024", "vtk_fill/1024".
 void RegisterPeers(const Scenes& scenes);
