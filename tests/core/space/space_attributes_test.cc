@@ -86,11 +86,11 @@ TEST_P(SpaceAttributes, ReproduceLinearFieldAtEveryPoint) {
 
 TEST_P(SpaceAttributes, HaveTheSameBitsForAnyOrderAndThreads) {
   SpaceCloud cloud;
-  // Particles at one position, with different values.
-  for (const float value : {.1f, .7f, 1e-3f, 3e7f}) {
-    cloud.particles.Add(Vec3{300, -200, 0});
+  // Particles at one position near the surface. The sum of their values depends on the order.
+  for (const float value : {1e30f, 1.0f, -1e30f, .3f}) {
+    cloud.particles.Add(Vec3{305.5, -200, 0});
     cloud.linear.push_back(value);
-    cloud.vector.insert(cloud.vector.end(), {value, 0, 1 / value});
+    cloud.vector.insert(cloud.vector.end(), {value, 0, -value});
   }
   SpaceCloud reversed = cloud;
   const std::size_t count = cloud.particles.size();

@@ -217,6 +217,38 @@ TEST_P(TrackedBodies, CavitiesFollowTheirBodies) {
   }
 }
 
+TEST(BodyIdentities, CavityHasTheNodesOnBothSidesOfItsIsland) {
+  SurfaceStream stream;
+  TrackedParticles all{.known = kNothing};
+  all.Add(Hollow(false, 0), 0);
+  ASSERT_EQ(stream.Next(all).ShellCount(), 3u);
+  const ShellHistory& history = stream.state().history;
+  int left = 0, right = 0;
+  for (const ShellRun& run : history.runs) {
+    if (run.row != 0 || run.layer != 0 || !history.shells[run.shell].is_cavity) continue;
+    left += run.last < 0;
+    right += run.first > 0;
+  }
+  EXPECT_EQ(left, 1);
+  EXPECT_EQ(right, 1);
+}
+
+// The body of the last frame does not move, so only the velocities of its parts relate them to it.
+TEST(BodyIdentities, PartsThatLeapApartHaveTheirBodyAsParent) {
+  SurfaceStream stream;
+  TrackedParticles whole{.known = kVelocities, .time = 0}, parts{.known = kVelocities, .time = 1};
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 leap{0, 40 * side, 0};
+    whole.Add(Block(side < 0 ? 0 : 7, 7), 0);
+    parts.Add(Block(side < 0 ? 0 : 7, 7), 0, leap, leap);
+  }
+  ASSERT_EQ(stream.Next(whole).ShellCount(), 1u);
+  const std::uint64_t identity = stream.surface().measures[0].identity;
+  ASSERT_EQ(stream.Next(parts).ShellCount(), 2u);
+  for (const double y : {-38.0, 42.0})
+    EXPECT_THAT(stream.Parents({7, y, 2}), ElementsAre(identity));
+}
+
 TEST(BodyIdentities, EmptyFrameEndsAll) {
   SurfaceStream stream;
   TrackedParticles all{.known = kIds};
