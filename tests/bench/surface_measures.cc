@@ -79,9 +79,10 @@ ParticlesInSpace Drops(int along) {
 
 void RegisterSurface(const std::string& scene, ParticlesInSpace particles) {
   const auto shared = std::make_shared<const ParticlesInSpace>(std::move(particles));
-  for (const auto& [name, placement] :
-       {std::pair("marching_cubes", SurfacePlacement::kMarchingCubes),
-        std::pair("virtual_plane", SurfacePlacement::kVirtualPlane)}) {
+  for (const SurfacePlacement placement :
+       {SurfacePlacement::kMarchingCubes, SurfacePlacement::kVirtualPlane}) {
+    const char* const name =
+        placement == SurfacePlacement::kMarchingCubes ? "marching_cubes" : "virtual_plane";
     for (const int threads : {1, 2}) {
       Register(absl::StrCat("surface/", scene, "/", name, "/", threads), 1,
                [shared, placement, threads](benchmark::State& state) {
