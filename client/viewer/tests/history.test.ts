@@ -99,9 +99,13 @@ test('linked tracks show the time of the chosen one', () => {
   link.refresh(fast, [slow, fast]);
   assert.equal(fast.player.mode, 'playing', 'the chosen one goes on playing');
   assert.equal(slow.player.mode, 'paused');
-  slow.player.seek(4);  // Before the next refresh.
+  const held = slow.player.sequence;
+  assert.ok(held !== null);
+  link.choose(slow);
+  assert.equal(slow.player.mode, 'playing');
+  slow.player.seek(held);  // To the frame where it was held, before the next refresh.
   link.refresh(slow, [slow, fast]);
-  assert.deepEqual([slow.player.mode, slow.player.sequence], ['paused', 4], 'the user has paused it');
+  assert.deepEqual([slow.player.mode, slow.player.sequence], ['paused', held], 'the user has paused it');
   fast.player.seek(1);
   link.refresh(fast, [slow, fast]);
   link.isOn = false;

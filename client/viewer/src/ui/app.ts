@@ -226,6 +226,7 @@ export class App {
   }
 
   private chosenChanged(): void {
+    this.link.choose(this.track);
     const pane = this.stage.chosen;
     const number = pane ? this.stage.panes.indexOf(pane) + 1 : 0;
     const name = this.stage.panes.length > 1 ? `of picture ${number}` : '';

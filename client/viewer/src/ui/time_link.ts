@@ -4,18 +4,18 @@ import type { Track } from '../stream/track';
 export class TimeLink {
   isOn = true;
   private leader: Track | null = null;
-  /** Tracks that this link has moved, and paused at this frame. */
-  private readonly held = new Map<Track, number>();
+  /** Tracks that this link has moved and paused. */
+  private readonly held = new Set<Track>();
 
   /** Whether a track shows the time of another one. */
   holds(track: Track): boolean { return this.held.has(track); }
 
   /** Called once per refresh of the screen. `chosen`: the track that the user moves in time. */
   refresh(chosen: Track | null, tracks: readonly Track[]): void {
-    for (const track of this.held.keys()) {
+    for (const track of this.held) {
       if (!this.isOn || !tracks.includes(track)) this.held.delete(track);
     }
-    if (chosen !== this.leader) this.lead(chosen);
+    this.choose(chosen);
     if (!this.isOn || !chosen) return;
     if (chosen.player.mode === 'live') {
       this.release();
@@ -29,14 +29,15 @@ export class TimeLink {
     }
   }
 
-  /** Playing goes on if the user chooses another track, unless the user has moved it since. */
-  private lead(chosen: Track | null): void {
+  /**
+   * Makes a track the one that the others follow. If the former one plays, the chosen one goes on playing. Call it
+   * as soon as the user chooses, so that what the user does next to the track is not undone.
+   */
+  choose(chosen: Track | null): void {
+    if (chosen === this.leader) return;
     const former = this.leader;
     this.leader = chosen;
-    const heldAt = chosen ? this.held.get(chosen) : undefined;
-    if (!chosen || heldAt === undefined) return;
-    this.held.delete(chosen);
-    if (former?.player.mode !== 'playing' || chosen.player.sequence !== heldAt) return;
+    if (!chosen || !this.held.delete(chosen) || former?.player.mode !== 'playing') return;
     chosen.player.speed = former.player.speed;
     chosen.player.play();
   }
@@ -44,14 +45,14 @@ export class TimeLink {
   private move(track: Track, time: number): void {
     const entry = track.history.nearestInTime(time);
     if (!entry) return;
-    this.held.set(track, entry.sequence);
+    this.held.add(track);
     const { mode, sequence } = track.player;
     if (mode !== 'paused' || sequence !== entry.sequence) track.player.seek(entry.sequence);
   }
 
   /** Streams follow their newest frame again. */
   private release(): void {
-    for (const track of this.held.keys()) track.player.follow();
+    for (const track of this.held) track.player.follow();
     this.held.clear();
   }
 }
