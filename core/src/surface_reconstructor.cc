@@ -58,18 +58,9 @@ struct SurfaceWorkspace::Buffers {
 
 namespace {
 
-/// The factor by which the calibrated radius of a slice is multiplied (core/SURFACES.md,
-/// "Calibration").
-double CalibrationOf(SurfacePlacement placement) {
-  switch (placement) {
-    case SurfacePlacement::kMarchingCubes:
-    case SurfacePlacement::kQef:
-      return 1.065;
-    case SurfacePlacement::kVirtualPlane:
-      return .985;
-  }
-  return 1;
-}
+// The factor by which the calibrated radius of a slice is multiplied (core/SURFACES.md,
+// "Calibration").
+constexpr double kCalibration = 1.065;
 
 /// The parameters in the form that the stages require: as for a slice, so that lengths and weights
 /// are in space.
@@ -86,8 +77,7 @@ ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
 ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space = InSpace(parameters);
   if (!in_space.reference_radius) {
-    in_space.reference_radius =
-        CalibrationOf(parameters.placement) * CalibratedSliceRadius(parameters.kernel_radius);
+    in_space.reference_radius = kCalibration * CalibratedSliceRadius(parameters.kernel_radius);
   }
   return in_space;
 }

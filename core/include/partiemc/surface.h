@@ -98,7 +98,7 @@ struct SurfaceParameters {
   double spacing = 1;
   /// As in ReconstructionParameters, with the same ranges.
   double kernel_radius = 3, cell_size = 1;
-  /// Reference radius in spacings. Absent: calibrated for the placement.
+  /// Reference radius in spacings. Absent: calibrated (core/SURFACES.md).
   std::optional<double> reference_radius = std::nullopt;
 
   /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "frame/calibration.h"
@@ -346,6 +347,31 @@ TEST(VirtualPlane, GivesDropsAndBallsTheVolumeOfTheirParticles) {
     EXPECT_GT(least, 1 - error) << count;
     EXPECT_LT(most, 1 + error) << count;
   }
+}
+
+// Darts in a ball anywhere in the lattice, without ellipsoids. Some of them are nearly apart.
+TEST(VirtualPlane, GivesMostDropsOfDartsTheVolumeOfTheirParticles) {
+  const auto reconstructor = SurfaceReconstructor::Create(
+      {.placement = SurfacePlacement::kVirtualPlane, .max_drop_particles = 0});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  Random random(11);
+  const int trials = support::Tries(100);
+  int wrong = 0;
+  for (const int count : {20, 30, 60, 120}) {
+    const double radius = std::cbrt(.75 * count / std::numbers::pi);
+    for (int trial = 0; trial < trials; ++trial) {
+      const Vec3 centre{random.Unit(), random.Unit(), random.Unit()};
+      SpaceParticles drop;
+      while (drop.size() < static_cast<std::size_t>(count)) {
+        const Vec3 arm{random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1)};
+        if (Length(arm) < 1) drop.Add(centre + radius * arm);
+      }
+      ASSERT_TRUE(reconstructor->Reconstruct(drop.AsFrame(), workspace, surface).ok());
+      wrong += std::abs(VolumeOf(surface) - count) > .1 * count;
+    }
+  }
+  EXPECT_LE(wrong, 1 + trials / 50) << "of " << 4 * trials;
 }
 
 }  // namespace
