@@ -1,6 +1,7 @@
 #include "client/input/collection.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -84,7 +85,53 @@ std::vector<Member> MembersOfPvd(std::string_view text) {
   return members;
 }
 
-// Reads a JSON string after its opening quote. Unicode escapes become '?'.
+void AppendUtf8(char32_t point, std::string& text) {
+  const auto continuation = [&](int shift) {
+    text.push_back(static_cast<char>(0x80 | (point >> shift & 0x3f)));
+  };
+  if (point < 0x80) {
+    text.push_back(static_cast<char>(point));
+  } else if (point < 0x800) {
+    text.push_back(static_cast<char>(0xc0 | point >> 6));
+    continuation(0);
+  } else if (point < 0x10000) {
+    text.push_back(static_cast<char>(0xe0 | point >> 12));
+    continuation(6);
+    continuation(0);
+  } else {
+    text.push_back(static_cast<char>(0xf0 | point >> 18));
+    continuation(12);
+    continuation(6);
+    continuation(0);
+  }
+}
+
+// Takes the digits of "\uXXXX" from the front, or of two escapes that are a surrogate pair. Returns
+// U+FFFD for other surrogates and for wrong digits.
+char32_t TakeUnicodeEscape(std::string_view& rest) {
+  constexpr char32_t kReplacement = 0xfffd;
+  const auto unit = [&rest]() -> char32_t {
+    const std::string_view digits = rest.substr(0, 4);
+    const char* const end = digits.data() + digits.size();
+    std::uint32_t value = 0;
+    const auto parsed = std::from_chars(digits.data(), end, value, 16);
+    if (digits.size() < 4 || parsed.ec != std::errc() || parsed.ptr != end) return kReplacement;
+    rest.remove_prefix(4);
+    return value;
+  };
+  const char32_t first = unit();
+  if (first < 0xd800 || first > 0xdfff) return first;
+  if (first > 0xdbff || !rest.starts_with("\\u")) return kReplacement;
+  std::string_view after = std::exchange(rest, rest.substr(2));
+  const char32_t second = unit();
+  if (second >= 0xdc00 && second <= 0xdfff) {
+    return 0x10000 + ((first - 0xd800) << 10 | (second - 0xdc00));
+  }
+  rest = after;  // The second escape is a character of its own.
+  return kReplacement;
+}
+
+// Reads a JSON string after its opening quote.
 bool TakeJsonString(std::string_view& rest, std::string& text) {
   text.clear();
   while (!rest.empty()) {
@@ -97,8 +144,13 @@ bool TakeJsonString(std::string_view& rest, std::string& text) {
     }
     const char escape = rest.front();
     rest.remove_prefix(1);
-    if (escape == 'u') rest.remove_prefix(std::min<std::size_t>(4, rest.size()));
-    text.push_back(escape == 'u' ? '?' : escape == 'n' ? '\n' : escape == 't' ? '\t' : escape);
+    constexpr std::string_view kEscapes = "bfnrt", kMeanings = "\b\f\n\r\t";
+    const std::size_t known = kEscapes.find(escape);
+    if (escape == 'u') {
+      AppendUtf8(TakeUnicodeEscape(rest), text);
+    } else {
+      text.push_back(known == std::string_view::npos ? escape : kMeanings[known]);
+    }
   }
   return false;
 }

@@ -38,6 +38,7 @@ struct GsdChunk {
 };
 
 struct GsdContent {
+  bool is_hoomd = false;  // Whether the file has the schema of HOOMD-blue.
   std::uint64_t frame_count = 0;
   std::map<std::uint64_t, std::vector<GsdChunk>> frames;  // By index; without empty frames.
 };
@@ -65,6 +66,7 @@ class GsdIndex {
     const auto index = Part(LittleEndian(*header, 8, 8), Product(count, kGsdEntryBytes), "index");
     if (!index.ok()) return index.status();
     GsdContent content;
+    content.is_hoomd = std::string_view(*header).substr(112).starts_with(std::string("hoomd\0", 6));
     for (std::uint64_t k = 0; k < count; ++k) {
       const std::string_view entry = std::string_view(*index).substr(k * kGsdEntryBytes);
       if (LittleEndian(entry, 16, 8) == 0) break;  // The rest of the index is unused.
@@ -142,17 +144,17 @@ class GsdReader final : public FrameReader {
     const std::string source = Concat(path_, ", frame ", frame);
     const auto particles = Number(frame, "particles/N");
     if (!particles.ok()) return particles.status();
-    if (!*particles) {
+    if (!*particles && !content_.is_hoomd) {
       return absl::FailedPreconditionError(
           Concat(source, ": has no particles/N; PartiEMC reads the schema hoomd"));
     }
     const auto step = Number(frame, "configuration/step");
     if (!step.ok()) return step.status();
-    const std::vector<StoredArray> arrays = Arrays(frame, **particles);
-    absl::Status status =
-        FillRows(arrays, static_cast<std::size_t>(**particles), request_, source, *rows);
+    const std::uint64_t count = particles->value_or(0);  // The schema's default.
+    absl::Status status = FillRows(count > 0 ? Arrays(frame, count) : EmptyArrays(),
+                                   static_cast<std::size_t>(count), request_, source, *rows);
     if (!status.ok()) return status;
-    rows->step = *step ? static_cast<double>(**step) : 0.0;  // The schema's default.
+    rows->step = static_cast<double>(step->value_or(0));  // The schema's default.
     return true;
   }
 
@@ -194,36 +196,60 @@ class GsdReader final : public FrameReader {
     return absl::OkStatus();
   }
 
-  // Returns the arrays with one row per particle: those of the GSD schema and logged quantities.
+  // The array of a chunk with a row for each particle: of the GSD schema, or a logged quantity.
+  std::optional<StoredArray> ArrayOf(const GsdChunk& chunk) const {
+    constexpr std::string_view kPrefix = "particles/";
+    const std::size_t at = chunk.name.find(kPrefix);
+    if (at == std::string::npos || chunk.name == "particles/N" || chunk.name == "particles/types" ||
+        chunk.components == 0 || chunk.components > kMaxArrayComponents) {
+      return std::nullopt;
+    }
+    return StoredArray{chunk.name.substr(at + kPrefix.size()),
+                       static_cast<std::size_t>(chunk.components), chunk.type, kBigEndianMachine,
+                       [this, &chunk](std::vector<char>& bytes) { return Load(chunk, bytes); }};
+  }
+
+  // Returns the arrays with one row per particle.
   std::vector<StoredArray> Arrays(std::uint64_t frame, std::uint64_t particles) const {
     std::vector<StoredArray> arrays;
     // Frame 0 does not replace a broken chunk.
     std::set<std::string_view> seen;
-    const auto add = [&](const GsdChunk& chunk) {
-      constexpr std::string_view kPrefix = "particles/";
-      const std::size_t at = chunk.name.find(kPrefix);
-      if (at == std::string::npos || chunk.name == "particles/N" ||
-          chunk.name == "particles/types" || !seen.insert(chunk.name).second ||
-          chunk.rows != particles || chunk.components == 0 ||
-          chunk.components > kMaxArrayComponents) {
-        return;
-      }
-      arrays.push_back({chunk.name.substr(at + kPrefix.size()),
-                        static_cast<std::size_t>(chunk.components), chunk.type, kBigEndianMachine,
-                        [this, &chunk](std::vector<char>& bytes) { return Load(chunk, bytes); }});
-    };
     for (const std::uint64_t from : {frame, std::uint64_t{0}}) {
       const auto chunks = content_.frames.find(from);
       if (chunks == content_.frames.end()) continue;
-      for (const GsdChunk& chunk : chunks->second) add(chunk);
+      for (const GsdChunk& chunk : chunks->second) {
+        if (!seen.insert(chunk.name).second || chunk.rows != particles) continue;
+        if (auto array = ArrayOf(chunk)) arrays.push_back(*std::move(array));
+      }
     }
     return arrays;
+  }
+
+  // Returns the arrays of a frame without particles. They are those of all frames, without rows, so
+  // that the frame has the columns of the others.
+  const std::vector<StoredArray>& EmptyArrays() {
+    if (!empty_.empty()) return empty_;
+    std::set<std::string_view> seen;
+    for (const auto& [frame, chunks] : content_.frames) {
+      for (const GsdChunk& chunk : chunks) {
+        if (!seen.insert(chunk.name).second) continue;
+        if (auto array = ArrayOf(chunk)) empty_.push_back(*std::move(array));
+      }
+    }
+    if (!seen.contains("particles/position")) {
+      empty_.push_back({"position", 3, ElementType::kFloat32, kBigEndianMachine, {}});
+    }
+    for (StoredArray& array : empty_) {
+      array.load = [](std::vector<char>&) { return absl::OkStatus(); };
+    }
+    return empty_;
   }
 
   std::string path_;
   GsdContent content_;
   const ColumnRequest& request_;
   std::uint64_t frame_ = 0;
+  std::vector<StoredArray> empty_;  // Of EmptyArrays, once it was called.
 };
 
 }  // namespace

@@ -429,6 +429,31 @@ class Formats(unittest.TestCase):
         rows = self.replay(self.write_gsd(), "--select", "typeid=1")
         self.assertEqual([int(row["particles"]) for row in rows], [int((IDS % 2).sum())] * len(FRAMES))
 
+    def test_gsd_frames_without_particles(self):
+        """HOOMD-blue leaves out what has its default, also the number 0 of particles in the first frame."""
+        empty = FRAMES[0][:0]
+        for k, run in enumerate(([empty, FRAMES[0], empty, FRAMES[1]], [FRAMES[0], empty, FRAMES[1]], [empty, empty])):
+            with self.subTest(run=k):
+                folder = self.folder / f"run_{k}"
+                folder.mkdir()
+                with gsd.hoomd.open(str(folder / "a.gsd"), "wb") as file:
+                    for step, positions in enumerate(run):
+                        frame = gsd.hoomd.Snapshot()
+                        frame.configuration.step = step
+                        frame.particles.N = len(positions)
+                        if len(positions):
+                            frame.particles.position = positions
+                            frame.particles.velocity = VELOCITIES
+                        file.append(frame)
+                        lines = [f"{x!r},{y!r},0.1,-0.4" for x, y in positions[:, :2].tolist()]
+                        (folder / f"frame_{step}.csv").write_text("\n".join(["x,y,vx,vy", *lines]) + "\n")
+                flags = ["--attributes", "velocity"] if k < 2 else []
+                keys = ("rings_digest", "mesh_digest", "particles")
+                rows, truth = ([[row[key] for key in keys] for row in self.replay(source, *flags)]
+                               for source in (folder / "a.gsd", folder / "frame_*.csv"))
+                self.assertEqual(len(rows), len(run))
+                self.assertEqual(rows, truth)
+
     def test_truncated_gsd(self):
         whole = self.write_gsd().read_bytes()
         for size in [*range(8, 300, 29), *range(300, len(whole), len(whole) // 40)]:

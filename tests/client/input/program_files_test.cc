@@ -207,6 +207,31 @@ TEST(Collection, FilesAreOrderedByTimeAndRelativeToTheCollection) {
   }
 }
 
+TEST(Collection, EscapedNamesInASeriesAreRead) {
+  const support::TemporaryFolder directory;
+  const auto read = [&](const std::string& escaped) {
+    return ReadAll(directory.Write("all.csv.series",
+                                   "{\"files\":[{\"name\":\"" + escaped + "\",\"time\":1}]}"));
+  };
+  const std::vector<std::pair<std::string, std::string>> names = {
+      {R"(gr\u00f6\u00dfe\/1.csv)", "gr\u00f6\u00dfe/1.csv"},
+      {R"(\u6d41\u4F53 \"a\".csv)", "\u6d41\u4f53 \"a\".csv"},
+      {R"(\ud83c\udf0a\u0041.csv)", "\U0001f30aA.csv"},
+      {R"(\ud83c\u0041\udf0a.csv)", "\ufffdA\ufffd.csv"},
+      {R"(\u12g4.csv)", "\ufffd12g4.csv"},
+  };
+  std::filesystem::create_directory(directory.Path("gr\u00f6\u00dfe"));
+  for (const auto& [escaped, name] : names) {
+    directory.Write(name, "x,y\n1,2\n");
+    const ReadSequence found = read(escaped);
+    EXPECT_TRUE(found.status.ok()) << found.status;
+    EXPECT_EQ(found.frames.size(), 1u) << name;
+  }
+  for (const char* cut : {"a\\", "a\\u", "a\\u00", "\\ud83c\\u"}) {
+    EXPECT_FALSE(read(cut).status.ok()) << cut;
+  }
+}
+
 TEST(Collection, WrongEntriesAreRefused) {
   const support::TemporaryFolder directory;
   directory.Write("b.csv", "x,y\n1,2\n");
