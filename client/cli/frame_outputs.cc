@@ -10,6 +10,12 @@
 
 namespace partiemc::client {
 
+CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb) {
+  return app.add_flag("--compress-glb", compress_glb,
+                      "Compress the files of --format glb without loss, for readers that support "
+                      "EXT_meshopt_compression");
+}
+
 CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
   std::string kinds;
   for (const GaugeTraits& traits : AllGauges()) {
@@ -32,15 +38,21 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
 
 absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
   FrameOutputs outputs;
+  bool writes_glb = false;
   if (!places.output_dir.empty()) {
     auto formats = ParseFrameFormats(places.format);
     if (!formats.ok()) return formats.status();
+    writes_glb = std::ranges::count(*formats, FrameFormat::kGlb) > 0;
     outputs.show_normals_ = std::ranges::count(*formats, FrameFormat::kCsv) > 0;
     auto frames = FrameWriter::Create({.directory = places.output_dir,
                                        .formats = *std::move(formats),
-                                       .color_by = places.color_by});
+                                       .color_by = places.color_by,
+                                       .compress_glb = places.compress_glb});
     if (!frames.ok()) return frames.status();
     outputs.frames_ = *std::move(frames);
+  }
+  if (places.compress_glb && !writes_glb) {
+    return absl::InvalidArgumentError("--compress-glb: requires --output-dir and --format glb");
   }
   if (!places.stats.empty()) {
     auto gauges = ParseGauges(places.gauges);

@@ -20,6 +20,9 @@ class Option;
 
 namespace partiemc::client {
 
+/// Adds --compress-glb.
+CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb);
+
 /// Adds --gauge, whose help lists the kinds.
 CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges);
 
@@ -28,11 +31,13 @@ class FrameOutputs {
   /// The values of the flags with the same names. An empty value disables the output.
   struct Places {
     std::string output_dir, format, stats, color_by;
+    bool compress_glb = false;
     std::vector<std::string> gauges = {};
   };
 
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge; the errors of AtomicFile.
+  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, and for `compress_glb`
+  /// without GLB files; the errors of AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether the files show the normals of the vertices.

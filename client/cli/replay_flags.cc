@@ -209,6 +209,7 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("LIST")
       ->capture_default_str()
       ->group(kGroup);
+  AddCompressGlbFlag(app, flags.compress_glb)->group(kGroup);
   app.add_option("--color-by", flags.color_by,
                  "Attribute that colours the pictures of svg and report; a vector by its length. "
                  "The values "

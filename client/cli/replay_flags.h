@@ -55,6 +55,7 @@ struct ReplayFlags {
   std::string output_dir;
   std::string format = "geojson";
   std::string color_by;
+  bool compress_glb = false;
   std::string stats;
   std::vector<std::string> gauges;  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
   std::string report;

@@ -243,6 +243,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
           "Attribute of the stream that colours the pictures of svg; a vector by its length")
       ->type_name("NAME")
       ->needs(output_dir);
+  AddCompressGlbFlag(*verb, flags.compress_glb);
   auto* const stats = verb->add_option("--stats", flags.stats,
                                        "Statistics of every frame, as CSV or JSON by extension")
                           ->type_name("FILE");
@@ -277,6 +278,7 @@ int Watch(const WatchFlags& flags) {
                                        .format = flags.format,
                                        .stats = flags.stats,
                                        .color_by = flags.color_by,
+                                       .compress_glb = flags.compress_glb,
                                        .gauges = flags.gauges});
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;

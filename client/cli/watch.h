@@ -25,6 +25,7 @@ struct WatchFlags {
   std::string output_dir;
   std::string format = "geojson";
   std::string color_by;
+  bool compress_glb = false;
   std::string stats;
   std::vector<std::string> gauges;
   std::string record;  ///< A recording to write; empty: none.

@@ -14,7 +14,8 @@ std::string EncodeObj(const FrameRecord& frame);
 std::string EncodeCsv(const FrameRecord& frame);
 std::string EncodePly(const FrameRecord& frame);
 std::string EncodeStl(const FrameRecord& frame);
-std::string EncodeGlb(const FrameRecord& frame);
+/// With `compress`, as for `FrameWriterOptions::compress_glb`.
+std::string EncodeGlb(const FrameRecord& frame, bool compress);
 #ifdef PARTIEMC_HAVE_VTK
 /// Errors: INTERNAL if VTK's writer fails.
 absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame);

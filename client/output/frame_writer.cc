@@ -119,7 +119,7 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
     case FrameFormat::kStl:
       return EncodeStl(frame);
     case FrameFormat::kGlb:
-      return EncodeGlb(frame);
+      return EncodeGlb(frame, options.compress_glb);
     case FrameFormat::kVtp:
 #ifdef PARTIEMC_HAVE_VTK
       return EncodeVtp(frame);

@@ -70,6 +70,9 @@ struct FrameWriterOptions {
   /// Attribute that colours the pictures, with a legend. A vector is coloured by its length. If the
   /// name is empty, or a frame lacks the attribute, the picture has plain colours.
   std::string color_by = {};
+  /// Compress GLB files without loss by the extension EXT_meshopt_compression, which their readers
+  /// must support. Other formats ignore it.
+  bool compress_glb = false;
 };
 
 /// The bytes of a frame in one of AllFrameFormats().

@@ -6,6 +6,9 @@
 #include <limits>
 #include <set>
 
+#define MESHOPTIMIZER_NO_WRAPPERS
+#include <meshoptimizer.h>
+
 #include "absl/strings/ascii.h"
 #include "client/output/formats.h"
 #include "client/output/text.h"
@@ -69,23 +72,52 @@ std::string JsonText(std::string_view text) {
   return out + '"';
 }
 
+// Primitive modes of glTF.
+constexpr int kLines = 1, kTriangles = 4;
+
+// The codecs of EXT_meshopt_compression. They lose no bit; TRIANGLES may rotate the three indices
+// of a triangle.
+std::string PackVertices(std::string_view bytes, std::size_t count) {
+  const std::size_t stride = bytes.size() / count;
+  std::vector<unsigned char> packed(meshopt_encodeVertexBufferBound(count, stride));
+  packed.resize(
+      meshopt_encodeVertexBuffer(packed.data(), packed.size(), bytes.data(), count, stride));
+  return {packed.begin(), packed.end()};
+}
+
+std::string PackIndices(std::span<const std::uint32_t> indices, int mode) {
+  meshopt_encodeIndexVersion(1);  // The only version that the extension permits.
+  const std::size_t count = indices.size();
+  const std::size_t vertices = std::size_t{*std::ranges::max_element(indices)} + 1;
+  const bool triangles = mode == kTriangles;
+  std::vector<unsigned char> packed(triangles ? meshopt_encodeIndexBufferBound(count, vertices)
+                                              : meshopt_encodeIndexSequenceBound(count, vertices));
+  const auto encode = triangles ? meshopt_encodeIndexBuffer : meshopt_encodeIndexSequence;
+  packed.resize(encode(packed.data(), packed.size(), indices.data(), count));
+  return {packed.begin(), packed.end()};
+}
+
 // Collects the buffer of a GLB and the JSON that describes it.
 class GlbBuffer {
  public:
-  // Adds an array and returns the index of its accessor. `more` is appended to the JSON members of
-  // the accessor.
-  template <typename T>
-  std::size_t Add(std::span<const T> values, std::size_t components, std::string_view more = "") {
-    constexpr bool kFloats = std::is_same_v<T, float>;
+  explicit GlbBuffer(bool compress) : compress_(compress) {}
+
+  // Adds an array of vectors and returns the index of its accessor. `more` is appended to the JSON
+  // members of the accessor.
+  std::size_t AddVertices(std::span<const float> values, std::size_t components,
+                          std::string_view more = "") {
     constexpr std::array<std::string_view, 3> kTypes = {"SCALAR", "VEC2", "VEC3"};
-    AppendAll(views_, views_.empty() ? "" : ",", R"({"buffer":0,"byteOffset":)", bytes_.size(),
-              R"(,"byteLength":)", values.size() * sizeof(T), R"(,"target":)",
-              kFloats ? 34962 : 34963, "}");
-    AppendAll(accessors_, accessors_.empty() ? "" : ",", R"({"bufferView":)", count_,
-              R"(,"componentType":)", kFloats ? 5126 : 5125, R"(,"count":)",
-              values.size() / components, R"(,"type":")", kTypes[components - 1], "\"", more, "}");
-    for (const T value : values) Put(value, bytes_);
-    return count_++;
+    const std::string bytes = BytesOf(values);
+    const std::size_t count = values.size() / components;
+    AddView(bytes, count, 34962, "ATTRIBUTES", compress_ ? PackVertices(bytes, count) : "");
+    return AddAccessor(5126, count, kTypes[components - 1], more);
+  }
+
+  // Adds the indices of a primitive of this mode and returns the index of their accessor.
+  std::size_t AddIndices(std::span<const std::uint32_t> indices, int mode) {
+    AddView(BytesOf(indices), indices.size(), 34963, mode == kTriangles ? "TRIANGLES" : "INDICES",
+            compress_ ? PackIndices(indices, mode) : "");
+    return AddAccessor(5125, indices.size(), "SCALAR", "");
   }
 
   // Returns the whole file. `scene` holds the JSON members besides the asset and the members that
@@ -94,7 +126,13 @@ class GlbBuffer {
     std::string json = Concat(R"({"asset":{"version":"2.0","generator":"PartiEMC"},)", scene);
     if (count_ > 0) {
       AppendAll(json, R"(,"accessors":[)", accessors_, R"(],"bufferViews":[)", views_,
-                R"(],"buffers":[{"byteLength":)", bytes_.size(), "}]");
+                R"(],"buffers":[{"byteLength":)", bytes_.size(), "}");
+      if (compress_) {
+        AppendAll(json, R"(,{"byteLength":)", unpacked_size_, R"(,"extensions":{)", kExtension,
+                  R"(:{"fallback":true}}}],"extensionsUsed":[)", kExtension,
+                  R"(],"extensionsRequired":[)", kExtension);
+      }
+      json += ']';
     }
     json += '}';
     json.resize((json.size() + 3) / 4 * 4, ' ');
@@ -112,7 +150,44 @@ class GlbBuffer {
   }
 
  private:
+  static constexpr std::string_view kExtension = R"("EXT_meshopt_compression")";
+
+  template <typename T>
+  static std::string BytesOf(std::span<const T> values) {
+    std::string bytes;
+    for (const T value : values) Put(value, bytes);
+    return bytes;
+  }
+
+  // Adds `count` elements, uncompressed or as `packed` by the codec. Compressed views refer to a
+  // second buffer, which has their uncompressed size and no data.
+  void AddView(std::string_view bytes, std::size_t count, int target, std::string_view codec,
+               std::string_view packed) {
+    AppendAll(views_, views_.empty() ? "" : ",", R"({"buffer":)", compress_ ? 1 : 0,
+              R"(,"byteOffset":)", unpacked_size_, R"(,"byteLength":)", bytes.size(),
+              R"(,"target":)", target);
+    if (compress_) {
+      AppendAll(views_, R"(,"extensions":{)", kExtension, R"(:{"buffer":0,"byteOffset":)",
+                bytes_.size(), R"(,"byteLength":)", packed.size(), R"(,"byteStride":)",
+                bytes.size() / count, R"(,"count":)", count, R"(,"mode":")", codec, "\"}}");
+    }
+    views_ += '}';
+    bytes_ += compress_ ? packed : bytes;
+    bytes_.resize((bytes_.size() + 3) / 4 * 4);
+    unpacked_size_ += bytes.size();
+  }
+
+  std::size_t AddAccessor(int component_type, std::size_t count, std::string_view type,
+                          std::string_view more) {
+    AppendAll(accessors_, accessors_.empty() ? "" : ",", R"({"bufferView":)", count_,
+              R"(,"componentType":)", component_type, R"(,"count":)", count, R"(,"type":")", type,
+              "\"", more, "}");
+    return count_++;
+  }
+
+  bool compress_;
   std::string bytes_, views_, accessors_;
+  std::size_t unpacked_size_ = 0;
   std::size_t count_ = 0;
 };
 
@@ -136,7 +211,7 @@ std::size_t AddPositions(const SharedVertices& vertices, std::array<double, 2> c
     positions.push_back(value);
     if (k % 2 == 1) positions.push_back(0);
   }
-  return buffer.Add<float>(
+  return buffer.AddVertices(
       positions, 3,
       Concat(R"(,"min":[)", low[0], ",", low[1], R"(,0],"max":[)", high[0], ",", high[1], ",0]"));
 }
@@ -207,10 +282,10 @@ std::string EncodeStl(const FrameRecord& frame) {
   return out;
 }
 
-std::string EncodeGlb(const FrameRecord& frame) {
+std::string EncodeGlb(const FrameRecord& frame, bool compress) {
   const Result& result = frame.result;
   const SharedVertices vertices = VerticesOf(result);
-  GlbBuffer buffer;
+  GlbBuffer buffer(compress);
   std::string scene = Concat(R"("extras":{"frame":)", frame.index);
   if (std::isfinite(frame.time)) AppendAll(scene, R"(,"time":)", frame.time);
   if (vertices.Count() == 0) {
@@ -221,14 +296,13 @@ std::string EncodeGlb(const FrameRecord& frame) {
   for (const AttributeValues& one : result.attributes) {
     if (!vertices.have_attributes) break;
     const std::size_t index =
-        buffer.Add<float>(one.values, static_cast<std::size_t>(one.components));
+        buffer.AddVertices(one.values, static_cast<std::size_t>(one.components));
     AppendAll(members, ",", JsonText(Concat("_", one.name)), ":", index);
   }
   const auto primitive = [&](const std::vector<std::uint32_t>& indices, int mode) {
     return Concat(R"({"attributes":{)", members, R"(},"indices":)",
-                  buffer.Add<std::uint32_t>(indices, 1), R"(,"mode":)", mode, "}");
+                  buffer.AddIndices(indices, mode), R"(,"mode":)", mode, "}");
   };
-  constexpr int kLines = 1, kTriangles = 4;
   std::string primitives;
   if (!result.mesh.triangles.empty()) primitives = primitive(result.mesh.triangles, kTriangles);
   const std::vector<std::uint32_t> sides = SidesOf(result.rings, vertices.first_of_rings);

@@ -85,6 +85,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"GTest", {"libgtest-dev", "libgmock-dev"}},
       {"lammps", {"liblammps-dev"}},
       {"libzstd", {"libzstd-dev"}},  // Its name in pkg-config.
+      {"meshoptimizer", {"libmeshoptimizer-dev"}},
       {"nlohmann_json", {"nlohmann-json3-dev"}},
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},

@@ -12,6 +12,7 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                       .format = flags.format,
                                       .stats = flags.stats,
                                       .color_by = flags.color_by,
+                                      .compress_glb = flags.compress_glb,
                                       .gauges = flags.gauges});
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));

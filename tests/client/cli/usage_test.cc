@@ -65,6 +65,8 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
       {"replay", kDamBreak, "--local", "--loop", "--stats", "loop.csv"},
       {"replay", kDamBreak, "--local", "--server", "127.0.0.1:1"},
       {"replay", kDamBreak, "--local", "--format", "svg"},
+      {"replay", kDamBreak, "--local", "--compress-glb"},
+      {"replay", kDamBreak, "--local", "--output-dir", "out", "--format", "svg", "--compress-glb"},
       {"replay", kDamBreak, "--local", "--frames", "x"},
       {"replay", kDamBreak, "--local", "--select", "type=1"},
       {"replay", kDamBreak, "--local", "--stats", "stats.xls"},

@@ -1,5 +1,6 @@
 #include "client/output/frame_writer.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cstring>
@@ -7,6 +8,9 @@
 #include <limits>
 #include <random>
 #include <sstream>
+
+#define MESHOPTIMIZER_NO_WRAPPERS
+#include <meshoptimizer.h>
 
 #include "client/output/color_map.h"
 #include "client/output/fixtures.h"
@@ -493,9 +497,89 @@ TEST(Glb, KeepsItsPrecisionFarFromTheOrigin) {
 
 TEST(Glb, AnEmptyFrameIsAnEmptyScene) {
   const Result result;
-  const json file = JsonOf(Encode(FrameFormat::kGlb, {.result = result}));
-  EXPECT_FALSE(file.contains("meshes"));
-  EXPECT_EQ(file.at("scenes").size(), 1u);
+  for (const bool compress : {false, true}) {
+    const std::string glb =
+        Encode(FrameFormat::kGlb, {.result = result}, {.compress_glb = compress});
+    const json file = JsonOf(glb);
+    EXPECT_FALSE(file.contains("meshes"));
+    EXPECT_FALSE(file.contains("extensionsRequired"));
+    EXPECT_EQ(file.at("scenes").size(), 1u);
+  }
+}
+
+// The bytes of a buffer view of a GLB, decoded by meshoptimizer if it is compressed.
+std::string ViewOf(const std::string& glb, const json& file, const json& view) {
+  const std::size_t begin = 28 + Number32(glb, 12);
+  const auto size = view.at("byteLength").get<std::size_t>();
+  const auto at = [&](const json& place) {
+    return glb.substr(begin + place.at("byteOffset").get<std::size_t>(), place.at("byteLength"));
+  };
+  if (!view.contains("extensions")) return at(view);
+  EXPECT_EQ(file.at("extensionsRequired"), json{"EXT_meshopt_compression"});
+  const json packed = view.at("extensions").at("EXT_meshopt_compression");
+  const std::string bytes = at(packed), mode = packed.at("mode");
+  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
+  const auto count = packed.at("count").get<std::size_t>();
+  const auto stride = packed.at("byteStride").get<std::size_t>();
+  EXPECT_EQ(count * stride, size);
+  EXPECT_EQ(bytes.front(), static_cast<char>(mode == "ATTRIBUTES"  ? 0xa0
+                                             : mode == "TRIANGLES" ? 0xe1
+                                                                   : 0xd1));
+  std::string out(size, '\0');
+  const auto decode = mode == "ATTRIBUTES"  ? meshopt_decodeVertexBuffer
+                      : mode == "TRIANGLES" ? meshopt_decodeIndexBuffer
+                                            : meshopt_decodeIndexSequence;
+  EXPECT_EQ(decode(out.data(), count, stride, data, bytes.size()), 0);
+  return out;
+}
+
+// Rotates each triangle to begin with its smallest index.
+std::vector<std::uint32_t> Rotated(const std::string& bytes) {
+  std::vector<std::uint32_t> triangles(bytes.size() / sizeof(std::uint32_t));
+  std::memcpy(triangles.data(), bytes.data(), bytes.size());
+  for (auto first = triangles.begin(); first != triangles.end(); first += 3) {
+    std::rotate(first, std::min_element(first, first + 3), first + 3);
+  }
+  return triangles;
+}
+
+TEST(Glb, CompressedArraysDecodeToTheSameBits) {
+  Result result = WithAttributes();
+  result.mesh.points[0] = result.rings.points[0] = 0.1;
+  result.attributes[0].values[3] = std::numeric_limits<float>::quiet_NaN();
+  const FrameRecord frame{.index = 3, .time = 0.5, .result = result};
+  const std::string plain = Encode(FrameFormat::kGlb, frame);
+  const std::string packed = Encode(FrameFormat::kGlb, frame, {.compress_glb = true});
+  const json file = JsonOf(plain), packed_file = JsonOf(packed);
+  for (const char* same : {"accessors", "meshes", "nodes", "extras"}) {
+    EXPECT_EQ(packed_file.at(same), file.at(same));
+  }
+  EXPECT_TRUE(packed_file.at("buffers")[1]["extensions"]["EXT_meshopt_compression"]["fallback"]);
+  const std::size_t triangles = file["meshes"][0]["primitives"][0]["indices"];
+  ASSERT_EQ(file.at("bufferViews").size(), 5u);
+  for (std::size_t k = 0; k < 5; ++k) {
+    const std::string expected = ViewOf(plain, file, file.at("bufferViews")[k]);
+    const std::string found = ViewOf(packed, packed_file, packed_file.at("bufferViews")[k]);
+    if (k == triangles) {
+      EXPECT_EQ(Rotated(found), Rotated(expected));
+    } else {
+      EXPECT_EQ(found, expected) << k;
+    }
+  }
+}
+
+TEST(Glb, CompressionMakesALargeMeshSmaller) {
+  Result result;
+  constexpr std::uint32_t kSide = 40;
+  for (std::uint32_t k = 0; k < kSide * kSide; ++k) {
+    result.mesh.points.insert(result.mesh.points.end(), {0.1 * (k % kSide), 0.1 * (k / kSide)});
+    if (k % kSide + 1 == kSide || k / kSide + 1 == kSide) continue;
+    const std::vector<std::uint32_t> two = {k, k + 1, k + kSide, k + 1, k + kSide + 1, k + kSide};
+    result.mesh.triangles.insert(result.mesh.triangles.end(), two.begin(), two.end());
+  }
+  const std::size_t plain = Encode(FrameFormat::kGlb, {.result = result}).size();
+  EXPECT_LT(Encode(FrameFormat::kGlb, {.result = result}, {.compress_glb = true}).size(),
+            plain / 4);
 }
 
 TEST(Ply, WithoutAMeshTheRingsAreEdges) {
