@@ -5,6 +5,9 @@
 # `grpcurl`: reflection, a unary call with a token over TLS, refusals.
 # `python`: protocol_client.py, compiled by grpcio-tools of PyPI, streams the dam break.
 # `go`: a client generated for Go streams the dam break.
+# `ghz`: 10,000 unary calls, beside the figures of `partiemc load`.
+# `gltf`: readers of npm decode the GLB files of --compress-glb.
+# `kubernetes`: kustomize and kubeconform on docker/kubernetes.
 set -euo pipefail
 bin=$(cd "$1" && pwd)
 shift
@@ -45,13 +48,17 @@ show() {
   local words=" $* "
   words=${words//$address/ADDRESS}
   words=${words//$work/DIR}
+  words=${words//$bin\//}
   printf '\n$%s\n' "${words//${token:-no token}/TOKEN}"
   "$@" 2>&1 | sed "s/$address/ADDRESS/g"
   return "${PIPESTATUS[0]}"
 }
 
+# Prints module and version of a program of Go.
+version_of() { go version -m "$(command -v "$1")" | sed -n -E 's,^\tmod\t(.*)\t.*,\1,p'; }
+
 check_grpcurl() {
-  go version -m "$(command -v grpcurl)" | sed -n -E 's,^\tmod\t(.*)\t.*,\1,p'
+  version_of grpcurl
   "$root/docker/try_tls.sh" "$work/tls"
   token=$(<"$work/tls/tokens")
   start --tls-cert "$work/tls/server.crt" --tls-key "$work/tls/server.key" --token-file "$work/tls/tokens"
@@ -115,6 +122,74 @@ PYTHON
   cmp "$work/digests" "$work/expected"
   echo "$(wc -l <"$work/digests") frames, the digests of replay --local"
   stop
+}
+
+# The same number of particles and of callers in both.
+check_ghz() {
+  local particles=2000 callers=8
+  version_of ghz
+  # Text format of protobuf: every byte as an octal escape.
+  python3 - "$particles" >"$work/frame.txt" <<'PYTHON'
+import struct, sys
+count = int(sys.argv[1])
+positions = struct.pack(f"<{2 * count}f", *(float(n) for k in range(count) for n in (k % 50, k // 50)))
+print('parameters { spacing: 1 } frame { position_format: POSITION_FORMAT_FLOAT32_2 positions: "%s" }'
+      % "".join(f"\\{byte:03o}" for byte in positions))
+PYTHON
+  protoc -I"$root/proto" --encode=partiemc.v1.ReconstructFrameRequest partiemc/v1/reconstruction.proto \
+    <"$work/frame.txt" >"$work/frame.bin"
+  start
+  # By reflection: the parser of ghz refuses `optional` in a .proto of proto3.
+  show ghz --insecure --call partiemc.v1.ReconstructionService.ReconstructFrame \
+    --binary-file "$work/frame.bin" --total 10000 --concurrency "$callers" --connections "$callers" \
+    --format json "$address" >"$work/ghz"
+  show "$bin/partiemc" load --server "$address" --streams "$callers" --particles "$particles" --rate 0 --no-ids \
+    --seconds 10 --json --quiet >"$work/load"
+  grep -h '^\$' "$work/ghz" "$work/load"
+  python3 - "$work/ghz" "$work/load" <<'PYTHON'
+import json, os, sys
+ghz, load = (json.loads("\n".join(open(path).read().split("\n")[2:])) for path in sys.argv[1:])
+assert ghz["statusCodeDistribution"] == {"OK": 10000}, ghz["statusCodeDistribution"]
+assert load["refused"] == 0, load
+of_ghz = {one["percentage"]: one["latency"] / 1e6 for one in ghz["latencyDistribution"]}
+print("load average %.1f" % os.getloadavg()[0])
+print(f"{'':14}{'per second':>12}{'p50 ms':>10}{'p90 ms':>10}{'p99 ms':>10}")
+for name, rate, times in (("ghz", ghz["rps"], [of_ghz[p] for p in (50, 90, 99)]),
+                          ("partiemc load", load["frames"] / load["seconds"],
+                           [load["answers"][f"p{p}_ms"] for p in (50, 90, 99)])):
+    print(f"{name:14}{rate:12.0f}" + "".join(f"{time:10.2f}" for time in times))
+PYTHON
+  stop
+}
+
+# Requires: JSON schemas of Kubernetes for kubeconform. $KUBERNETES_SCHEMAS names another place than
+# kubeconform's default.
+check_kubernetes() {
+  version_of kustomize
+  version_of kubeconform
+  local overlay check=(kubeconform -strict -summary -schema-location "${KUBERNETES_SCHEMAS:-default}")
+  for overlay in base production; do
+    printf '\n$ kustomize build docker/kubernetes/%s | kubeconform -strict -summary\n' "$overlay"
+    kustomize build "$root/docker/kubernetes/$overlay" >"$work/$overlay.yaml"
+    "${check[@]}" "$work/$overlay.yaml"
+  done
+  sed 's/containerPort:/containrPort:/' "$work/base.yaml" >"$work/misspelled.yaml"
+  printf '\n$ the base with "containrPort"\n'
+  ! "${check[@]}" "$work/misspelled.yaml" >"$work/refused" || fail "a misspelled field is valid"
+  grep '^Summary' "$work/refused"
+}
+
+check_gltf() {
+  mkdir "$work/gltf"
+  cp "$root/tests/outside/gltf/main.mjs" "$work/gltf"
+  (cd "$work/gltf" &&
+    npm install --no-audit --no-fund @gltf-transform/core @gltf-transform/extensions meshoptimizer gltf-validator &&
+    npm ls) >"$work/log" 2>&1 || fail "$(cat "$work/log")"
+  sed -n 's/^[├└]── //p' "$work/log"
+  local replay=("$bin/partiemc" replay "$root/client/recordings/dam_break.pemc" --local --quiet --format glb)
+  "${replay[@]}" --output-dir "$work/plain" --attributes velocity
+  "${replay[@]}" --output-dir "$work/packed" --attributes velocity --compress-glb
+  node "$work/gltf/main.mjs" "$work/plain" "$work/packed"
 }
 
 for check in "$@"; do
