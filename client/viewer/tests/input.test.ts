@@ -97,6 +97,31 @@ test('a LAMMPS dump is split and unscaled', async () => {
   assert.deepEqual(doubles((await source.frame(1)).positions), [2.5, 10, 1, 4]);
 });
 
+/** A dump of one frame at step 250 with the atoms of `rows`. */
+const dumpOf = (columns: string, rows: string[], box = ['0 10', '0 20', '-1 1'], bounds = 'pp pp pp') =>
+  ['ITEM: TIMESTEP', '250', 'ITEM: NUMBER OF ATOMS', rows.length, `ITEM: BOX BOUNDS ${bounds}`, ...box,
+    `ITEM: ATOMS ${columns}`, ...rows, ''].join('\n');
+
+test('image flags unwrap a LAMMPS dump, and its step is the time', async () => {
+  const tilted = ['0 14 4', '0 20 0', '-1 1 0'];
+  const edges = ['10 0 0 0', '4 20 0 0', '0 0 2 -1'];
+  for (const [text, positions] of [
+    [dumpOf('id x y ix iy', ['1 1 2 0 0', '2 3 4 -1 2']), [1, 2, -7, 44]],
+    [dumpOf('id xs ys ix iy', ['1 .5 .5 0 0', '2 .5 .5 1 -1']), [5, 10, 15, -10]],
+    [dumpOf('id x y ix iy', ['1 1 2 0 1'], tilted, 'xy xz yz pp pp pp'), [5, 22]],
+    [dumpOf('id x y ix iy', ['1 1 2 1 1'], edges, 'abc origin pp pp pp'), [15, 22]],
+    [dumpOf('id xu yu ix iy', ['1 1 2 1 1']), [1, 2]],
+  ] as const) {
+    const frame = await (await openDropped([file('d.lammpstrj', text)])).frame(0);
+    assert.deepEqual(doubles(frame.positions), positions);
+    assert.equal(frame.time, 250);
+  }
+  const asked = await openDropped([file('d.lammpstrj', dumpOf('id x y ix iy', ['2 3 4 -1 2']))],
+                                  { ...NO_OPTIONS, columns: 'x,y' });
+  assert.deepEqual(doubles((await asked.frame(0)).positions), [3, 4]);
+  await assert.rejects(openDropped([file('d.lammpstrj', dumpOf('id x y ix iy', ['2 3 4 .5 2']))]), /image flag 0.5/);
+});
+
 test('a truncated dump is refused with its frame', () => {
   assert.throws(() => parseLammpsFrame(DUMP.slice(0, -20), 4, 'd'), /d, frame 5 has|cells|no number/);
   assert.throws(() => parseLammpsFrame('ITEM: TIMESTEP\n1\n', 0, 'd'), /no atoms/);

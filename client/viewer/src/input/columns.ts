@@ -11,6 +11,8 @@ export interface ColumnPlan {
   scalars: { name: string; column: number }[];
   /** Positions are fractions of the box (LAMMPS xs, ys, zs). */
   scaled: boolean;
+  /** Columns ix iy iz of LAMMPS: how often the particle has crossed the periodic box along each axis. */
+  images: (number | null)[];
   /** The conditions of the request. */
   conditions: { column: number; condition: Condition }[];
 }
@@ -52,6 +54,8 @@ const FAMILIES: ((axis: number) => string[])[] = [
   (axis) => [`${AXES[axis]}su`],
 ];
 const FIRST_SCALED_FAMILY = 3;
+/** The families that image flags unwrap: x and xs. The request names positions that stay as they are. */
+const WRAPPED_FAMILIES = [0, 3];
 
 /** Number of axes with a column. */
 function found(axes: (number | null)[]): number {
@@ -76,12 +80,16 @@ function findAsked(given: string[], names: string[], asked: string): number | nu
   return find(names, [canonical(asked)]);
 }
 
-interface PositionPlan { positions: (number | null)[]; scaled: boolean; isKnown: boolean }
+type PositionPlan = Pick<ColumnPlan, 'positions' | 'scaled' | 'images'> & { isKnown: boolean };
+
+const NO_IMAGES = [null, null, null];
 
 function recognisedPositions(names: string[], given: string[]): PositionPlan {
   for (const [k, family] of FAMILIES.entries()) {
     const positions = AXES.map((_, axis) => find(names, family(axis)));
-    if (found(positions) >= 2) return { positions, scaled: k >= FIRST_SCALED_FAMILY, isKnown: true };
+    if (found(positions) < 2) continue;
+    const images = WRAPPED_FAMILIES.includes(k) ? AXES.map((axis) => find(names, [`i${axis}`])) : NO_IMAGES;
+    return { positions, scaled: k >= FIRST_SCALED_FAMILY, images, isKnown: true };
   }
   throw new FieldError('columns', `No position columns in ${list(given)}. Name the columns of x and y.`);
 }
@@ -102,15 +110,15 @@ function askedPositions(names: string[], given: string[], asked: readonly string
     for (let axis = 0; axis < 3 && next < columns.length; ++axis) {
       if (find(names, family(axis)) === columns[next]) positions[axis] = columns[next++];
     }
-    if (next === columns.length) return { positions, scaled: k >= FIRST_SCALED_FAMILY, isKnown: true };
+    if (next === columns.length) return { positions, scaled: k >= FIRST_SCALED_FAMILY, images: NO_IMAGES, isKnown: true };
   }
-  return { positions: AXES.map((_, axis) => columns[axis] ?? null), scaled: false, isKnown: false };
+  return { positions: AXES.map((_, axis) => columns[axis] ?? null), scaled: false, images: NO_IMAGES, isKnown: false };
 }
 
 /** Plans a table with named columns. Throws FieldError. */
 export function planNamedColumns(given: string[], request: ColumnRequest = ALL_COLUMNS): ColumnPlan {
   const names = given.map(canonical);
-  const { positions, scaled, isKnown } = request.columns.length > 0
+  const { positions, scaled, images, isKnown } = request.columns.length > 0
     ? askedPositions(names, given, request.columns) : recognisedPositions(names, given);
   const velocities = isKnown ? planVelocities(names) : [null, null, null];
   const id = find(names, IDS);
@@ -125,7 +133,7 @@ export function planNamedColumns(given: string[], request: ColumnRequest = ALL_C
     }
     return { column, condition };
   });
-  return { positions, velocities, id, volume, scalars, scaled, conditions };
+  return { positions, velocities, id, volume, scalars, scaled, images, conditions };
 }
 
 /**

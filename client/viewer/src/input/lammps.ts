@@ -1,6 +1,5 @@
 // LAMMPS text dumps of the styles atom and custom. A frame has sections that start with "ITEM:".
-import type { Unscale } from './particles';
-import { planNamedColumns } from './columns';
+import type { Place } from './particles';
 import { TextRows } from './rows';
 import { InputError } from './source';
 import { splitAtBlanks } from './table';
@@ -25,25 +24,35 @@ function boxOf(lines: string[]): Box {
   };
 }
 
-function unscaleIn(box: Box): Unscale {
-  return (axes) => {
-    const count = axes.find((axis) => axis)?.length ?? 0;
-    for (let i = 0; i < count; ++i) {
-      const point = [...box.origin];
-      axes.forEach((axis, a) => {
-        if (axis) box.edges[a].forEach((edge, k) => { if (edge !== 0) point[k] += axis[i] * edge; });
-      });
-      axes.forEach((axis, a) => { if (axis) axis[i] = point[a]; });
-    }
+/** "ITEM: BOX BOUNDS abc origin": each line has an edge and a coordinate of the origin. */
+function boxOfEdges(lines: string[]): Box {
+  const numbers = lines.map((line) => splitAtBlanks(line).map(Number));
+  return { origin: numbers.map((line) => line[3]), edges: numbers.map((line) => line.slice(0, 3)) };
+}
+
+function placeIn(box: Box | null, where: string): Place {
+  return (axes, images, scaled) => {
+    if (!box && scaled) throw new InputError(`${where}: scaled positions without a box.`);
+    images.forEach((crossings, a) => crossings?.forEach((image, i) => {
+      if (!Number.isInteger(image)) throw new InputError(`${where}: the image flag ${image} is no whole number.`);
+      if (image === 0) return;
+      if (!box) throw new InputError(`${where}: image flags (ix iy) without a box.`);
+      const shift = scaled ? [0, 1, 2].map((k) => Number(k === a)) : box.edges[a];
+      axes.forEach((axis, k) => { if (axis) axis[i] += image * shift[k]; });
+    }));
+    if (box && scaled) unscale(axes, box);
   };
 }
 
-/** Whether the recognised positions are fractions of the box. */
-function hasScaledPositions(names: string[]): boolean {
-  try {
-    return planNamedColumns(names).scaled;
-  } catch {
-    return false;
+/** Converts fractions of the box to coordinates. An axis that the dump lacks counts as 0. */
+function unscale(axes: (Float64Array | null)[], box: Box): void {
+  const count = axes.find((axis) => axis)?.length ?? 0;
+  for (let i = 0; i < count; ++i) {
+    const point = [...box.origin];
+    axes.forEach((axis, a) => {
+      if (axis) box.edges[a].forEach((edge, k) => { if (edge !== 0) point[k] += axis[i] * edge; });
+    });
+    axes.forEach((axis, a) => { if (axis) axis[i] = point[a]; });
   }
 }
 
@@ -52,6 +61,7 @@ export function parseLammpsFrame(text: string, index: number, name: string): Fra
   const where = `${name}, frame ${index + 1}`;
   const lines = text.split(/\r?\n/);
   let time: number | null = null;
+  let step: number | undefined;
   let atoms = -1;
   let box: Box | null = null;
   for (let k = 0; k < lines.length; ++k) {
@@ -59,10 +69,10 @@ export function parseLammpsFrame(text: string, index: number, name: string): Fra
     if (line.startsWith('ITEM: NUMBER OF ATOMS')) {
       atoms = Number(lines[++k]);
     } else if (line.startsWith('ITEM: BOX BOUNDS')) {
-      box = boxOf(lines.slice(k + 1, k + 4));
+      box = (line.includes('abc') ? boxOfEdges : boxOf)(lines.slice(k + 1, k + 4));
       k += 3;
     } else if (line.startsWith('ITEM: TIMESTEP')) {
-      ++k;
+      step = Number(lines[++k]);
     } else if (line.startsWith('ITEM: TIME')) {
       time = Number(lines[++k]);
     } else if (line.startsWith('ITEM: ATOMS')) {
@@ -71,11 +81,9 @@ export function parseLammpsFrame(text: string, index: number, name: string): Fra
       if (rows.length !== atoms || rows.some((cells) => cells.length < names.length)) {
         throw new InputError(`${where} has ${rows.length} of ${atoms} atoms. It is truncated.`);
       }
-      const isScaled = hasScaledPositions(names);
-      if (isScaled && !box) throw new InputError(`${where}: scaled positions without a box.`);
       return {
-        names, columnCount: names.length, rows: new TextRows(rows, where), time, index, name: where,
-        unscale: isScaled && box ? unscaleIn(box) : undefined,
+        names, columnCount: names.length, rows: new TextRows(rows, where), time, step, index, name: where,
+        place: placeIn(box, where),
       };
     }
   }

@@ -64,31 +64,34 @@ function idsOf(rows: Rows, at: number): BigUint64Array | null {
   return ids && new Set(ids).size === rows.count ? ids : null;
 }
 
-/** Converts fractions of a box to coordinates, in place. */
-export type Unscale = (axes: Axes) => void;
+/** Moves particles in place: from fractions of a box if `scaled`, by the boxes that they have crossed. */
+export type Place = (axes: Axes, images: Axes, scaled: boolean) => void;
 
 /** The particles of a frame. */
 export interface ParticleTable {
   rows: Rows;
-  /** Null: none. The particles then have the time `index`, and no velocities. */
+  /** Null: none. The particles then have no velocities, and `step` or else `index` as time. */
   time: number | null;
+  /** Number of the time step. */
+  step?: number;
   index: number;
   /** For errors. */
   name: string;
-  unscale?: Unscale;
+  place?: Place;
 }
 
 /** The coordinates of the particles, by axis. */
-export function positionsOf({ rows, unscale }: ParticleTable, plan: ColumnPlan): Axes {
-  const axes = plan.positions.map((at) => at === null ? null : rows.numbers(at));
-  unscale?.(axes);
+export function positionsOf({ rows, place }: ParticleTable, plan: ColumnPlan): Axes {
+  const numbersOf = (columns: (number | null)[]) => columns.map((at) => at === null ? null : rows.numbers(at));
+  const axes = numbersOf(plan.positions);
+  place?.(axes, numbersOf(plan.images), plan.scaled);
   return axes;
 }
 
 /** Converts table rows to a frame. `inSpace`: keeps three coordinates. Throws InputError. */
 export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace = false): Particles {
   const rows = table.rows.where(plan.conditions);
-  const { time, index, name } = table;
+  const { time, step, index, name } = table;
   const axes = positionsOf({ ...table, rows }, plan);
   if (inSpace && axes.some((axis) => axis === null)) {
     throw new FieldError('slice', `${name} has two coordinates. A plane cuts particles with x, y and z only.`);
@@ -98,7 +101,7 @@ export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace = fa
   const positions = interleaved(chosen.map((axis) => axes[axis] as Float64Array),
                                 new Float64Array(components * rows.count));
   const frame: Particles = {
-    time: time ?? index,
+    time: time ?? step ?? index,
     positionFormat: inSpace ? PositionFormat.FLOAT64_3 : PositionFormat.FLOAT64_2,
     positions: bytesOf(positions),
     scalars: [],

@@ -3,7 +3,7 @@ import { once } from 'node:events';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import { CHROMIUM_FLAGS } from './support.mjs';
+import { CHROMIUM_FLAGS, until } from './support.mjs';
 
 /** Controls Chromium over a pipe. Playwright copies every WebSocket frame, which makes them ten times
  * slower. */
@@ -50,7 +50,15 @@ export class BareChromium {
   async close() {
     this.child.kill();
     await once(this.child, 'exit');
-    rmSync(this.#profile, { recursive: true, force: true, maxRetries: 20 });
+    // Chromium's other processes still write for a moment.
+    await until('the profile is removed', () => {
+      try {
+        rmSync(this.#profile, { recursive: true, force: true });
+        return true;
+      } catch {
+        return false;
+      }
+    });
   }
 
   #receive(text) {

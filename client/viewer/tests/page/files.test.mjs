@@ -120,12 +120,16 @@ test('a recording plays, and its particles are drawn', async () => {
   await until('particles are drawn', async () => await viewer.picture() !== before);
 });
 
-test('a LAMMPS dump plays', async () => {
+test('a LAMMPS dump with image flags plays in its steps', async () => {
   const dump = path.join(world.folder, 'dump.lammpstrj');
   const frames = Array.from({ length: 3 }, (_, k) => {
-    const rows = drops(k).trim().split('\n').slice(1).map((row) => row.split(',').slice(0, 3).join(' '));
+    const rows = drops(k).trim().split('\n').slice(1).map((row) => {
+      const [id, x, y] = row.split(',').map(Number);
+      const [i, j] = [Math.floor(x / 4), Math.floor(y / 4)];
+      return [id, x - 4 * i, y - 4 * j, i, j].join(' ');
+    });
     return ['ITEM: TIMESTEP', k * 100, 'ITEM: NUMBER OF ATOMS', rows.length,
-      'ITEM: BOX BOUNDS pp pp pp', '-2 2', '-2 2', '-0.1 0.1', 'ITEM: ATOMS id x y', ...rows].join('\n');
+      'ITEM: BOX BOUNDS pp pp pp', '0 4', '0 4', '-0.1 0.1', 'ITEM: ATOMS id x y ix iy', ...rows].join('\n');
   });
   writeFileSync(dump, `${frames.join('\n')}\n`);
   const truth = await world.statistics(dump);
@@ -134,6 +138,7 @@ test('a LAMMPS dump plays', async () => {
   await isAll();
   await viewer.scrubTo(3, 2);
   assert.equal(await viewer.value('rings-digest'), truth[2].rings_digest);
+  assert.equal(await viewer.value('time'), '200');
 });
 
 test('a frame has the number of the command line, at the slider too', async () => {
