@@ -122,6 +122,40 @@ test('image flags unwrap a LAMMPS dump, and its step is the time', async () => {
   await assert.rejects(openDropped([file('d.lammpstrj', dumpOf('id x y ix iy', ['2 3 4 .5 2']))]), /image flag 0.5/);
 });
 
+test('collections have the files in the order of their times', async () => {
+  const members = [file('b.csv', 'x,y\n1,2\n'), file('a & ö.csv', 'x,y\n3,4\n')];
+  const pvd = '<VTKFile type="Collection"><Collection>\n<!-- <DataSet timestep="9" file="gone.csv"/> -->\n' +
+    '<DataSet timestep=\'2.5\' part=\'0\' file=\'run/a &amp; ö.csv\'/>\n<DataSet timestep="1" file="b.csv"/></Collection></VTKFile>';
+  const series = '{"files": [{"name": "a & \\u00f6.csv", "time": 2.5}, {"time": 1, "name": "b.csv"}]}';
+  for (const collection of [file('all.pvd', pvd), file('all.csv.series', series)]) {
+    const source = await openDropped([...members, collection, file('other.csv', 'x,y\n9,9\n')]);
+    assert.equal(source.title, collection.name);
+    assert.equal(source.count, 2);
+    const frames = [await source.frame(0), await source.frame(1)];
+    assert.deepEqual(frames.map(({ time }) => time), [1, 2.5]);
+    assert.deepEqual(frames.map(({ positions }) => doubles(positions)), [[1, 2], [3, 4]]);
+  }
+});
+
+test('wrong collections are refused', async () => {
+  const entry = (attributes: string) => `<DataSet ${attributes}/>`;
+  const b = entry('timestep="1" file="b.csv"');
+  for (const [name, text, message] of [
+    ['a.pvd', '', /without files/],
+    ['a.pvd', entry('file="b.csv"'), /'b\.csv' has not/],
+    ['a.pvd', entry('timestep="nan" file="b.csv"'), /a file and a time/],
+    ['a.pvd', entry('timestep="" file="b.csv"'), /a file and a time/],
+    ['a.pvd', b + b, /several files at time 1/],
+    ['a.pvd', entry('timestep="1" file="gone.vtp"'), /gone\.vtp, which is missing/],
+    ['a.pvd', entry('timestep="1" file="d.lammpstrj"'), /which has 2 frames/],
+    ['a.vtp.series', '{"files": [{"name"', /truncated or damaged/],
+    ['a.vtp.series', '{"files": [{"name": "b.csv"}]}', /a file and a time/],
+  ] as const) {
+    await assert.rejects(openDropped([file(name, text), file('b.csv', 'x,y\n1,2\n'), file('d.lammpstrj', DUMP + DUMP)]),
+                         message, text);
+  }
+});
+
 test('a truncated dump is refused with its frame', () => {
   assert.throws(() => parseLammpsFrame(DUMP.slice(0, -20), 4, 'd'), /d, frame 5 has|cells|no number/);
   assert.throws(() => parseLammpsFrame('ITEM: TIMESTEP\n1\n', 0, 'd'), /no atoms/);
@@ -152,7 +186,6 @@ test('a truncated recording keeps its whole blocks', async () => {
 test('unreadable files are refused by their kind, with a remedy', async () => {
   const refused = (name: string, text: string, message: RegExp) =>
     assert.rejects(openDropped([file(name, text)]), message);
-  await refused('a.pvd', '<?xml version="1.0"?>\n<VTKFile type="Collection">', /a ParaView collection/);
   await assert.rejects(openDropped([new File([Uint8Array.of(0x89, 72, 68, 70, 13, 10, 26, 10)], 'a.h5')]), /an HDF5 file/);
   await refused('a.ply', 'ply\nformat ascii 1.0\n', /a PLY file/);
   await refused('a.pkl', 'x', /a Python pickle.*numpy\.savez/);

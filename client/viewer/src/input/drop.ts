@@ -1,3 +1,4 @@
+import { filesOfMembers, isCollectionName, membersOf } from './collection';
 import { CsvReader, parseTimes } from './csv';
 import { refusalOf } from './kinds';
 import { LammpsReader } from './lammps';
@@ -65,7 +66,7 @@ const KINDS: readonly Kind[] = [
   { matches: (_, head) => /^PK(\x03\x04|\x05\x06)/.test(head), open: async (file) => new NpzReader(await blobOf(file), file.name) },
   { matches: (_, head) => head.startsWith('# vtk DataFile'), open: async (file) => new VtkLegacyReader(await blobOf(file), file.name) },
   {
-    matches: (name, head) => head.includes('<VTKFile') && !/\.(pvd|series)$/.test(name),
+    matches: (name, head) => head.includes('<VTKFile') && !isCollectionName(name),
     open: async (file) => new VtkXmlReader(await blobOf(file), file.name),
   },
   {
@@ -103,22 +104,47 @@ export async function inspectFiles(dropped: File[]): Promise<FileInput> {
     const recording = RecordingSource.open(new Uint8Array(await first.arrayBuffer()), first.name);
     return { title: recording.title, facts: await recording.facts(), open: (options) => recording.with(options) };
   }
+  const collection = files.find((file) => isCollectionName(plainName(file)));
+  if (collection) return inspectCollection(collection, files);
   const tables = files.length > 1 ? files.filter((file) => !isTimes(file)) : files;
   const heads = await Promise.all(tables.map(async (file) => textOfBytes(await headOf(file))));
   for (const kind of KINDS) {
     const own = tables.filter((file, k) => kind.matches(plainName(file), heads[k]));
     if (own.length === 0) continue;
-    const reader = new ReaderChain(await Promise.all(own.map((file) => kind.open(file))));
+    const readers = await Promise.all(own.map((file) => kind.open(file)));
     const timesFile = files.length > 1 ? files.find(isTimes) : undefined;
     const times = timesFile ? parseTimes(await textOf(timesFile), timesFile.name) : new Map<number, number>();
     const title = own.length === 1 ? own[0].name
       : `${own.length} files, ${own[0].name} to ${own[own.length - 1].name}`;
-    return {
-      title, facts: await factsOf(reader), open: (options) => TableSource.open(title, reader, times, options),
-    };
+    return inputOf(title, readers, times);
   }
-  const text = textOfBytes(firstHead);
-  throw new InputError(refusalOf(first.name, { text, extension: extensionOf(plainName(first)) }));
+  throw refused(first, textOfBytes(firstHead));
+}
+
+function refused(file: File, text: string): InputError {
+  return new InputError(refusalOf(file.name, { text, extension: extensionOf(plainName(file)) }));
+}
+
+async function inputOf(title: string, readers: readonly TableReader[], times: Map<number, number>): Promise<FileInput> {
+  const reader = new ReaderChain(readers);
+  return { title, facts: await factsOf(reader), open: (options) => TableSource.open(title, reader, times, options) };
+}
+
+/** The files that a collection lists, with its times. Other opened files are ignored. */
+async function inspectCollection(collection: File, opened: readonly File[]): Promise<FileInput> {
+  const members = membersOf(collection.name, await textOf(collection));
+  const readers: TableReader[] = [];
+  for (const file of filesOfMembers(members, collection.name, opened)) {
+    const head = textOfBytes(await headOf(file));
+    const kind = KINDS.find(({ matches }) => matches(plainName(file), head));
+    if (!kind) throw refused(file, head);
+    const reader = await kind.open(file);
+    if (reader.count !== 1) {
+      throw new InputError(`${collection.name} lists ${file.name}, which has ${reader.count} frames. Open it alone.`);
+    }
+    readers.push(reader);
+  }
+  return inputOf(collection.name, readers, new Map(members.map(({ time }, k) => [k, time])));
 }
 
 /** Opens dropped files as frames. Throws InputError. */

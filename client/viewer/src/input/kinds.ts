@@ -4,13 +4,9 @@
 export interface FileHead { text: string; extension: string }
 
 /** What the page reads, for errors. */
-export const READABLE = 'CSV, LAMMPS text dumps, NPY, NPZ, VTK (.vtk, .vtp, .vtu), extended XYZ and recordings (.pemc)';
+export const READABLE = 'CSV, LAMMPS text dumps, NPY, NPZ, VTK (.vtk, .vtp, .vtu, .pvd, .series), extended XYZ and recordings (.pemc)';
 
 const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?: string }[] = [
-  {
-    name: 'a ParaView collection', matches: ({ extension }) => extension === 'pvd' || extension === 'series',
-    remedy: 'Open the folder of its files here, or run partiemc convert.',
-  },
   { name: 'an HDF5 file', matches: ({ text }) => text.startsWith('\x89HDF\r\n') },
   { name: 'a GSD file', matches: ({ text }) => text.startsWith('\xDF\x65\xDF\x65\xDF\x65\xDF\x65') },
   { name: 'a BGEO file', matches: ({ text, extension }) => text.startsWith('BgeoV') || /^(bgeo|bhclassic)$/.test(extension) },

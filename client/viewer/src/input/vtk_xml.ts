@@ -6,8 +6,10 @@ import { sizeOf, tableOf, textArray, VTK_TYPES, type VtkArray } from './vtk_arra
 
 type Attributes = Map<string, string>;
 
-function attributesOf(text: string): Attributes {
-  return new Map([...text.matchAll(/([\w:]+)\s*=\s*"([^"]*)"/g)].map(([, key, value]) => [key, unescaped(value)]));
+/** The attributes of an XML element. */
+export function attributesOf(text: string): Attributes {
+  return new Map([...text.matchAll(/([\w:]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g)]
+    .map(([, key, double, single]) => [key, unescaped(double ?? single)]));
 }
 
 function unescaped(text: string): string {

@@ -79,6 +79,32 @@ test('files of other programs have the digests of the command line', async () =>
   }
 });
 
+test('a collection dropped with its files has the times and digests of the command line', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  const names = [2, 0, 1].map((k) => {
+    const rows = Array.from({ length: 400 }, (_, i) => `${(i % 20) * (1 + 0.02 * k)},${Math.floor(i / 20)},0.1,${-k}`);
+    writeFileSync(place(`part_${k}.csv`), ['x,y,vx,vy', ...rows, ''].join('\n'));
+    return [`part_${k}.csv`, [0.5, 0.75, 1.25][k]];
+  });
+  const lists = {
+    'all.pvd': `<VTKFile type="Collection"><Collection>${names.map(([name, time]) =>
+      `<DataSet timestep="${time}" file="${name}"/>`).join('')}</Collection></VTKFile>`,
+    'all.csv.series': JSON.stringify({ files: names.map(([name, time]) => ({ name, time })) }),
+  };
+  for (const [name, text] of Object.entries(lists)) {
+    writeFileSync(place(name), text);
+    const truth = await world.statistics(place(name));
+    await viewer.drop(place(name), ...names.map(([file]) => place(file)));
+    await until(name, async () => await viewer.pane().locator('.name').textContent() === name);
+    await viewer.allFrames();
+    for (const k of [0, 2]) {
+      await viewer.scrubTo(k + 1, k);
+      await until(`frame ${k} as the command line`, async () => await viewer.value('rings-digest') === truth[k].rings_digest);
+      assert.equal(Number(await viewer.value('time')), truth[k].time);
+    }
+  }
+});
+
 test('other kinds are refused by name, with what to do', async () => {
   viewer = await Viewer.open(browser, world.url);
   writeFileSync(place('run.h5'), Buffer.from('\x89HDF\r\n\x1a\n', 'latin1'));
