@@ -1,5 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { Gauges } from '../src/gauges/gauges';
 import { History, type Entry } from '../src/stream/history';
 import { STAGES } from '../src/stream/summary';
 import { curvePoints, curvesCsv } from '../src/ui/curve_data';
@@ -64,7 +65,7 @@ test('an axis has at least three round ticks', () => {
 });
 
 test('the curves are saved as CSV, with empty cells for unknown numbers', () => {
-  const [head, first, second, ...rest] = curvesCsv(track([1, 2])).trimEnd().split('\n');
+  const [head, first, second, ...rest] = curvesCsv(track([1, 2]), new Gauges()).trimEnd().split('\n');
   assert.equal(head, `frame,time,area,rings,holes,triangles,triangles_unmerged,reduction_percent,milliseconds,${
     STAGES.map((name) => `${name}_ms`).join()},received,drawn,dropped,latency_ms`);
   assert.match(first, /^1,0\.25,2\.5,3,1,10,20,50,1\.5,0,0\.125,/);

@@ -2,6 +2,7 @@
 import 'uplot/dist/uPlot.min.css';
 import './report.css';
 import { applyKey } from '../draw/navigation';
+import { Gauges } from '../gauges/gauges';
 import { AS_STREAMED } from '../stream/settings';
 import { addressText, parseAddress } from '../ui/address';
 import { CurvesPanel, RESULT_CURVES } from '../ui/curves_panel';
@@ -87,7 +88,7 @@ class Report {
     };
     button('zoom-in').addEventListener('click', () => zoom('+'));
     button('zoom-out').addEventListener('click', () => zoom('-'));
-    button('export-csv').addEventListener('click', () => downloadCurves(this.track, this.track.title));
+    button('export-csv').addEventListener('click', () => downloadCurves(this.track, this.track.title, new Gauges()));
     button('fit').addEventListener('click', () => this.pane.fit());
     addEventListener('beforeprint', () => this.pane.scene.draw());
     const actions: Record<string, () => void> = {

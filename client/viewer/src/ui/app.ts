@@ -1,3 +1,4 @@
+import { Gauges } from '../gauges/gauges';
 import { Gateway } from '../stream/gateway';
 import { NO_OPTIONS, optionsText, parseOptions } from '../input/options';
 import type { FrameSource } from '../input/source';
@@ -10,6 +11,7 @@ import { CurvesPanel, RESULT_CURVES, STREAM_CURVES } from './curves_panel';
 import { button, byId, input } from './dom';
 import { ExportPanel, NO_PICTURE } from './export_panel';
 import { FilesPanel, type OpenFile } from './files_panel';
+import { GaugesPanel } from './gauges_panel';
 import { releaseFocusAfterClicks, usesKey } from './keys';
 import { Layout } from './layout';
 import { LookPanel } from './look_panel';
@@ -23,6 +25,8 @@ import { TimeLink } from './time_link';
 import { TimePanel } from './time_panel';
 
 const TOKEN_KEY = 'partiemc-token';
+/** For gauges, in each refresh of the screen. */
+const GAUGES_MS = 3;
 
 /** The page: connects the controls with the tracks on the stage. */
 export class App {
@@ -30,6 +34,7 @@ export class App {
   private readonly layout = new Layout();
   private readonly status = new StatusLine();
   private readonly link = new TimeLink();
+  private readonly gauges = new Gauges();
   private readonly look: LookPanel;
   private readonly settings: SettingsPanel;
   private readonly stage: Stage;
@@ -68,7 +73,8 @@ export class App {
       this.look.setDark(dark);
       this.curves.setDark(dark);
     });
-    this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look,
+    new GaugesPanel(this.gauges, (curves) => this.curves.setFirst(curves));
+    this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look, this.gauges,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
     this.files = new FilesPanel({
       opened: (source, file) => this.openFile(source, file),
@@ -385,6 +391,8 @@ export class App {
     this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.scene.legend() ?? null);
     this.time.refresh();
+    const end = performance.now() + GAUGES_MS;
+    this.gauges.measure(this.curves.shownEntries, () => performance.now() > end);
     this.curves.refresh(pane?.curves ?? null, isVariant ? this.track : null, pane?.summary ?? null,
       pane?.isStreamed ?? true, now);
     this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,

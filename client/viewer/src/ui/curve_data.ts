@@ -1,3 +1,5 @@
+import type { Gauges } from '../gauges/gauges';
+import { columnsOf } from '../gauges/kinds';
 import type { Entry, Summary } from '../stream/history';
 import { reductionOf, STAGES } from '../stream/summary';
 import type { CurveSource, Track } from '../stream/track';
@@ -51,13 +53,16 @@ const COLUMNS: [string, (summary: Summary) => number][] = [
   ['latency_ms', (s) => s.latency],
 ];
 
-/** All frames of the history as CSV. A number that is unknown is empty. */
-export function curvesCsv(track: Pick<Track, 'history' | 'labelOf'>): string {
+/** All frames of the history as CSV, with the values of the gauges. A number that is unknown is empty. */
+export function curvesCsv(track: Pick<Track, 'history' | 'labelOf'>, gauges: Gauges): string {
   const { history } = track;
+  gauges.measure(Array.from({ length: history.size }, (_, k) => history.entry(k)), () => false);
+  const columns = [...COLUMNS, ...gauges.all.flatMap((gauge) => columnsOf(gauge).map(
+    (name, k): [string, (summary: Summary) => number] => [name, (s) => gauges.value(s, gauge, k)]))];
   const cell = (value: number) => (Number.isFinite(value) ? String(value) : '');
   const rows = Array.from({ length: history.size }, (_, k) => {
     const { sequence, time, summary } = history.entry(k);
-    return [track.labelOf(sequence), cell(time), ...COLUMNS.map(([, value]) => cell(value(summary)))].join(',');
+    return [track.labelOf(sequence), cell(time), ...columns.map(([, value]) => cell(value(summary)))].join(',');
   });
-  return `${[['frame', 'time', ...COLUMNS.map(([name]) => name)].join(','), ...rows].join('\n')}\n`;
+  return `${[['frame', 'time', ...columns.map(([name]) => name)].join(','), ...rows].join('\n')}\n`;
 }

@@ -10,7 +10,7 @@ import { tickDigits, ticks } from './ticks';
 /** `text`: the value as under the picture. */
 interface Line { name: string; value(summary: Summary): number; text(value: number): string }
 
-interface Curve {
+export interface Curve {
   title: string;
   lines: Line[];
   isWide?: boolean;
@@ -83,11 +83,12 @@ function topOf(values: (number | null | undefined)[]): number {
   return sorted.length > 10 && peak > 2 * usual ? usual : 1.05 * peak;
 }
 
+interface Item { curve: Curve; figure: HTMLElement; caption: HTMLElement; holder: HTMLElement; plot: uPlot }
+
 /** Curves over the frames of a track. A click goes to a frame. */
 export class CurvesPanel {
-  private plots: uPlot[] = [];
-  private readonly captions: HTMLElement[] = [];
-  private readonly holders: HTMLElement[] = [];
+  private items: Item[] = [];
+  private readonly panel = byId('curves', HTMLElement);
   private entries: readonly (Entry | null)[] = [];
   private track: CurveSource | null = null;
   /** Whether the dashed lines have data. */
@@ -103,25 +104,36 @@ export class CurvesPanel {
   private colours = COLOURS.light;
 
   /** `isDetailed`: captions have the value of every band. */
-  constructor(private readonly curves: Curve[], private readonly isDetailed: boolean,
+  constructor(private readonly curves: readonly Curve[], private readonly isDetailed: boolean,
               private readonly goTo: (sequence: number) => void) {
-    const panel = byId('curves', HTMLElement);
-    for (const { title, isWide } of curves) {
-      const caption = make('figcaption', {}, title);
-      const holder = make('div', { class: 'plot' });
-      this.captions.push(caption);
-      this.holders.push(holder);
-      panel.append(make('figure', { class: isWide ? 'curve wide' : 'curve', 'aria-label': title }, caption, holder));
+    this.items = curves.map((curve) => this.makeItem(curve));
+    new ResizeObserver(() => this.resize()).observe(this.panel);
+  }
+
+  /** Shows these curves, and no others, before the ones that are always there. */
+  setFirst(first: readonly Curve[]): void {
+    for (const { figure, plot } of this.items.splice(0, this.items.length - this.curves.length)) {
+      plot.destroy();
+      figure.remove();
     }
-    new ResizeObserver(() => this.resize()).observe(panel);
+    const items = first.map((curve) => this.makeItem(curve));
+    this.items[0].figure.before(...items.map(({ figure }) => figure));
+    this.items.unshift(...items);
+    this.resize();
+    this.lastRefresh = -Infinity;
   }
 
   setDark(dark: boolean): void {
-    for (const plot of this.plots) plot.destroy();
     this.colours = dark ? COLOURS.dark : COLOURS.light;
-    this.plots = this.curves.map((curve, k) => this.makePlot(curve, this.holders[k]));
+    for (const item of this.items) {
+      item.plot.destroy();
+      item.plot = this.makePlot(item.curve, item.holder);
+    }
     this.lastRefresh = -Infinity;
   }
+
+  /** The frames that the curves show. */
+  get shownEntries(): readonly (Entry | null)[] { return this.entries; }
 
   /**
    * `other`: frames to compare with, drawn as dashed lines. `shown`: the figures under the picture.
@@ -145,15 +157,16 @@ export class CurvesPanel {
     const { x, entries } = track ? curvePoints(track) : { x: [], entries: [] };
     this.entries = entries;
     const others = other ? entriesOf(other, entries) : entries.map(() => null);
-    this.curves.forEach((curve, k) =>
-      this.plots[k]?.setData([x, ...valuesOf(curve, entries), ...curve.total ? [] : valuesOf(curve, others)]));
+    for (const { curve, plot } of this.items) {
+      plot.setData([x, ...valuesOf(curve, entries), ...curve.total ? [] : valuesOf(curve, others)]);
+    }
     this.showCaptions();
   }
 
   /** The values at the pointer, or else those under the picture, in the colours of the lines. */
   private showCaptions(): void {
     const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
-    this.curves.forEach(({ title, lines, isWide, total }, k) => {
+    for (const { curve: { title, lines, isWide, total }, caption } of this.items) {
       const note = total && this.isCompared ? '' : this.note;
       const parts: (Node | string)[] = [title];
       if (total && summary) parts.push(' ', make('b', {}, milliseconds(total(summary))));
@@ -163,8 +176,16 @@ export class CurvesPanel {
         parts.push(' ', make('b', { style: `color: ${this.colours[i]}`, title: line.name }, text));
       });
       if (this.hovered === null && note) parts.push(note);
-      this.captions[k].replaceChildren(...parts);
-    });
+      caption.replaceChildren(...parts);
+    }
+  }
+
+  private makeItem(curve: Curve): Item {
+    const caption = make('figcaption', {}, curve.title);
+    const holder = make('div', { class: 'plot' });
+    const figure = make('figure', { class: curve.isWide ? 'curve wide' : 'curve', 'aria-label': curve.title }, caption, holder);
+    this.panel.append(figure);
+    return { curve, figure, caption, holder, plot: this.makePlot(curve, holder) };
   }
 
   private makePlot(curve: Curve, holder: HTMLElement): uPlot {
@@ -241,9 +262,8 @@ export class CurvesPanel {
   }
 
   private resize(): void {
-    this.plots.forEach((plot, k) => {
-      const { clientWidth: width, clientHeight: height } = this.holders[k];
+    for (const { plot, holder: { clientWidth: width, clientHeight: height } } of this.items) {
       if (width > 0 && height > 0) plot.setSize({ width, height });
-    });
+    }
   }
 }

@@ -1,6 +1,7 @@
 import type { Look } from '../draw';
 import { clip, type Clip, download, geojson, marksOf, png, svg } from '../export';
 import { NO_WEBGL } from '../draw';
+import type { Gauges } from '../gauges/gauges';
 import type { CurveSource } from '../stream/track';
 import { curvesCsv } from './curve_data';
 import { button, input, setText } from './dom';
@@ -25,7 +26,7 @@ export const NO_PICTURE = 'No picture yet. Choose a stream or drop files.';
 export class ExportPanel {
   private recording: { clip: Clip; pane: Pane } | null = null;
 
-  constructor(private readonly pane: () => Pane | null, private readonly look: () => Look,
+  constructor(private readonly pane: () => Pane | null, private readonly look: () => Look, gauges: Gauges,
               private readonly report: (text: string, isError: boolean, isGone?: () => boolean) => void) {
     this.on('export-png', async (shown) => download(this.name(shown, 'png'), await png(shown.scene, this.marks(shown))));
     this.on('export-svg', async (shown) => {
@@ -40,7 +41,7 @@ export class ExportPanel {
       const blob = new Blob([geojson(shown.frame)], { type: 'application/geo+json' });
       download(this.name(shown, 'geojson'), blob);
     });
-    this.on('export-csv', async ({ track, curves }) => downloadCurves(curves, track.title));
+    this.on('export-csv', async ({ track, curves }) => downloadCurves(curves, track.title, gauges));
     button('export-clip').addEventListener('click', () => {
       // The picture that is recorded may be closed by now.
       if (this.recording) this.run(this.stopClip(this.recording));
@@ -120,8 +121,8 @@ export class ExportPanel {
 }
 
 /** Saves the numbers of all frames of a track. */
-export function downloadCurves(track: CurveSource, title: string): void {
-  download(`${fileName(title)}_curves.csv`, new Blob([curvesCsv(track)], { type: 'text/csv' }));
+export function downloadCurves(track: CurveSource, title: string, gauges: Gauges): void {
+  download(`${fileName(title)}_curves.csv`, new Blob([curvesCsv(track, gauges)], { type: 'text/csv' }));
 }
 
 function fileName(title: string): string {

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, World } from './support.mjs';
+import { launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser, viewer, box;
 
@@ -95,4 +95,50 @@ test('clicks measure a distance, an angle and a ring', async () => {
   await viewer.page.keyboard.press('Escape');
   await until('it is gone', async () => await viewer.pane().locator('.overlay .measure').count() === 0);
   assert.match(decodeURIComponent(new URL(viewer.page.url()).hash), /look=.*axes/);
+});
+
+test('gauges have curves and columns with the values of the command line', async () => {
+  const gauges = ['front=front:1,0', 'level=height:0.5', 'part=box:0,0,1,1', 'slope=repose', 'wall=wetted:0,0,4,0',
+    'drop=contact:0,0,1,0,0.5'];
+  const truth = await world.statistics(recording, ...gauges.flatMap((gauge) => ['--gauge', gauge]));
+  const files = await Viewer.open(browser, world.url);
+  await files.drop(recording);
+  await files.allFrames();
+  const field = files.page.getByLabel('New gauge');
+  await field.fill('level=height');
+  await field.press('Enter');
+  const error = files.page.locator('#gauge-error');
+  await until('the rule', async () => await error.isVisible() && /height must have the numbers x/.test(await error.textContent()));
+  for (const gauge of gauges) {
+    await field.fill(gauge);
+    await field.press('Enter');
+  }
+  assert.equal(await error.isVisible(), false);
+  const caption = files.page.getByRole('figure', { name: 'level (height)' }).locator('figcaption');
+  await until('the caption has a value', async () => /level \(height\) [\d.]+/.test(await caption.textContent()));
+  await field.scrollIntoViewIfNeeded();
+  await files.page.getByText('Kinds', { exact: true }).click();
+  await files.page.screenshot({ path: path.join(screenshots, 'gauges.png') });
+  assert.deepEqual(await withoutTooltip(files.page), []);
+  assert.deepEqual(await violations(files.page), []);
+  const [download] = await Promise.all([files.page.waitForEvent('download'), files.button('CSV of curves').click()]);
+  const chunks = [];
+  for await (const chunk of await download.createReadStream()) chunks.push(chunk);
+  const [head, ...rows] = Buffer.concat(chunks).toString().trimEnd().split('\n').map((row) => row.split(','));
+  assert.equal(rows.length, truth.length);
+  const columns = Object.keys(truth[0]).filter((name) => gauges.some((gauge) => `${name}_`.startsWith(`${gauge.split('=')[0]}_`)));
+  assert.equal(columns.length, 16);
+  for (const name of columns) {
+    const at = head.indexOf(name);
+    assert.ok(at > 0, `the file has ${name}`);
+    rows.forEach((row, k) => {
+      const [found, wanted] = [row[at] === '' ? null : Number(row[at]), truth[k][name]];
+      if (wanted === null) assert.equal(found, null, `${name}, frame ${k}`);
+      else assert.ok(Math.abs(found - wanted) < 1e-3 * Math.max(1, Math.abs(wanted)), `${name}, frame ${k}: ${found}, ${wanted}`);
+    });
+  }
+  await files.page.getByLabel('Remove level').click();
+  assert.equal(await files.page.getByRole('figure', { name: 'level (height)' }).count(), 0);
+  assert.deepEqual(files.errors, []);
+  await files.close();
 });
