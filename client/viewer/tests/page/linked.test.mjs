@@ -58,6 +58,8 @@ test('pictures of different files share time, view and selection', async () => {
   assert.equal(await viewer.page.getByLabel('Linked').isVisible(), false, 'one picture has no partner');
   await viewer.button('Side by side').click();
   await viewer.drop(place('fast'));
+  // The second picture shows all frames of the first files until the others are open.
+  await until('the other files', async () => /fast_0/.test(await viewer.pane(1).locator('.name').textContent()));
   await until('all frames', async () => /All frames/.test(await viewer.pane(1).locator('.state').getAttribute('title')));
   assert.deepEqual(await withoutTooltip(viewer.page), []);
   await canvas(0).focus();
