@@ -225,8 +225,7 @@ class GsdReader final : public FrameReader {
     return arrays;
   }
 
-  // Returns the arrays of a frame without particles. They are those of all frames, without rows, so
-  // that the frame has the columns of the others.
+  // Returns the arrays of a frame without particles: those of all frames, without rows.
   const std::vector<StoredArray>& EmptyArrays() {
     if (!empty_.empty()) return empty_;
     std::set<std::string_view> seen;
@@ -249,7 +248,7 @@ class GsdReader final : public FrameReader {
   GsdContent content_;
   const ColumnRequest& request_;
   std::uint64_t frame_ = 0;
-  std::vector<StoredArray> empty_;  // Of EmptyArrays, once it was called.
+  std::vector<StoredArray> empty_;  // The result of EmptyArrays.
 };
 
 }  // namespace
