@@ -318,6 +318,7 @@ TEST_F(RelayTest, AddressesAreThoseOfReplicasThatDoNotDrain) {
   MemoryReplica path(hub_, 0, "unix:/run/p.sock"), malformed(hub_, 0, "a;b");
   ASSERT_TRUE(Eventually([&] { return shows_.relay().replicas() == 5; }));
   EXPECT_THAT(shows_.relay().Addresses(), ElementsAre("a.example:50051", "b.example:50051"));
+  EXPECT_TRUE(Eventually([&] { return !a.relay().Addresses().empty(); }));
   EXPECT_THAT(a.relay().Addresses(), ElementsAre("b.example:50051"));
   b.relay().WillDrain();
   EXPECT_TRUE(Eventually([&] { return shows_.relay().Addresses().size() == 1; }));

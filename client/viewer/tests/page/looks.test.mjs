@@ -3,21 +3,23 @@
 import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { after, before, test } from 'node:test';
+import { after, afterEach, before, beforeEach, test } from 'node:test';
 import { launch, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser;
 
 before(async () => {
   mkdirSync(screenshots, { recursive: true });
-  world = await World.start();
   browser = await launch();
+});
+after(() => browser?.close());
+
+// A new stream for every test, so that the history still has the first frame.
+beforeEach(async () => {
+  world = await World.start();
   world.loop('dam_break');
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
+afterEach(() => world?.close());
 
 for (const colorScheme of ['light', 'dark']) {
   for (const width of [1600, 800]) {
