@@ -58,8 +58,10 @@ std::string AsFlag(const absl::Status& status) {
   line.erase(0, kPrefix.size());
   // Removes the prefix "sections[K].": a user of --slice and --isolines does not know the index K.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
+  if (line.starts_with("surface.")) line.erase(0, line.find('.') + 1);
   for (const auto& [field, flag] :
-       {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:")}) {
+       {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
+        std::pair("min_component_volume:", "min-volume:")}) {
     if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
   }
   line.insert(0, "--");

@@ -19,6 +19,18 @@ absl::Status CheckCombinations(const CLI::App& app) {
   if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
     return absl::InvalidArgumentError("--format: requires --output-dir");
   }
+  if (app.count("--surface") > 0) {
+    if (app.count("--local") == 0) {
+      return absl::InvalidArgumentError(
+          "--surface: requires --local; servers reconstruct outlines only");
+    }
+    for (const char* flat : {"--report", "--gauge", "--color-by"}) {
+      if (app.count(flat) > 0) {
+        return absl::InvalidArgumentError(
+            Concat(flat, ": shows outlines, so it cannot be combined with --surface"));
+      }
+    }
+  }
   if (app.count("--color-by") > 0 &&
       (app.count("--attributes") == 0 ||
        (app.count("--output-dir") == 0 && app.count("--report") == 0))) {
@@ -119,10 +131,40 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
       ->group(kGroup);
 }
 
+void AddSurfaceFlags(CLI::App& app, ReplayFlags& flags, const char* group) {
+  CLI::Option* const surface =
+      app.add_flag("--surface", flags.surface,
+                   "Closed surfaces of 3D particles instead of outlines; requires --spacing and "
+                   "--local. Each --slice adds the outline on a plane")
+          ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
+          ->group(group);
+  app.add_option("--thinning-distance", flags.surface_options.thinning_distance,
+                 "Surfaces: drop vertices that are at most this far from the triangles without "
+                 "them; 0: none")
+      ->type_name("D")
+      ->capture_default_str()
+      ->needs(surface)
+      ->group(group);
+  app.add_option("--max-drop-particles", flags.surface_options.max_drop_particles,
+                 "Surfaces: bodies of up to this many particles become ellipsoids; 0: none")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->needs(surface)
+      ->group(group);
+  app.add_option("--min-volume", flags.surface_options.min_component_volume,
+                 "Surfaces: drop bodies whose particles have less volume, in cubed spacings")
+      ->type_name("V")
+      ->capture_default_str()
+      ->needs(surface)
+      ->group(group);
+}
+
 void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Method (lengths in spacings)";
   app.add_option("--placement", flags.placement,
-                 "marching-squares, qef, farthest-particle or virtual-plane")
+                 "marching-squares (marching cubes with --surface), qef, farthest-particle or "
+                 "virtual-plane")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(kGroup);
@@ -136,6 +178,7 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
          "spacing of the recording, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
+  AddSurfaceFlags(app, flags, kGroup);
   app.add_option("--slice", flags.slices,
                  "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal; requires "
                  "--spacing. "
@@ -205,9 +248,10 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_option("--output-dir", flags.output_dir, "Write DIR/frame_000000.EXT for every frame")
       ->type_name("DIR")
       ->group(kGroup);
-  app.add_option("--format", flags.format, "Formats of these files, from " + formats)
+  app.add_option(
+         "--format", flags.format,
+         "Formats of these files, from " + formats + " (default: geojson; with --surface ply)")
       ->type_name("LIST")
-      ->capture_default_str()
       ->group(kGroup);
   AddCompressGlbFlag(app, flags.compress_glb)->group(kGroup);
   app.add_option("--color-by", flags.color_by,
@@ -254,6 +298,8 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "--rate 25\n"
       "  partiemc replay dam_break.pemc --local --stats dam.csv --gauge front=front:1,0 "
       "--gauge level=height:0.5\n"
+      "  partiemc replay splash.vtu --local --surface --spacing 0.05 --output-dir out "
+      "--format ply,vtp\n"
       "  partiemc replay dam_break.pemc --local --isolines .2,.5,.8 --report dam_break.html\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
       "watch "

@@ -30,10 +30,13 @@ struct ReplayFlags {
   std::string name;                             ///< Stream name; empty: chosen by the server.
   bool echo_particles = false;
 
+  bool surface = false;  ///< Surfaces in space instead of outlines.
+  SurfaceOptions surface_options = {};
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
-  std::vector<std::string> slices;  ///< "z=0.5" or six numbers. The first is the outline.
-  std::vector<double> isolines;     ///< Isovalues of the density, drawn on each slice.
+  /// "z=0.5" or six numbers. The first is the outline, unless the stream has a surface.
+  std::vector<std::string> slices;
+  std::vector<double> isolines;  ///< Isovalues of the density, drawn on each slice.
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   double kernel_radius = 3;
   double cell_size = 1;
@@ -53,7 +56,7 @@ struct ReplayFlags {
   bool quiet = false;
 
   std::string output_dir;
-  std::string format = "geojson";
+  std::string format;  ///< Empty: geojson, or ply for surfaces.
   std::string color_by;
   bool compress_glb = false;
   std::string stats;

@@ -63,7 +63,8 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
-// Makes the first slice the stream's slice, and adds a section for the outline of each other slice.
+// Makes the first slice the stream's slice, unless the stream has a surface. Adds a section for the
+// outline of each other slice.
 // Adds sections for the isolines of every slice; without slices, for the isolines of the stream.
 absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   const auto add_isolines = [&](const std::optional<SlicePlane>& slice) {
@@ -75,7 +76,7 @@ absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& par
   for (const std::string& text : flags.slices) {
     const auto slice = SliceOf(text);
     if (!slice) return WrongFlag("--slice", text, "x=C, y=C, z=C or OX,OY,OZ,NX,NY,NZ");
-    if (!parameters.slice) {
+    if (!parameters.slice && !flags.surface) {
       parameters.slice = slice;
     } else {
       parameters.sections.push_back({.slice = slice});
@@ -94,7 +95,8 @@ std::optional<double> PositiveNumber(std::string_view text) {
 
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                                       std::optional<double> recorded_spacing) {
-  ReconstructionParameters parameters{.spacing = recorded_spacing,
+  ReconstructionParameters parameters{.output = flags.surface ? Output::kSurface : Output::kOutline,
+                                      .spacing = recorded_spacing,
                                       .kernel_radius = flags.kernel_radius,
                                       .cell_size = flags.cell_size,
                                       .reference_radius = flags.reference_radius,
@@ -102,7 +104,8 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                       .attribute_tolerance = flags.attribute_tolerance,
                                       .normal_memory = !flags.no_normal_memory,
                                       .min_component_area = flags.min_area,
-                                      .min_component_particles = flags.min_particles};
+                                      .min_component_particles = flags.min_particles,
+                                      .surface = flags.surface_options};
   const auto placement = FindPlacement(flags.placement);
   if (!placement) return WrongFlag("--placement", flags.placement, Names(AllPlacements()));
   parameters.placement = *placement;

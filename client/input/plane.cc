@@ -63,8 +63,8 @@ absl::StatusOr<PlaneProjection::Axes> PlaneProjection::AxesFor(const ParticleRow
                                                                std::vector<std::string>& notices) {
   if (in_space_) {
     if (HasThreeAxes(rows)) return kAllAxes;
-    return absl::FailedPreconditionError(
-        Concat(rows.source, ": has two coordinates; must have x, y and z for a slice"));
+    return absl::FailedPreconditionError(Concat(
+        rows.source, ": has two coordinates; must have x, y and z for a slice or a surface"));
   }
   std::size_t dropped = 2;
   if (HasThreeAxes(rows)) {
@@ -131,9 +131,8 @@ absl::Status PlaneProjection::Decide(const ParticleRows& rows, std::vector<std::
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(absl::StrFormat(
-      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): of particles in one plane, its outline "
-      "is drawn; with "
-      "--slice z=0, for example, that of its section",
+      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): --surface --local makes closed surfaces; "
+      "--slice z=0, for example, the outline on a plane",
       rows.source, intervals[0].Extent(), intervals[1].Extent(), intervals[2].Extent()));
 }
 

@@ -208,6 +208,7 @@ void Worker::Process(const OwnedFrame& frame, Event& event) {
   event.kind = Event::Kind::kResult;
   event.frame.rings_digest = DigestRings(event.frame.result.rings);
   event.frame.mesh_digest = DigestMesh(event.frame.result.mesh);
+  event.frame.surface_digest = DigestSurface(event.frame.result.surface);
   event.frame.section_digests = DigestSections(event.frame.result);
 }
 

@@ -71,6 +71,12 @@ bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
 absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address,
                                                      const StreamOptions& options) {
   if (auto valid = Validate(options.parameters); !valid.ok()) return valid;
+  if (options.parameters.output != Output::kOutline) {
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {"UNSUPPORTED", "parameters.output", std::string(Name(options.parameters.output)),
+         "must be outline: servers do not reconstruct surfaces, LocalStream does"});
+  }
   if (auto valid = CheckParts(options); !valid.ok()) return valid;
   return ResumingStream::Open(address, options);
 }

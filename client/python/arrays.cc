@@ -1,5 +1,6 @@
 #include "client/python/arrays.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -35,11 +36,12 @@ py::array AsArray(const py::object& given, const char* field) {
   return array;
 }
 
-// True if `type` is T in this machine's byte order, under any of NumPy's names.
+// True if `type` is T in this machine's byte order, under any of NumPy's names. Reads the attribute
+// `itemsize`: pybind11 before 2.12 reads it at the place that it had before NumPy 2.
 template <typename T>
 bool Is(const py::dtype& type) {
-  const py::dtype same = py::dtype::of<T>();
-  return type.kind() == same.kind() && type.itemsize() == same.itemsize() &&
+  return type.kind() == py::dtype::of<T>().kind() &&
+         type.attr("itemsize").cast<std::size_t>() == sizeof(T) &&
          type.attr("isnative").cast<bool>();
 }
 

@@ -129,6 +129,7 @@ py::object ToPython(const std::optional<SlicePlane>& slice) {
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
   ReconstructionParameters parameters;
+  TakeNamed(arguments, "output", parameters.output);
   TakeNamed(arguments, "placement", parameters.placement);
   TakeNamed(arguments, "fill", parameters.fill);
   TakeNamed(arguments, "plane", parameters.plane);
@@ -146,6 +147,9 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeSlice(arguments, parameters.slice);
   TakeInto(arguments, "isovalue", parameters.isovalue);
   TakeSections(arguments, parameters.sections);
+  TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
+  TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
+  TakeInto(arguments, "min_component_volume", parameters.surface.min_component_volume);
   return parameters;
 }
 
@@ -224,18 +228,24 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
   }
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
-  return py::dict(
-      "placement"_a = named(parameters.placement), "fill"_a = named(parameters.fill),
-      "plane"_a = named(parameters.plane), "spacing_rule"_a = named(parameters.spacing_rule),
-      "spacing"_a = parameters.spacing, "kernel_radius"_a = parameters.kernel_radius,
-      "cell_size"_a = parameters.cell_size, "reference_radius"_a = parameters.reference_radius,
-      "surface_offset"_a = parameters.surface_offset,
-      "attribute_tolerance"_a = parameters.attribute_tolerance,
-      "normal_memory"_a = parameters.normal_memory, "clean"_a = parameters.clean,
-      "min_component_area"_a = parameters.min_component_area,
-      "min_component_particles"_a = parameters.min_component_particles,
-      "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
-      "sections"_a = sections);
+  py::dict dict("output"_a = named(parameters.output), "placement"_a = named(parameters.placement),
+                "fill"_a = named(parameters.fill), "plane"_a = named(parameters.plane),
+                "spacing_rule"_a = named(parameters.spacing_rule), "spacing"_a = parameters.spacing,
+                "kernel_radius"_a = parameters.kernel_radius, "cell_size"_a = parameters.cell_size,
+                "reference_radius"_a = parameters.reference_radius,
+                "surface_offset"_a = parameters.surface_offset,
+                "attribute_tolerance"_a = parameters.attribute_tolerance,
+                "normal_memory"_a = parameters.normal_memory, "clean"_a = parameters.clean,
+                "min_component_area"_a = parameters.min_component_area,
+                "min_component_particles"_a = parameters.min_component_particles,
+                "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
+                "sections"_a = sections);
+  if (parameters.output == Output::kSurface) {
+    dict["thinning_distance"] = parameters.surface.thinning_distance;
+    dict["max_drop_particles"] = parameters.surface.max_drop_particles;
+    dict["min_component_volume"] = parameters.surface.min_component_volume;
+  }
+  return dict;
 }
 
 }  // namespace partiemc::python

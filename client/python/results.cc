@@ -14,6 +14,8 @@
 
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
+#include "client/python/parts.h"
+#include "client/python/surface_view.h"
 #include "partiemc/doubt.h"
 #include "partiemc/gauges.h"
 #include "partiemc/stage.h"
@@ -24,25 +26,8 @@ namespace {
 
 namespace py = pybind11;
 
-// A part of a result. `owner` is the Python object that keeps the arrays alive.
-template <typename Part>
-struct PartOf {
-  py::object owner;
-  const Part& part;
-};
 using RingsView = PartOf<Rings>;
 using MeshView = PartOf<Mesh>;
-
-// One member of the measures of all rings, as a strided view.
-template <typename As, typename T>
-py::array Column(const RingsView& rings, T RingMeasures::*member, py::ssize_t columns = 0) {
-  const auto& measures = rings.part.measures;
-  const void* first = measures.empty() ? nullptr : &(measures.front().*member);
-  const auto count = static_cast<py::ssize_t>(measures.size());
-  constexpr py::ssize_t kStride = sizeof(RingMeasures);
-  if (columns == 0) return View<As>(first, {count}, {kStride}, rings.owner);
-  return View<As>(first, {count, columns}, {kStride, sizeof(T)}, rings.owner);
-}
 
 py::array RingPoints(const RingsView& rings, py::ssize_t index) {
   const auto count = static_cast<py::ssize_t>(rings.part.RingCount());
@@ -136,16 +121,6 @@ py::array Heights(const RingsView& rings, double x) {
   return py::array_t<double>(static_cast<py::ssize_t>(heights.size()), heights.data());
 }
 
-// Pickles a part of a result (such as its rings) as a reference: the result, and the name of the
-// attribute that holds the part.
-template <typename View>
-auto Reduce(const char* attribute) {
-  return [attribute](const View& view) {
-    return py::make_tuple(py::module_::import("builtins").attr("getattr"),
-                          py::make_tuple(view.owner, attribute));
-  };
-}
-
 static_assert(offsetof(RingMeasures, centroid_y) ==
               offsetof(RingMeasures, centroid_x) + sizeof(double));
 
@@ -155,7 +130,7 @@ void DefineRings(py::module_& module) {
                         "Closed polylines as flat points and offsets, as in contourpy. All arrays "
                         "are read-only views that keep the result alive. rings[k] is the (P, 2) "
                         "array of ring k. Pickled and copied with its result.")
-      .def("__reduce__", Reduce<RingsView>("rings"))
+      .def("__reduce__", Reduce<Rings>("rings"))
       .def("__len__", [](R r) { return r.part.RingCount(); })
       .def("__getitem__", &RingPoints)
       .def_property_readonly(
@@ -217,7 +192,7 @@ void DefineMesh(py::module_& module) {
   py::class_<MeshView>(module, "Mesh",
                        "Triangles that cover the inside. All arrays are read-only views that keep "
                        "the result alive. Pickled and copied with its result.")
-      .def("__reduce__", Reduce<MeshView>("mesh"))
+      .def("__reduce__", Reduce<Mesh>("mesh"))
       .def("__len__", [](M m) { return m.part.TriangleCount(); })
       .def_property_readonly(
           "points", [](M m) { return View<double>(m.part.points, 2, m.owner); },
@@ -232,7 +207,9 @@ void DefineMesh(py::module_& module) {
 
 py::dict AttributesOf(const py::object& self) {
   py::dict attributes;
-  for (const AttributeValues& one : self.cast<const PythonResult&>().frame.result.attributes) {
+  const Result& result = self.cast<const PythonResult&>().frame.result;
+  const bool is_surface = result.attributes.empty();
+  for (const AttributeValues& one : is_surface ? result.surface.attributes : result.attributes) {
     attributes[py::str(one.name)] =
         View<float>(one.values, static_cast<std::size_t>(one.components), self);
   }
@@ -257,6 +234,7 @@ const client::FrameResult& WithDigests(PythonResult& result) {
   if (!std::exchange(result.has_digests, true)) {
     result.frame.rings_digest = DigestRings(result.frame.result.rings);
     result.frame.mesh_digest = DigestMesh(result.frame.result.mesh);
+    result.frame.surface_digest = DigestSurface(result.frame.result.surface);
   }
   return result.frame;
 }
@@ -293,6 +271,9 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
 py::tuple ToState(PythonResult& result) {
   const auto& sections = SectionsOf(result);  // Leaves empty results in their places in the frame.
   const client::FrameResult& frame = result.frame;
+  if (frame.result.surface != Surface{}) {
+    throw py::value_error("pickle: results with surfaces cannot be pickled; pickle their arrays");
+  }
   v1::ReconstructedFrame message;
   RaiseUnlessOk(wire::EncodeResult(frame.result, {frame.times.stages_ms, frame.times.total_ms},
                                    {.normals = true}, message));
@@ -368,6 +349,7 @@ std::shared_ptr<PythonResult> ResultPool::Take() {
 void DefineResults(py::module_& module) {
   DefineRings(module);
   DefineMesh(module);
+  DefineSurface(module);
   // A view holds a reference to the object that it comes from, so that its memory stays valid.
   py::class_<PythonResult, std::shared_ptr<PythonResult>>(
       module, "Result", "The result of one frame. It can be pickled and copied.")
@@ -384,11 +366,13 @@ void DefineResults(py::module_& module) {
             return MeshView{self, self.cast<const PythonResult&>().frame.result.mesh};
           },
           "The inside: Mesh; empty with fill='none'.")
+      .def_property_readonly("surface", &SurfaceOf,
+                             "With output='surface': closed surfaces, a Surface; else empty.")
       .def_property_readonly(
           "attributes", [](const py::object& self) { return AttributesOf(self); },
           "Attributes at the vertices, a dict of float32 arrays: (V,), or (V, 2) or (V, 3) for "
-          "vectors. V is len(mesh.points), which begin with rings.points; without a mesh "
-          "len(rings.points).")
+          "vectors. V is len(surface.points) with output='surface', else len(mesh.points), which "
+          "begin with rings.points; without a mesh len(rings.points).")
       .def_property_readonly(
           "sections", &SectionsOf,
           "Additional outlines of the frame: a list of Result in the order of `sections`.")
@@ -396,7 +380,10 @@ void DefineResults(py::module_& module) {
                     "The frame's number: 1, 2, ... in a stream; 0 for partiemc.reconstruct.")
       .def_readonly("time", &PythonResult::time, "Simulation time of the frame.")
       .def_property_readonly("area", Statistic(&FrameStatistics::area),
-                             "Sum of the rings' signed areas, world units squared.")
+                             "Sum of the rings' signed areas, or of the areas of surfaces, world "
+                             "units squared.")
+      .def_property_readonly("volume", Statistic(&FrameStatistics::volume),
+                             "Volume inside surfaces, world units cubed; 0 for outlines.")
       .def_property_readonly("perimeter", Statistic(&FrameStatistics::perimeter),
                              "Sum of the rings' perimeters, world units.")
       .def_property_readonly("spacing", Statistic(&FrameStatistics::spacing),
@@ -414,6 +401,9 @@ void DefineResults(py::module_& module) {
       .def_property_readonly(
           "mesh_digest", [](PythonResult& r) { return WithDigests(r).mesh_digest; },
           "64-bit digest of the mesh.")
+      .def_property_readonly(
+          "surface_digest", [](PythonResult& r) { return WithDigests(r).surface_digest; },
+          "64-bit digest of the surface.")
       .def_property_readonly(
           "particles",
           [](py::object self) {

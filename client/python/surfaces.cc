@@ -12,7 +12,7 @@
 
 #include "client/python/errors.h"
 #include "partiemc/arena.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 
 namespace partiemc::python {
 namespace {

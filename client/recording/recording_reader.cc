@@ -178,11 +178,11 @@ class RecordingReader::Impl {
  private:
   absl::Status CheckSpace(const RecordedFrame& frame) const {
     if (in_space_ == (frame.components == 3)) return absl::OkStatus();
-    return absl::FailedPreconditionError(
-        absl::StrCat(path_, ": frame ", frame.index, " has ",
-                     in_space_ ? "two coordinates; leave --slice or --in-space out"
-                               : "three coordinates; replay it with --slice, or convert it with "
-                                 "--in-space"));
+    return absl::FailedPreconditionError(absl::StrCat(
+        path_, ": frame ", frame.index, " has ",
+        in_space_ ? "two coordinates; leave --slice, --surface or --in-space out"
+                  : "three coordinates; replay it with --slice or --surface, or convert it with "
+                    "--in-space"));
   }
 
   // Reads the next message into `message_`. Returns false at the end of the file. Adds a notice if

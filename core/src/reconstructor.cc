@@ -16,6 +16,7 @@
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
 #include "partiemc/status.h"
+#include "partiemc/surface_reconstructor.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 
@@ -42,6 +43,7 @@ auto InStage(StageObserver* observer, Stage stage, Run run) {
 void MakeEmpty(Result& result) {
   result.Clear();
   result.attributes.clear();
+  result.surface.attributes.clear();
   result.sections.clear();
 }
 
@@ -55,33 +57,41 @@ void Name(std::span<const Attribute> attributes, std::vector<AttributeValues>& v
   }
 }
 
-void Prepare(std::span<const Attribute> attributes, std::size_t sections, Result& result) {
+void Prepare(std::span<const Attribute> attributes, const ReconstructionParameters& parameters,
+             Result& result) {
+  const bool is_surface = parameters.output == Output::kSurface;
+  const std::size_t sections = parameters.sections.size();
   result.Clear();
-  Name(attributes, result.attributes);
+  Name(is_surface ? std::span<const Attribute>() : attributes, result.attributes);
   result.sections.resize(sections);
   for (Result& section : result.sections) Name(attributes, section.attributes);
 }
 
 // The parameters of a section, not yet resolved.
 ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const Section& section) {
+  parameters.output = Output::kOutline;
   parameters.sections.clear();
   if (section.slice) parameters.slice = section.slice;
   parameters.isovalue = section.isovalue;
   return parameters;
 }
 
-// Reserves memory for the outlines of a frame, one after another. The memory of earlier outlines
-// stays reserved.
-class OutlineMemory {
+// Reserves memory for the outlines and the surface of a frame, one after another. The memory of
+// earlier ones stays reserved.
+class FrameMemory final : public MemoryGuard {
  public:
-  explicit OutlineMemory(MemoryGuard* guard) : guard_(guard) {}
+  explicit FrameMemory(MemoryGuard* guard) : guard_(guard) {}
+
+  bool Reserve(std::uint64_t bytes) override {
+    last_ = bytes;
+    return guard_ == nullptr || guard_->Reserve(done_ + last_);
+  }
 
   // Returns RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier
   // ones.
-  absl::Status Reserve(const FrameSize& size) {
-    last_ = WorkspaceBytes(size);
-    const std::uint64_t bytes = done_ + last_;
-    if (guard_ == nullptr || guard_->Reserve(bytes)) return absl::OkStatus();
+  absl::Status ReserveOutline(const FrameSize& size) {
+    const std::uint64_t bytes = done_ + WorkspaceBytes(size);
+    if (Reserve(WorkspaceBytes(size))) return absl::OkStatus();
     return ViolationError(
         absl::StatusCode::kResourceExhausted,
         {std::string(kReasonOutOfMemory), "positions",
@@ -245,8 +255,8 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
 }
 
 // Computes one outline and its next state. Errors: see Reconstruct.
-absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
-                                Workspace::Buffers& b, NextState& next, Result& result) {
+absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Workspace::Buffers& b,
+                                NextState& next, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
   StageObserver* const observer = task.observer;
   Frame seen;
@@ -262,12 +272,12 @@ absl::Status ReconstructOutline(const OutlineTask& task, OutlineMemory& memory,
                         : checked;
   });
   if (!status.ok() || !lengths) return status;
-  status = memory.Reserve({.particles = seen.ParticleCount(),
-                           .tiles = b.bins.tiles.size(),
-                           .attribute_values = AttributeValuesOf(seen)});
+  status = memory.ReserveOutline({.particles = seen.ParticleCount(),
+                                  .tiles = b.bins.tiles.size(),
+                                  .attribute_values = AttributeValuesOf(seen)});
   if (!status.ok()) return status;
   FindRings(parameters, scale, observer, b);
-  status = memory.Reserve(SizeOf(parameters, seen, b));
+  status = memory.ReserveOutline(SizeOf(parameters, seen, b));
   if (!status.ok()) return status;
   status = FillOutline(task, seen, scale, b, result);
   if (!status.ok()) return status;
@@ -301,6 +311,62 @@ void CommitState(NextState& next, State& state) {
   std::swap(state.history, next.state.history);
 }
 
+// The parameters of a surface in the form of SurfaceReconstructor.
+SurfaceParameters SurfaceParametersOf(const ReconstructionParameters& parameters) {
+  SurfaceParameters surface;
+  switch (parameters.placement) {
+    case Placement::kMarchingSquares:
+      surface.placement = SurfacePlacement::kMarchingCubes;
+      break;
+    case Placement::kQef:
+      surface.placement = SurfacePlacement::kQef;
+      break;
+    case Placement::kFarthestParticle:  // Validate refuses it.
+    case Placement::kVirtualPlane:
+      surface.placement = SurfacePlacement::kVirtualPlane;
+      break;
+  }
+  surface.spacing = *parameters.spacing;
+  surface.kernel_radius = parameters.kernel_radius;
+  surface.cell_size = parameters.cell_size;
+  surface.reference_radius = parameters.reference_radius;
+  surface.clean = parameters.clean;
+  surface.thinning_distance = parameters.surface.thinning_distance;
+  surface.max_drop_particles = parameters.surface.max_drop_particles;
+  surface.min_component_volume = parameters.surface.min_component_volume;
+  surface.min_component_particles = parameters.min_component_particles;
+  return surface;
+}
+
+// Fills in the statistics of a frame that has become a surface.
+void SummariseSurface(const ReconstructionParameters& parameters, const Frame& frame,
+                      Result& result) {
+  const Surface& surface = result.surface;
+  FrameStatistics& statistics = result.statistics;
+  statistics.particles = frame.ParticleCount();
+  statistics.tiles = surface.statistics.bricks;
+  statistics.dropped_holes = surface.statistics.dropped_cavities;
+  statistics.dropped_components = surface.statistics.dropped_components;
+  statistics.dropped_spray = surface.statistics.dropped_spray;
+  statistics.triangles = surface.TriangleCount();
+  statistics.spacing = *parameters.spacing;
+  statistics.cell_size = parameters.cell_size * *parameters.spacing;
+  for (const ShellMeasures& measures : surface.measures) {
+    statistics.area += measures.area;
+    statistics.volume += measures.volume;
+  }
+}
+
+// CORRUPT_STATE if the state belongs to a stream with another output.
+absl::Status CheckOutput(const State& state, Output output) {
+  const bool is_other = output == Output::kSurface ? state.cell_size.has_value()
+                                                   : state.surface.cell_size.has_value();
+  if (!is_other) return absl::OkStatus();
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonCorruptState), "state", "of another output",
+                         "must be of a stream with the output " + std::string(Name(output))});
+}
+
 }  // namespace
 
 Workspace::Workspace() : buffers_(std::make_unique<Buffers>()) {}
@@ -315,6 +381,11 @@ Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const F
       variant_(std::make_shared<const VirtualPlaneVariant>(variant)) {
   for (const Section& section : parameters.sections) {
     sections_.push_back(Resolve(ParametersOf(parameters, section)));
+  }
+  if (parameters.output == Output::kSurface) {
+    // Validate has accepted the parameters.
+    surface_ = std::make_shared<const SurfaceReconstructor>(
+        *SurfaceReconstructor::Create(SurfaceParametersOf(parameters_), limits));
   }
 }
 
@@ -334,7 +405,7 @@ absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& para
 absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Workspace& workspace,
                                         Result& result, const FrameControl& control) const {
   const CancellationScope scope(control.cancelled);
-  Prepare(frame.attributes, sections_.size(), result);
+  Prepare(frame.attributes, parameters_, result);
   absl::Status status;
   try {
     status = ReconstructOrThrow(frame, state, workspace.buffers(), result, control);
@@ -355,26 +426,39 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
 absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
                                                Workspace::Buffers& b, Result& result,
                                                const FrameControl& control) const {
+  absl::Status status = CheckOutput(state, parameters_.output);
+  if (!status.ok()) return status;
+  const bool is_surface = surface_ != nullptr;
   b.next_states.resize(std::max(b.next_states.size(), 1 + sections_.size()));
-  OutlineMemory memory(control.memory);
+  FrameMemory memory(control.memory);
   const State unseen;
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {
-    absl::Status status =
+    const bool is_first = outline == (is_surface ? 1 : 0);
+    absl::Status outlined =
         ReconstructOutline({parameters, VariantFor(parameters, *variant_), limits_, frame, previous,
-                            control.observer, outline == 0},
+                            control.observer, is_first},
                            memory, b, b.next_states[outline], into);
     memory.Done();
-    return status;
+    return outlined;
   };
-  absl::Status status = reconstruct(parameters_, state, 0, result);
+  if (!is_surface) status = reconstruct(parameters_, state, 0, result);
   for (std::size_t k = 0; status.ok() && k < sections_.size(); ++k) {
     const State& previous = k < state.sections.size() ? state.sections[k] : unseen;
     status = reconstruct(sections_[k], previous, k + 1, result.sections[k]);
   }
   if (!status.ok()) return status;
+  state.sections.reserve(sections_.size());
+  if (is_surface) {
+    // The last step that can fail, because it commits its state.
+    status = surface_->Reconstruct(frame, state.surface, b.surface, result.surface,
+                                   {.memory = &memory, .cancelled = control.cancelled});
+    if (!status.ok()) return status;
+    SummariseSurface(parameters_, frame, result);
+  } else {
+    CommitState(b.next_states[0], state);
+  }
   state.sections.resize(sections_.size());
-  CommitState(b.next_states[0], state);
   for (std::size_t k = 0; k < sections_.size(); ++k) {
     CommitState(b.next_states[k + 1], state.sections[k]);
   }

@@ -1,4 +1,6 @@
 // Runs the stages of a surface in order.
+#include "partiemc/surface_reconstructor.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -19,7 +21,6 @@
 #include "frame/scale.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
-#include "partiemc/surface.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/certificate.h"
@@ -58,10 +59,6 @@ struct SurfaceWorkspace::Buffers {
 
 namespace {
 
-// The factor by which the calibrated radius of a slice is multiplied (core/SURFACES.md,
-// "Calibration").
-constexpr double kCalibration = 1.065;
-
 /// The parameters in the form that the stages require: as for a slice, so that lengths and weights
 /// are in space.
 ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
@@ -77,7 +74,7 @@ ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
 ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space = InSpace(parameters);
   if (!in_space.reference_radius) {
-    in_space.reference_radius = kCalibration * CalibratedSliceRadius(parameters.kernel_radius);
+    in_space.reference_radius = CalibratedSurfaceRadius(parameters.kernel_radius);
   }
   return in_space;
 }
@@ -379,6 +376,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
     space::InterpolateInSpace(frame, b.bins, scale, surface.points, surface.attributes);
   }
   surface.statistics = statistics;
+  surface.statistics.bricks = bricks.size();
   return absl::OkStatus();
 }
 

@@ -17,6 +17,7 @@
 #include "normals/normals.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/state.h"
+#include "partiemc/surface_reconstructor.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
@@ -51,6 +52,7 @@ struct Workspace::Buffers {
   AttributeScratch attribute_scratch;
   std::vector<AttributeValues> node_attributes;  // At the nodes around interior cells.
   std::vector<NextState> next_states;            // By outline: the main one, then the sections.
+  SurfaceWorkspace surface;
 };
 
 }  // namespace partiemc

@@ -35,9 +35,11 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Lists each member by name. If a member is added, this statement does not compile until the
   // author also hashes the new member.
-  const auto& [placement, fill, spacing, spacing_rule, kernel_radius, cell_size, reference_radius,
-               surface_offset, attribute_tolerance, normal_memory, clean, min_component_area,
-               min_component_particles, plane, slice, isovalue, sections] = parameters;
+  const auto& [output, placement, fill, spacing, spacing_rule, kernel_radius, cell_size,
+               reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
+               min_component_area, min_component_particles, plane, slice, isovalue, sections,
+               surface] = parameters;
+  const auto& [thinning_distance, max_drop_particles, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
   const auto put_optional = [&](std::optional<double> value) {
@@ -74,6 +76,13 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     put_small('t');  // Distinguishes it from an isovalue.
     PutNumber(attribute_tolerance, bytes);
+  }
+  if (output != Output::kOutline) {
+    put_small('o');
+    put_small(output);
+    PutNumber(thinning_distance, bytes);
+    PutNumber(max_drop_particles, bytes);
+    PutNumber(min_component_volume, bytes);
   }
   if (isovalue) PutNumber(*isovalue, bytes);
   for (const Section& section : sections) {

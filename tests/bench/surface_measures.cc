@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "bench/measures.h"
 #include "bench/require.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "support/random.h"
 
 namespace partiemc::bench {

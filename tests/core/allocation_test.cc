@@ -18,7 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "support/particles.h"
 
 namespace {

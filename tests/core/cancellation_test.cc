@@ -13,7 +13,7 @@
 
 #include "base/parallel.h"
 #include "partiemc/partiemc.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "support/particles.h"
 #include "support/random.h"
 

@@ -12,7 +12,7 @@
 #include "fuzz/hostile_frames.h"
 #include "fuzz/require.h"
 #include "partiemc/status.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 
 namespace partiemc::fuzz {
 namespace {

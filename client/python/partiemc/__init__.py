@@ -3,6 +3,8 @@
     import partiemc
     result = partiemc.reconstruct(positions, spacing=0.01)     # in this process
     result.rings.points, result.rings.offsets, result.mesh.triangles
+    result = partiemc.reconstruct(in_space, output="surface", spacing=0.01)
+    result.surface.points, result.surface.triangles, result.surface.normals
 
     with partiemc.connect("127.0.0.1:50051", spacing=0.01) as stream:   # on a server
         for result in stream.map(frames):
@@ -17,25 +19,28 @@ that keep the memory of their result alive.
 
 from . import _convert
 from ._errors import Error, PartiemcWarning
-from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Watch, server, streams,
+from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Surface, Watch, server, streams,
                       version as __version__)
 
-__all__ = ["Error", "Mesh", "PartiemcWarning", "Reconstructor", "Result", "Rings", "Stream", "Watch",
-           "connect", "read_pysph", "reconstruct", "server", "streams", "watch"]
+__all__ = ["Error", "Mesh", "PartiemcWarning", "Reconstructor", "Result", "Rings", "Stream", "Surface",
+           "Watch", "connect", "read_pysph", "reconstruct", "server", "streams", "watch"]
 
 
 def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
                 **parameters):
     """Reconstructs one frame in this process and returns a Result.
 
-    positions: (N, 2) float32 or float64, world units; (N, 3) for particles in a plane parallel to
-        `plane`; or a tuple of two or three arrays of N. Finite.
+    positions: (N, 2) float32 or float64, world units; (N, 3) for particles in space, or in a plane
+        parallel to `plane`; or a tuple of two or three arrays of N. Finite.
     volumes: (N,) areas of particles, world units squared; spacing squared if None.
     ids: (N,) integers of 32 or 64 bits; a particle has the same id in every frame.
     velocities: same shape as positions, world units per unit of time.
     attributes: particle attributes to interpolate to the vertices (Result.attributes): a dict from
         names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}. `fill` and
         `attribute_tolerance` decide how well triangles represent them.
+    output: "outline", or "surface" for closed surfaces of particles in space (Result.surface).
+        A surface requires (N, 3) positions and spacing; `volumes` are then volumes, and each of
+        `sections` is a slice. Only in this process; servers make outlines.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
     threads: number of compute threads; one per processor if None.
     placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
@@ -54,6 +59,7 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
+    thinning_distance, max_drop_particles, min_component_volume: only for output "surface".
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 
@@ -174,3 +180,4 @@ Rings.to_path = _convert.to_path
 Mesh.to_triangulation = _convert.to_triangulation
 Mesh.to_meshio = _convert.to_meshio
 Result.to_svg = _convert.to_svg
+Surface.to_meshio = _convert.surface_to_meshio

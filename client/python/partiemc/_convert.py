@@ -55,6 +55,18 @@ def to_meshio(mesh, attributes=None):
                        point_data=dict(attributes or {}))
 
 
+def surface_to_meshio(surface, attributes=None):
+    """A meshio Mesh. meshio writes VTK, VTU, PLY, OBJ, STL, Gmsh and other formats.
+
+    attributes: those of the result, at the points of its surface.
+    """
+    import meshio
+    import numpy
+
+    return meshio.Mesh(surface.points, [("triangle", surface.triangles.astype(numpy.int64))],
+                       point_data=dict(attributes or {}))
+
+
 def to_svg(result, width=800):
     """The text of an SVG picture: outline and mesh, `width` pixels wide."""
     points = result.rings.points

@@ -13,10 +13,17 @@
 
 namespace partiemc {
 
+/// What a frame of particles becomes.
+enum class Output : std::uint8_t {
+  kOutline,  ///< Rings and their mesh in a plane (core/METHOD.md).
+  kSurface,  ///< Closed surfaces in space (core/SURFACES.md).
+};
+
 /// How the vertices of the outline are placed (paper, sections 3.4-3.5; core/METHOD.md,
 /// "Placements").
 enum class Placement : std::uint8_t {
-  kMarchingSquares,   ///< Linear interpolation of the level set on lattice edges.
+  kMarchingSquares,   ///< Linear interpolation of the level set on lattice edges; for surfaces,
+                      ///< marching cubes.
   kQef,               ///< Marching squares plus one vertex per cell that minimises Eq. 14.
   kFarthestParticle,  ///< Section 3.5 to the letter: vertices are particles. For comparisons only:
                       ///< rings may cross, triangles may fold.
@@ -58,14 +65,37 @@ struct SlicePlane {
 
 /// A further outline of the same particles. All other parameters are those of the stream.
 struct Section {
-  /// Absent: the slice of the stream. May be present only if the stream has a slice.
+  /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
+  /// present only if the stream has a slice.
   std::optional<SlicePlane> slice = std::nullopt;
   std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
 
   friend bool operator==(const Section&, const Section&) = default;
 };
 
+/// Used only by Output::kSurface.
+struct SurfaceOptions {
+  /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
+  /// replace them, in spacings. At least 0; 0 keeps all. Marching cubes ignore it.
+  double thinning_distance = .03;
+
+  /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
+  /// particles, where nothing else is near. 0: none. Only for `virtual-plane`.
+  std::uint64_t max_drop_particles = 30;
+
+  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings. At least 0;
+  /// 0 keeps all. `min_component_particles` applies to surfaces, too.
+  double min_component_volume = 0;
+
+  friend bool operator==(const SurfaceOptions&, const SurfaceOptions&) = default;
+};
+
+/// The parameters of a stream. Output::kSurface requires `spacing`, ignores `fill`,
+/// `spacing_rule`, `surface_offset`, `attribute_tolerance`, `normal_memory`, `min_component_area`
+/// and `plane`, and excludes `slice`, `isovalue` and Placement::kFarthestParticle. Its sections are
+/// slices of the same particles.
 struct ReconstructionParameters {
+  Output output = Output::kOutline;
   Placement placement = Placement::kVirtualPlane;
   Fill fill = Fill::kGreedy;
 
@@ -141,6 +171,8 @@ struct ReconstructionParameters {
   /// another frame, except that the input is checked only once.
   std::vector<Section> sections = {};
 
+  SurfaceOptions surface = {};
+
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;
 };
@@ -158,6 +190,7 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters);
 bool KeepsGuarantees(Placement placement);
 
 /// The names used on command lines, in files and in reports: "marching-squares", "greedy", ...
+std::string_view Name(Output output);
 std::string_view Name(Placement placement);
 std::string_view Name(Fill fill);
 std::string_view Name(SpacingRule rule);

@@ -21,4 +21,5 @@
 #include "partiemc/stage.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
+#include "partiemc/surface.h"
 #include "partiemc/validate.h"

@@ -1,4 +1,4 @@
-// Turns frames of particles into outlines and meshes.
+// Turns frames of particles into outlines and meshes, or into surfaces.
 #pragma once
 
 #include <atomic>
@@ -57,6 +57,7 @@ struct FrameControl {
 };
 
 struct VirtualPlaneVariant;  // core/internal/research.h
+class SurfaceReconstructor;  // partiemc/surface_reconstructor.h
 
 /// Reconstructs frames with the parameters of one stream. Immutable; may be shared between threads.
 class Reconstructor {
@@ -70,8 +71,9 @@ class Reconstructor {
   /// in the points of the rings.
   /// Errors with a Violation:
   ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, particles
-  ///   outside one plane. RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory`
-  ///   refused the memory. OUT_OF_RANGE: float32 too coarse for the spacing.
+  ///   outside one plane, a state of another kind of stream. RESOURCE_EXHAUSTED: too many particles
+  ///   or tiles, or `control.memory` refused the memory. OUT_OF_RANGE: float32 too coarse for the
+  ///   spacing.
   /// Errors without a Violation: CANCELLED, if `control.cancelled` was set; INTERNAL, a bug.
   /// On an error or exception (std::bad_alloc) `state` is unchanged and `result` is empty. After
   /// CANCELLED or an exception `workspace` is empty, too.
@@ -96,6 +98,7 @@ class Reconstructor {
   std::vector<ReconstructionParameters> sections_;  // Resolved.
   FrameLimits limits_;
   std::shared_ptr<const VirtualPlaneVariant> variant_;
+  std::shared_ptr<const SurfaceReconstructor> surface_;  // Null for Output::kOutline.
 };
 
 }  // namespace partiemc

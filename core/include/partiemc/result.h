@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "partiemc/attribute_values.h"
 #include "partiemc/doubt.h"
+#include "partiemc/surface.h"
 
 namespace partiemc {
 
@@ -82,17 +84,19 @@ struct Mesh {
 
 struct FrameStatistics {
   std::uint64_t particles = 0;
-  std::uint64_t tiles = 0;               ///< Tiles of 32 x 32 nodes that were allocated.
-  std::uint64_t active_cells = 0;        ///< Cells that the outline crosses.
+  /// Tiles of 32 x 32 nodes that were allocated; for surfaces, bricks of 8 x 8 x 8 nodes.
+  std::uint64_t tiles = 0;
+  std::uint64_t active_cells = 0;        ///< Cells that the outline crosses; 0 for surfaces.
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Components below the minimum size in the parameters.
-  std::uint64_t triangles = 0;           ///< Triangles of the mesh.
+  std::uint64_t triangles = 0;           ///< Triangles of the mesh or of the surface.
   std::uint64_t triangles_grid = 0;      ///< Triangles of a mesh by Fill::kGrid of the same rings.
   std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.
   std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
-  double area = 0;       ///< Sum over rings of their signed areas, world units squared.
+  double area = 0;  ///< Rings: sum of their signed areas. Surfaces: sum of the areas of shells.
   double perimeter = 0;  ///< Sum over rings, world units.
+  double volume = 0;     ///< Sum over shells of their signed volumes; 0 for outlines.
   double spacing = 0;    ///< Spacing used in this frame, world units; 0: unknown.
   double cell_size = 0;  ///< Lattice spacing, world units; constant in a stream unless provisional.
   Doubts doubts;         ///< Reasons to distrust the result.
@@ -100,20 +104,12 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-/// An attribute of the frame (Frame::attributes), interpolated to the vertices.
-struct AttributeValues {
-  std::string name;
-  int components = 1;
-  /// Interleaved, `components` per vertex: first the points of the rings, then the other points of
-  /// the mesh in the order of Mesh::points.
-  std::vector<float> values;
-
-  friend bool operator==(const AttributeValues&, const AttributeValues&) = default;
-};
-
+/// Output::kOutline leaves `surface` empty, Output::kSurface leaves `rings` and `mesh` empty. Its
+/// attributes are in `surface`.
 struct Result {
   Rings rings;
-  Mesh mesh;                                ///< Empty for Fill::kNone.
+  Mesh mesh;  ///< Empty for Fill::kNone.
+  Surface surface;
   std::vector<AttributeValues> attributes;  ///< In the order of Frame::attributes.
   FrameStatistics statistics;
   /// The results of ReconstructionParameters::sections. Each is the same as if its outline were the
@@ -129,6 +125,7 @@ struct Result {
 /// so that any client can compute them.
 std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
+std::uint64_t DigestSurface(const Surface& surface);
 
 /// The digests of one outline.
 struct OutlineDigests {

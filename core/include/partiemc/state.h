@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "partiemc/result.h"
+#include "partiemc/surface_state.h"
 
 namespace partiemc {
 
@@ -83,6 +84,8 @@ struct State {
   /// Normals of the active cells of the last frame by row, then column; at most one per cell.
   std::vector<CellNormal> normals;
   RingHistory history;
+  /// The state of the surface. With Output::kSurface the members above stay empty.
+  SurfaceState surface;
   /// The states of the sections (ReconstructionParameters::sections).
   std::vector<State> sections;
 
@@ -91,7 +94,8 @@ struct State {
 
 /// Writes a state with version and checksum; same bytes on every machine. Size: 88 bytes, 16 per
 /// normal, 32 per ring, 16 per run, 20 per sample. A state with sections takes 24 bytes, and for
-/// each outline 8 bytes plus the size of its state.
+/// each outline 8 bytes plus the size of its state. A state of a stream of surfaces does the same,
+/// with the surface in place of the first outline.
 std::string Serialize(const State& state);
 
 /// The size of Serialize(state), without writing it.

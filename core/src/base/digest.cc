@@ -51,6 +51,15 @@ std::uint64_t DigestMesh(const Mesh& mesh) {
   return digest.value();
 }
 
+std::uint64_t DigestSurface(const Surface& surface) {
+  Digest digest;
+  digest.Add(surface.points);
+  digest.Add(surface.triangles);
+  digest.Add(surface.triangle_offsets);
+  digest.Add(surface.outer_of);
+  return digest.value();
+}
+
 std::vector<OutlineDigests> DigestSections(const Result& result) {
   std::vector<OutlineDigests> digests;
   for (const Result& section : result.sections) {

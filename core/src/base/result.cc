@@ -1,7 +1,5 @@
 #include "partiemc/result.h"
 
-#include "partiemc/surface.h"
-
 namespace partiemc {
 
 void Rings::Clear() {
@@ -23,6 +21,7 @@ void Mesh::Clear() {
 void Result::Clear() {
   rings.Clear();
   mesh.Clear();
+  surface.Clear();
   for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
   for (Result& section : sections) section.Clear();

@@ -165,12 +165,14 @@ absl::Status CheckMesh(const Result& result, bool allows_t_junctions) {
 }  // namespace
 
 absl::Status Validate(const Result& result) {
+  if (absl::Status status = Validate(result.surface); !status.ok()) return status;
   if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
   // With Fill::kNone there is no mesh to check.
   return result.mesh == Mesh{} ? absl::OkStatus() : CheckMesh(result, true);
 }
 
 absl::Status Validate(const Result& result, Fill fill) {
+  if (absl::Status status = Validate(result.surface); !status.ok()) return status;
   if (absl::Status status = CheckRings(result.rings); !status.ok()) return status;
   if (fill == Fill::kNone && result.mesh == Mesh{}) return absl::OkStatus();
   return CheckMesh(result, fill != Fill::kConforming && fill != Fill::kPolygon);

@@ -34,4 +34,9 @@ double CalibratedSliceRadius(double kernel_radius) {
   return AxisAlignedLatticeDistance<true>(kernel_radius);
 }
 
+double CalibratedSurfaceRadius(double kernel_radius) {
+  constexpr double kFactor = 1.065;
+  return kFactor * CalibratedSliceRadius(kernel_radius);
+}
+
 }  // namespace partiemc

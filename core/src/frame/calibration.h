@@ -13,4 +13,7 @@ double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 /// with balls and tori cut at many heights show (core/METHOD.md, "Slices").
 double CalibratedSliceRadius(double kernel_radius);
 
+/// The reference radius of surfaces, for every placement (core/SURFACES.md, "Calibration").
+double CalibratedSurfaceRadius(double kernel_radius);
+
 }  // namespace partiemc

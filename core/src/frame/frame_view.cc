@@ -216,7 +216,7 @@ absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& para
   }
   if (parameters.slice && frame.components != 3) {
     return InvalidFrame(kReasonOutOfRange, "components", absl::StrCat(frame.components),
-                        "must be 3 for a slice: x, y and z");
+                        "must be 3 for a slice or a surface: x, y and z");
   }
   if (values % frame.components != 0) {
     return InvalidFrame(kReasonCount, "positions", absl::StrCat(values, " values"),

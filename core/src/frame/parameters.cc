@@ -86,6 +86,7 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   if (p.isovalue) {
     if (auto status = CheckIsovalue("", *p.isovalue); !status.ok()) return status;
   }
+  const bool is_surface = p.output == Output::kSurface;
   if (p.sections.size() > p.kMaxSections) {
     return Refused("sections", absl::StrCat(p.sections.size()),
                    absl::StrCat("must be at most ", p.kMaxSections));
@@ -93,7 +94,10 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   for (std::size_t k = 0; k < p.sections.size(); ++k) {
     const Section& section = p.sections[k];
     const std::string of = absl::StrCat("sections[", k, "].");
-    if (section.slice && !p.slice) {
+    if (is_surface && !section.slice) {
+      return Refused(of + "slice", "absent", "must be present: the stream has a surface");
+    }
+    if (section.slice && !p.slice && !is_surface) {
       return Refused(of + "slice", "present", "must be absent unless parameters.slice is set");
     }
     if (section.slice) {
@@ -117,6 +121,36 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     return Refused("placement", std::string(Name(p.placement)),
                    "must be another one for an isovalue: its vertices are particles, which are not "
                    "on the isoline");
+  }
+  return absl::OkStatus();
+}
+
+// Checks what only surfaces require.
+absl::Status CheckSurface(const ReconstructionParameters& p) {
+  const auto check = [](const char* field, double value, const char* rule) {
+    if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
+    return OutOfRange(field, value, rule);
+  };
+  if (auto status = check("surface.thinning_distance", p.surface.thinning_distance,
+                          "must be 0 or more spacings, and finite");
+      !status.ok()) {
+    return status;
+  }
+  if (auto status = check("surface.min_component_volume", p.surface.min_component_volume,
+                          "must be 0 or more cubed spacings, and finite");
+      !status.ok()) {
+    return status;
+  }
+  if (p.output != Output::kSurface) return absl::OkStatus();
+  if (!p.spacing) return Refused("spacing", "absent", "must be given for a surface");
+  if (p.slice) {
+    return Refused("slice", "present",
+                   "must be absent for a surface: add a section with the slice");
+  }
+  if (p.isovalue) return Refused("isovalue", "present", "must be absent for a surface");
+  if (!KeepsGuarantees(p.placement)) {
+    return Refused("placement", std::string(Name(p.placement)),
+                   "must be another one for a surface");
   }
   return absl::OkStatus();
 }
@@ -150,15 +184,17 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
     return OutOfRange("min_component_area", p.min_component_area,
                       "must be 0 or more squared spacings, and finite");
   }
+  if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   return CheckOutlines(p);
 }
 
 ReconstructionParameters Resolve(ReconstructionParameters parameters) {
   if (!parameters.reference_radius) {
+    const double kernel_radius = parameters.kernel_radius;
     parameters.reference_radius =
-        parameters.slice
-            ? CalibratedSliceRadius(parameters.kernel_radius)
-            : CalibratedReferenceRadius(parameters.placement, parameters.kernel_radius);
+        parameters.output == Output::kSurface ? CalibratedSurfaceRadius(kernel_radius)
+        : parameters.slice                    ? CalibratedSliceRadius(kernel_radius)
+                           : CalibratedReferenceRadius(parameters.placement, kernel_radius);
   }
   if (!parameters.clean) {
     parameters.clean = TraitsOf(parameters.placement).cleans && !parameters.isovalue;
@@ -169,6 +205,8 @@ ReconstructionParameters Resolve(ReconstructionParameters parameters) {
 bool KeepsGuarantees(Placement placement) { return !TraitsOf(placement).takes_particles; }
 
 std::string_view Name(Placement placement) { return TraitsOf(placement).name; }
+
+std::string_view Name(Output output) { return output == Output::kOutline ? "outline" : "surface"; }
 
 std::string_view Name(Fill fill) { return NameOf(kFillNames, fill); }
 

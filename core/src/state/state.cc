@@ -3,7 +3,9 @@
 // samples, these arrays, checksum.
 //
 // A state with sections has another magic, the version and the number of states. Each state
-// follows, the main one first: the number of its bytes, then its bytes. The checksum is last.
+// follows, the main one first: the number of its bytes, then its bytes. The checksum is last. The
+// state of a stream of surfaces has a third magic and the same layout. Its first state is a
+// SurfaceState.
 #include "partiemc/state.h"
 
 #include <array>
@@ -25,8 +27,9 @@
 namespace partiemc {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x53504d45;          // "EMPS"
-constexpr std::uint32_t kSectionsMagic = 0x4d504d45;  // "EMPM"
+constexpr std::uint32_t kMagic = 0x53504d45;             // "EMPS"
+constexpr std::uint32_t kSectionsMagic = 0x4d504d45;     // "EMPM"
+constexpr std::uint32_t kWithSurfaceMagic = 0x55504d45;  // "EMPU"
 constexpr std::uint32_t kVersion = 5;
 
 // The arrays of a state in the order of the layout.
@@ -154,6 +157,8 @@ absl::Status CheckContents(const State& state) {
   return status;
 }
 
+bool HasSurface(const State& state) { return state.surface != SurfaceState{}; }
+
 Counts CountsOf(const State& state) {
   return std::apply([](const auto&... arrays) { return Counts{arrays.size()...}; },
                     ArraysOf(state));
@@ -206,7 +211,8 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   return state;
 }
 
-absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
+// Reads the bytes of several states. The first one is a SurfaceState if `has_surface`.
+absl::StatusOr<State> ParseStates(std::string_view bytes, bool has_surface) {
   constexpr std::size_t kMostStates = 1 + ReconstructionParameters::kMaxSections;
   if (bytes.size() < kSectionsHeaderBytes + kChecksumBytes) {
     return Corrupt(absl::StrCat(bytes.size(), " bytes"), kAsWritten);
@@ -215,16 +221,25 @@ absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
   std::string_view rest = bytes.substr(4, bytes.size() - 4 - kChecksumBytes);
   if (absl::Status status = TakeVersion(rest, kVersion); !status.ok()) return status;
   const auto count = TakeNumber<std::uint64_t>(rest);
-  if (count < 2 || count > kMostStates) {
-    return Corrupt(absl::StrCat(count, " states"), absl::StrCat("must be 2 to ", kMostStates));
+  const std::uint64_t least = has_surface ? 1 : 2;
+  if (count < least || count > kMostStates) {
+    return Corrupt(absl::StrCat(count, " states"),
+                   absl::StrCat("must be ", least, " to ", kMostStates));
   }
   State state;
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::uint64_t own = rest.size() < 8 ? ~std::uint64_t{0} : TakeNumber<std::uint64_t>(rest);
     if (own > rest.size()) return Corrupt("states cut off", kAsWritten);
-    auto parsed = ParseOwn(rest.substr(0, own));
-    if (!parsed.ok()) return parsed;
+    const std::string_view own_bytes = rest.substr(0, own);
     rest.remove_prefix(own);
+    if (k == 0 && has_surface) {
+      auto surface = ParseSurfaceState(own_bytes);
+      if (!surface.ok()) return surface.status();
+      state.surface = *std::move(surface);
+      continue;
+    }
+    auto parsed = ParseOwn(own_bytes);
+    if (!parsed.ok()) return parsed;
     if (k == 0) {
       state = *std::move(parsed);
     } else {
@@ -238,8 +253,10 @@ absl::StatusOr<State> ParseWithSections(std::string_view bytes) {
 }  // namespace
 
 std::size_t SerializedBytes(const State& state) {
-  if (state.sections.empty()) return OwnBytes(state);
-  std::size_t bytes = kSectionsHeaderBytes + 8 + OwnBytes(state) + kChecksumBytes;
+  const bool has_surface = HasSurface(state);
+  if (state.sections.empty() && !has_surface) return OwnBytes(state);
+  const std::size_t first = has_surface ? SerializedBytes(state.surface) : OwnBytes(state);
+  std::size_t bytes = kSectionsHeaderBytes + 8 + first + kChecksumBytes;
   for (const State& section : state.sections) bytes += 8 + OwnBytes(section);
   return bytes;
 }
@@ -247,18 +264,25 @@ std::size_t SerializedBytes(const State& state) {
 std::string Serialize(const State& state) {
   std::string bytes;
   bytes.reserve(SerializedBytes(state));
-  if (state.sections.empty()) {
+  const bool has_surface = HasSurface(state);
+  if (state.sections.empty() && !has_surface) {
     PutOwn(state, bytes);
     return bytes;
   }
-  PutNumber(kSectionsMagic, bytes);
+  PutNumber(has_surface ? kWithSurfaceMagic : kSectionsMagic, bytes);
   PutNumber(kVersion, bytes);
   PutNumber(std::uint64_t{state.sections.size() + 1}, bytes);
   const auto put = [&](const State& own) {
     PutNumber(std::uint64_t{OwnBytes(own)}, bytes);
     PutOwn(own, bytes);
   };
-  put(state);
+  if (has_surface) {
+    const std::string surface = Serialize(state.surface);
+    PutNumber(std::uint64_t{surface.size()}, bytes);
+    bytes += surface;
+  } else {
+    put(state);
+  }
   for (const State& section : state.sections) put(section);
   PutNumber(ChecksumOf(bytes), bytes);
   return bytes;
@@ -266,8 +290,9 @@ std::string Serialize(const State& state) {
 
 absl::StatusOr<State> ParseState(std::string_view bytes) {
   std::string_view rest = bytes;
-  const bool has_sections = rest.size() >= 4 && TakeNumber<std::uint32_t>(rest) == kSectionsMagic;
-  return has_sections ? ParseWithSections(bytes) : ParseOwn(bytes);
+  const auto magic = rest.size() < 4 ? 0 : TakeNumber<std::uint32_t>(rest);
+  if (magic != kSectionsMagic && magic != kWithSurfaceMagic) return ParseOwn(bytes);
+  return ParseStates(bytes, magic == kWithSurfaceMagic);
 }
 
 }  // namespace partiemc

@@ -103,7 +103,7 @@ TEST(Convert, KeepsParticlesInSpaceForSlices) {
 
   const Ran flat = RunPartiemc({"replay", recording, "--local"});
   EXPECT_EQ(flat.exit_code, 3);
-  EXPECT_THAT(flat.error, HasSubstr("has three coordinates; replay it with --slice"));
+  EXPECT_THAT(flat.error, HasSubstr("has three coordinates; replay it with --slice or --surface"));
   const Ran sliced = RunPartiemc({"replay", kDamBreak, "--local", "--slice", "z=0"});
   EXPECT_EQ(sliced.exit_code, 3);
   EXPECT_THAT(sliced.error, HasSubstr("has two coordinates; leave --slice"));

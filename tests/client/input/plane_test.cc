@@ -120,7 +120,8 @@ TEST(Plane, InSpaceAllAxesStay) {
   rows.has_position[2] = false;
   const absl::Status flat = projection.Project(rows, frame, notices);
   EXPECT_EQ(flat.code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(flat.message(), "frame.csv: has two coordinates; must have x, y and z for a slice");
+  EXPECT_EQ(flat.message(),
+            "frame.csv: has two coordinates; must have x, y and z for a slice or a surface");
 }
 
 }  // namespace

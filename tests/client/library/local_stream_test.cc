@@ -93,6 +93,35 @@ TEST(LocalStream, CancelEndsItWithFramesStillWaiting) {
             absl::StatusCode::kCancelled);
 }
 
+TEST(LocalStream, SurfacesAreThoseOfTheReconstructor) {
+  const ReconstructionParameters parameters{
+      .output = Output::kSurface,
+      .spacing = 1,
+      .sections = {{.slice = SlicePlane{.origin = {0, 0, 1.5}, .normal = {0, 0, 1}}}}};
+  std::vector<double> cube;
+  for (int k = 0; k < 512; ++k) {
+    for (const int at : {k % 8, k / 8 % 8, k / 64}) cube.push_back(at);
+  }
+  const Frame frame{.positions = std::span<const double>(cube), .components = 3};
+  const auto stream = LocalStream::Open({.parameters = parameters, .threads = 2});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  const auto reconstructor = Reconstructor::Create(parameters);
+  State state;
+  Workspace workspace;
+  Result expected;
+  Event event;
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE((*stream)->Send(frame, k).ok());
+    ASSERT_TRUE((*stream)->Receive(event).ok());
+    ASSERT_EQ(event.kind, Event::Kind::kResult);
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, state, workspace, expected).ok());
+    EXPECT_GT(expected.surface.TriangleCount(), 100u);
+    EXPECT_EQ(event.frame.result, expected);
+    EXPECT_EQ(event.frame.surface_digest, DigestSurface(expected.surface));
+    EXPECT_EQ(event.frame.section_digests, DigestSections(expected));
+  }
+}
+
 TEST(LocalStream, WrongParametersAreRefused) {
   EXPECT_EQ(LocalStream::Open({.parameters = {.cell_size = 100}}).status().code(),
             absl::StatusCode::kInvalidArgument);

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/exact_shapes.h"
 #include "space/space_particles.h"
 

@@ -8,7 +8,7 @@
 
 #include "frame/calibration.h"
 #include "partiemc/status.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/cleaning.h"

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 #include "support/tries.h"
 

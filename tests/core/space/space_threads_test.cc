@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "partiemc/arena.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/near_particles.h"
 #include "space/point_sums.h"
 #include "space/space_particles.h"

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/bodies.h"
 #include "space/cell_loops.h"
 #include "space/certificate.h"

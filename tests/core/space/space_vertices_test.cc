@@ -9,7 +9,7 @@
 
 #include "frame/calibration.h"
 #include "frame/scale.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/crossings.h"

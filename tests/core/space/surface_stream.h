@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/vec3.h"
-#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 #include "support/random.h"
 #include "support/tracked_scene.h"

@@ -37,6 +37,7 @@ struct FrameResult {
   FrameTimes times;
   std::uint64_t rings_digest = 0;                    ///< DigestRings of the whole result.
   std::uint64_t mesh_digest = 0;                     ///< DigestMesh of the whole result.
+  std::uint64_t surface_digest = 0;                  ///< DigestSurface of the whole result.
   std::vector<OutlineDigests> section_digests = {};  ///< The digests of each of result.sections.
 };
 

@@ -32,6 +32,10 @@ absl::Status SetByName(std::string_view field, std::string_view name, std::span<
       {"UNSUPPORTED", "parameters." + std::string(field), std::string(name), std::move(rule)});
 }
 
+inline absl::Status SetByName(std::string_view name, Output& output) {
+  static constexpr std::array kAll = {Output::kOutline, Output::kSurface};
+  return SetByName("output", name, std::span<const Output>(kAll), output);
+}
 inline absl::Status SetByName(std::string_view name, Placement& placement) {
   return SetByName("placement", name, AllPlacements(), placement);
 }

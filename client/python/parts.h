@@ -1,0 +1,43 @@
+// The parts of a result as Python objects: what rings, meshes and surfaces have in common.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <vector>
+
+#include "client/python/arrays.h"
+
+namespace partiemc::python {
+
+/// A part of a result. `owner` is the Python object that keeps the arrays alive.
+template <typename Part>
+struct PartOf {
+  pybind11::object owner;
+  const Part& part;
+};
+
+/// One member of the measures of all rings or shells, as a strided view. With `columns`, the
+/// members that follow it in memory are the other columns.
+template <typename As, typename T, typename Measures, typename Part>
+pybind11::array Column(const PartOf<Part>& of, T Measures::*member, pybind11::ssize_t columns = 0) {
+  const std::vector<Measures>& measures = of.part.measures;
+  const void* first = measures.empty() ? nullptr : &(measures.front().*member);
+  const auto count = static_cast<pybind11::ssize_t>(measures.size());
+  constexpr pybind11::ssize_t kStride = sizeof(Measures);
+  if (columns == 0) return View<As>(first, {count}, {kStride}, of.owner);
+  return View<As>(first, {count, columns}, {kStride, sizeof(T)}, of.owner);
+}
+
+/// Pickles a part of a result (such as its rings) as a reference: the result, and the name of the
+/// attribute that holds the part.
+template <typename Part>
+auto Reduce(const char* attribute) {
+  return [attribute](const PartOf<Part>& view) {
+    namespace py = pybind11;
+    return py::make_tuple(py::module_::import("builtins").attr("getattr"),
+                          py::make_tuple(view.owner, attribute));
+  };
+}
+
+}  // namespace partiemc::python

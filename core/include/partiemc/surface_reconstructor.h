@@ -1,0 +1,112 @@
+// Turns frames of particles that fill space into closed surfaces. Reconstructor does the same for
+// streams; this is the interface for research.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/reconstructor.h"
+#include "partiemc/surface.h"
+#include "partiemc/surface_state.h"
+
+namespace partiemc {
+
+/// How the vertices of a surface are placed (core/SURFACES.md).
+enum class SurfacePlacement : std::uint8_t {
+  kMarchingCubes,  ///< Linear interpolation of the level set on lattice edges.
+  kQef,            ///< Vertices in cells by dual contouring (least squares), for comparison.
+  kVirtualPlane,   ///< Vertices on smoothed planes, with the volume of the particles.
+};
+
+struct SurfaceParameters {
+  SurfacePlacement placement = SurfacePlacement::kMarchingCubes;
+
+  /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of h.
+  double spacing = 1;
+  /// As in ReconstructionParameters, with the same ranges.
+  double kernel_radius = 3, cell_size = 1;
+  /// Reference radius in spacings. Absent: calibrated (core/SURFACES.md).
+  std::optional<double> reference_radius = std::nullopt;
+
+  /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for
+  /// `kVirtualPlane`, off for the other placements.
+  std::optional<bool> clean = std::nullopt;
+
+  /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
+  /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
+  double thinning_distance = .03;
+
+  /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
+  /// particles, where nothing else is near. 0: none. Only for `kVirtualPlane`.
+  std::uint64_t max_drop_particles = 30;
+
+  /// Spray: drops bodies whose particles have less volume than `min_component_volume`, in cubed
+  /// spacings, or number fewer than `min_component_particles`. At least 0; 0 keeps all.
+  double min_component_volume = 0;
+  std::uint64_t min_component_particles = 0;
+
+  friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
+};
+
+/// Reusable buffers, one set for each thread that calls Reconstruct. Earlier frames in the same
+/// workspace never change a result.
+class SurfaceWorkspace {
+ public:
+  SurfaceWorkspace();
+  ~SurfaceWorkspace();
+  SurfaceWorkspace(SurfaceWorkspace&&) noexcept;
+  SurfaceWorkspace& operator=(SurfaceWorkspace&&) noexcept;
+
+  struct Buffers;
+  Buffers& buffers() { return *buffers_; }
+
+ private:
+  std::unique_ptr<Buffers> buffers_;
+};
+
+/// Reconstructs surfaces. Immutable; may be shared between threads.
+class SurfaceReconstructor {
+ public:
+  /// Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
+  static absl::StatusOr<SurfaceReconstructor> Create(const SurfaceParameters& parameters,
+                                                     const FrameLimits& limits = {});
+
+  /// Reconstructs one frame and updates `state`; `frame.components` is 3, volumes are in world
+  /// units cubed. Runs in the caller's Arena. The bits of `surface` and `state` depend neither on
+  /// the number of threads nor on the order of the particles. Limits: `max_tiles` counts bricks of
+  /// 8 x 8 x 8 nodes. Reserves from
+  /// `control.memory` twice: the bricks, then the full estimate.
+  /// No stage is reported to `control.observer`.
+  /// Errors: as Reconstructor; INVALID_ARGUMENT (CORRUPT_STATE) for the state of a stream with
+  /// another cell size. On an error or exception (std::bad_alloc) `state` is unchanged and
+  /// `surface` is empty. After CANCELLED or an exception `workspace` is empty, too.
+  absl::Status Reconstruct(const Frame& frame, SurfaceState& state, SurfaceWorkspace& workspace,
+                           Surface& surface, const FrameControl& control = {}) const;
+
+  /// Reconstructs a frame that belongs to no stream. Shells have no identities and no parents; all
+  /// else is the same.
+  absl::Status Reconstruct(const Frame& frame, SurfaceWorkspace& workspace, Surface& surface,
+                           const FrameControl& control = {}) const;
+
+ private:
+  SurfaceReconstructor(const SurfaceParameters& parameters, const FrameLimits& limits);
+
+  // `state` is null for a frame that belongs to no stream.
+  absl::Status ReconstructFrame(const Frame& frame, SurfaceState* state,
+                                SurfaceWorkspace& workspace, Surface& surface,
+                                const FrameControl& control) const;
+  absl::Status ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
+                                  SurfaceWorkspace::Buffers& buffers, Surface& surface,
+                                  MemoryGuard* memory) const;
+
+  SurfaceParameters parameters_;
+  ReconstructionParameters in_space_;  // Resolved, in the form for the stages.
+  FrameLimits limits_;
+};
+
+}  // namespace partiemc

@@ -1,0 +1,104 @@
+// `partiemc replay --surface` as a program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// Two balls of particles with the attribute `p`, in two frames that differ by a shift.
+void WriteBalls(const support::TemporaryFolder& directory) {
+  for (int frame = 0; frame < 2; ++frame) {
+    std::ofstream file(directory.Path("frame_" + std::to_string(frame) + ".csv"));
+    file << "x,y,z,p\n";
+    for (const int centre : {0, 12}) {
+      for (int x = -5; x <= 5; ++x) {
+        for (int y = -5; y <= 5; ++y) {
+          for (int z = -5; z <= 5; ++z) {
+            if (x * x + y * y + z * z > 20) continue;
+            file << x + centre + .3 * frame << "," << y << "," << z << "," << x << "\n";
+          }
+        }
+      }
+    }
+  }
+}
+
+std::vector<std::string> Flags(const support::TemporaryFolder& input,
+                               std::vector<std::string> more) {
+  std::vector<std::string> flags = {"replay",    input.path().string(), "--local",
+                                    "--surface", "--spacing",           "1"};
+  flags.insert(flags.end(), more.begin(), more.end());
+  return flags;
+}
+
+TEST(SurfaceReplay, WritesFilesStatisticsAndOutlinesOnPlanes) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const Ran ran = RunPartiemc(
+      Flags(input, {"--check", "--slice", "z=0", "--attributes", "p", "--output-dir",
+                    output.Path("files"), "--format", "ply,stl", "--stats", output.Path("s.csv")}));
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("2 frames"), HasSubstr("whole frame")));
+  EXPECT_THAT(
+      FilesIn(output.path()),
+      ElementsAre("files/frame_000000.ply", "files/frame_000000.stl",
+                  "files/frame_000000_section_1.ply", "files/frame_000000_section_1.stl",
+                  "files/frame_000001.ply", "files/frame_000001.stl",
+                  "files/frame_000001_section_1.ply", "files/frame_000001_section_1.stl", "s.csv"));
+  const std::string ply = Content(output.Path("files/frame_000001.ply"));
+  EXPECT_THAT(ply, StartsWith("ply\nformat binary_little_endian 1.0\n"));
+  EXPECT_THAT(ply.substr(0, 600), HasSubstr("property float p\n"));
+}
+
+TEST(SurfaceReplay, WritesPlyByDefault) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const Ran ran = RunPartiemc(Flags(input, {"--frames", "0:1", "--output-dir", output.Path("")}));
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(FilesIn(output.path()), ElementsAre("frame_000000.ply"));
+}
+
+TEST(SurfaceReplay, DropsSmallBodiesOnRequest) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const auto size_with = [&](const std::string& least) {
+    const Ran ran = RunPartiemc(
+        Flags(input, {"--frames", "0:1", "--min-volume", least, "--output-dir", output.Path("")}));
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return Content(output.Path("frame_000000.ply")).size();
+  };
+  EXPECT_GT(size_with("0"), 10 * size_with("1000"));
+}
+
+TEST(SurfaceReplay, TellsWhatItRequires) {
+  const support::TemporaryFolder input;
+  WriteBalls(input);
+  const std::string frames = input.path().string();
+  const Ran flat = RunPartiemc({"replay", frames, "--local"});
+  EXPECT_EQ(flat.exit_code, 3);
+  EXPECT_THAT(flat.error, AllOf(HasSubstr("is 3D"), HasSubstr("--surface"), HasSubstr("--slice")));
+  const Ran without_spacing = RunPartiemc({"replay", frames, "--local", "--surface"});
+  EXPECT_EQ(without_spacing.exit_code, 2);
+  EXPECT_THAT(without_spacing.error, HasSubstr("--spacing: absent; must be given"));
+  const Ran in_plane = RunPartiemc({"replay", kDamBreak, "--local", "--surface"});
+  EXPECT_EQ(in_plane.exit_code, 3);
+  EXPECT_THAT(in_plane.error, HasSubstr("has two coordinates; leave --slice, --surface"));
+  const Ran served = RunPartiemc({"replay", frames, "--surface", "--spacing", "1"});
+  EXPECT_EQ(served.exit_code, 2);
+  EXPECT_THAT(served.error, HasSubstr("--surface: requires --local"));
+}
+
+}  // namespace
+}  // namespace partiemc::client
