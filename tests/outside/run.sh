@@ -6,6 +6,7 @@
 # `python`: protocol_client.py, compiled by grpcio-tools of PyPI, streams the dam break.
 # `go`: a client generated for Go streams the dam break.
 # `ghz`: 10,000 unary calls, beside the figures of `partiemc load`.
+# `numpy`: the Python package with NumPy, trimesh and PyVista of PyPI.
 # `gltf`: readers of npm decode the GLB files of --compress-glb.
 # `kubernetes`: kustomize and kubeconform on docker/kubernetes.
 set -euo pipefail
@@ -177,6 +178,34 @@ check_kubernetes() {
   printf '\n$ the base with "containrPort"\n'
   ! "${check[@]}" "$work/misspelled.yaml" >"$work/refused" || fail "a misspelled field is valid"
   grep '^Summary' "$work/refused"
+}
+
+# Requires: numpy, trimesh and pyvista in the Python of $PYTHON, of the version that the package in
+# BIN_DIR/../python was built for.
+check_numpy() {
+  local python=${PYTHON:-python3}
+  local package
+  package=$(cd "$bin/../python" && pwd)
+  "$python" -c 'import numpy, trimesh, pyvista
+for module in (numpy, trimesh, pyvista): print(module.__name__, module.__version__)'
+  export PYTHONPATH=$package PYTHONDONTWRITEBYTECODE=1
+  PARTIEMC_SOURCE_DIR=$root PARTIEMC_PYTHON_DIR=$package PARTIEMC_PROGRAM=$bin/partiemc \
+    PARTIEMC_SERVER_PROGRAM=$bin/partiemc-server \
+    "$python" "$root/tests/client/python/test_reconstruct.py" 2>&1 | grep -E '^(Ran|OK|FAIL|ERROR)' |
+    sed 's/ in .*//'
+  "$python" - <<'PYTHON'
+import numpy, partiemc, pyvista, trimesh
+axis = numpy.arange(-12.0, 13.0)
+ball = numpy.stack(numpy.meshgrid(axis, axis, axis), -1).reshape(-1, 3)
+ball = ball[(ball ** 2).sum(axis=1) < 140]
+surface = partiemc.reconstruct(ball, output="surface", spacing=1).surface
+of_trimesh = trimesh.Trimesh(surface.points, surface.triangles, vertex_normals=surface.normals, process=False)
+of_pyvista = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
+assert of_trimesh.is_watertight and of_trimesh.is_winding_consistent and of_pyvista.is_manifold
+for volume in (of_trimesh.volume, of_pyvista.volume, len(ball)):
+    assert abs(volume - surface.volume[0]) < .002 * volume, (volume, surface.volume)
+print(f"{len(surface.triangles)} triangles, volume {surface.volume[0]:.1f} in all three")
+PYTHON
 }
 
 check_gltf() {
