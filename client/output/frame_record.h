@@ -13,6 +13,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
+#include "partiemc/surface.h"
 
 namespace partiemc::client {
 
@@ -22,6 +23,9 @@ struct FrameRecord {
   std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.
   const Result& result;
+  /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and
+  /// `result` is not used.
+  const Surface* surface = nullptr;
   std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
   std::span<const float> particle_areas = {};      ///< Of each of them; empty: not known.
   std::array<double, kStageCount> stages_ms = {};  ///< Wall time by stage.
@@ -36,6 +40,33 @@ struct FrameRecord {
   const AttributeValues* particle_color = nullptr;
   std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
 };
+
+/// Numbers of a surface, over all of its shells.
+struct SurfaceTotals {
+  std::uint64_t bodies = 0, cavities = 0;
+  std::uint64_t particles = 0;  ///< Sum over bodies.
+  double area = 0;              ///< Sum over bodies and cavities.
+  double volume = 0;            ///< Bodies minus their cavities.
+  std::int64_t genus = 0;       ///< Handles: the sum over shells.
+};
+
+inline SurfaceTotals TotalsOf(const Surface& surface) {
+  SurfaceTotals totals;
+  for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    ++(surface.outer_of[shell] == kNoShell ? totals.bodies : totals.cavities);
+    totals.particles += surface.measures[shell].particles;
+    totals.area += surface.measures[shell].area;
+    totals.volume += surface.measures[shell].volume;
+    // Each triangle has three sides, which it shares with one other triangle each, so the Euler
+    // characteristic is points - triangles / 2.
+    const std::int64_t points =
+        std::int64_t{surface.point_offsets[shell + 1]} - surface.point_offsets[shell];
+    const std::int64_t triangles =
+        std::int64_t{surface.triangle_offsets[shell + 1]} - surface.triangle_offsets[shell];
+    totals.genus += 1 - (points - triangles / 2) / 2;
+  }
+  return totals;
+}
 
 /// Returns section `k` of a frame, from 0 on, as a record. The record has no particles, because
 /// they may lie outside the section's plane. It has no wall times, because they belong to the whole

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <iterator>
 #include <limits>
 #include <span>
 #include <system_error>
@@ -12,7 +12,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_format.h"
 #include "client/output/atomic_file.h"
-#include "client/output/formats.h"
+#include "client/output/formats/formats.h"
 #include "client/output/text.h"
 #include "common/text.h"
 
@@ -64,6 +64,14 @@ std::string_view Name(FrameFormat format) {
   return "";
 }
 
+std::string Names(std::span<const FrameFormat> formats) {
+  std::string names;
+  for (const FrameFormat format : formats) {
+    AppendAll(names, names.empty() ? "" : ",", Name(format));
+  }
+  return names;
+}
+
 absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names) {
   std::vector<FrameFormat> formats;
   for (const std::string_view part : Split(names, ',', /*blanks=*/"")) {
@@ -71,13 +79,10 @@ absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view name
     const auto format = std::find_if(kFormats.begin(), kFormats.end(),
                                      [&](FrameFormat known) { return Name(known) == word; });
     if (format == kFormats.end()) {
-      std::string known;
-      for (const FrameFormat name : kFormats)
-        AppendAll(known, known.empty() ? "" : ",", Name(name));
       const bool needs_vtk = word == Name(FrameFormat::kVtp);
       return absl::InvalidArgumentError(Concat("format: '", absl::Utf8SafeCHexEscape(word), "'",
                                                needs_vtk ? " requires a build with VTK" : "",
-                                               "; must be some of ", known));
+                                               "; must be some of ", Names(kFormats)));
     }
     if (std::find(formats.begin(), formats.end(), *format) == formats.end()) {
       formats.push_back(*format);
@@ -86,22 +91,34 @@ absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view name
   return formats;
 }
 
-bool MeshSharesRingPoints(const Result& result) {
-  const std::vector<double>& rings = result.rings.points;
-  return rings.empty() ||
-         (result.mesh.points.size() >= rings.size() &&
-          std::memcmp(result.mesh.points.data(), rings.data(), rings.size() * sizeof(double)) == 0);
+bool HoldsSurfaces(FrameFormat format) {
+  return format != FrameFormat::kGeoJson && format != FrameFormat::kSvg &&
+         format != FrameFormat::kCsv;
+}
+
+absl::Status CheckHoldsSurfaces(FrameFormat format) {
+  if (HoldsSurfaces(format)) return absl::OkStatus();
+  std::vector<FrameFormat> others;
+  std::ranges::copy_if(kFormats, std::back_inserter(others), HoldsSurfaces);
+  return absl::InvalidArgumentError(Concat("format: '", Name(format),
+                                           "' cannot hold surfaces in space; must be some of ",
+                                           Names(others)));
 }
 
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options) {
-  if (!AllFinite(frame.result.rings.points) || !AllFinite(frame.result.mesh.points)) {
+  if (frame.surface) {
+    if (absl::Status status = CheckHoldsSurfaces(format); !status.ok()) return status;
+  }
+  const std::span<const double> points =
+      frame.surface ? frame.surface->points : frame.result.rings.points;
+  if (!AllFinite(points) || (!frame.surface && !AllFinite(frame.result.mesh.points))) {
     return absl::DataLossError(Concat("frame ", frame.index,
                                       ": a coordinate of the result is not finite; "
                                       "reconstruct it again with --check"));
   }
   const bool has_floats = format == FrameFormat::kStl || format == FrameFormat::kGlb;
-  if (has_floats && !AreFloats(frame.result.rings.points)) {
+  if (has_floats && !AreFloats(points)) {
     return absl::OutOfRangeError(Concat("frame ", frame.index, ": coordinates above 3.4e38; ",
                                         Name(format), " has 32-bit floats"));
   }

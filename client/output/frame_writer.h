@@ -17,6 +17,7 @@
 
 namespace partiemc::client {
 
+/// Each format holds outlines. Formats of meshes also hold surfaces in space: see HoldsSurfaces.
 enum class FrameFormat : std::uint8_t {
   /// RFC 7946 FeatureCollection with one Polygon per outer ring and its holes. In every case outer
   /// rings are counter-clockwise, holes are clockwise, and the first point is repeated at the end.
@@ -30,10 +31,15 @@ enum class FrameFormat : std::uint8_t {
   kSvg,
   /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
   /// polylines). Indices begin at 1.
+  /// A surface: vertices "v x y z", normals "vn", and a group "body_K" of faces for each body,
+  /// which
+  /// includes its cavities. Attributes are left out.
   kObj,
   /// VTK XML PolyData, only in builds with VTK: rings as closed lines, triangles as polygons. Cell
   /// data: "class" (0 boundary and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for
   /// triangles). Point data: the attributes. Field data: TimeValue.
+  /// A surface: triangles as polygons. Cell data: "shell" and "body". Point data also has the
+  /// normals.
   kVtp,
   /// CSV with one row per vertex of the rings and the columns ring,index,x,y,nx,ny. Without normals
   /// nx and ny are empty. Then follows a column for each attribute, or NAME:0, NAME:1 and NAME:2
@@ -41,11 +47,14 @@ enum class FrameFormat : std::uint8_t {
   kCsv,
   /// Binary PLY: the mesh with its attributes (NAME_0, NAME_1 and NAME_2 for a vector). Without a
   /// mesh, the rings as edges.
+  /// A surface: vertices also have the normals nx, ny, nz, and the integer "shell".
   kPly,
   /// Binary STL: the triangles of the mesh in float32. It cannot hold rings and attributes.
+  /// A surface: facets have their normals.
   kStl,
   /// Binary glTF: triangles, and lines for the rings, in float32 relative to the node's
   /// translation. Attributes have the names _NAME.
+  /// A surface: vertices also have normals, and triangles a material that is visible from outside.
   kGlb,
 };
 
@@ -55,6 +64,16 @@ std::span<const FrameFormat> AllFrameFormats();
 /// "geojson", "svg", "obj", "vtp", "csv", "ply", "stl", "glb": the name on command lines and the
 /// file's extension.
 std::string_view Name(FrameFormat format);
+
+/// The names of formats, separated by commas.
+std::string Names(std::span<const FrameFormat> formats);
+
+/// Whether a format can hold surfaces in space: all except geojson, svg and csv. Bodies are
+/// numbered from 0 in the order of their outer shells.
+bool HoldsSurfaces(FrameFormat format);
+
+/// Errors: INVALID_ARGUMENT, which lists the formats that hold surfaces.
+absl::Status CheckHoldsSurfaces(FrameFormat format);
 
 /// Parses a list of format names separated by commas. Returns each format once, in the order given.
 /// Errors: INVALID_ARGUMENT, which names the unknown word and lists the known formats.
@@ -76,7 +95,8 @@ struct FrameWriterOptions {
 };
 
 /// The bytes of a frame in one of AllFrameFormats().
-/// Errors: DATA_LOSS if a coordinate is not finite; INTERNAL from VTK.
+/// Errors: INVALID_ARGUMENT as for CheckHoldsSurfaces; DATA_LOSS if a coordinate is not finite;
+/// OUT_OF_RANGE for coordinates or sizes that the format cannot hold; INTERNAL from VTK.
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options);
 

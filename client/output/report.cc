@@ -280,6 +280,9 @@ absl::StatusOr<ReportWriter> ReportWriter::Create(const std::filesystem::path& p
 }
 
 absl::Status ReportWriter::Add(const FrameRecord& frame) {
+  if (frame.surface) {
+    return absl::InvalidArgumentError("report: cannot show surfaces in space; must be of outlines");
+  }
   const std::string geometry = EncodeReportGeometry(frame, {.max_particles = options_.max_particles,
                                                             .max_triangles = options_.max_triangles,
                                                             .color_by = options_.color_by});

@@ -41,6 +41,7 @@ class ReportWriter {
   static absl::StatusOr<ReportWriter> Create(const std::filesystem::path& path,
                                              ReportOptions options);
 
+  /// Errors: INVALID_ARGUMENT for a surface in space; as for AtomicFile.
   absl::Status Add(const FrameRecord& frame);
 
   /// Adds the table of `summary` and completes the file.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "client/output/color_map.h"
-#include "client/output/formats.h"
+#include "client/output/formats/file_mesh.h"
 
 namespace partiemc::client {
 namespace {

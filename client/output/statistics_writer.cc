@@ -31,6 +31,21 @@ constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
                                                            "section"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
+constexpr std::array<std::string_view, 14> kOfSurfaces = {"frame",
+                                                          "particles",
+                                                          "bodies",
+                                                          "cavities",
+                                                          "points",
+                                                          "triangles",
+                                                          "genus",
+                                                          "area",
+                                                          "volume",
+                                                          "milliseconds",
+                                                          "dropped_cavities",
+                                                          "dropped_components",
+                                                          "dropped_spray",
+                                                          "time"};
+
 // "vertices" is the name of a count and of a stage, so the columns of stages have the suffix "_ms".
 constexpr std::string_view kStageSuffix = "_ms";
 
@@ -70,6 +85,26 @@ std::string CsvLine(const Values& values) {
 class Row {
  public:
   Row(const FrameRecord& frame, std::span<const Gauge> gauges, bool json) : json_(json) {
+    if (frame.surface) {
+      AddSurface(frame);
+    } else {
+      AddOutline(frame, gauges);
+    }
+  }
+
+  std::string Csv() const { return CsvLine(values_); }
+
+  std::string Json(std::span<const std::string> columns) const {
+    std::string out = "{";
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      AppendAll(out, k == 0 ? "" : ",", "\"", columns[k], "\":", values_[k]);
+    }
+    out += '}';
+    return out;
+  }
+
+ private:
+  void AddOutline(const FrameRecord& frame, std::span<const Gauge> gauges) {
     const FrameStatistics& statistics = frame.result.statistics;
     Number(frame.index);
     Number(statistics.particles);
@@ -97,18 +132,25 @@ class Row {
     }
   }
 
-  std::string Csv() const { return CsvLine(values_); }
-
-  std::string Json(std::span<const std::string> columns) const {
-    std::string out = "{";
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      AppendAll(out, k == 0 ? "" : ",", "\"", columns[k], "\":", values_[k]);
-    }
-    out += '}';
-    return out;
+  void AddSurface(const FrameRecord& frame) {
+    const Surface& surface = *frame.surface;
+    const SurfaceTotals totals = TotalsOf(surface);
+    Number(frame.index);
+    Number(totals.particles);
+    Number(totals.bodies);
+    Number(totals.cavities);
+    Number(surface.PointCount());
+    Number(surface.TriangleCount());
+    Number(totals.genus);
+    Number(totals.area);
+    Number(totals.volume);
+    Number(frame.total_ms);
+    Number(surface.statistics.dropped_cavities);
+    Number(surface.statistics.dropped_components);
+    Number(surface.statistics.dropped_spray);
+    Number(frame.time);
   }
 
- private:
   template <typename Value>
   void Number(Value value) {
     std::string& text = values_.emplace_back();
@@ -130,7 +172,10 @@ class Row {
 
 }  // namespace
 
-std::span<const std::string_view> StatisticsColumns() { return Columns(); }
+std::span<const std::string_view> StatisticsColumns(StatisticsOf what) {
+  if (what == StatisticsOf::kSurfaces) return kOfSurfaces;
+  return Columns();
+}
 
 absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts) {
   std::vector<Gauge> gauges;
@@ -152,16 +197,19 @@ absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& t
   return gauges;
 }
 
-StatisticsWriter::StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges)
+StatisticsWriter::StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges,
+                                   StatisticsOf what)
     : file_(std::move(file)),
       json_(json),
+      what_(what),
       gauges_(std::move(gauges)),
-      columns_(Columns().begin(), Columns().end()) {
+      columns_(StatisticsColumns(what).begin(), StatisticsColumns(what).end()) {
   for (const Gauge& gauge : gauges_) AppendColumns(gauge, columns_);
 }
 
 absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem::path& path,
-                                                          std::vector<Gauge> gauges) {
+                                                          std::vector<Gauge> gauges,
+                                                          StatisticsOf what) {
   const std::string extension = absl::AsciiStrToLower(path.extension().native());
   const bool json = extension == ".json";
   if (!json && extension != ".csv") {
@@ -169,16 +217,27 @@ absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem:
         Concat("stats: '", absl::Utf8SafeCHexEscape(path.native()),
                "' has no known extension; must end in .csv or .json"));
   }
+  if (what == StatisticsOf::kSurfaces && !gauges.empty()) {
+    return absl::InvalidArgumentError(
+        Concat("gauge ", gauges.front().name, ": cannot measure surfaces; must be of outlines"));
+  }
   absl::StatusOr<AtomicFile> file = AtomicFile::Create(path);
   if (!file.ok()) return file.status();
-  StatisticsWriter writer(*std::move(file), json, std::move(gauges));
+  StatisticsWriter writer(*std::move(file), json, std::move(gauges), what);
   absl::Status status = writer.file_.Append(json ? "[" : CsvLine(writer.columns_));
   if (!status.ok()) return status;
   return writer;
 }
 
 absl::Status StatisticsWriter::Add(const FrameRecord& frame) {
+  const bool is_surface = frame.surface != nullptr;
+  if (is_surface != (what_ == StatisticsOf::kSurfaces)) {
+    return absl::InvalidArgumentError(Concat(
+        "stats: frame ", frame.index, " is ",
+        is_surface ? "a surface; the file has outlines" : "an outline; the file has surfaces"));
+  }
   absl::Status status = AddRow(frame);
+  if (is_surface) return status;
   for (std::size_t k = 0; status.ok() && k < frame.result.sections.size(); ++k) {
     status = AddRow(SectionOf(frame, k));
   }

@@ -1,7 +1,8 @@
 // Writes `--stats FILE`: for each frame, one row of numbers for its own outline, and one for each
-// of its sections (ReconstructionParameters::sections).
+// of its sections (ReconstructionParameters::sections); or one row for its surface in space.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -16,19 +17,30 @@
 
 namespace partiemc::client {
 
-/// The columns in order: frame, particles, polylines, vertices, triangles_grid, triangles, area,
-/// milliseconds; one column of milliseconds per stage, "bins_ms" to "attributes_ms"; perimeter,
-/// self_intersections, folded_triangles, dropped_holes, dropped_components, dropped_spray,
-/// rings_digest, mesh_digest, time, doubts (names separated by blanks), section.
+/// The kind of frames in a file.
+enum class StatisticsOf : std::uint8_t { kOutlines, kSurfaces };
+
+/// The columns of outlines in order: frame, particles, polylines, vertices, triangles_grid,
+/// triangles, area, milliseconds; one column of milliseconds per stage, "bins_ms" to
+/// "attributes_ms"; perimeter, self_intersections, folded_triangles, dropped_holes,
+/// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (names separated by
+/// blanks), section.
 ///
 /// Section 0 is the frame's own outline; a row for each section follows. After `section` come the
 /// columns of the gauges (partiemc/gauges.h): NAME for a gauge with one value, otherwise
 /// NAME_VALUE. A gauge is "nan" if the outline has no such point. Digests have 16 hexadecimal
 /// digits. Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts
 /// rings, `vertices` their vertices.
-std::span<const std::string_view> StatisticsColumns();
+///
+/// The columns of surfaces in order: frame, particles, bodies, cavities, points, triangles, genus,
+/// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, time.
+///
+/// `particles` counts the particles of bodies. `genus` counts handles: the sum over bodies and
+/// cavities, from their Euler characteristics. `volume` is the volume of bodies minus their cavities.
+/// `area` is the sum over bodies and cavities.
+std::span<const std::string_view> StatisticsColumns(StatisticsOf what = StatisticsOf::kOutlines);
 
-/// Parses gauges. Checks that their columns differ from each other and from StatisticsColumns().
+/// Parses gauges. Checks that their columns differ from each other and from the columns of outlines.
 /// Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
 absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts);
 
@@ -37,20 +49,24 @@ absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& t
 class StatisticsWriter {
  public:
   /// Selects CSV or JSON by the extension of `path`.
-  /// Errors: INVALID_ARGUMENT for other extensions; as for AtomicFile.
+  /// Errors: INVALID_ARGUMENT for other extensions, and for gauges of surfaces, since gauges
+  /// measure outlines; as for AtomicFile.
   static absl::StatusOr<StatisticsWriter> Create(const std::filesystem::path& path,
-                                                 std::vector<Gauge> gauges = {});
+                                                 std::vector<Gauge> gauges = {},
+                                                 StatisticsOf what = StatisticsOf::kOutlines);
 
+  /// Errors: INVALID_ARGUMENT for a surface among outlines, or an outline among surfaces.
   absl::Status Add(const FrameRecord& frame);
   absl::Status Finish();
 
  private:
   absl::Status AddRow(const FrameRecord& frame);
 
-  StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges);
+  StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge> gauges, StatisticsOf what);
 
   AtomicFile file_;
   bool json_;
+  StatisticsOf what_;
   std::vector<Gauge> gauges_;
   std::vector<std::string> columns_;
   bool empty_ = true;

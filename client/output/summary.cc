@@ -47,6 +47,17 @@ SummaryRow Row(std::string_view label, const std::vector<double>& values, int me
 }  // namespace
 
 void Summary::Add(const FrameRecord& frame) {
+  total_ms_.push_back(frame.total_ms);
+  if (!frame.surface) return AddOutline(frame);
+  const SurfaceTotals totals = TotalsOf(*frame.surface);
+  particles_.push_back(static_cast<double>(totals.particles));
+  bodies_.push_back(static_cast<double>(totals.bodies));
+  cavities_.push_back(static_cast<double>(totals.cavities));
+  vertices_.push_back(static_cast<double>(frame.surface->PointCount()));
+  triangles_.push_back(static_cast<double>(frame.surface->TriangleCount()));
+}
+
+void Summary::AddOutline(const FrameRecord& frame) {
   const FrameStatistics& statistics = frame.result.statistics;
   const auto grid = static_cast<double>(statistics.triangles_grid);
   const auto triangles = static_cast<double>(statistics.triangles);
@@ -57,7 +68,6 @@ void Summary::Add(const FrameRecord& frame) {
   triangles_.push_back(triangles);
   if (grid > 0) reduction_.push_back(100 * (1 - triangles / grid));
   for (std::size_t k = 0; k < kStageCount; ++k) stages_ms_[k].push_back(frame.stages_ms[k]);
-  total_ms_.push_back(frame.total_ms);
   self_intersections_ += statistics.self_intersections;
   folded_triangles_ += statistics.folded_triangles;
   for (std::size_t k = 0; k < kAllDoubts.size(); ++k) {
@@ -77,7 +87,16 @@ std::vector<std::string> Summary::Warnings() const {
 
 double Summary::MeanReductionPercent() const { return Mean(reduction_); }
 
+std::vector<SummaryRow> Summary::SurfaceRows() const {
+  return {
+      Row("particles", particles_, 1, 0), Row("bodies", bodies_, 1, 0),
+      Row("cavities", cavities_, 1, 0),   Row("points", vertices_, 1, 0),
+      Row("triangles", triangles_, 1, 0), Row("milliseconds", total_ms_, 3, 3),
+  };
+}
+
 std::vector<SummaryRow> Summary::Rows() const {
+  if (!bodies_.empty()) return SurfaceRows();
   std::vector<SummaryRow> rows = {
       Row("particles", particles_, 1, 0),
       Row("rings", rings_, 1, 0),

@@ -35,9 +35,10 @@ class Summary {
   /// are none.
   double MeanReductionPercent() const;
 
-  /// Mean, median and 99th percentile (nearest rank) over frames: particles, rings, vertices,
-  /// triangles unmerged and merged, reduction, milliseconds by stage and in total. Cost: n log n in
-  /// the frames.
+  /// Mean, median and 99th percentile (nearest rank) over frames. Outlines: particles, rings,
+  /// vertices, triangles unmerged and merged, reduction, milliseconds by stage and in total.
+  /// Surfaces: particles, bodies, cavities, points, triangles, milliseconds in total. A replay has
+  /// only outlines or only surfaces. Cost: n log n in the frames.
   std::vector<SummaryRow> Rows() const;
 
   /// One line per kind of doubt: number of frames, explanation.
@@ -51,6 +52,10 @@ class Summary {
   std::string Table(double wall_seconds) const;
 
  private:
+  void AddOutline(const FrameRecord& frame);
+  std::vector<SummaryRow> SurfaceRows() const;
+
+  std::vector<double> bodies_, cavities_;  // Of surfaces, with `particles_`, `vertices_`, ...
   std::vector<double> particles_, rings_, vertices_, triangles_grid_, triangles_, reduction_;
   std::array<std::vector<double>, kStageCount> stages_ms_;
   std::vector<double> total_ms_;

@@ -109,7 +109,7 @@ TEST(Architecture, AnIncludeOfARoomBelowIsSeen) {
   for (const auto& [file, include] : std::map<std::string, std::string>{
            {"client/include/partiemc/client/stream.h", "client/library/channel.h"},
            {"client/library/channel.h", "client/output/text.h"},
-           {"client/output/svg.cc", "client/input/plane.h"},
+           {"client/output/formats/svg.cc", "client/input/plane.h"},
            {"client/recording/block.h", "client/cli/console.h"},
            {"client/input/base/columns.h", "client/input/formats/frame_reader.h"},
            {"client/input/formats/xyz.cc", "client/input/plane.h"}}) {

@@ -1,7 +1,7 @@
 #!/bin/bash
 # usage: tests/outside/run.sh BIN_DIR CHECK...
 # Checks the contract with clients of others, by hand; tests/outside/README.md says how to install
-# them. BIN_DIR has partiemc and partiemc-server. Each CHECK prints its log and ends with "CHECK: good".
+# them. BIN_DIR has partiemc, partiemc-server and surface_files. Each CHECK prints its log and ends with "CHECK: good".
 # `grpcurl`: reflection, a unary call with a token over TLS, refusals.
 # `python`: protocol_client.py, compiled by grpcio-tools of PyPI, streams the dam break.
 # `go`: a client generated for Go streams the dam break.
@@ -219,6 +219,10 @@ check_gltf() {
   "${replay[@]}" --output-dir "$work/plain" --attributes velocity
   "${replay[@]}" --output-dir "$work/packed" --attributes velocity --compress-glb
   node "$work/gltf/main.mjs" "$work/plain" "$work/packed"
+  "$bin/surface_files" "$work/surfaces"
+  mkdir "$work/plain_surfaces"
+  cp "$work/surfaces/"*.glb "$work/plain_surfaces"
+  node "$work/gltf/main.mjs" "$work/plain_surfaces" "$work/surfaces/packed"
 }
 
 for check in "$@"; do

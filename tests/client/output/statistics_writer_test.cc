@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "client/output/fixtures.h"
+#include "client/output/surface_scene.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
@@ -163,6 +164,78 @@ TEST(Statistics, WritesNonFiniteNumbersAsNullInJson) {
   result.statistics.area = std::numeric_limits<double>::quiet_NaN();
   const auto rows = ordered_json::parse(Written(directory / "stats.json", {Record(result)}));
   EXPECT_TRUE(rows[0].at("area").is_null());
+}
+
+StatisticsWriter WriterOfSurfaces(const std::filesystem::path& path) {
+  auto writer = StatisticsWriter::Create(path, {}, StatisticsOf::kSurfaces);
+  EXPECT_TRUE(writer.ok()) << writer.status();
+  return *std::move(writer);
+}
+
+TEST(SurfaceStatistics, CsvHasTheDocumentedColumns) {
+  support::TemporaryFolder directory;
+  StatisticsWriter writer = WriterOfSurfaces(directory / "stats.csv");
+  // Two tetrahedra, a cavity in the second one.
+  Surface surface;
+  surface.points.resize(36);
+  surface.triangles.resize(36);
+  surface.point_offsets = surface.triangle_offsets = {0, 4, 8, 12};
+  surface.outer_of = {kNoShell, kNoShell, 1};
+  surface.measures = {{.area = 2, .volume = 0.5, .particles = 7},
+                      {.area = 20, .volume = 8, .particles = 90},
+                      {.area = 1.5, .volume = -0.25}};
+  surface.statistics = {.dropped_cavities = 3, .dropped_components = 4, .dropped_spray = 5};
+  const Result result;
+  const FrameRecord record{
+      .index = 3, .time = 0.1, .result = result, .surface = &surface, .total_ms = 28.5};
+  ASSERT_TRUE(writer.Add(record).ok());
+  ASSERT_TRUE(writer.Finish().ok());
+  EXPECT_EQ(ReadFile(directory / "stats.csv"),
+            "frame,particles,bodies,cavities,points,triangles,genus,area,volume,milliseconds,"
+            "dropped_cavities,dropped_components,dropped_spray,time\n"
+            "3,97,2,1,12,12,0,23.5,8.25,28.5,3,4,5,0.1\n");
+}
+
+TEST(SurfaceStatistics, CountsHandles) {
+  support::TemporaryFolder directory;
+  StatisticsWriter writer = WriterOfSurfaces(directory / "stats.json");
+  const Surface surface = HollowBallAndTorus(), empty;
+  const Result result;
+  ASSERT_TRUE(writer.Add({.result = result, .surface = &surface}).ok());
+  ASSERT_TRUE(writer.Add({.index = 1, .result = result, .surface = &empty}).ok());
+  ASSERT_TRUE(writer.Finish().ok());
+  const auto rows = ordered_json::parse(ReadFile(directory / "stats.json"));
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].size(), StatisticsColumns(StatisticsOf::kSurfaces).size());
+  EXPECT_EQ(rows[0].at("genus"), 1);
+  EXPECT_EQ(rows[0].at("bodies"), 2);
+  EXPECT_EQ(rows[0].at("cavities"), 1);
+  EXPECT_EQ(rows[0].at("triangles"), surface.TriangleCount());
+  EXPECT_EQ(rows[1].at("genus"), 0);
+  EXPECT_EQ(rows[1].at("volume"), 0);
+}
+
+TEST(SurfaceStatistics, AFileHasEitherOutlinesOrSurfaces) {
+  support::TemporaryFolder directory;
+  StatisticsWriter surfaces = WriterOfSurfaces(directory / "surfaces.csv");
+  const Result result;
+  const Surface surface;
+  EXPECT_EQ(surfaces.Add({.result = result}).code(), absl::StatusCode::kInvalidArgument);
+  auto outlines = StatisticsWriter::Create(directory / "outlines.csv");
+  ASSERT_TRUE(outlines.ok());
+  EXPECT_EQ(outlines->Add({.result = result, .surface = &surface}).code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST(SurfaceStatistics, RefusesGauges) {
+  support::TemporaryFolder directory;
+  EXPECT_EQ(
+      StatisticsWriter::Create(directory / "stats.csv", ParseGauges({"level=height:0.5"}).value(),
+                               StatisticsOf::kSurfaces)
+          .status()
+          .code(),
+      absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(directory.Entries(), IsEmpty());
 }
 
 TEST(Statistics, RefusesOtherExtensions) {

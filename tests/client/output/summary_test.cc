@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "client/output/fixtures.h"
+#include "client/output/surface_scene.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -114,6 +115,21 @@ TEST(Summary, AlignsTheTable) {
     EXPECT_NE(lines[k][mean_end - 1], ' ') << lines[k];
     for (const char c : lines[k]) EXPECT_TRUE(c >= ' ' && c <= '~') << lines[k];
   }
+}
+
+TEST(Summary, CountsBodiesAndCavitiesOfSurfaces) {
+  const Surface surface = HollowBallAndTorus();
+  const Result result;
+  Summary summary;
+  for (const double ms : {1.0, 2.0, 6.0}) {
+    summary.Add({.result = result, .surface = &surface, .total_ms = ms});
+  }
+  EXPECT_EQ(summary.frame_count(), 3u);
+  EXPECT_EQ(RowOf(summary, "bodies").p50, "2");
+  EXPECT_EQ(RowOf(summary, "cavities").mean, "1.0");
+  EXPECT_EQ(RowOf(summary, "milliseconds").mean, "3.000");
+  EXPECT_NE(RowOf(summary, "points").p50, RowOf(summary, "triangles").p50);
+  for (const SummaryRow& row : summary.Rows()) EXPECT_NE(row.label, "rings");
 }
 
 TEST(Summary, HasATableWithoutFrames) {

@@ -1,4 +1,4 @@
-#include "client/output/formats.h"
+#include "client/output/formats/formats.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {

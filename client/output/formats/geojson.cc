@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "client/output/formats.h"
+#include "client/output/formats/formats.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {

@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/output/color_map.h"
-#include "client/output/formats.h"
+#include "client/output/formats/formats.h"
 #include "client/output/html.h"
 #include "client/output/text.h"
 

@@ -1,0 +1,78 @@
+// Wavefront OBJ.
+#include "client/output/formats/file_mesh.h"
+#include "client/output/formats/formats.h"
+#include "client/output/text.h"
+
+namespace partiemc::client {
+namespace {
+
+/// A line "KEY x y z" for each vector.
+template <typename Number>
+void AppendVectors(std::string& out, std::string_view key, std::span<const Number> values) {
+  for (std::size_t k = 0; k < values.size(); k += 3) {
+    AppendAll(out, key, " ", values[k], " ", values[k + 1], " ", values[k + 2], "\n");
+  }
+}
+
+void AppendFaces(std::string& out, std::span<const std::uint32_t> triangles) {
+  for (std::size_t k = 0; k < triangles.size(); k += 3) {
+    AppendAll(out, "f ", std::size_t{triangles[k]} + 1, " ", std::size_t{triangles[k + 1]} + 1, " ",
+              std::size_t{triangles[k + 2]} + 1, "\n");
+  }
+}
+
+void AppendRings(std::string& out, const FileMesh& mesh) {
+  const Rings& rings = mesh.rings();
+  const std::size_t base = std::size_t{mesh.first_of_rings()} + 1;
+  out += "g rings\n";
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    out += 'l';
+    for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+      AppendAll(out, " ", base + k);
+    }
+    AppendAll(out, " ", base + rings.offsets[ring], "\n");
+  }
+}
+
+/// The faces of one shell, whose corners have the normals of their points.
+void AppendShell(std::string& out, const Surface& surface, std::size_t shell) {
+  for (std::size_t k = std::size_t{3} * surface.triangle_offsets[shell];
+       k < std::size_t{3} * surface.triangle_offsets[shell + 1]; ++k) {
+    const std::size_t vertex = std::size_t{surface.triangles[k]} + 1;
+    AppendAll(out, k % 3 == 0 ? "f " : " ", vertex, "//", vertex, k % 3 == 2 ? "\n" : "");
+  }
+}
+
+void AppendBodies(std::string& out, const Surface& surface) {
+  const std::vector<std::uint32_t> bodies = BodyOfShells(surface);
+  std::vector<std::vector<std::size_t>> shells;
+  for (std::size_t shell = 0; shell < bodies.size(); ++shell) {
+    if (shells.size() <= bodies[shell]) shells.resize(std::size_t{bodies[shell]} + 1);
+    shells[bodies[shell]].push_back(shell);
+  }
+  for (std::size_t body = 0; body < shells.size(); ++body) {
+    AppendAll(out, "g body_", body, "\n");
+    for (const std::size_t shell : shells[body]) AppendShell(out, surface, shell);
+  }
+}
+
+}  // namespace
+
+std::string EncodeObj(const FrameRecord& frame) {
+  const FileMesh mesh(frame);
+  std::string out = Concat("# frame ", frame.index, ", time ", frame.time, "\n");
+  AppendVectors(out, "v", mesh.points());
+  if (mesh.surface()) {
+    AppendVectors(out, "vn", mesh.normals());
+    AppendBodies(out, *mesh.surface());
+    return out;
+  }
+  if (mesh.TriangleCount() > 0) {
+    out += "g mesh\n";
+    AppendFaces(out, mesh.triangles());
+  }
+  AppendRings(out, mesh);
+  return out;
+}
+
+}  // namespace partiemc::client

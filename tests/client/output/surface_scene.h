@@ -1,0 +1,12 @@
+// A surface with a cavity, a handle and attributes.
+#pragma once
+
+#include "partiemc/surface.h"
+
+namespace partiemc::client {
+
+/// A hollow ball and a ring-shaped body, reconstructed: two bodies, one cavity, genus 1.
+/// Attributes: "height" (z) and "a,b" (x, y, z). `shift` moves all particles along x.
+Surface HollowBallAndTorus(double shift = 0);
+
+}  // namespace partiemc::client
