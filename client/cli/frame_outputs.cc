@@ -42,6 +42,10 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
   if (!places.output_dir.empty()) {
     auto formats = ParseFrameFormats(places.format);
     if (!formats.ok()) return formats.status();
+    for (const FrameFormat format : *formats) {
+      absl::Status status = places.surface ? CheckHoldsSurfaces(format) : absl::OkStatus();
+      if (!status.ok()) return status;
+    }
     writes_glb = std::ranges::count(*formats, FrameFormat::kGlb) > 0;
     outputs.show_normals_ = std::ranges::count(*formats, FrameFormat::kCsv) > 0;
     auto frames = FrameWriter::Create({.directory = places.output_dir,
@@ -57,7 +61,9 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
   if (!places.stats.empty()) {
     auto gauges = ParseGauges(places.gauges);
     if (!gauges.ok()) return gauges.status();
-    auto statistics = StatisticsWriter::Create(places.stats, *std::move(gauges));
+    auto statistics = StatisticsWriter::Create(
+        places.stats, *std::move(gauges),
+        places.surface ? StatisticsOf::kSurfaces : StatisticsOf::kOutlines);
     if (!statistics.ok()) return statistics.status();
     outputs.statistics_.emplace(*std::move(statistics));
   }

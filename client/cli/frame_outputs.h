@@ -32,12 +32,13 @@ class FrameOutputs {
   struct Places {
     std::string output_dir, format, stats, color_by;
     bool compress_glb = false;
+    bool surface = false;  ///< The frames are surfaces in space.
     std::vector<std::string> gauges = {};
   };
 
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, and for `compress_glb`
-  /// without GLB files; the errors of AtomicFile.
+  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, for a format that cannot hold
+  /// surfaces, and for `compress_glb` without GLB files; the errors of AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether the files show the normals of the vertices.

@@ -23,8 +23,8 @@ struct FrameRecord {
   std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.
   const Result& result;
-  /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and
-  /// `result` is not used.
+  /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and of
+  /// `result` only the particle count, the doubts and the sections are used.
   const Surface* surface = nullptr;
   std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
   std::span<const float> particle_areas = {};      ///< Of each of them; empty: not known.
@@ -32,6 +32,7 @@ struct FrameRecord {
   double total_ms = 0;                             ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
+  std::uint64_t surface_digest = 0;
   std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
   /// Indices of the sections that the picture of the frame shows as thin lines.
   std::span<const std::size_t> sections_in_plane = {};
@@ -44,17 +45,15 @@ struct FrameRecord {
 /// Numbers of a surface, over all of its shells.
 struct SurfaceTotals {
   std::uint64_t bodies = 0, cavities = 0;
-  std::uint64_t particles = 0;  ///< Sum over bodies.
-  double area = 0;              ///< Sum over bodies and cavities.
-  double volume = 0;            ///< Bodies minus their cavities.
-  std::int64_t genus = 0;       ///< Handles: the sum over shells.
+  double area = 0;         ///< Sum over bodies and cavities.
+  double volume = 0;       ///< Bodies minus their cavities.
+  std::int64_t genus = 0;  ///< Handles: the sum over shells.
 };
 
 inline SurfaceTotals TotalsOf(const Surface& surface) {
   SurfaceTotals totals;
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     ++(surface.outer_of[shell] == kNoShell ? totals.bodies : totals.cavities);
-    totals.particles += surface.measures[shell].particles;
     totals.area += surface.measures[shell].area;
     totals.volume += surface.measures[shell].volume;
     // Each triangle has three sides, which it shares with one other triangle each, so the Euler

@@ -31,7 +31,7 @@ constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
                                                            "section"};
 constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
-constexpr std::array<std::string_view, 14> kOfSurfaces = {"frame",
+constexpr std::array<std::string_view, 16> kOfSurfaces = {"frame",
                                                           "particles",
                                                           "bodies",
                                                           "cavities",
@@ -44,7 +44,9 @@ constexpr std::array<std::string_view, 14> kOfSurfaces = {"frame",
                                                           "dropped_cavities",
                                                           "dropped_components",
                                                           "dropped_spray",
-                                                          "time"};
+                                                          "surface_digest",
+                                                          "time",
+                                                          "doubts"};
 
 // "vertices" is the name of a count and of a stage, so the columns of stages have the suffix "_ms".
 constexpr std::string_view kStageSuffix = "_ms";
@@ -136,7 +138,7 @@ class Row {
     const Surface& surface = *frame.surface;
     const SurfaceTotals totals = TotalsOf(surface);
     Number(frame.index);
-    Number(totals.particles);
+    Number(frame.result.statistics.particles);
     Number(totals.bodies);
     Number(totals.cavities);
     Number(surface.PointCount());
@@ -148,7 +150,9 @@ class Row {
     Number(surface.statistics.dropped_cavities);
     Number(surface.statistics.dropped_components);
     Number(surface.statistics.dropped_spray);
+    Digest(frame.surface_digest);
     Number(frame.time);
+    Words(DoubtsText(frame.result.statistics.doubts));
   }
 
   template <typename Value>

@@ -33,15 +33,16 @@ enum class StatisticsOf : std::uint8_t { kOutlines, kSurfaces };
 /// rings, `vertices` their vertices.
 ///
 /// The columns of surfaces in order: frame, particles, bodies, cavities, points, triangles, genus,
-/// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, time.
+/// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, surface_digest,
+/// time, doubts. Sections of a surface have no rows.
 ///
-/// `particles` counts the particles of bodies. `genus` counts handles: the sum over bodies and
-/// cavities, from their Euler characteristics. `volume` is the volume of bodies minus their cavities.
-/// `area` is the sum over bodies and cavities.
+/// `genus` counts handles: the sum over bodies and
+/// cavities, from their Euler characteristics. `volume` is the volume of bodies minus their
+/// cavities. `area` is the sum over bodies and cavities.
 std::span<const std::string_view> StatisticsColumns(StatisticsOf what = StatisticsOf::kOutlines);
 
-/// Parses gauges. Checks that their columns differ from each other and from the columns of outlines.
-/// Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
+/// Parses gauges. Checks that their columns differ from each other and from the columns of
+/// outlines. Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
 absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts);
 
 /// Writes CSV with a header line, or a JSON array with one object per row, in which non-finite

@@ -48,9 +48,12 @@ SummaryRow Row(std::string_view label, const std::vector<double>& values, int me
 
 void Summary::Add(const FrameRecord& frame) {
   total_ms_.push_back(frame.total_ms);
+  for (std::size_t k = 0; k < kAllDoubts.size(); ++k) {
+    if (frame.result.statistics.doubts.Has(kAllDoubts[k])) ++doubted_[k];
+  }
   if (!frame.surface) return AddOutline(frame);
   const SurfaceTotals totals = TotalsOf(*frame.surface);
-  particles_.push_back(static_cast<double>(totals.particles));
+  particles_.push_back(static_cast<double>(frame.result.statistics.particles));
   bodies_.push_back(static_cast<double>(totals.bodies));
   cavities_.push_back(static_cast<double>(totals.cavities));
   vertices_.push_back(static_cast<double>(frame.surface->PointCount()));
@@ -70,9 +73,6 @@ void Summary::AddOutline(const FrameRecord& frame) {
   for (std::size_t k = 0; k < kStageCount; ++k) stages_ms_[k].push_back(frame.stages_ms[k]);
   self_intersections_ += statistics.self_intersections;
   folded_triangles_ += statistics.folded_triangles;
-  for (std::size_t k = 0; k < kAllDoubts.size(); ++k) {
-    if (statistics.doubts.Has(kAllDoubts[k])) ++doubted_[k];
-  }
 }
 
 std::vector<std::string> Summary::Warnings() const {

@@ -119,8 +119,7 @@ py::dict Measured(const RingsView& rings, const std::string& kind, const py::kwa
 py::array Heights(const RingsView& rings, double x) {
   const std::vector<double> heights = HeightsAt(rings.part, x);
   // With a count instead of a shape, pybind11 before 2.12 gives wrong strides to NumPy 2.
-  return py::array_t<double>(std::vector{static_cast<py::ssize_t>(heights.size())},
-                             heights.data());
+  return py::array_t<double>(std::vector{static_cast<py::ssize_t>(heights.size())}, heights.data());
 }
 
 static_assert(offsetof(RingMeasures, centroid_y) ==

@@ -15,6 +15,7 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                       .stats = flags.stats,
                                       .color_by = flags.color_by,
                                       .compress_glb = flags.compress_glb,
+                                      .surface = flags.surface,
                                       .gauges = flags.gauges});
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));

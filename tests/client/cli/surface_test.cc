@@ -50,7 +50,11 @@ TEST(SurfaceReplay, WritesFilesStatisticsAndOutlinesOnPlanes) {
       Flags(input, {"--check", "--slice", "z=0", "--attributes", "p", "--output-dir",
                     output.Path("files"), "--format", "ply,stl", "--stats", output.Path("s.csv")}));
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("2 frames"), HasSubstr("whole frame")));
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("2 frames"), HasSubstr("bodies")));
+  const std::string stats = Content(output.Path("s.csv"));
+  EXPECT_THAT(Column(stats, "bodies"), ElementsAre("2", "2"));
+  EXPECT_THAT(Column(stats, "genus"), ElementsAre("0", "0"));
+  EXPECT_THAT(Column(stats, "particles"), ElementsAre("778", "778"));
   EXPECT_THAT(
       FilesIn(output.path()),
       ElementsAre("files/frame_000000.ply", "files/frame_000000.stl",

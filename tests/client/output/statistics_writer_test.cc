@@ -185,15 +185,21 @@ TEST(SurfaceStatistics, CsvHasTheDocumentedColumns) {
                       {.area = 20, .volume = 8, .particles = 90},
                       {.area = 1.5, .volume = -0.25}};
   surface.statistics = {.dropped_cavities = 3, .dropped_components = 4, .dropped_spray = 5};
-  const Result result;
-  const FrameRecord record{
-      .index = 3, .time = 0.1, .result = result, .surface = &surface, .total_ms = 28.5};
+  Result result;
+  result.statistics.particles = 99;
+  result.statistics.doubts.Add(Doubt::kPositionsCoarse);
+  const FrameRecord record{.index = 3,
+                           .time = 0.1,
+                           .result = result,
+                           .surface = &surface,
+                           .total_ms = 28.5,
+                           .surface_digest = 0xabc};
   ASSERT_TRUE(writer.Add(record).ok());
   ASSERT_TRUE(writer.Finish().ok());
   EXPECT_EQ(ReadFile(directory / "stats.csv"),
             "frame,particles,bodies,cavities,points,triangles,genus,area,volume,milliseconds,"
-            "dropped_cavities,dropped_components,dropped_spray,time\n"
-            "3,97,2,1,12,12,0,23.5,8.25,28.5,3,4,5,0.1\n");
+            "dropped_cavities,dropped_components,dropped_spray,surface_digest,time,doubts\n"
+            "3,99,2,1,12,12,0,23.5,8.25,28.5,3,4,5,0000000000000abc,0.1,positions-coarse\n");
 }
 
 TEST(SurfaceStatistics, CountsHandles) {

@@ -5,7 +5,7 @@
 #include <iostream>
 #include <vector>
 
-#include "partiemc/frame.h"
+#include "partiemc/surface_reconstructor.h"
 
 namespace partiemc::client {
 namespace {
