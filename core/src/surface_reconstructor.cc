@@ -20,6 +20,7 @@
 #include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "partiemc/surface.h"
+#include "simplify/simplify.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/certificate.h"
@@ -214,6 +215,16 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   return absl::OkStatus();
 }
 
+// A larger error removes what the particles show.
+constexpr double kMostSimplify = 1;
+
+absl::Status CheckSimplify(double simplify) {
+  if (simplify >= 0 && simplify <= kMostSimplify) return absl::OkStatus();
+  return ViolationError(absl::StatusCode::kInvalidArgument,
+                        {std::string(kReasonOutOfRange), "parameters.simplify",
+                         ShortestNumber(simplify), "must be 0 to 1 spacings"});
+}
+
 /// CORRUPT_STATE if the state belongs to a lattice with another cell size.
 absl::Status CheckCellSize(const SurfaceState& state, double cell_size) {
   if (state.cell_size.value_or(cell_size) == cell_size) return absl::OkStatus();
@@ -270,6 +281,7 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
       !status.ok()) {
     return status;
   }
+  if (absl::Status status = CheckSimplify(parameters.simplify); !status.ok()) return status;
   return SurfaceReconstructor(parameters, limits);
 }
 
@@ -344,6 +356,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
   size.has_windows = placement == SurfacePlacement::kVirtualPlane;
   AddBodies(frame, b.bodies, size);
   size.has_state = state != nullptr;
+  size.is_simplified = parameters_.simplify > 0;
   if (status = Reserve(size, memory); !status.ok()) return status;
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
   if (placement == SurfacePlacement::kMarchingCubes) {
@@ -373,6 +386,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
     space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
                            b.mesh.shell_of, cell_size},
                           state->history, b.identities, b.next_history, surface);
+  }
+  if (parameters_.simplify > 0) {
+    ThrowIfCancelled();
+    simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
   }
   if (!frame.attributes.empty()) {
     ThrowIfCancelled();

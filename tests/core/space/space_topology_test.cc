@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "partiemc/status.h"
 #include "partiemc/surface.h"
 #include "space/bodies.h"
 #include "space/cell_loops.h"
@@ -366,6 +367,13 @@ TEST(SurfaceReconstructor, RefusesBadInput) {
   EXPECT_FALSE(SurfaceReconstructor::Create({.cell_size = .1}).ok());
   for (const double distance : {-.01, std::nan(""), HUGE_VAL}) {
     EXPECT_FALSE(SurfaceReconstructor::Create({.thinning_distance = distance}).ok());
+  }
+  for (const double error : {-.01, 1.01, std::nan(""), HUGE_VAL}) {
+    const auto refused = SurfaceReconstructor::Create({.simplify = error});
+    const auto violation = FindViolation(refused.status());
+    ASSERT_TRUE(violation.has_value()) << error;
+    EXPECT_EQ(violation->reason, kReasonOutOfRange);
+    EXPECT_EQ(violation->field, "parameters.simplify");
   }
   const auto reconstructor = SurfaceReconstructor::Create({});
   ASSERT_TRUE(reconstructor.ok());
