@@ -10,10 +10,12 @@
 #include <cstdio>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "partiemc/arena.h"
 #include "partiemc/surface.h"
+#include "simplify/mesh_faults.h"
 #include "simplify/simplify.h"
 #include "space/exact_shapes.h"
 #include "space/shells.h"
@@ -238,6 +240,75 @@ TEST(Simplify, SmallShellsKeepTheirTriangles) {
   EXPECT_EQ(report.certified_shells, 1u);
   EXPECT_EQ(surface.triangles, all.triangles);
   EXPECT_EQ(surface.points, all.points);
+}
+
+/// A ring with a cross section of `sides` corners.
+testing::Shell RingShell(double large, double small, std::uint32_t steps, std::uint32_t sides) {
+  testing::Shell shell;
+  const auto at = [&](std::uint32_t step, std::uint32_t side) {
+    return step % steps * sides + side % sides;
+  };
+  for (std::uint32_t step = 0; step < steps; ++step) {
+    for (std::uint32_t side = 0; side < sides; ++side) {
+      const double around = 6.283185307 * step / steps, turn = 6.283185307 * side / sides;
+      const double radius = large + small * std::cos(turn);
+      shell.points.push_back(
+          {radius * std::cos(around), radius * std::sin(around), small * std::sin(turn)});
+      const std::uint32_t a = at(step, side), b = at(step + 1, side), c = at(step + 1, side + 1),
+                          d = at(step, side + 1);
+      shell.triangles.insert(shell.triangles.end(), {a, b, c, a, c, d});
+    }
+  }
+  return shell;
+}
+
+TEST(Simplify, RingsKeepTheirHole) {
+  int certified = 0;
+  for (const std::uint32_t sides : {3u, 4u, 8u}) {
+    for (const double large : {.3, .7, 1.5, 4.0}) {
+      for (const double small : {.05, .1, .25}) {
+        Surface surface;
+        testing::AddShell(RingShell(large, small, 24, sides), kNoShell, surface);
+        ASSERT_TRUE(Validate(surface).ok()) << Validate(surface);
+        certified += static_cast<int>(
+            simplify::Simplify({.error = .4, .spacing = 1}, surface).certified_shells);
+        const absl::Status status = Validate(surface);
+        EXPECT_TRUE(status.ok()) << status.message();
+        EXPECT_EQ(2 * surface.PointCount(), surface.TriangleCount());
+      }
+    }
+  }
+  EXPECT_GT(certified, 0);
+}
+
+TEST(Simplify, FindsPlantedFaults) {
+  const testing::Shell ball = testing::BallShell({}, 1, 1);
+  std::vector<double> points;
+  for (const double shift : {0.0, 3.0}) {
+    for (const Vec3& at : ball.points) points.insert(points.end(), {at.x + shift, at.y, at.z});
+  }
+  const auto count = static_cast<std::uint32_t>(ball.points.size());
+  const auto faults = [&](const std::vector<std::uint32_t>& triangles) {
+    std::vector<simplify::Box> found;
+    simplify::FindManifoldFaults(points, triangles, found);
+    return found.size();
+  };
+  EXPECT_EQ(faults(ball.triangles), 0u);
+  EXPECT_TRUE(simplify::IsConnected(ball.triangles, count));
+  EXPECT_FALSE(simplify::IsConnected(ball.triangles, count + 1));
+  std::vector<std::uint32_t> two = ball.triangles, joined = ball.triangles, open = ball.triangles;
+  for (const std::uint32_t k : ball.triangles) {
+    two.push_back(k + count);
+    joined.push_back(k == 0 ? 0 : k + count);
+  }
+  EXPECT_EQ(faults(two), 0u);
+  EXPECT_FALSE(simplify::IsConnected(two, 2 * count));
+  EXPECT_EQ(faults(joined), 1u);
+  open.resize(open.size() - 3);
+  EXPECT_EQ(faults(open), 3u);
+  std::vector<std::uint32_t> turned = ball.triangles;
+  std::swap(turned[0], turned[1]);
+  EXPECT_EQ(faults(turned), 6u);
 }
 
 SpaceParticles ShapeOf(int shape, Random& random) {
