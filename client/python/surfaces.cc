@@ -71,8 +71,8 @@ class Surfaces {
                                       .reference_radius = reference_radius,
                                       .clean = clean,
                                       .thinning_distance = thinning_distance,
-                                      .simplify = simplify,
                                       .max_drop_particles = max_drop_particles,
+                                      .simplify = simplify,
                                       .min_component_particles = min_component_particles});
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <utility>
 #include <vector>
@@ -20,7 +19,6 @@
 #include "space/space_particles.h"
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
-#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -29,12 +27,6 @@ using support::Random;
 using testing::RandomSpaceScene;
 using testing::Shuffled;
 using testing::SpaceParticles;
-
-/// More frames than usual, for a longer run: PARTIEMC_SPACE_FRAMES.
-std::uint64_t Frames(std::uint64_t usual) {
-  const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
-  return wanted == nullptr ? support::Tries(usual) : std::strtoull(wanted, nullptr, 10);
-}
 
 TEST(CellLoops, CoverEveryCrossingOnce) {
   for (unsigned corners = 0; corners < 256; ++corners) {
@@ -129,7 +121,7 @@ Signs RandomSigns(std::uint64_t seed) {
 }
 
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
-  const std::uint64_t frames = Frames(300);
+  const std::uint64_t frames = testing::Frames(300);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const Signs signs = RandomSigns(seed);
     std::vector<Vec3> positions, normals;
@@ -206,7 +198,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
-  const std::uint64_t frames = Frames(8);
+  const std::uint64_t frames = testing::Frames(8);
   int intersections = 0;
   std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
@@ -325,7 +317,7 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
   Surface surface;
-  const std::uint64_t frames = Frames(40);
+  const std::uint64_t frames = testing::Frames(40);
   std::size_t triangles = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const SpaceParticles particles = RandomSpaceScene(seed);
