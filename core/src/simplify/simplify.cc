@@ -7,14 +7,12 @@
 #include <span>
 #include <vector>
 
-#define MESHOPTIMIZER_NO_WRAPPERS
-#include <meshoptimizer.h>
-
 #include "base/bits.h"
 #include "base/cancellation.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "check/shell_nesting.h"
+#include "simplify/blocks.h"
 #include "simplify/far_points.h"
 #include "simplify/mesh_faults.h"
 #include "space/lattice.h"
@@ -33,6 +31,8 @@ constexpr double kCell = 2, kMargin = 1;
 constexpr double kFarthestCell = 1 << 30;
 // A shell with a fault that reaches more cells keeps its certified triangles.
 constexpr double kMostCells = 1 << 12;
+// Least side of the blocks in which a shell is simplified, in spacings.
+constexpr double kLeastBlock = 16;
 // A closed surface has at least four triangles.
 constexpr std::size_t kLeastIndices = 12;
 
@@ -123,49 +123,31 @@ void Simplifier::CopyCertified(std::uint32_t shell) {
   attempts_[shell] = kMostAttempts + 1;
 }
 
-/// meshoptimizer reads float coordinates relative to the box of the shell, so that a shell far from
-/// the origin loses nothing. Their rounding influences the choice of points only.
 void Simplifier::SimplifyShell(std::uint32_t shell) {
   progress_[shell] = Progress::kSimplified;
   if (attempts_[shell] >= kMostAttempts) return CopyCertified(shell);
   const auto [first, last] = PointsOf(shell);
   const std::span<const std::uint32_t> certified = CertifiedOf(shell);
-  const Box box = BoxOf(certified_.points, certified);
-  const Vec3 size = box.high - box.low;
-  const double extent = std::max({size.x, size.y, size.z});
-  std::vector<float> positions;
-  positions.reserve(3 * std::size_t{last - first});
   std::vector<std::uint8_t> stays(last - first, 0);
-  for (std::uint32_t k = first; k < last; ++k) {
-    const Vec3 at = Vec3At(certified_.points, k);
-    const Vec3 within = (1 / extent) * (at - box.low);
-    for (const double value : {within.x, within.y, within.z}) {
-      positions.push_back(static_cast<float>(value));
-    }
-    stays[k - first] = kept_cells_.size() > 0 && kept_cells_.Find(CellOf(at)) != kNoIndex ? 1 : 0;
+  for (std::uint32_t k = first; k < last && kept_cells_.size() > 0; ++k) {
+    const space::BrickCoordinate cell = CellOf(Vec3At(certified_.points, k));
+    stays[k - first] = kept_cells_.Find(cell) != kNoIndex ? 1 : 0;
   }
-  std::vector<std::uint32_t> input, kept;
-  input.reserve(certified.size());
+  std::vector<std::uint32_t> changed, kept;
   for (std::size_t t = 0; t < certified.size(); t += 3) {
-    const std::uint32_t a = certified[t] - first, b = certified[t + 1] - first,
-                        c = certified[t + 2] - first;
-    auto& to = stays[a] != 0 || stays[b] != 0 || stays[c] != 0 ? kept : input;
+    const std::uint32_t a = certified[t], b = certified[t + 1], c = certified[t + 2];
+    const bool is_kept = stays[a - first] != 0 || stays[b - first] != 0 || stays[c - first] != 0;
+    auto& to = is_kept ? kept : changed;
     to.insert(to.end(), {a, b, c});
   }
-  std::vector<std::uint32_t> output(input.size());
-  if (!input.empty()) {
-    // Points on the border of `input` stay, so the kept triangles fit.
-    output.resize(meshopt_simplify(output.data(), input.data(), input.size(), positions.data(),
-                                   last - first, 3 * sizeof(float), 0,
-                                   static_cast<float>(limits_.error / extent),
-                                   meshopt_SimplifyLockBorder, nullptr));
-  }
-  output.insert(output.end(), kept.begin(), kept.end());
-  if (output.size() < kLeastIndices) return CopyCertified(shell);
+  // Points on the border of the changed triangles stay, so the kept triangles fit.
+  SimplifyInBlocks(certified_.points,
+                   {.error = limits_.error, .least_block = kLeastBlock * limits_.spacing}, changed);
+  const std::size_t indices = changed.size() + kept.size();
+  if (indices < kLeastIndices) return CopyCertified(shell);
   ++attempts_[shell];
-  triangle_count_[shell] = output.size() / 3;
-  std::ranges::transform(output, TrianglesOf(shell).begin(),
-                         [offset = first](std::uint32_t k) { return offset + k; });
+  triangle_count_[shell] = indices / 3;
+  std::ranges::copy(kept, std::ranges::copy(changed, TrianglesOf(shell).begin()).out);
 }
 
 void Simplifier::FindFaults(std::uint32_t shell) {

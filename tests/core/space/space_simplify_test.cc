@@ -164,6 +164,7 @@ TEST_P(SpaceSimplify, KeepsAttributesIdentitiesAndParents) {
     ASSERT_TRUE(plain.Try(particles.AsFrame(true)).ok());
     ASSERT_TRUE(simplified.Try(particles.AsFrame(true)).ok());
     const Surface &all = plain.surface(), &less = simplified.surface();
+    EXPECT_TRUE(Validate(less).ok());
     ASSERT_EQ(all.ShellCount(), 2u);
     EXPECT_LT(less.PointCount(), all.PointCount());
     EXPECT_EQ(less.parents, all.parents);
