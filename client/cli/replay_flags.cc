@@ -145,6 +145,12 @@ void AddSurfaceFlags(CLI::App& app, ReplayFlags& flags, const char* group) {
       ->capture_default_str()
       ->needs(surface)
       ->group(group);
+  app.add_option("--simplify", flags.surface_options.simplify,
+                 "Surfaces: fewer triangles, within this error; .05 leaves about a third of them")
+      ->type_name("D")
+      ->capture_default_str()
+      ->needs(surface)
+      ->group(group);
   app.add_option("--max-drop-particles", flags.surface_options.max_drop_particles,
                  "Surfaces: bodies of up to this many particles become ellipsoids; 0: none")
       ->type_name("N")

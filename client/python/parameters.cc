@@ -149,6 +149,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeSections(arguments, parameters.sections);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
+  TakeInto(arguments, "simplify", parameters.surface.simplify);
   TakeInto(arguments, "min_component_volume", parameters.surface.min_component_volume);
   return parameters;
 }
@@ -243,6 +244,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;
+    dict["simplify"] = parameters.surface.simplify;
     dict["min_component_volume"] = parameters.surface.min_component_volume;
   }
   return dict;

@@ -60,7 +60,7 @@ class Surfaces {
  public:
   Surfaces(const std::string& placement, double spacing, double kernel_radius, double cell_size,
            std::optional<double> reference_radius, std::optional<bool> clean,
-           double thinning_distance, std::uint64_t max_drop_particles,
+           double thinning_distance, double simplify, std::uint64_t max_drop_particles,
            std::uint64_t min_component_particles, unsigned threads)
       : arena_(threads) {
     auto reconstructor =
@@ -72,6 +72,7 @@ class Surfaces {
                                       .clean = clean,
                                       .thinning_distance = thinning_distance,
                                       .max_drop_particles = max_drop_particles,
+                                      .simplify = simplify,
                                       .min_component_particles = min_component_particles});
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);
@@ -108,11 +109,11 @@ void DefineSurfaces(py::module_& module) {
   using namespace py::literals;
   py::class_<Surfaces>(module, "_Surfaces")
       .def(py::init<const std::string&, double, double, double, std::optional<double>,
-                    std::optional<bool>, double, std::uint64_t, std::uint64_t, unsigned>(),
+                    std::optional<bool>, double, double, std::uint64_t, std::uint64_t, unsigned>(),
            py::kw_only(), "placement"_a = "virtual-plane", "spacing"_a = 1.0,
            "kernel_radius"_a = 3.0, "cell_size"_a = 1.0, "reference_radius"_a = std::nullopt,
            "clean"_a = std::nullopt, "thinning_distance"_a = SurfaceParameters{}.thinning_distance,
-           "max_drop_particles"_a = SurfaceParameters{}.max_drop_particles,
+           "simplify"_a = 0.0, "max_drop_particles"_a = SurfaceParameters{}.max_drop_particles,
            "min_component_particles"_a = 0, "threads"_a = 1)
       .def("reconstruct", &Surfaces::Reconstruct, "positions"_a, py::kw_only(),
            "validate"_a = false);

@@ -19,7 +19,7 @@ install(TARGETS partiemc_core EXPORT partiemcCore)
 install(DIRECTORY core/include/ TYPE INCLUDE)
 install(EXPORT partiemcCore NAMESPACE partiemc:: DESTINATION ${package_dir})
 partiemc_pkg_config(core "Outlines and meshes of particles (C++20)"
-  "absl_status absl_statusor absl_strings tbb libhwy" "-lpartiemc_core -pthread")
+  "absl_status absl_statusor absl_strings tbb libhwy" "-lpartiemc_core -lmeshoptimizer -pthread")
 
 if(PARTIEMC_SERVICE)
   list(APPEND PARTIEMC_COMPONENTS client)

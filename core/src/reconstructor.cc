@@ -333,6 +333,7 @@ SurfaceParameters SurfaceParametersOf(const ReconstructionParameters& parameters
   surface.clean = parameters.clean;
   surface.thinning_distance = parameters.surface.thinning_distance;
   surface.max_drop_particles = parameters.surface.max_drop_particles;
+  surface.simplify = parameters.surface.simplify;
   surface.min_component_volume = parameters.surface.min_component_volume;
   surface.min_component_particles = parameters.min_component_particles;
   return surface;

@@ -21,6 +21,7 @@
 #include "frame/scale.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
+#include "simplify/simplify.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/certificate.h"
@@ -68,6 +69,10 @@ ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
   in_space.cell_size = parameters.cell_size;
   in_space.reference_radius = parameters.reference_radius;
   in_space.slice = SlicePlane{};
+  in_space.surface = {.thinning_distance = parameters.thinning_distance,
+                      .max_drop_particles = parameters.max_drop_particles,
+                      .simplify = parameters.simplify,
+                      .min_component_volume = parameters.min_component_volume};
   return in_space;
 }
 
@@ -251,22 +256,6 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
-  const auto check = [](double value, const char* field, const char* rule) {
-    if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), field, ShortestNumber(value), rule});
-  };
-  if (absl::Status status =
-          check(parameters.min_component_volume, "parameters.min_component_volume",
-                "must be 0 or more cubed spacings, and finite");
-      !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = check(parameters.thinning_distance, "parameters.thinning_distance",
-                                  "must be 0 or more spacings, and finite");
-      !status.ok()) {
-    return status;
-  }
   return SurfaceReconstructor(parameters, limits);
 }
 
@@ -341,6 +330,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
   size.has_windows = placement == SurfacePlacement::kVirtualPlane;
   AddBodies(frame, b.bodies, size);
   size.has_state = state != nullptr;
+  size.is_simplified = parameters_.simplify > 0;
   if (status = Reserve(size, memory); !status.ok()) return status;
   space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
   if (placement == SurfacePlacement::kMarchingCubes) {
@@ -370,6 +360,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
     space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
                            b.mesh.shell_of, cell_size},
                           state->history, b.identities, b.next_history, surface);
+  }
+  if (parameters_.simplify > 0) {
+    ThrowIfCancelled();
+    simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
   }
   if (!frame.attributes.empty()) {
     ThrowIfCancelled();

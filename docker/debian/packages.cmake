@@ -77,7 +77,7 @@ set(CPACK_COMPONENT_DEV_DESCRIPTION
   "Outlines of streamed particles: for developers\n Libraries and headers of C++ and C, the contract of the service.")
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-  "libpartiemc-c1 (= ${PROJECT_VERSION}-1), libgrpc++-dev, libprotobuf-dev, libabsl-dev, libtbb-dev, libhwy-dev")
+  "libpartiemc-c1 (= ${PROJECT_VERSION}-1), libgrpc++-dev, libprotobuf-dev, libabsl-dev, libtbb-dev, libhwy-dev, libmeshoptimizer-dev")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-partiemc)
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION
   "Outlines of streamed particles: for Python\n NumPy arrays in, NumPy arrays out, in process or by a server.")

@@ -39,7 +39,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
                reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
                min_component_area, min_component_particles, plane, slice, isovalue, sections,
                surface] = parameters;
-  const auto& [thinning_distance, max_drop_particles, min_component_volume] = surface;
+  const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
   const auto put_optional = [&](std::optional<double> value) {
@@ -82,6 +82,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     put_small(output);
     PutNumber(thinning_distance, bytes);
     PutNumber(max_drop_particles, bytes);
+    PutNumber(simplify, bytes);
     PutNumber(min_component_volume, bytes);
   }
   if (isovalue) PutNumber(*isovalue, bytes);

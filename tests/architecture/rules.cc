@@ -182,7 +182,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         "core/src/",
         {"base", "frame", "state", "bins", "field", "crossings", "rings", "sampler", "normals",
          "vertices", "identities", "mesh", "attributes", "gauges", "space", "space_vertices",
-         "space_identities", "check"},
+         "space_identities", "check", "simplify"},
         {"frame_lengths", "reconstructor", "surface_reconstructor", "workspace",
          "workspace_bytes"}},
        {"server/",

@@ -24,13 +24,15 @@
 namespace {
 
 std::atomic<std::size_t> allocations = 0;
-std::atomic<std::size_t> live_bytes = 0;
+std::atomic<std::size_t> live_bytes = 0, peak_bytes = 0;
 
 void* Allocate(std::size_t bytes, std::size_t alignment) {
   ++allocations;
   void* memory = nullptr;
   if (posix_memalign(&memory, alignment, bytes) != 0) throw std::bad_alloc();
-  live_bytes += malloc_usable_size(memory);
+  const std::size_t live = live_bytes += malloc_usable_size(memory);
+  std::size_t peak = peak_bytes;
+  while (peak < live && !peak_bytes.compare_exchange_weak(peak, live)) continue;
   return memory;
 }
 
@@ -463,6 +465,26 @@ TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
     const std::size_t held = live_bytes - before;
     EXPECT_LE(held, guard.last());
     EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
+  }
+}
+
+// The simplification frees its memory, so the peak counts.
+TEST(MemoryGuard, IsToldNoLessThanASimplificationTakes) {
+  for (SurfaceCase& tested : SurfaceCases()) {
+    SCOPED_TRACE(tested.name);
+    tested.parameters.simplify = .1;
+    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
+    ASSERT_TRUE(reconstructor.ok());
+    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const std::size_t before = live_bytes;
+    peak_bytes = before;
+    Guard guard(2);
+    SurfaceWorkspace workspace;
+    Surface surface;
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard}).ok());
+    const std::size_t held = peak_bytes - before;
+    EXPECT_LE(held, guard.last());
+    EXPECT_GE(3 * static_cast<double>(held), static_cast<double>(guard.last()));
   }
 }
 

@@ -242,7 +242,7 @@ class SurfaceCancellation : public testing::TestWithParam<unsigned> {
   const tbb::global_control control_{tbb::global_control::max_allowed_parallelism, GetParam()};
   Arena arena_{GetParam()};
   const absl::StatusOr<SurfaceReconstructor> reconstructor_ =
-      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane, .simplify = .05});
   std::vector<double> xyz_;
   Surface expected_;
 };

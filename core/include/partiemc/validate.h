@@ -9,11 +9,11 @@
 
 namespace partiemc {
 
-/// Checks R1-R4 and M1-M3 of result.h, and S1-S5 of surface.h, with exact arithmetic. M2 is checked in two ways: the areas
-/// of rings and triangles agree (to 1e-9 relative), and opposite sides of the triangles cancel,
-/// except along the segments of the rings. With M1 and R2 this excludes gaps and overlaps.
-/// Errors: INTERNAL with the guarantee, the ring, triangle or shell, and the values. Cost: n log n
-/// in the points.
+/// Checks R1-R4 and M1-M3 of result.h, and S1-S5 of surface.h, with exact arithmetic. M2 is checked
+/// in two ways: the areas of rings and triangles agree (to 1e-9 relative), and opposite sides of
+/// the triangles cancel, except along the segments of the rings. With M1 and R2 this excludes gaps
+/// and overlaps. Errors: INTERNAL with the guarantee, the ring, triangle or shell, and the values.
+/// Cost: n log n in the points.
 absl::Status Validate(const Result& result);
 
 /// Checks all of the above, and M4 if `fill` guarantees it: each side belongs to exactly

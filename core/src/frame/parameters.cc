@@ -141,6 +141,10 @@ absl::Status CheckSurface(const ReconstructionParameters& p) {
       !status.ok()) {
     return status;
   }
+  // A larger error removes what the particles show.
+  if (!Within(p.surface.simplify, 0, 1)) {
+    return OutOfRange("surface.simplify", p.surface.simplify, "must be in [0, 1] spacings");
+  }
   if (p.output != Output::kSurface) return absl::OkStatus();
   if (!p.spacing) return Refused("spacing", "absent", "must be given for a surface");
   if (p.slice) {

@@ -113,29 +113,6 @@ void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scrat
   }
 }
 
-void MeasureShell(std::uint32_t shell, Surface& surface) {
-  const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
-  double area = 0, volume = 0;
-  Vec3 moment;
-  for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
-       ++t) {
-    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]) - origin;
-    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]) - origin;
-    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]) - origin;
-    const double part = Dot(a, Cross(b, c)) / 6;
-    area += Length(Cross(b - a, c - a)) / 2;
-    volume += part;
-    moment = moment + (part / 4) * (a + b + c);
-  }
-  ShellMeasures& measures = surface.measures[shell];
-  measures.area = area;
-  measures.volume = volume;
-  const Vec3 centroid = volume != 0 ? origin + (1 / volume) * moment : origin;
-  measures.centroid_x = centroid.x;
-  measures.centroid_y = centroid.y;
-  measures.centroid_z = centroid.z;
-}
-
 }  // namespace
 
 void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
@@ -161,6 +138,29 @@ void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& cross
       }
     }
   }
+}
+
+void MeasureShell(std::uint32_t shell, Surface& surface) {
+  const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
+  double area = 0, volume = 0;
+  Vec3 moment;
+  for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
+       ++t) {
+    const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]) - origin;
+    const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]) - origin;
+    const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]) - origin;
+    const double part = Dot(a, Cross(b, c)) / 6;
+    area += Length(Cross(b - a, c - a)) / 2;
+    volume += part;
+    moment = moment + (part / 4) * (a + b + c);
+  }
+  ShellMeasures& measures = surface.measures[shell];
+  measures.area = area;
+  measures.volume = volume;
+  const Vec3 centroid = volume != 0 ? origin + (1 / volume) * moment : origin;
+  measures.centroid_x = centroid.x;
+  measures.centroid_y = centroid.y;
+  measures.centroid_z = centroid.z;
 }
 
 void AssembleSurface(const MeshInput& input, MeshScratch& scratch, Surface& surface) {

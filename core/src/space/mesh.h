@@ -46,6 +46,9 @@ struct MeshScratch {
 void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        std::vector<VertexTriangle>& triangles);
 
+/// Sets area, volume and centroid of a shell to those of its triangles.
+void MeasureShell(std::uint32_t shell, Surface& surface);
+
 /// Sorts `scratch.triangles` and their vertices by shell and measures the shells. Shells are
 /// ordered by their first vertex. The outer shell of a body is the shell directly below its lowest
 /// node.

@@ -15,7 +15,8 @@ struct SurfaceSize {
   std::uint64_t bodies = 0;            ///< Bodies, and particles that may become one.
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
   bool has_state = false;              ///< Of a stream.
-  std::uint64_t samples = 0;           ///< Particles that a state may store; 0 without ids.
+  bool is_simplified = false;
+  std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
 };
 
 /// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
@@ -37,6 +38,9 @@ inline constexpr std::uint64_t kBytesPerSample = 200;
 inline constexpr std::uint64_t kBytesPerValue = 8;
 inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 
+/// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
+inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 500;
+
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
@@ -49,7 +53,9 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
                         kBytesPerBrick * size.bricks + kBytesPerEdge * size.edges +
                         per_loop * size.loops;
   const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
-  bytes += kBytesPerValue * size.attribute_values * (size.edges + size.loops + drop_points);
+  const std::uint64_t points = size.edges + size.loops + drop_points;
+  bytes += kBytesPerValue * size.attribute_values * points;
+  if (size.is_simplified) bytes += kBytesPerSimplifiedPoint * points;
   if (size.has_state) {
     bytes += kBytesPerTrackedEdge * size.edges + kBytesPerTrackedBody * size.bodies +
              kBytesPerTrackedParticle * size.particles + kBytesPerSample * size.samples;

@@ -66,6 +66,7 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
       {"replay", kDamBreak, "--local", "--surface", "--thinning-distance", "-1"},
       {"replay", kDamBreak, "--local", "--surface", "--min-volume", "inf"},
       {"replay", kDamBreak, "--local", "--min-volume", "8"},
+      {"replay", kDamBreak, "--local", "--surface", "--simplify", "1.1"},
       {"replay", kDamBreak, "--local", "--surface", "--report", "report.html"},
       {"replay", kDamBreak, "--local", "--surface", "--output-dir", "out", "--format", "geojson"},
       {"replay", kDamBreak, "--local", "--rate", "0"},

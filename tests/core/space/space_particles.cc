@@ -1,8 +1,11 @@
 #include "space/space_particles.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 #include <utility>
+
+#include "support/tries.h"
 
 namespace partiemc::testing {
 namespace {
@@ -167,6 +170,11 @@ SpaceParticles RandomSpaceScene(std::uint64_t seed) {
     }
   }
   return particles;
+}
+
+std::uint64_t Frames(std::uint64_t usual) {
+  const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
+  return wanted == nullptr ? support::Tries(usual) : std::strtoull(wanted, nullptr, 10);
 }
 
 SpaceParticles Shuffled(const SpaceParticles& particles, Random& random) {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "space/bodies.h"
 #include "space/cell_loops.h"
@@ -19,7 +19,6 @@
 #include "space/space_particles.h"
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
-#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -28,12 +27,6 @@ using support::Random;
 using testing::RandomSpaceScene;
 using testing::Shuffled;
 using testing::SpaceParticles;
-
-/// More frames than usual, for a longer run: PARTIEMC_SPACE_FRAMES.
-std::uint64_t Frames(std::uint64_t usual) {
-  const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
-  return wanted == nullptr ? support::Tries(usual) : std::strtoull(wanted, nullptr, 10);
-}
 
 TEST(CellLoops, CoverEveryCrossingOnce) {
   for (unsigned corners = 0; corners < 256; ++corners) {
@@ -128,7 +121,7 @@ Signs RandomSigns(std::uint64_t seed) {
 }
 
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
-  const std::uint64_t frames = Frames(300);
+  const std::uint64_t frames = testing::Frames(300);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const Signs signs = RandomSigns(seed);
     std::vector<Vec3> positions, normals;
@@ -205,7 +198,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
-  const std::uint64_t frames = Frames(8);
+  const std::uint64_t frames = testing::Frames(8);
   int intersections = 0;
   std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
@@ -324,7 +317,7 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
   Surface surface;
-  const std::uint64_t frames = Frames(40);
+  const std::uint64_t frames = testing::Frames(40);
   std::size_t triangles = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const SpaceParticles particles = RandomSpaceScene(seed);
@@ -366,6 +359,13 @@ TEST(SurfaceReconstructor, RefusesBadInput) {
   EXPECT_FALSE(SurfaceReconstructor::Create({.cell_size = .1}).ok());
   for (const double distance : {-.01, std::nan(""), HUGE_VAL}) {
     EXPECT_FALSE(SurfaceReconstructor::Create({.thinning_distance = distance}).ok());
+  }
+  for (const double error : {-.01, 1.01, std::nan(""), HUGE_VAL}) {
+    const auto refused = SurfaceReconstructor::Create({.simplify = error});
+    const auto violation = FindViolation(refused.status());
+    ASSERT_TRUE(violation.has_value()) << error;
+    EXPECT_EQ(violation->reason, kReasonOutOfRange);
+    EXPECT_EQ(violation->field, "parameters.simplify");
   }
   const auto reconstructor = SurfaceReconstructor::Create({});
   ASSERT_TRUE(reconstructor.ok());

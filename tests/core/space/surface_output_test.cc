@@ -66,9 +66,14 @@ TEST(SurfaceOutput, EqualsTheSurfaceReconstructor) {
     ReconstructionParameters parameters = OfSurface();
     parameters.placement = placement;
     parameters.min_component_particles = 2;
+    parameters.surface = {.thinning_distance = .02, .max_drop_particles = 8, .simplify = .03};
     Stream stream(parameters);
-    const auto reference = SurfaceReconstructor::Create(
-        {.placement = in_space, .spacing = 1, .min_component_particles = 2});
+    const auto reference = SurfaceReconstructor::Create({.placement = in_space,
+                                                         .spacing = 1,
+                                                         .thinning_distance = .02,
+                                                         .max_drop_particles = 8,
+                                                         .simplify = .03,
+                                                         .min_component_particles = 2});
     ASSERT_TRUE(reference.ok());
     SurfaceState state;
     SurfaceWorkspace workspace;
@@ -246,6 +251,7 @@ TEST(SurfaceOutput, RefusesParametersOfOutlines) {
       {"parameters.placement", [](P& p) { p.placement = Placement::kFarthestParticle; }},
       {"parameters.sections[0].slice", [](P& p) { p.sections = {{.isovalue = .5}}; }},
       {"parameters.surface.thinning_distance", [](P& p) { p.surface.thinning_distance = -1; }},
+      {"parameters.surface.simplify", [](P& p) { p.surface.simplify = 1.01; }},
       {"parameters.surface.min_component_volume",
        [](P& p) { p.surface.min_component_volume = std::nan(""); }},
   };

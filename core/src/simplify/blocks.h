@@ -1,0 +1,23 @@
+// Simplifies triangles by meshoptimizer, in blocks that are small enough for its precision.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace partiemc::simplify {
+
+struct BlockLimits {
+  double error = 0;        ///< Limit of the root mean square error, in world units.
+  double least_block = 1;  ///< Least side of a block, in world units.
+};
+
+/// Collapses edges of `triangles`, triples of indices into `points`. Points on the border of the
+/// triangles stay. Guarantees neither manifold triangles nor their error.
+/// meshoptimizer sums floats relative to the extent of its input. So larger extents are cut into
+/// blocks with fixed borders, and then into other blocks, which hold the borders of the first.
+/// Deterministic for any number of threads.
+void SimplifyInBlocks(std::span<const double> points, const BlockLimits& limits,
+                      std::vector<std::uint32_t>& triangles);
+
+}  // namespace partiemc::simplify

@@ -1,0 +1,129 @@
+#include "simplify/mesh_faults.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "check/triangle_contact.h"
+#include "check/triangle_grid.h"
+
+namespace partiemc::simplify {
+namespace {
+
+Triangle TriangleAt(std::span<const std::uint32_t> triangles, std::size_t triangle) {
+  return {triangles[3 * triangle], triangles[3 * triangle + 1], triangles[3 * triangle + 2]};
+}
+
+Box Intersection(const Box& a, const Box& b) {
+  return {
+      {std::max(a.low.x, b.low.x), std::max(a.low.y, b.low.y), std::max(a.low.z, b.low.z)},
+      {std::min(a.high.x, b.high.x), std::min(a.high.y, b.high.y), std::min(a.high.z, b.high.z)}};
+}
+
+/// A side of a triangle, and the third corner.
+struct Side {
+  std::uint32_t from, to, third;
+
+  friend bool operator<(const Side& a, const Side& b) {
+    return a.from != b.from ? a.from < b.from : a.to < b.to;
+  }
+};
+
+/// The sides, sorted.
+std::vector<Side> SidesOf(std::span<const std::uint32_t> triangles) {
+  std::vector<Side> sides;
+  sides.reserve(triangles.size());
+  for (std::size_t t = 0; t < triangles.size() / 3; ++t) {
+    const auto [a, b, c] = TriangleAt(triangles, t);
+    sides.insert(sides.end(), {{a, b, c}, {b, c, a}, {c, a, b}});
+  }
+  std::sort(sides.begin(), sides.end());
+  return sides;
+}
+
+}  // namespace
+
+Box BoxOf(std::span<const double> points, std::span<const std::uint32_t> indices) {
+  Box box{Vec3At(points, indices[0]), Vec3At(points, indices[0])};
+  for (const std::uint32_t index : indices.subspan(1)) {
+    const Vec3 at = Vec3At(points, index);
+    box.low = {std::min(box.low.x, at.x), std::min(box.low.y, at.y), std::min(box.low.z, at.z)};
+    box.high = {std::max(box.high.x, at.x), std::max(box.high.y, at.y), std::max(box.high.z, at.z)};
+  }
+  return box;
+}
+
+void FindManifoldFaults(std::span<const double> points, std::span<const std::uint32_t> triangles,
+                        std::vector<Box>& faults) {
+  faults.clear();
+  const std::vector<Side> sides = SidesOf(triangles);
+  const auto find = [&](std::uint32_t from, std::uint32_t to) {
+    return std::lower_bound(sides.begin(), sides.end(), Side{from, to, 0});
+  };
+  for (std::size_t k = 0; k < sides.size(); ++k) {
+    const Side& side = sides[k];
+    const bool is_double = k > 0 && !(sides[k - 1] < side);
+    const auto opposite = find(side.to, side.from);
+    const bool is_open =
+        opposite == sides.end() || opposite->from != side.to || opposite->to != side.from;
+    if (!is_double && !is_open && side.from != side.to) continue;
+    faults.push_back(BoxOf(points, std::array{side.from, side.to}));
+  }
+  if (!faults.empty()) return;
+  for (std::size_t first = 0, last = 0; first < sides.size(); first = last) {
+    const std::uint32_t point = sides[first].from;
+    while (last < sides.size() && sides[last].from == point) ++last;
+    // Turning about the point visits each of its triangles once.
+    std::size_t visited = 0, side = first;
+    do {
+      side = find(point, sides[side].third) - sides.begin();
+      ++visited;
+    } while (side != first && visited <= last - first);
+    if (visited != last - first) faults.push_back(BoxOf(points, std::array{point}));
+  }
+}
+
+bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points) {
+  const auto [least, most] = std::minmax_element(triangles.begin(), triangles.end());
+  const std::uint32_t first = *least;
+  std::vector<std::uint32_t> parent(*most - first + 1);
+  for (std::uint32_t k = 0; k < parent.size(); ++k) parent[k] = k;
+  const auto root_of = [&](std::uint32_t k) {
+    while (parent[k] != k) k = parent[k] = parent[parent[k]];
+    return k;
+  };
+  std::size_t joined = 1;
+  for (std::size_t t = 0; t < triangles.size() / 3; ++t) {
+    for (int k = 1; k < 3; ++k) {
+      const std::uint32_t a = root_of(triangles[3 * t] - first);
+      const std::uint32_t b = root_of(triangles[3 * t + k] - first);
+      joined += a != b ? 1 : 0;
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  return joined == points;
+}
+
+void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
+                  std::span<const std::uint8_t> is_new, std::vector<Contact>& contacts) {
+  contacts.clear();
+  for (std::uint32_t t = 0; t < triangles.size() / 3; ++t) {
+    const Triangle corners = TriangleAt(triangles, t);
+    if (is_new[t] == 0 || !AreCollinear(Vec3At(points, corners[0]), Vec3At(points, corners[1]),
+                                        Vec3At(points, corners[2]))) {
+      continue;
+    }
+    contacts.push_back({t, t, BoxOf(points, corners)});
+  }
+  if (!contacts.empty()) return;
+  TriangleGrid(points, triangles).ForEachPair([&](std::uint32_t a, std::uint32_t b) {
+    if (is_new[a] == 0 && is_new[b] == 0) return true;
+    const Triangle first = TriangleAt(triangles, a), second = TriangleAt(triangles, b);
+    if (TrianglesCollide(points, first, second)) {
+      contacts.push_back({a, b, Intersection(BoxOf(points, first), BoxOf(points, second))});
+    }
+    return true;
+  });
+}
+
+}  // namespace partiemc::simplify

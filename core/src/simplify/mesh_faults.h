@@ -1,0 +1,43 @@
+// Finds where simplified shells break the guarantees of surfaces (partiemc/surface.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vec3.h"
+
+namespace partiemc::simplify {
+
+struct Box {
+  Vec3 low, high;
+};
+
+/// The box of the points with these indices, of which there is one at least.
+Box BoxOf(std::span<const double> points, std::span<const std::uint32_t> indices);
+
+/// Finds where a shell is not closed or not manifold: boxes of the edges that break S1 or, if there
+/// are none, the points that break S2. A triangle that has a point twice breaks S1, too.
+/// `triangles` are triples of indices into `points`, which may hold unused points.
+/// Cost: n log n in the triangles.
+void FindManifoldFaults(std::span<const double> points, std::span<const std::uint32_t> triangles,
+                        std::vector<Box>& faults);
+
+/// Whether the triangles of a shell without faults are one connected surface with this number of
+/// points.
+bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points);
+
+/// Two triangles that break S3, or one that is degenerate (a == b).
+struct Contact {
+  std::uint32_t a, b;
+  Box box;  ///< Holds where they touch.
+};
+
+/// Finds degenerate triangles or, if there are none, pairs of triangles that intersect. Exact.
+/// Only triangles with `is_new` set are checked, against all others.
+/// Requires: S1, coordinates in the domain of predicates_in_space.h.
+/// Cost: n log n in the triangles if they are of similar size.
+void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
+                  std::span<const std::uint8_t> is_new, std::vector<Contact>& contacts);
+
+}  // namespace partiemc::simplify
