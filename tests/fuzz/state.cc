@@ -20,10 +20,9 @@ namespace {
 constexpr std::size_t kMarkBytes = 8;  // Magic number and version.
 constexpr std::size_t kChecksumBytes = 8;
 
-template <typename AnyState>
-std::string PutRight(std::string_view bytes) {
-  static const auto* const kMark = new std::string(Serialize(AnyState{}).substr(0, kMarkBytes));
-  std::string state = *kMark;
+// Gives bytes the mark of `like` and a right checksum.
+std::string PutRight(std::string_view bytes, const auto& like) {
+  std::string state = Serialize(like).substr(0, kMarkBytes);
   if (bytes.size() > kMarkBytes + kChecksumBytes) {
     state += bytes.substr(kMarkBytes, bytes.size() - kMarkBytes - kChecksumBytes);
   }
@@ -67,7 +66,7 @@ void ContinueSurfaces(SurfaceState state) {
 
 void AttackSurfaceState(std::string_view bytes) {
   Parsed(ParseSurfaceState(bytes));
-  const auto state = Parsed(ParseSurfaceState(PutRight<SurfaceState>(bytes)));
+  const auto state = Parsed(ParseSurfaceState(PutRight(bytes, SurfaceState{})));
   if (state && state->history.identities_given < std::uint64_t{1} << 61) ContinueSurfaces(*state);
 }
 
@@ -81,7 +80,11 @@ void AttackState(Bytes bytes) {
   const std::string_view rest = choices.TakeRest();
   AttackSurfaceState(rest);
   Parse(rest);
-  const std::string right = PutRight<State>(rest);
+  // The state of a stream of surfaces, with its sections.
+  if (const auto state = Parse(PutRight(rest, State{.surface = {.cell_size = 1}}))) {
+    Require(Parse(Serialize(*state)) == state, "a state of surfaces reads back the same");
+  }
+  const std::string right = PutRight(rest, State{});
   if (const auto state = Parse(right)) {
     Require(Parse(Serialize(*state)).has_value(), "a state that was accepted is accepted again");
     Choices of_frames(Bytes(reinterpret_cast<const std::uint8_t*>(frames.data()), frames.size()));

@@ -228,7 +228,7 @@ TEST(SpaceCleaning, RefusesBadVolumes) {
   ASSERT_FALSE(refused.ok());
   const auto violation = FindViolation(refused.status());
   ASSERT_TRUE(violation.has_value());
-  EXPECT_EQ(violation->field, "parameters.min_component_volume");
+  EXPECT_EQ(violation->field, "parameters.surface.min_component_volume");
   EXPECT_EQ(violation->reason, kReasonOutOfRange);
 }
 

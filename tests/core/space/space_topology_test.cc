@@ -365,7 +365,7 @@ TEST(SurfaceReconstructor, RefusesBadInput) {
     const auto violation = FindViolation(refused.status());
     ASSERT_TRUE(violation.has_value()) << error;
     EXPECT_EQ(violation->reason, kReasonOutOfRange);
-    EXPECT_EQ(violation->field, "parameters.simplify");
+    EXPECT_EQ(violation->field, "parameters.surface.simplify");
   }
   const auto reconstructor = SurfaceReconstructor::Create({});
   ASSERT_TRUE(reconstructor.ok());
