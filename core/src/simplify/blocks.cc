@@ -15,8 +15,8 @@
 namespace partiemc::simplify {
 namespace {
 
-// Side of a block in errors. Squared errors are sums of floats of about 1, so smaller errors would
-// drown in rounding: with a side of 8,000 errors, three times as many triangles were left.
+// Side of a block in errors. meshoptimizer sums squared errors as floats in units of the extent,
+// whose rounding exceeds smaller errors. A side of 8,000 errors left three times as many triangles.
 constexpr double kBlock = 1000;
 
 double ExtentOf(const Box& box) {

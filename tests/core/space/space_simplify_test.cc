@@ -247,6 +247,19 @@ TEST(Simplify, SmallShellsKeepTheirTriangles) {
   EXPECT_EQ(surface.points, all.points);
 }
 
+/// A flat shell. Without blocks, rounding hides errors this small relative to it: .285 are left.
+TEST(Simplify, LargeShellsAreSimplifiedInBlocks) {
+  testing::Shell shell = testing::BallShell({}, 100, 6);
+  for (Vec3& point : shell.points) point.z *= .1;
+  Surface surface;
+  testing::AddShell(shell, kNoShell, surface);
+  const std::size_t triangles = surface.TriangleCount();
+  const auto report = simplify::Simplify({.error = .02, .spacing = 1}, surface);
+  EXPECT_TRUE(Validate(surface).ok());
+  EXPECT_EQ(report.certified_shells, 0u);
+  EXPECT_LT(static_cast<double>(surface.TriangleCount()), .2 * static_cast<double>(triangles));
+}
+
 /// A ring with a cross section of `sides` corners.
 testing::Shell RingShell(double large, double small, std::uint32_t steps, std::uint32_t sides) {
   testing::Shell shell;
