@@ -83,16 +83,16 @@ struct SurfaceOptions {
   /// particles, where nothing else is near. 0: none. Only for `virtual-plane`.
   std::uint64_t max_drop_particles = 30;
 
-  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings. At least 0;
-  /// 0 keeps all. `min_component_particles` applies to surfaces, too.
-  double min_component_volume = 0;
-
   /// Removes points while the root mean square error stays below this many spacings. No removed
   /// point is farther than twice this from the surface. In [0, 1]; 0 keeps all points. S1 to S5
   /// hold: where they would not, triangles stay as they are. Shells lose some of their volume
   /// (core/SURFACES.md, "Simplification"). meshoptimizer allocates memory by its own allocator
   /// (meshopt_setAllocator), so frames allocate memory also with a warm workspace.
   double simplify = 0;
+
+  /// Spray: drops bodies whose particles have less volume than this, in cubed spacings. At least 0;
+  /// 0 keeps all. `min_component_particles` applies to surfaces, too.
+  double min_component_volume = 0;
 
   friend bool operator==(const SurfaceOptions&, const SurfaceOptions&) = default;
 };
