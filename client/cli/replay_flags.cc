@@ -146,7 +146,8 @@ void AddSurfaceFlags(CLI::App& app, ReplayFlags& flags, const char* group) {
       ->needs(surface)
       ->group(group);
   app.add_option("--simplify", flags.surface_options.simplify,
-                 "Surfaces: fewer triangles, within this error; .05 leaves about a third of them")
+                 "Surfaces: fewer triangles, within this error; .05 leaves a third of those of "
+                 "large bodies")
       ->type_name("D")
       ->capture_default_str()
       ->needs(surface)

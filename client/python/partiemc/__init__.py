@@ -59,8 +59,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
-    simplify: for output "surface": fewer triangles, within this error in spacings; .05 leaves about a
-        third of them. 0 by default.
+    simplify: for output "surface": fewer triangles, within this error in spacings; .05 leaves a third
+        of those of large bodies. 0 by default.
     thinning_distance, max_drop_particles, min_component_volume: only for output "surface".
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.

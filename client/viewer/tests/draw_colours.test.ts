@@ -90,7 +90,7 @@ test('SVG pictures of the command line have the same colours', () => {
   assert.deepEqual(bytes.map(([, ...parts]) => `#${parts.join('')}`), rampStops({ dark: false, map: 'violet-yellow' }));
   const { interior, edge, particle, outline, isoline } = theme(false);
   for (const colour of [interior, edge, particle, outline, isoline]) {
-    assert.ok(read('svg.cc').includes(hex(colour)), hex(colour));
+    assert.ok(read('formats/svg.cc').includes(hex(colour)), hex(colour));
   }
 });
 
