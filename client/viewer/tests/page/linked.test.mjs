@@ -90,12 +90,13 @@ test('pictures of different files share time, view and selection', async () => {
 });
 
 test('a link waits for a frame that has not arrived', async () => {
-  viewer = await Viewer.open(browser, world.url, { hash: '#stream=coming&frame=70' });
-  world.loop('coming', '--rate', '12');
+  world.loop('coming', '--rate', '3');  // A slow host has 20 s to show the notice.
+  await until('the stream', () => world.log.join('').includes('name=coming'));
+  viewer = await Viewer.open(browser, world.url, { hash: '#stream=coming&frame=60' });
   const notice = viewer.pane().locator('.notice');
-  await until('the notice', async () => await notice.isVisible() && /Waiting for frame 70 of the link\. The newest frame is \d+/.test(await notice.textContent()));
-  assert.match(new URL(viewer.page.url()).hash, /frame=70/);
-  await until('its frame', async () => await viewer.frame() === 70);
+  await until('the notice', async () => await notice.isVisible() && /Waiting for frame 60 of the link\. The newest frame is \d+/.test(await notice.textContent()));
+  assert.match(new URL(viewer.page.url()).hash, /frame=60/);
+  await until('its frame', async () => await viewer.frame() === 60);
   assert.equal(await viewer.button('Play').count(), 1, 'paused there');
   assert.equal(await notice.isVisible(), false);
 });
