@@ -116,7 +116,8 @@ export class WatchTrack implements Track {
 
   /** Whether neither the page nor the server holds a frame. */
   isGone(sequence: number): boolean {
-    return this.wasOpen && sequence < this.serverOldest && this.history.get(sequence) === null;
+    // An open stream without frames has no oldest frame: nothing of it is gone.
+    return Number.isFinite(this.serverOldest) && sequence < this.serverOldest && this.history.get(sequence) === null;
   }
 
   close(): void {

@@ -90,9 +90,8 @@ test('pictures of different files share time, view and selection', async () => {
 });
 
 test('a link waits for a frame that has not arrived', async () => {
-  world.loop('coming', '--rate', '3');  // A slow host has 20 s to show the notice.
-  await until('the stream', () => world.log.join('').includes('name=coming'));
   viewer = await Viewer.open(browser, world.url, { hash: '#stream=coming&frame=60' });
+  world.loop('coming', '--rate', '3');  // A slow host has 20 s to show the notice.
   const notice = viewer.pane().locator('.notice');
   await until('the notice', async () => await notice.isVisible() && /Waiting for frame 60 of the link\. The newest frame is \d+/.test(await notice.textContent()));
   assert.match(new URL(viewer.page.url()).hash, /frame=60/);
