@@ -31,9 +31,8 @@ enum class FrameFormat : std::uint8_t {
   kSvg,
   /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
   /// polylines). Indices begin at 1.
-  /// A surface: vertices "v x y z", normals "vn", and a group "body_K" of faces for each body,
-  /// which
-  /// includes its cavities. Attributes are left out.
+  /// A surface: vertices "v x y z", normals "vn", and for each body a group "body_K" with the faces
+  /// of the body and of its cavities. Attributes are left out.
   kObj,
   /// VTK XML PolyData, only in builds with VTK: rings as closed lines, triangles as polygons. Cell
   /// data: "class" (0 boundary and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for
