@@ -1,8 +1,10 @@
 #include "client/cli/frame_outputs.h"
 
 #include <algorithm>
+#include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "CLI/CLI.hpp"
 #include "client/output/text.h"
@@ -36,34 +38,64 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
       ->allow_extra_args(false);
 }
 
-absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
-  FrameOutputs outputs;
-  bool writes_glb = false;
+namespace {
+
+std::string_view FormatOf(const FrameOutputs::Places& places) {
+  if (!places.format.empty()) return places.format;
+  return places.surface ? "ply" : "geojson";
+}
+
+StatisticsOf StatisticsFor(const FrameOutputs::Places& places) {
+  return places.surface ? StatisticsOf::kSurfaces : StatisticsOf::kOutlines;
+}
+
+absl::Status CheckSurfaces(const FrameOutputs::Places& places,
+                           std::span<const FrameFormat> formats) {
+  if (!places.surface) return absl::OkStatus();
+  if (!places.color_by.empty()) {
+    return absl::InvalidArgumentError("--color-by: colours outlines, but the frames are surfaces");
+  }
+  if (!places.gauges.empty()) {
+    return absl::InvalidArgumentError("--gauge: measures outlines, but the frames are surfaces");
+  }
+  for (const FrameFormat format : formats) {
+    if (absl::Status status = CheckHoldsSurfaces(format); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status FrameOutputs::Check(const Places& places) {
+  std::vector<FrameFormat> formats;
   if (!places.output_dir.empty()) {
-    auto formats = ParseFrameFormats(places.format);
-    if (!formats.ok()) return formats.status();
-    for (const FrameFormat format : *formats) {
-      absl::Status status = places.surface ? CheckHoldsSurfaces(format) : absl::OkStatus();
-      if (!status.ok()) return status;
-    }
-    writes_glb = std::ranges::count(*formats, FrameFormat::kGlb) > 0;
-    outputs.show_normals_ = std::ranges::count(*formats, FrameFormat::kCsv) > 0;
+    auto parsed = ParseFrameFormats(FormatOf(places));
+    if (!parsed.ok()) return parsed.status();
+    formats = *std::move(parsed);
+  }
+  if (places.compress_glb && std::ranges::count(formats, FrameFormat::kGlb) == 0) {
+    return absl::InvalidArgumentError("--compress-glb: requires --output-dir and --format glb");
+  }
+  if (auto gauges = ParseGauges(places.gauges); !gauges.ok()) return gauges.status();
+  return CheckSurfaces(places, formats);
+}
+
+absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
+  if (absl::Status status = Check(places); !status.ok()) return status;
+  FrameOutputs outputs;
+  if (!places.output_dir.empty()) {
+    auto formats = *ParseFrameFormats(FormatOf(places));
+    outputs.show_normals_ = std::ranges::count(formats, FrameFormat::kCsv) > 0;
     auto frames = FrameWriter::Create({.directory = places.output_dir,
-                                       .formats = *std::move(formats),
+                                       .formats = std::move(formats),
                                        .color_by = places.color_by,
                                        .compress_glb = places.compress_glb});
     if (!frames.ok()) return frames.status();
     outputs.frames_ = *std::move(frames);
   }
-  if (places.compress_glb && !writes_glb) {
-    return absl::InvalidArgumentError("--compress-glb: requires --output-dir and --format glb");
-  }
   if (!places.stats.empty()) {
-    auto gauges = ParseGauges(places.gauges);
-    if (!gauges.ok()) return gauges.status();
-    auto statistics = StatisticsWriter::Create(
-        places.stats, *std::move(gauges),
-        places.surface ? StatisticsOf::kSurfaces : StatisticsOf::kOutlines);
+    auto statistics =
+        StatisticsWriter::Create(places.stats, *ParseGauges(places.gauges), StatisticsFor(places));
     if (!statistics.ok()) return statistics.status();
     outputs.statistics_.emplace(*std::move(statistics));
   }

@@ -30,15 +30,20 @@ class FrameOutputs {
  public:
   /// The values of the flags with the same names. An empty value disables the output.
   struct Places {
-    std::string output_dir, format, stats, color_by;
+    std::string output_dir;
+    std::string format;  ///< Empty: geojson, or ply for surfaces.
+    std::string stats, color_by;
     bool compress_glb = false;
     bool surface = false;  ///< The frames are surfaces in space.
     std::vector<std::string> gauges = {};
   };
 
+  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, for a format, gauge or
+  /// colours that surfaces do not have, and for `compress_glb` without GLB files.
+  static absl::Status Check(const Places& places);
+
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, for a format that cannot hold
-  /// surfaces, and for `compress_glb` without GLB files; the errors of AtomicFile.
+  /// Errors: those of Check and of AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether the files show the normals of the vertices.

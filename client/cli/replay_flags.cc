@@ -20,16 +20,15 @@ absl::Status CheckCombinations(const CLI::App& app) {
     return absl::InvalidArgumentError("--format: requires --output-dir");
   }
   if (app.count("--surface") > 0) {
-    if (app.count("--local") == 0) {
-      return absl::InvalidArgumentError(
-          "--surface: requires --local; servers reconstruct outlines only");
-    }
     for (const char* flat : {"--report", "--gauge", "--color-by"}) {
       if (app.count(flat) > 0) {
         return absl::InvalidArgumentError(
             Concat(flat, ": shows outlines, so it cannot be combined with --surface"));
       }
     }
+  }
+  if (app.count("--check") > 0 && app.count("--coordinates") > 0) {
+    return absl::InvalidArgumentError("--check: requires --coordinates float64, the default");
   }
   if (app.count("--color-by") > 0 &&
       (app.count("--attributes") == 0 ||
@@ -110,10 +109,19 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   CLI::Option* const echo =
       app.add_flag("--echo-particles", flags.echo_particles, "Send the particles to watchers too")
           ->group(kGroup);
+  CLI::Option* const coordinates =
+      app.add_option("--coordinates", flags.coordinates,
+                     "How the server sends coordinates: float64 (exact), float32 (half the bytes) "
+                     "or compact (surfaces in about 5 bytes per triangle, within .001 spacings)")
+          ->check(CLI::IsMember({"float64", "float32", "compact"}))
+          ->type_name("FORMAT")
+          ->capture_default_str()
+          ->group(kGroup);
   app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
       ->excludes(server)
       ->excludes(name)
       ->excludes(echo)
+      ->excludes(coordinates)
       ->group(kGroup);
   app.add_option("--threads", flags.threads,
                  "Number of threads with --local (default: one per processor)")

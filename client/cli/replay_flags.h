@@ -30,6 +30,7 @@ struct ReplayFlags {
   std::string name;                             ///< Stream name; empty: chosen by the server.
   bool echo_particles = false;
 
+  std::string coordinates = "float64";
   bool surface = false;  ///< Surfaces in space instead of outlines.
   SurfaceOptions surface_options = {};
   std::string placement = "virtual-plane";

@@ -21,11 +21,36 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
   }
 }
 
+// The value of --slice.
+std::string TextOf(const SlicePlane& slice) {
+  std::string text;
+  for (const auto& vector : {slice.origin, slice.normal}) {
+    for (const double number : vector) {
+      AppendAll(text, text.empty() ? "" : ",", ShortestNumber(number));
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   const ReconstructionParameters defaults;
   std::string flags;
+  if (parameters.output == Output::kSurface) {
+    const SurfaceOptions& surface = parameters.surface;
+    AppendAll(flags, " --surface");
+    AddFlag(flags, "--thinning-distance", surface.thinning_distance,
+            defaults.surface.thinning_distance);
+    AddFlag(flags, "--simplify", surface.simplify, defaults.surface.simplify);
+    AddFlag(flags, "--max-drop-particles", surface.max_drop_particles,
+            defaults.surface.max_drop_particles);
+    AddFlag(flags, "--min-volume", surface.min_component_volume,
+            defaults.surface.min_component_volume);
+    for (const Section& section : parameters.sections) {
+      if (section.slice && !section.isovalue) AppendAll(flags, " --slice ", TextOf(*section.slice));
+    }
+  }
   AddFlag(flags, "--placement", Name(parameters.placement), Name(defaults.placement));
   AddFlag(flags, "--fill", Name(parameters.fill), Name(defaults.fill));
   if (!parameters.spacing && parameters.spacing_rule == SpacingRule::kEveryFrame) {
@@ -46,7 +71,8 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
           defaults.min_component_particles);
   std::string isovalues;
   for (const Section& section : parameters.sections) {
-    if (!section.isovalue) continue;
+    // Every slice has the same isolines.
+    if (!section.isovalue || section.slice != parameters.sections.front().slice) continue;
     AppendAll(isovalues, isovalues.empty() ? "" : ",", ShortestNumber(*section.isovalue));
   }
   if (!isovalues.empty()) AppendAll(flags, " --isolines ", isovalues);
@@ -59,7 +85,9 @@ absl::StatusOr<StreamRecorder> StreamRecorder::Create(const std::string& path,
   auto writer = RecordingWriter::Create(
       path, {.spacing = stream.parameters.spacing, .title = stream_name}, {.float64 = true});
   if (!writer.ok()) return writer.status();
-  return StreamRecorder(path, ReplayFlagsOf(stream.parameters), *std::move(writer));
+  StreamRecorder recorder(path, ReplayFlagsOf(stream.parameters), *std::move(writer));
+  if (stream.parameters.output == Output::kSurface) recorder.frame_.components = 3;
+  return recorder;
 }
 
 absl::Status StreamRecorder::Add(WatchedFrame& frame) {

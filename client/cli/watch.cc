@@ -30,16 +30,22 @@ constexpr std::chrono::milliseconds kPollInterval(100);
 // Pause between two searches for a stream that has not started, in poll intervals.
 constexpr int kSearchPause = 2;
 
-FrameRecord RecordOf(const WatchedFrame& frame, std::span<const std::size_t> sections_in_plane) {
+FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
+                     std::span<const std::size_t> sections_in_plane) {
+  // No output shows particles in space.
+  const std::span<const double> particles =
+      is_surface ? std::span<const double>() : frame.particles;
   return {.index = frame.sequence - 1,  // A replay numbers its files in the same way.
           .time = frame.time,
           .result = frame.frame.result,
-          .particles = frame.particles,
+          .surface = is_surface ? &frame.frame.result.surface : nullptr,
+          .particles = particles,
           .particle_areas = frame.particle_volumes,
           .stages_ms = frame.frame.times.stages_ms,
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,
           .mesh_digest = frame.frame.mesh_digest,
+          .surface_digest = frame.frame.surface_digest,
           .section_digests = frame.frame.section_digests,
           .sections_in_plane = sections_in_plane};
 }
@@ -72,16 +78,20 @@ struct Ended {
 };
 
 // Details of a frame for the line of progress: "t = 1.25, 2278 particles, 5 polylines, 3 dropped".
-std::string Detail(const WatchedFrame& frame, std::uint64_t dropped) {
-  std::string detail = Concat("t = ", frame.time, ", ", frame.frame.result.statistics.particles,
-                              " particles, ", frame.frame.result.rings.RingCount(), " polylines");
+std::string Detail(const WatchedFrame& frame, bool is_surface, std::uint64_t dropped) {
+  const Result& result = frame.frame.result;
+  std::string detail = Concat("t = ", frame.time, ", ", result.statistics.particles, " particles, ",
+                              is_surface ? Plural(result.statistics.triangles, "triangle")
+                                         : Concat(result.rings.RingCount(), " polylines"));
   if (dropped > 0) AppendAll(detail, ", ", dropped, " dropped");
   return detail;
 }
 
 Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& outputs,
                  std::optional<StreamRecorder>& recorder, Progress& progress) {
-  const std::vector<std::size_t> sections_in_plane = SectionsInPlane(watcher.stream().parameters);
+  const ReconstructionParameters& parameters = watcher.stream().parameters;
+  const std::vector<std::size_t> sections_in_plane = SectionsInPlane(parameters);
+  const bool is_surface = parameters.output == Output::kSurface;
   Ended ended;
   WatchedFrame frame;
   for (std::uint64_t count = 0; flags.frames == 0 || count < flags.frames;) {
@@ -108,10 +118,10 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
                            Plural(frame.gap, "frame")));
     }
-    absl::Status status = outputs.Write(RecordOf(frame, sections_in_plane));
+    absl::Status status = outputs.Write(RecordOf(frame, is_surface, sections_in_plane));
     if (status.ok() && recorder) status = recorder->Add(frame);
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
-    progress.Update(++count, Detail(frame, ended.dropped));
+    progress.Update(++count, Detail(frame, is_surface, ended.dropped));
   }
   return ended;
 }
@@ -234,10 +244,11 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
               "--output-dir", flags.output_dir,
               "Write DIR/frame_000000.EXT for every frame, with the numbers of the producer")
           ->type_name("DIR");
-  verb->add_option("--format", flags.format, "Formats of these files, from " + formats)
+  verb->add_option("--format", flags.format,
+                   "Formats of these files, from " + formats +
+                       " (default: geojson; for streams of surfaces ply)")
       ->needs(output_dir)
-      ->type_name("LIST")
-      ->capture_default_str();
+      ->type_name("LIST");
   verb->add_option(
           "--color-by", flags.color_by,
           "Attribute of the stream that colours the pictures of svg; a vector by its length")
@@ -274,15 +285,15 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
 
 int Watch(const WatchFlags& flags) {
   CatchInterrupts();  // Before the first temporary file exists.
-  auto outputs = FrameOutputs::Create({.output_dir = flags.output_dir,
-                                       .format = flags.format,
-                                       .stats = flags.stats,
-                                       .color_by = flags.color_by,
-                                       .compress_glb = flags.compress_glb,
-                                       .gauges = flags.gauges});
-  if (!outputs.ok()) {
-    const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
-    return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
+  FrameOutputs::Places places{.output_dir = flags.output_dir,
+                              .format = flags.format,
+                              .stats = flags.stats,
+                              .color_by = flags.color_by,
+                              .compress_glb = flags.compress_glb,
+                              .gauges = flags.gauges};
+  // Before the stream is known, which may take long.
+  if (const absl::Status right = FrameOutputs::Check(places); !right.ok()) {
+    return Complain(kUsage, right);
   }
   std::optional<Progress> progress;
   const auto watcher = OpenOrWait(flags, progress);
@@ -290,6 +301,13 @@ int Watch(const WatchFlags& flags) {
     progress.reset();  // Ends its line.
     if (absl::IsCancelled(watcher.status())) return Complain(kInterrupted, watcher.status());
     return ComplainOfServer(watcher.status());
+  }
+  places.surface = (*watcher)->stream().parameters.output == Output::kSurface;
+  auto outputs = FrameOutputs::Create(places);
+  if (!outputs.ok()) {
+    progress.reset();
+    const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
+    return Complain(wrong_flag ? kUsage : kFailed, outputs.status());
   }
   std::optional<StreamRecorder> recorder;
   if (!flags.record.empty()) {

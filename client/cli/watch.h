@@ -23,7 +23,7 @@ struct WatchFlags {
   double deadline_seconds = 30;
   double give_up_after_seconds = 30;  ///< 0: a lost connection ends the watch.
   std::string output_dir;
-  std::string format = "geojson";
+  std::string format;  ///< Empty: geojson, or ply for surfaces.
   std::string color_by;
   bool compress_glb = false;
   std::string stats;

@@ -32,6 +32,7 @@ absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::st
     event.frame.times = {.stages_ms = scratch.times.stages_ms, .total_ms = scratch.times.total_ms};
     event.frame.rings_digest = scratch.rings_digest;
     event.frame.mesh_digest = scratch.mesh_digest;
+    event.frame.surface_digest = scratch.surface_digest;
     std::swap(event.frame.section_digests, scratch.section_digests);
     return absl::OkStatus();
   }

@@ -17,9 +17,13 @@ namespace {
 // Limits the client's memory: a server may announce a window of any size.
 constexpr std::size_t kMaxFramesInFlight = 64;
 
-absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened) {
+absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened, Output output) {
   auto parameters = wire::DecodeParameters(opened.parameters());
   if (!parameters.ok()) return parameters.status();
+  // Servers of before there were surfaces ignore the output.
+  if (output == Output::kSurface && parameters->output != output) {
+    return absl::UnimplementedError("the server does not support surfaces: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,
@@ -71,12 +75,6 @@ bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
 absl::StatusOr<std::unique_ptr<Stream>> Stream::Open(std::string_view address,
                                                      const StreamOptions& options) {
   if (auto valid = Validate(options.parameters); !valid.ok()) return valid;
-  if (options.parameters.output != Output::kOutline) {
-    return ViolationError(
-        absl::StatusCode::kInvalidArgument,
-        {"UNSUPPORTED", "parameters.output", std::string(Name(options.parameters.output)),
-         "must be outline: servers do not reconstruct surfaces, LocalStream does"});
-  }
   if (auto valid = CheckParts(options); !valid.ok()) return valid;
   return ResumingStream::Open(address, options);
 }
@@ -111,7 +109,7 @@ absl::Status ResumingStream::OpenFirst() {
   AssertShared();
   auto opened = connector_.OpenNew();
   if (!opened.ok()) return opened.status();
-  auto info = ReadOpened(opened->message);
+  auto info = ReadOpened(opened->message, options_.parameters.output);
   if (!info.ok()) {
     connector_.Drop(std::move(opened->call));
     return info.status();
@@ -391,7 +389,7 @@ absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
   auto opened = connector_.OpenAgain(until);
   if (!opened.ok()) return opened.status();
   if (!*opened) return false;
-  const auto info = ReadOpened((*opened)->message);
+  const auto info = ReadOpened((*opened)->message, options_.parameters.output);
   if (!info.ok()) return info.status();
   if (auto suits = CheckReplica(**opened, *info); !suits.ok()) {
     LoseCall(std::move((*opened)->call), {.status = suits, .why = "does not suit"});

@@ -17,16 +17,29 @@ namespace {
 constexpr std::chrono::milliseconds kShortConnect(250);
 constexpr std::chrono::milliseconds kRest(20);
 
+wire::Coordinates ToWire(Coordinates coordinates) {
+  switch (coordinates) {
+    case Coordinates::kFloat64:
+      return wire::Coordinates::kFloat64;
+    case Coordinates::kRelativeFloat32:
+      return wire::Coordinates::kRelativeFloat32;
+    case Coordinates::kCompact:
+      return wire::Coordinates::kCompact;
+  }
+  return wire::Coordinates::kFloat64;
+}
+
 v1::OpenStream OpenMessage(const StreamOptions& options) {
   v1::OpenStream open;
   open.set_stream_name(options.name);
   wire::EncodeParameters(options.parameters, *open.mutable_parameters());
-  wire::EncodeOutputs({.mesh = options.outputs.mesh,
-                       .normals = options.outputs.normals,
-                       .relative_float32 = options.outputs.relative_float32,
-                       .echo_particles = options.outputs.echo_particles,
-                       .attributes = options.outputs.attributes},
-                      *open.mutable_outputs());
+  wire::EncodeOutputs(
+      {.mesh = options.outputs.mesh,
+       .normals = options.outputs.normals || options.parameters.output == Output::kSurface,
+       .coordinates = ToWire(options.outputs.coordinates),
+       .echo_particles = options.outputs.echo_particles,
+       .attributes = options.outputs.attributes},
+      *open.mutable_outputs());
   open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
   if (options.reconnect.give_up_after.count() > 0) {
     open.set_checkpoint_interval(options.checkpoint_interval);

@@ -16,26 +16,42 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// Sets `xy` to two coordinates of each vector, along the axes of `plane`. Each vector has
-// `components` values. If it has only two, both are copied.
+// Sets `values` to the coordinates `axes` of each vector of `components` values.
 template <typename From, typename To>
-void Project(std::span<const From> vectors, std::size_t components, Plane plane,
-             std::vector<To>& xy) {
-  const std::size_t first = components == 3 && plane == Plane::kYz ? 1 : 0;
-  const std::size_t second = components == 3 && plane != Plane::kXy ? 2 : 1;
+void Project(std::span<const From> vectors, std::size_t components,
+             std::span<const std::size_t> axes, std::vector<To>& values) {
   const std::size_t count = vectors.size() / components;
-  xy.resize(2 * count);
+  values.resize(axes.size() * count);
   for (std::size_t i = 0; i < count; ++i) {
-    xy[2 * i] = static_cast<To>(vectors[i * components + first]);
-    xy[2 * i + 1] = static_cast<To>(vectors[i * components + second]);
+    for (std::size_t k = 0; k < axes.size(); ++k) {
+      values[axes.size() * i + k] = static_cast<To>(vectors[i * components + axes[k]]);
+    }
   }
 }
 
-void TakeParticles(const Frame& echoed, Plane plane, WatchedFrame& frame) {
+// The coordinates of particles with `components` that a watcher receives.
+std::vector<std::size_t> AxesOf(const ReconstructionParameters& parameters,
+                                std::size_t components) {
+  if (components == 2) return {0, 1};
+  if (parameters.output == Output::kSurface) return {0, 1, 2};
+  switch (parameters.plane) {
+    case Plane::kXy:
+      return {0, 1};
+    case Plane::kXz:
+      return {0, 2};
+    case Plane::kYz:
+      return {1, 2};
+  }
+  return {0, 1};
+}
+
+void TakeParticles(const Frame& echoed, const ReconstructionParameters& parameters,
+                   WatchedFrame& frame) {
   const auto components = static_cast<std::size_t>(echoed.components);
-  std::visit([&](auto positions) { Project(positions, components, plane, frame.particles); },
+  const std::vector<std::size_t> axes = AxesOf(parameters, components);
+  std::visit([&](auto positions) { Project(positions, components, axes, frame.particles); },
              echoed.positions);
-  Project(echoed.velocities, components, plane, frame.particle_velocities);
+  Project(echoed.velocities, components, axes, frame.particle_velocities);
   frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
   frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
 }
@@ -173,6 +189,7 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.frame.times = {.stages_ms = decoded_.times.stages_ms, .total_ms = decoded_.times.total_ms};
   frame.frame.rings_digest = decoded_.rings_digest;
   frame.frame.mesh_digest = decoded_.mesh_digest;
+  frame.frame.surface_digest = decoded_.surface_digest;
   std::swap(frame.frame.section_digests, decoded_.section_digests);
   frame.dropped = message.frame().dropped();
   frame.oldest_sequence = message.frame().oldest_sequence();
@@ -188,7 +205,7 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   particles_.mutable_velocities()->swap(*result.mutable_particle_velocities());
   const auto particles = wire::DecodeFrame(particles_);
   if (!particles.ok()) return Broken("sent particles that cannot be read");
-  TakeParticles(*particles, stream_.parameters.plane, frame);
+  TakeParticles(*particles, stream_.parameters, frame);
   return absl::OkStatus();
 }
 

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
+#include "base/in_stage.h"
 #include "bins/cell_mask.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
@@ -22,22 +23,6 @@
 
 namespace partiemc {
 namespace {
-
-// Runs a stage and reports it to the observer.
-template <typename Run>
-auto InStage(StageObserver* observer, Stage stage, Run run) {
-  ThrowIfCancelled();
-  struct Scope {
-    StageObserver* observer;
-    Stage stage;
-    ~Scope() {
-      if (observer != nullptr) observer->StageEnds(stage);
-    }
-  };
-  if (observer != nullptr) observer->StageBegins(stage);
-  const Scope scope{observer, stage};
-  return run();
-}
 
 // Empties a result, but keeps the buffers of rings and mesh.
 void MakeEmpty(Result& result) {
@@ -452,8 +437,9 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
   state.sections.reserve(sections_.size());
   if (is_surface) {
     // The last step that can fail, because it commits its state.
-    status = surface_->Reconstruct(frame, state.surface, b.surface, result.surface,
-                                   {.memory = &memory, .cancelled = control.cancelled});
+    status = surface_->Reconstruct(
+        frame, state.surface, b.surface, result.surface,
+        {.observer = control.observer, .memory = &memory, .cancelled = control.cancelled});
     if (!status.ok()) return status;
     SummariseSurface(parameters_, frame, result);
   } else {

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "attributes/plane_fit.h"
 #include "base/cancellation.h"
+#include "base/in_stage.h"
 #include "base/vec3.h"
 #include "frame/calibration.h"
 #include "frame/distinct_ids.h"
@@ -279,7 +280,7 @@ absl::Status SurfaceReconstructor::ReconstructFrame(const Frame& frame, SurfaceS
   ResizeValues(frame.attributes, 0, surface.attributes);
   absl::Status status;
   try {
-    status = ReconstructOrThrow(frame, state, workspace.buffers(), surface, control.memory);
+    status = ReconstructOrThrow(frame, state, workspace.buffers(), surface, control);
   } catch (...) {
     // The buffers may be in any state.
     workspace = SurfaceWorkspace();
@@ -302,75 +303,89 @@ absl::Status SurfaceReconstructor::ReconstructFrame(const Frame& frame, SurfaceS
 
 absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
                                                       SurfaceWorkspace::Buffers& b,
-                                                      Surface& surface, MemoryGuard* memory) const {
-  const double cell_size = parameters_.cell_size * parameters_.spacing;
-  absl::Status status = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
-  if (status.ok() && state != nullptr) status = CheckCellSize(*state, cell_size);
+                                                      Surface& surface,
+                                                      const FrameControl& control) const {
+  const double h = parameters_.spacing, cell_size = parameters_.cell_size * h;
+  const SurfacePlacement placement = parameters_.placement;
+  const space::BrickDirectory& bricks = b.bins.bricks;
+  space::SurfaceSize size{.particles = frame.ParticleCount(),
+                          .has_windows = placement == SurfacePlacement::kVirtualPlane,
+                          .has_state = state != nullptr,
+                          .is_simplified = parameters_.simplify > 0};
+  const auto in_stage = [&](Stage stage, auto run) {
+    return InStage(control.observer, stage, run);
+  };
+  Scale scale;
+  absl::Status status = in_stage(Stage::kBins, [&] {
+    absl::Status checked = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
+    if (checked.ok() && state != nullptr) checked = CheckCellSize(*state, cell_size);
+    if (!checked.ok() || frame.ParticleCount() == 0) return checked;
+    scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, h));
+    checked = space::FindBricks(frame, scale, limits_, b.bins);
+    size.bricks = bricks.size();
+    if (checked.ok()) checked = Reserve(size, control.memory);
+    if (checked.ok()) space::SortParticles(frame, scale, b.bins);
+    return checked;
+  });
   if (!status.ok()) return status;
-  ThrowIfCancelled();
   if (frame.ParticleCount() == 0) {
     if (state != nullptr) EndIdentities(frame, state->history, b.next_history);
     return absl::OkStatus();
   }
-  const SurfacePlacement placement = parameters_.placement;
-  const Scale scale = MakeScale(in_space_, parameters_.spacing, cell_size,
-                                LightestVolume(frame, parameters_.spacing));
-  status = space::FindBricks(frame, scale, limits_, b.bins);
+  in_stage(Stage::kField, [&] { space::SampleField(b.bins, scale, b.field); });
+  in_stage(Stage::kRings, [&] { surface.statistics = FindCleanBodies(frame, parameters_, b); });
+  status = in_stage(Stage::kCrossings, [&] {
+    space::FindCrossings(bricks, b.field, b.crossings);
+    size.edges = b.crossings.edge_count;
+    if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
+    AddBodies(frame, b.bodies, size);
+    return Reserve(size, control.memory);
+  });
   if (!status.ok()) return status;
-  const space::BrickDirectory& bricks = b.bins.bricks;
-  space::SurfaceSize size{.particles = frame.ParticleCount(), .bricks = bricks.size()};
-  if (status = Reserve(size, memory); !status.ok()) return status;
-  ThrowIfCancelled();
-  space::SortParticles(frame, scale, b.bins);
-  space::SampleField(b.bins, scale, b.field);
-  const SurfaceStatistics statistics = FindCleanBodies(frame, parameters_, b);
-  space::FindCrossings(bricks, b.field, b.crossings);
-  size.edges = b.crossings.edge_count;
-  if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
-  size.has_windows = placement == SurfacePlacement::kVirtualPlane;
-  AddBodies(frame, b.bodies, size);
-  size.has_state = state != nullptr;
-  size.is_simplified = parameters_.simplify > 0;
-  if (status = Reserve(size, memory); !status.ok()) return status;
-  space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field);
-  if (placement == SurfacePlacement::kMarchingCubes) {
-    PlaceByMarchingCubes(cell_size, b);
-  } else if (status = PlaceMovedVertices(parameters_, scale, b); !status.ok()) {
-    return status;
-  }
-  ThrowIfCancelled();
-  const double h = parameters_.spacing;
-  b.drops.drops.clear();
-  if (placement == SurfacePlacement::kVirtualPlane) {
+  in_stage(Stage::kField, [&] { space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field); });
+  status = in_stage(Stage::kVertices, [&] {
+    b.drops.drops.clear();
+    if (placement == SurfacePlacement::kMarchingCubes) {
+      PlaceByMarchingCubes(cell_size, b);
+      return absl::OkStatus();
+    }
+    absl::Status placed = PlaceMovedVertices(parameters_, scale, b);
+    if (!placed.ok() || placement == SurfacePlacement::kQef) return placed;
     space::ReplaceDrops(
         {frame, b.bins, scale, b.bodies, b.certificate.nodes, b.virtual_plane.volumes.body_of},
         {.most_particles = parameters_.max_drop_particles,
          .least_particles = parameters_.min_component_particles,
          .least_volume = parameters_.min_component_volume * h * h * h},
         b.drops, b.positions, b.normals, b.mesh.triangles);
-  }
-  space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
-                         b.mesh, surface);
-  for (const space::Drops::Drop& drop : b.drops.drops) {
-    if (!drop.is_taken) continue;
-    surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
-  }
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  in_stage(Stage::kMesh, [&] {
+    surface.statistics.bricks = bricks.size();
+    space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
+                           b.mesh, surface);
+    for (const space::Drops::Drop& drop : b.drops.drops) {
+      if (!drop.is_taken) continue;
+      surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
+    }
+  });
   if (state != nullptr) {
-    ThrowIfCancelled();
-    space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
-                           b.mesh.shell_of, cell_size},
-                          state->history, b.identities, b.next_history, surface);
+    in_stage(Stage::kIdentities, [&] {
+      space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
+                             b.mesh.shell_of, cell_size},
+                            state->history, b.identities, b.next_history, surface);
+    });
   }
   if (parameters_.simplify > 0) {
-    ThrowIfCancelled();
-    simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
+    in_stage(Stage::kMesh, [&] {
+      simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
+    });
   }
   if (!frame.attributes.empty()) {
-    ThrowIfCancelled();
-    space::InterpolateInSpace(frame, b.bins, scale, surface.points, surface.attributes);
+    in_stage(Stage::kAttributes, [&] {
+      space::InterpolateInSpace(frame, b.bins, scale, surface.points, surface.attributes);
+    });
   }
-  surface.statistics = statistics;
-  surface.statistics.bricks = bricks.size();
   return absl::OkStatus();
 }
 

@@ -26,6 +26,30 @@ absl::Status UnknownEnum(std::string field, int value) {
                  "must be a value that this version knows");
 }
 
+std::optional<Output> FromWire(v1::Output output) {
+  switch (output) {
+    case v1::OUTPUT_UNSPECIFIED:
+      return ReconstructionParameters{}.output;
+    case v1::OUTPUT_OUTLINE:
+      return Output::kOutline;
+    case v1::OUTPUT_SURFACE:
+      return Output::kSurface;
+    default:
+      return std::nullopt;
+  }
+}
+
+Coordinates FromWire(v1::CoordinateFormat format) {
+  switch (format) {
+    case v1::COORDINATE_FORMAT_FLOAT32_RELATIVE:
+      return Coordinates::kRelativeFloat32;
+    case v1::COORDINATE_FORMAT_COMPACT:
+      return Coordinates::kCompact;
+    default:
+      return Coordinates::kFloat64;
+  }
+}
+
 std::optional<Placement> FromWire(v1::Placement placement) {
   switch (placement) {
     case v1::PLACEMENT_UNSPECIFIED:
@@ -219,9 +243,10 @@ absl::Status ViewAttributes(const v1::ParticleFrame& message, std::span<const st
 absl::Status CheckNames(const v1::Outputs& message) {
   constexpr int kMostNames = 16;
   if (message.attributes_size() == 0) return absl::OkStatus();
-  if (!message.rings() && !message.mesh()) {
+  if (!message.rings() && !message.mesh() && !message.surface()) {
     return Invalid(kReasonOutOfRange, "outputs.attributes", Printable(message.attributes(0)),
-                   "must come with outputs.rings or outputs.mesh: they are at their vertices");
+                   "must come with outputs.rings, outputs.mesh or outputs.surface: they are at "
+                   "their vertices");
   }
   if (message.attributes_size() > kMostNames) {
     return Invalid(kReasonOutOfRange, "outputs.attributes",
@@ -234,7 +259,43 @@ absl::Status CheckNames(const v1::Outputs& message) {
                  absl::StrCat(message.attributes_size(), " names"), "must all be different");
 }
 
+SurfaceOptions FromWire(const v1::SurfaceOptions& message) {
+  SurfaceOptions options;
+  if (message.has_thinning_distance()) options.thinning_distance = message.thinning_distance();
+  if (message.has_max_drop_particles()) options.max_drop_particles = message.max_drop_particles();
+  if (message.has_simplify()) options.simplify = message.simplify();
+  if (message.has_min_component_volume()) {
+    options.min_component_volume = message.min_component_volume();
+  }
+  return options;
+}
+
+v1::SurfaceOptions ToWire(const SurfaceOptions& options) {
+  v1::SurfaceOptions message;
+  message.set_thinning_distance(options.thinning_distance);
+  message.set_max_drop_particles(options.max_drop_particles);
+  message.set_simplify(options.simplify);
+  message.set_min_component_volume(options.min_component_volume);
+  return message;
+}
+
 }  // namespace
+
+v1::Output ToWire(Output output) {
+  return output == Output::kSurface ? v1::OUTPUT_SURFACE : v1::OUTPUT_OUTLINE;
+}
+
+v1::CoordinateFormat ToWire(Coordinates coordinates) {
+  switch (coordinates) {
+    case Coordinates::kFloat64:
+      return v1::COORDINATE_FORMAT_FLOAT64;
+    case Coordinates::kRelativeFloat32:
+      return v1::COORDINATE_FORMAT_FLOAT32_RELATIVE;
+    case Coordinates::kCompact:
+      return v1::COORDINATE_FORMAT_COMPACT;
+  }
+  return v1::COORDINATE_FORMAT_UNSPECIFIED;
+}
 
 v1::Placement ToWire(Placement placement) {
   switch (placement) {
@@ -268,6 +329,8 @@ v1::Fill ToWire(Fill fill) {
 
 absl::StatusOr<ReconstructionParameters> DecodeParameters(
     const v1::ReconstructionParameters& message) {
+  const auto output = FromWire(message.output());
+  if (!output) return UnknownEnum("parameters.output", message.output());
   const auto placement = FromWire(message.placement());
   if (!placement) return UnknownEnum("parameters.placement", message.placement());
   const auto fill = FromWire(message.fill());
@@ -278,6 +341,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (!plane) return UnknownEnum("parameters.plane", message.plane());
 
   ReconstructionParameters parameters;
+  parameters.output = *output;
   parameters.placement = *placement;
   parameters.fill = *fill;
   parameters.spacing_rule = *spacing_rule;
@@ -305,12 +369,17 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
     if (from.has_slice()) section.slice = FromWire(from.slice());
     if (from.has_isovalue()) section.isovalue = from.isovalue();
   }
+  if (message.has_surface()) parameters.surface = FromWire(message.surface());
   return parameters;
 }
 
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message) {
   message.Clear();
+  if (parameters.output == Output::kSurface) {
+    message.set_output(v1::OUTPUT_SURFACE);
+    *message.mutable_surface() = ToWire(parameters.surface);
+  }
   message.set_placement(ToWire(parameters.placement));
   message.set_fill(ToWire(parameters.fill));
   if (parameters.spacing) message.set_spacing(*parameters.spacing);
@@ -340,33 +409,35 @@ absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) 
   if (!v1::CoordinateFormat_IsValid(message.coordinate_format())) {
     return UnknownEnum("outputs.coordinate_format", message.coordinate_format());
   }
-  if (message.normals() && !message.rings()) {
+  if (message.normals() && !message.rings() && !message.surface()) {
     return Invalid(kReasonOutOfRange, "outputs.normals", "true",
-                   "must come with outputs.rings: normals are at the vertices of the rings");
+                   "must come with outputs.rings or outputs.surface: normals are at the vertices "
+                   "of the rings or of the surface");
   }
-  if (message.coordinate_format() != v1::COORDINATE_FORMAT_UNSPECIFIED && !message.rings() &&
-      !message.mesh()) {
+  const bool has_points = message.rings() || message.mesh() || message.surface();
+  if (message.coordinate_format() != v1::COORDINATE_FORMAT_UNSPECIFIED && !has_points) {
     return Invalid(kReasonOutOfRange, "outputs.coordinate_format",
                    v1::CoordinateFormat_Name(message.coordinate_format()),
-                   "must come with outputs.rings or outputs.mesh: nothing else has coordinates");
+                   "must come with outputs.rings, outputs.mesh or outputs.surface: nothing else "
+                   "has coordinates");
   }
-  return Outputs{
-      .rings = message.rings(),
-      .mesh = message.mesh(),
-      .normals = message.normals(),
-      .relative_float32 = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE,
-      .echo_particles = message.echo_particles(),
-      .attributes = {message.attributes().begin(), message.attributes().end()}};
+  return Outputs{.rings = message.rings(),
+                 .mesh = message.mesh(),
+                 .surface = message.surface(),
+                 .normals = message.normals(),
+                 .coordinates = FromWire(message.coordinate_format()),
+                 .echo_particles = message.echo_particles(),
+                 .attributes = {message.attributes().begin(), message.attributes().end()}};
 }
 
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message) {
   message.Clear();
   message.set_rings(outputs.rings);
   message.set_mesh(outputs.mesh);
+  message.set_surface(outputs.surface);
   message.set_normals(outputs.normals);
-  if (outputs.rings || outputs.mesh) {
-    message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
-                                                           : v1::COORDINATE_FORMAT_FLOAT64);
+  if (outputs.rings || outputs.mesh || outputs.surface) {
+    message.set_coordinate_format(ToWire(outputs.coordinates));
   }
   message.set_echo_particles(outputs.echo_particles);
   for (const std::string& name : outputs.attributes) message.add_attributes(name);

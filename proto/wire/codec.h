@@ -25,12 +25,16 @@ inline constexpr std::string_view kReasonByteCount = "BYTE_COUNT";
 inline constexpr std::string_view kReasonUnsupported = "UNSUPPORTED";
 using partiemc::kReasonResolution;
 
+/// v1::CoordinateFormat.
+enum class Coordinates : std::uint8_t { kFloat64, kRelativeFloat32, kCompact };
+
 /// The requested outputs (v1::Outputs), with defaults filled in.
 struct Outputs {
   bool rings = true;
   bool mesh = true;
+  bool surface = true;  ///< Of a stream with Output::kSurface.
   bool normals = false;
-  bool relative_float32 = false;             ///< COORDINATE_FORMAT_FLOAT32_RELATIVE.
+  Coordinates coordinates = Coordinates::kFloat64;
   bool echo_particles = false;               ///< To watchers.
   std::vector<std::string> attributes = {};  ///< Names, all different.
 
@@ -51,9 +55,12 @@ struct ReconstructedFrame {
   FrameTimes times;
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
+  std::uint64_t surface_digest = 0;
   std::vector<OutlineDigests> section_digests = {};  ///< Of result.sections.
 };
 
+v1::Output ToWire(Output output);
+v1::CoordinateFormat ToWire(Coordinates coordinates);
 v1::Placement ToWire(Placement placement);
 v1::Fill ToWire(Fill fill);
 v1::Doubt ToWire(Doubt doubt);
@@ -66,8 +73,8 @@ void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
 /// `present`: whether the request sets the message. Errors: INVALID_ARGUMENT with a Violation for
-/// normals without rings, for a format or attributes without rings and mesh, and for too many or
-/// repeated attributes.
+/// normals without rings and surface, for a format or attributes without rings, mesh and surface,
+/// and for too many or repeated attributes.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 
@@ -91,8 +98,9 @@ void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 
 /// Writes every field except sequence and time. Reuses the buffers of `message`. The digests cover
 /// the whole result, even if `outputs` omits a part of it. Errors: OUT_OF_RANGE with a Violation
-/// (RESOLUTION) if relative float32 coordinates would move a vertex by more than 1e-4 spacings.
-/// Rings, mesh and sections of `message` are then absent.
+/// (RESOLUTION) if relative float32 coordinates would move a vertex by more than 1e-4 spacings, or
+/// if a surface is too large for compact ones. Rings, mesh, surface and sections of `message` are
+/// then absent.
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message);
 

@@ -1,76 +1,25 @@
 // Encodes and decodes rings, mesh and statistics.
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <span>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include "partiemc/status.h"
 #include "wire/bytes.h"
 #include "wire/codec.h"
+#include "wire/result_parts.h"
+#include "wire/surface_codec.h"
 
 namespace partiemc::wire {
 namespace {
 
-// Largest error of relative coordinates, in spacings: a hundredth of the accuracy of the outline.
-constexpr double kMaxRelativeShift = 1e-4;
-
-struct Point {
-  double x = 0, y = 0;
-};
-
-// The centre of the bounding box minimises the largest relative coordinate.
-Point MiddleOf(const Result& result) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Point low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
-  const auto include = [&](std::span<const double> points) {
-    for (std::size_t i = 0; i + 1 < points.size(); i += 2) {
-      low = {std::min(low.x, points[i]), std::min(low.y, points[i + 1])};
-      high = {std::max(high.x, points[i]), std::max(high.y, points[i + 1])};
-    }
-  };
-  include(result.rings.points);
-  include(result.mesh.points);
-  if (low.x > high.x) return {};
-  return {low.x + (high.x - low.x) / 2, low.y + (high.y - low.y) / 2};
-}
-
-absl::Status AssignRelative(std::span<const double> points, Point origin, double spacing,
-                            absl::string_view field, std::string& bytes) {
-  bytes.resize(points.size() * sizeof(float));
-  const double limit = kMaxRelativeShift * spacing;
-  for (std::size_t i = 0; i + 1 < points.size(); i += 2) {
-    const auto x = static_cast<float>(points[i] - origin.x);
-    const auto y = static_cast<float>(points[i + 1] - origin.y);
-    std::memcpy(bytes.data() + i * sizeof(float), &x, sizeof(float));
-    std::memcpy(bytes.data() + (i + 1) * sizeof(float), &y, sizeof(float));
-    const double shift = std::hypot(origin.x + x - points[i], origin.y + y - points[i + 1]);
-    // This form of the comparison refuses NaN, too.
-    if (shift <= limit) continue;
-    return ViolationError(absl::StatusCode::kOutOfRange,
-                          {std::string(kReasonResolution), absl::StrCat(field, "[", i / 2, "]"),
-                           absl::StrCat("moved by ", ShortestNumber(shift / spacing), " spacings"),
-                           absl::StrCat("must move by at most ", ShortestNumber(kMaxRelativeShift),
-                                        " spacings; ask for COORDINATE_FORMAT_FLOAT64")});
-  }
-  return absl::OkStatus();
-}
-
-absl::Status EncodePoints(std::span<const double> points, const v1::ReconstructedFrame& message,
-                          double spacing, absl::string_view field, std::string& bytes) {
-  if (message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE) {
-    return AssignRelative(points, {message.origin_x(), message.origin_y()}, spacing, field, bytes);
-  }
-  AssignBytes(points, bytes);
-  return absl::OkStatus();
+// The points of rings and meshes.
+PointFormat FormatOf(const v1::ReconstructedFrame& message) {
+  return {.format = message.coordinate_format(), .origin = OriginOf(message), .components = 2};
 }
 
 void EncodeMeasures(const Rings& rings, v1::Rings& message) {
   auto& measures = *message.mutable_measures();
-  // Clear() would free the elements that are overwritten below.
-  while (measures.size() > static_cast<int>(rings.measures.size())) measures.RemoveLast();
-  while (measures.size() < static_cast<int>(rings.measures.size())) measures.Add();
+  Resize(measures, rings.measures.size());
   auto& identities = *message.mutable_identities();
   identities.resize(rings.measures.size() * sizeof(std::uint64_t));
   for (std::size_t k = 0; k < rings.measures.size(); ++k) {
@@ -88,25 +37,6 @@ void EncodeMeasures(const Rings& rings, v1::Rings& message) {
   }
 }
 
-using NamedAttributes = google::protobuf::RepeatedPtrField<v1::NamedAttribute>;
-
-// Writes the attributes of the first `points` vertices.
-void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t points,
-                      NamedAttributes& messages) {
-  while (messages.size() > static_cast<int>(attributes.size())) messages.RemoveLast();
-  while (messages.size() < static_cast<int>(attributes.size())) messages.Add();
-  for (std::size_t k = 0; k < attributes.size(); ++k) {
-    const AttributeValues& from = attributes[k];
-    v1::NamedAttribute& to = messages[static_cast<int>(k)];
-    to.set_name(from.name);
-    to.set_components(static_cast<std::uint32_t>(from.components));
-    // An empty frame has none.
-    AssignBytes(
-        std::span(from.values).first(std::min(from.values.size(), points * from.components)),
-        *to.mutable_values());
-  }
-}
-
 absl::Status EncodeRings(const Result& result, bool with_normals, v1::ReconstructedFrame& message) {
   v1::Rings& rings = *message.mutable_rings();
   AssignBytes(std::span<const std::uint32_t>(result.rings.offsets), *rings.mutable_offsets());
@@ -118,8 +48,8 @@ absl::Status EncodeRings(const Result& result, bool with_normals, v1::Reconstruc
     rings.clear_normals();
   }
   EncodeAttributes(result.attributes, result.rings.PointCount(), *rings.mutable_attributes());
-  return EncodePoints(result.rings.points, message, result.statistics.spacing, "rings.points",
-                      *rings.mutable_points());
+  return EncodePoints(result.rings.points, FormatOf(message), result.statistics.spacing,
+                      "rings.points", *rings.mutable_points());
 }
 
 absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
@@ -128,8 +58,8 @@ absl::Status EncodeMesh(const Result& result, v1::ReconstructedFrame& message) {
   static_assert(sizeof(TriangleClass) == 1);
   AssignBytes(std::span<const TriangleClass>(result.mesh.classes), *mesh.mutable_classes());
   EncodeAttributes(result.attributes, result.mesh.PointCount(), *mesh.mutable_attributes());
-  return EncodePoints(result.mesh.points, message, result.statistics.spacing, "mesh.points",
-                      *mesh.mutable_points());
+  return EncodePoints(result.mesh.points, FormatOf(message), result.statistics.spacing,
+                      "mesh.points", *mesh.mutable_points());
 }
 
 void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& message) {
@@ -145,6 +75,7 @@ void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& me
   message.set_folded_triangles(statistics.folded_triangles);
   message.set_area(statistics.area);
   message.set_perimeter(statistics.perimeter);
+  message.set_volume(statistics.volume);
   message.set_spacing(statistics.spacing);
   message.set_cell_size(statistics.cell_size);
   message.clear_doubts();
@@ -161,33 +92,6 @@ void EncodeTimes(const FrameTimes& times, v1::FrameStatistics& message) {
     time.set_milliseconds(times.stages_ms[stage]);
   }
   message.set_milliseconds(times.total_ms);
-}
-
-absl::Status Lost(absl::string_view field, absl::string_view rule) {
-  return absl::DataLossError(absl::StrCat(field, " of the server's answer ", rule));
-}
-
-absl::Status DecodePoints(const v1::ReconstructedFrame& message, const std::string& bytes,
-                          absl::string_view field, std::vector<double>& points) {
-  const bool relative = message.coordinate_format() == v1::COORDINATE_FORMAT_FLOAT32_RELATIVE;
-  const std::size_t point_bytes = 2 * (relative ? sizeof(float) : sizeof(double));
-  if (bytes.size() % point_bytes != 0) {
-    return Lost(
-        field, absl::StrCat("has ", bytes.size(), " bytes, which is no multiple of ", point_bytes));
-  }
-  if (relative) {
-    const auto values = ViewBytes<float>(bytes);
-    points.resize(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      points[i] = (i % 2 == 0 ? message.origin_x() : message.origin_y()) + double{values[i]};
-    }
-  } else {
-    CopyBytes(bytes, points);
-  }
-  if (!std::all_of(points.begin(), points.end(), [](double v) { return std::isfinite(v); })) {
-    return Lost(field, "has a coordinate that is not finite");
-  }
-  return absl::OkStatus();
 }
 
 absl::Status CheckOffsets(std::span<const std::uint32_t> offsets, std::size_t points) {
@@ -248,7 +152,7 @@ absl::Status CheckRingCounts(const v1::Rings& message, std::size_t points) {
 
 absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
   const v1::Rings& from = message.rings();
-  if (auto status = DecodePoints(message, from.points(), "rings.points", rings.points);
+  if (auto status = DecodePoints(from.points(), FormatOf(message), "rings.points", rings.points);
       !status.ok()) {
     return status;
   }
@@ -280,7 +184,7 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
 
 absl::Status DecodeMesh(const v1::ReconstructedFrame& message, Mesh& mesh) {
   const v1::Mesh& from = message.mesh();
-  if (auto status = DecodePoints(message, from.points(), "mesh.points", mesh.points);
+  if (auto status = DecodePoints(from.points(), FormatOf(message), "mesh.points", mesh.points);
       !status.ok()) {
     return status;
   }
@@ -305,29 +209,6 @@ absl::Status DecodeMesh(const v1::ReconstructedFrame& message, Mesh& mesh) {
   return absl::OkStatus();
 }
 
-absl::Status CheckAttributes(absl::string_view of, const NamedAttributes& messages,
-                             std::size_t points) {
-  for (int k = 0; k < messages.size(); ++k) {
-    const std::uint64_t components = messages[k].components();
-    if (components < 1 || components > 3 ||
-        messages[k].values().size() != points * components * sizeof(float)) {
-      return Lost(absl::StrCat(of, ".attributes[", k, "]"),
-                  absl::StrCat("must have 1 to 3 floats for each of the ", points, " points"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-void DecodeAttributes(const NamedAttributes& messages, std::vector<AttributeValues>& attributes) {
-  attributes.resize(static_cast<std::size_t>(messages.size()));
-  for (std::size_t k = 0; k < attributes.size(); ++k) {
-    const v1::NamedAttribute& from = messages[static_cast<int>(k)];
-    attributes[k].name = from.name();
-    attributes[k].components = static_cast<int>(from.components());
-    CopyBytes(from.values(), attributes[k].values);
-  }
-}
-
 void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& statistics) {
   statistics = {.particles = message.particles(),
                 .tiles = message.tiles(),
@@ -341,6 +222,7 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
                 .folded_triangles = message.folded_triangles(),
                 .area = message.area(),
                 .perimeter = message.perimeter(),
+                .volume = message.volume(),
                 .spacing = message.spacing(),
                 .cell_size = message.cell_size()};
   // A newer server may send doubts that are unknown here.
@@ -381,17 +263,13 @@ absl::Status DecodeGeometry(const v1::ReconstructedFrame& message, Result& resul
   return absl::OkStatus();
 }
 
-// Decodes an outline, except for times and sections.
 absl::Status EncodeOutline(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message) {
-  EncodeStatistics(result.statistics, *message.mutable_statistics());
-  message.set_rings_digest(DigestRings(result.rings));
-  message.set_mesh_digest(DigestMesh(result.mesh));
-  const Point origin = outputs.relative_float32 ? MiddleOf(result) : Point{};
-  message.set_coordinate_format(outputs.relative_float32 ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
-                                                         : v1::COORDINATE_FORMAT_FLOAT64);
-  message.set_origin_x(origin.x);
-  message.set_origin_y(origin.y);
+  const std::span<const double> points[] = {result.rings.points, result.mesh.points};
+  const bool relative = outputs.coordinates != Coordinates::kFloat64;
+  SetOrigin(relative ? MiddleOf(points, 2) : Origin{}, message);
+  message.set_coordinate_format(relative ? v1::COORDINATE_FORMAT_FLOAT32_RELATIVE
+                                         : v1::COORDINATE_FORMAT_FLOAT64);
   // Overwrites the messages of rings and mesh, so that their buffers are reused.
   if (!outputs.rings) message.clear_rings();
   if (!outputs.mesh) message.clear_mesh();
@@ -401,9 +279,36 @@ absl::Status EncodeOutline(const Result& result, const Outputs& outputs,
   return status;
 }
 
-absl::Status DecodeOutline(const v1::ReconstructedFrame& message, Result& result) {
+// Encodes the result of a frame or of a section, except for times and sections. It has a surface or
+// an outline.
+absl::Status EncodeShape(const Result& result, const Outputs& outputs,
+                         v1::ReconstructedFrame& message) {
+  EncodeStatistics(result.statistics, *message.mutable_statistics());
+  message.set_rings_digest(DigestRings(result.rings));
+  message.set_mesh_digest(DigestMesh(result.mesh));
+  message.set_surface_digest(DigestSurface(result.surface));
+  if (result.surface.ShellCount() == 0) {
+    message.clear_surface();
+    return EncodeOutline(result, outputs, message);
+  }
+  message.clear_rings();
+  message.clear_mesh();
+  if (outputs.surface) return EncodeSurface(result, outputs, message);
+  message.clear_surface();
+  return absl::OkStatus();
+}
+
+absl::Status DecodeShape(const v1::ReconstructedFrame& message, Result& result) {
   DecodeStatistics(message.statistics(), result.statistics);
-  return DecodeGeometry(message, result);
+  auto status = DecodeGeometry(message, result);
+  if (status.ok()) status = DecodeSurface(message, result.surface);
+  if (!status.ok() || !message.has_surface()) return status;
+  const FrameStatistics& statistics = result.statistics;
+  result.surface.statistics = {.dropped_cavities = statistics.dropped_holes,
+                               .dropped_components = statistics.dropped_components,
+                               .dropped_spray = statistics.dropped_spray,
+                               .bricks = statistics.tiles};
+  return status;
 }
 
 }  // namespace
@@ -425,18 +330,17 @@ v1::Doubt ToWire(Doubt doubt) {
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message) {
   EncodeTimes(times, *message.mutable_statistics());
-  absl::Status status = EncodeOutline(result, outputs, message);
+  absl::Status status = EncodeShape(result, outputs, message);
   const int sections = static_cast<int>(result.sections.size());
-  // Existing elements keep their buffers.
-  while (message.sections_size() > sections) message.mutable_sections()->RemoveLast();
-  while (message.sections_size() < sections) message.add_sections();
+  Resize(*message.mutable_sections(), result.sections.size());
   for (int k = 0; status.ok() && k < sections; ++k) {
-    status = EncodeOutline(result.sections[static_cast<std::size_t>(k)], outputs,
-                           *message.mutable_sections(k));
+    status = EncodeShape(result.sections[static_cast<std::size_t>(k)], outputs,
+                         *message.mutable_sections(k));
   }
   if (!status.ok()) {
     message.clear_rings();
     message.clear_mesh();
+    message.clear_surface();
     message.clear_sections();
   }
   return status;
@@ -448,12 +352,13 @@ absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFr
   DecodeTimes(message.statistics(), frame.times);
   frame.rings_digest = message.rings_digest();
   frame.mesh_digest = message.mesh_digest();
-  absl::Status status = DecodeOutline(message, frame.result);
+  frame.surface_digest = message.surface_digest();
+  absl::Status status = DecodeShape(message, frame.result);
   frame.result.sections.resize(static_cast<std::size_t>(message.sections_size()));
   frame.section_digests.clear();
   for (int k = 0; status.ok() && k < message.sections_size(); ++k) {
     const v1::ReconstructedFrame& section = message.sections(k);
-    status = DecodeOutline(section, frame.result.sections[static_cast<std::size_t>(k)]);
+    status = DecodeShape(section, frame.result.sections[static_cast<std::size_t>(k)]);
     frame.section_digests.push_back({section.rings_digest(), section.mesh_digest()});
   }
   if (!status.ok()) {

@@ -13,18 +13,22 @@
 namespace partiemc::server {
 namespace {
 
-std::uint32_t NumberOf(const wire::Outputs& outputs) {
+// Numbers of outlines are the same as before there were surfaces, so that checkpoints stay valid.
+std::uint32_t NumberOf(const wire::Outputs& outputs, bool is_surface) {
   // Lists every member. If a member is added, this statement does not compile until the author also
   // adds the member to the number.
-  const auto& [rings, mesh, normals, relative_float32, echo_particles, attributes] = outputs;
+  const auto& [rings, mesh, surface, normals, coordinates, echo_particles, attributes] = outputs;
+  const bool relative = coordinates == wire::Coordinates::kRelativeFloat32;
+  const bool compact = coordinates == wire::Coordinates::kCompact;
   std::uint32_t number = 0;
-  for (const bool part : {rings, mesh, normals, relative_float32, echo_particles}) {
+  for (const bool part : {rings, mesh, normals, relative, echo_particles}) {
     number = number << 1 | std::uint32_t{part};
   }
+  number |= (std::uint32_t{is_surface && surface} << 1 | std::uint32_t{compact}) << 30;
   if (attributes.empty()) return number;
   std::map<std::string, std::string> names;
   for (const std::string& name : attributes) names.emplace(absl::StrCat(names.size()), name);
-  return number | static_cast<std::uint32_t>(FingerprintOf(names)) << 5;
+  return number ^ static_cast<std::uint32_t>(FingerprintOf(names)) << 5;
 }
 
 }  // namespace
@@ -34,7 +38,7 @@ StreamTerms TermsOf(const v1::OpenStream& open, const wire::Outputs& outputs,
   return {.lineage = LineageOf(token),
           .name = open.stream_name(),
           .labels = FingerprintOf({open.labels().begin(), open.labels().end()}),
-          .outputs = NumberOf(outputs),
+          .outputs = NumberOf(outputs, open.parameters().output() == v1::OUTPUT_SURFACE),
           .checkpoint_interval = open.checkpoint_interval()};
 }
 

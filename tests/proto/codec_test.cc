@@ -148,14 +148,16 @@ TEST(OutputsMessage, AbsentMeansRingsAndMesh) {
 }
 
 TEST(OutputsMessage, EveryCombinationThatMeansSomethingComesBackAsItWas) {
-  for (int bits = 0; bits < 32; ++bits) {
+  for (int bits = 0; bits < 96; ++bits) {
     const Outputs outputs{.rings = (bits & 1) != 0,
                           .mesh = (bits & 2) != 0,
-                          .normals = (bits & 4) != 0,
-                          .relative_float32 = (bits & 8) != 0,
+                          .surface = (bits & 4) != 0,
+                          .normals = (bits & 8) != 0,
+                          .coordinates = static_cast<Coordinates>(bits / 32),
                           .echo_particles = (bits & 16) != 0};
-    if (outputs.normals && !outputs.rings) continue;
-    if (outputs.relative_float32 && !outputs.rings && !outputs.mesh) continue;
+    if (outputs.normals && !outputs.rings && !outputs.surface) continue;
+    const bool has_points = outputs.rings || outputs.mesh || outputs.surface;
+    if (outputs.coordinates != Coordinates::kFloat64 && !has_points) continue;
     v1::Outputs message;
     EncodeOutputs(outputs, message);
     const auto decoded = DecodeOutputs(message, /*present=*/true);

@@ -64,7 +64,7 @@ FrameTimes SomeTimes() {
   return times;
 }
 
-constexpr Outputs kAll{.rings = true, .mesh = true, .normals = true, .relative_float32 = false};
+constexpr Outputs kAll{.rings = true, .mesh = true, .normals = true};
 
 v1::ReconstructedFrame Encoded(const Result& result, const Outputs& outputs) {
   v1::ReconstructedFrame message;
@@ -135,8 +135,9 @@ TEST(ResultMessage, ASectionTooWideForRelativeCoordinatesRefusesTheFrame) {
   result.sections = {SquareWithHole()};
   result.sections[0].rings.points[0] = -1e6 - 0.3;
   v1::ReconstructedFrame message = Encoded(SquareWithHole(), kAll);
-  EXPECT_EQ(EncodeResult(result, {}, {.relative_float32 = true}, message).code(),
-            absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(
+      EncodeResult(result, {}, {.coordinates = Coordinates::kRelativeFloat32}, message).code(),
+      absl::StatusCode::kOutOfRange);
   EXPECT_FALSE(message.has_rings() || message.has_mesh());
   EXPECT_EQ(message.sections_size(), 0);
 }
@@ -189,7 +190,7 @@ TEST(RelativeCoordinates, FarFromTheOriginMoveAVertexByLessThanTheRuleSays) {
   Result result = SquareWithHole();
   for (double& value : result.mesh.points) value = 1e9 + within(random);
   result.rings.points.assign(result.mesh.points.begin(), result.mesh.points.begin() + 16);
-  const auto message = Encoded(result, {.relative_float32 = true});
+  const auto message = Encoded(result, {.coordinates = Coordinates::kRelativeFloat32});
   EXPECT_EQ(message.rings().points().size(), 16 * sizeof(float));
   ReconstructedFrame frame;
   ASSERT_TRUE(DecodeResult(message, frame).ok());
@@ -206,7 +207,8 @@ TEST(RelativeCoordinates, AFrameTooWideForThemIsRefused) {
   Result result = SquareWithHole();
   result.rings.points[0] = -1e6 - 0.3;
   v1::ReconstructedFrame message = Encoded(SquareWithHole(), kAll);
-  const auto status = EncodeResult(result, {}, {.relative_float32 = true}, message);
+  const auto status =
+      EncodeResult(result, {}, {.coordinates = Coordinates::kRelativeFloat32}, message);
   EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange);
   const auto violation = FindViolation(status);
   ASSERT_TRUE(violation.has_value());
@@ -223,8 +225,9 @@ TEST(RelativeCoordinates, LengthsBeyondTheRangeOfFloat32AreRefusedToo) {
     for (double& value : result.mesh.points) value *= scale;
     result.statistics.spacing = scale;
     v1::ReconstructedFrame message;
-    EXPECT_EQ(EncodeResult(result, {}, {.relative_float32 = true}, message).code(),
-              absl::StatusCode::kOutOfRange);
+    EXPECT_EQ(
+        EncodeResult(result, {}, {.coordinates = Coordinates::kRelativeFloat32}, message).code(),
+        absl::StatusCode::kOutOfRange);
   }
 }
 

@@ -36,6 +36,12 @@ std::string InputLabel(const std::string& input) {
   return label;
 }
 
+// The value of --coordinates.
+Coordinates CoordinatesOf(std::string_view name) {
+  if (name == "compact") return Coordinates::kCompact;
+  return name == "float32" ? Coordinates::kRelativeFloat32 : Coordinates::kFloat64;
+}
+
 absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags,
                                                         const ReconstructionParameters& parameters,
                                                         bool normals) {
@@ -54,6 +60,7 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
        .parameters = parameters,
        .outputs = {.mesh = parameters.fill != Fill::kNone,
                    .normals = normals,
+                   .coordinates = CoordinatesOf(flags.coordinates),
                    .echo_particles = flags.echo_particles,
                    .attributes = flags.sequence.attributes},
        .labels = {{"input", InputLabel(flags.input)}},

@@ -9,9 +9,7 @@ namespace partiemc::client {
 absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                                     const ReconstructionParameters& parameters) {
   auto frames = FrameOutputs::Create({.output_dir = flags.output_dir,
-                                      .format = !flags.format.empty() ? flags.format
-                                                : flags.surface       ? "ply"
-                                                                      : "geojson",
+                                      .format = flags.format,
                                       .stats = flags.stats,
                                       .color_by = flags.color_by,
                                       .compress_glb = flags.compress_glb,

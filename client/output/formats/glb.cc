@@ -188,7 +188,7 @@ std::size_t AddPositions(std::span<const double> points, const Vector& centre, G
 // Adds the arrays of the vertices and returns the JSON members that list them.
 std::string AddVertexArrays(const FileMesh& mesh, const Vector& centre, GlbBuffer& buffer) {
   std::string members = Concat(R"("POSITION":)", AddPositions(mesh.points(), centre, buffer));
-  if (mesh.surface()) {
+  if (!mesh.normals().empty()) {
     AppendAll(members, R"(,"NORMAL":)", buffer.AddVertices(mesh.normals(), 3));
   }
   for (const AttributeValues& one : mesh.attributes()) {

@@ -34,12 +34,14 @@ void AppendRings(std::string& out, const FileMesh& mesh) {
   }
 }
 
-/// The faces of one shell, whose corners have the normals of their points.
+/// The faces of one shell, whose corners have the normals of their points, if there are normals.
 void AppendShell(std::string& out, const Surface& surface, std::size_t shell) {
   for (std::size_t k = std::size_t{3} * surface.triangle_offsets[shell];
        k < std::size_t{3} * surface.triangle_offsets[shell + 1]; ++k) {
     const std::size_t vertex = std::size_t{surface.triangles[k]} + 1;
-    AppendAll(out, k % 3 == 0 ? "f " : " ", vertex, "//", vertex, k % 3 == 2 ? "\n" : "");
+    AppendAll(out, k % 3 == 0 ? "f " : " ", vertex);
+    if (!surface.normals.empty()) AppendAll(out, "//", vertex);
+    if (k % 3 == 2) out += '\n';
   }
 }
 

@@ -22,9 +22,13 @@ std::string PlyName(std::string_view name) {
 std::string VertexProperties(const FileMesh& mesh) {
   std::string out = "property double x\nproperty double y\nproperty double z\n";
   std::set<std::string> used = {"x", "y", "z"};
+  if (!mesh.normals().empty()) {
+    out += "property float nx\nproperty float ny\nproperty float nz\n";
+    used.insert({"nx", "ny", "nz"});
+  }
   if (mesh.surface()) {
-    out += "property float nx\nproperty float ny\nproperty float nz\nproperty int shell\n";
-    used.insert({"nx", "ny", "nz", "shell"});
+    out += "property int shell\n";
+    used.insert("shell");
   }
   for (const AttributeValues& one : mesh.attributes()) {
     for (int c = 0; c < one.components; ++c) {
@@ -39,11 +43,12 @@ std::string VertexProperties(const FileMesh& mesh) {
 
 void AppendVertices(const FileMesh& mesh, std::string& out) {
   const std::span<const double> points = mesh.points();
+  const std::span<const float> normals = mesh.normals();
   std::int32_t shell = 0;
   for (std::size_t k = 0; k < mesh.PointCount(); ++k) {
     for (std::size_t c = 0; c < 3; ++c) Put(points[3 * k + c], out);
+    for (std::size_t c = 0; c < 3 && !normals.empty(); ++c) Put(normals[3 * k + c], out);
     if (const Surface* const surface = mesh.surface()) {
-      for (std::size_t c = 0; c < 3; ++c) Put(surface->normals[3 * k + c], out);
       while (k >= surface->point_offsets[static_cast<std::size_t>(shell) + 1]) ++shell;
       Put(shell, out);
     }

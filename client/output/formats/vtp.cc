@@ -51,7 +51,7 @@ void AddPoints(const FileMesh& mesh, vtkPolyData* data) {
     points->InsertNextPoint(coordinates[k], coordinates[k + 1], coordinates[k + 2]);
   }
   data->SetPoints(points);
-  if (mesh.surface()) {
+  if (!mesh.normals().empty()) {
     data->GetPointData()->SetNormals(FloatArray(kNormals, 3, mesh.normals()));
   }
   for (const AttributeValues& one : mesh.attributes()) {

@@ -109,7 +109,7 @@ class SurfaceReconstructor {
                                 const FrameControl& control) const;
   absl::Status ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
                                   SurfaceWorkspace::Buffers& buffers, Surface& surface,
-                                  MemoryGuard* memory) const;
+                                  const FrameControl& control) const;
 
   SurfaceParameters parameters_;
   ReconstructionParameters in_space_;  // Resolved, in the form for the stages.

@@ -99,9 +99,79 @@ TEST(SurfaceReplay, TellsWhatItRequires) {
   const Ran in_plane = RunPartiemc({"replay", kDamBreak, "--local", "--surface"});
   EXPECT_EQ(in_plane.exit_code, 3);
   EXPECT_THAT(in_plane.error, HasSubstr("has two coordinates; leave --slice, --surface"));
-  const Ran served = RunPartiemc({"replay", frames, "--surface", "--spacing", "1"});
-  EXPECT_EQ(served.exit_code, 2);
-  EXPECT_THAT(served.error, HasSubstr("--surface: requires --local"));
+}
+
+// The surfaces that a server made are those of this process, for the producer and for a watcher.
+TEST(SurfaceReplay, IsTheSameThroughAServer) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const ServerProgram server;
+  const auto files = [&](const std::string& name) -> std::vector<std::string> {
+    return {"--output-dir", output.Path(name), "--format",
+            "ply,vtp,obj",  "--stats",         output.Path(name + ".csv")};
+  };
+  const auto with = [](std::vector<std::string> flags, const std::vector<std::string>& more) {
+    flags.insert(flags.end(), more.begin(), more.end());
+    return flags;
+  };
+  const std::vector<std::string> what = {
+      "--surface", "--spacing", "1", "--slice", "z=0", "--attributes", "p", "--simplify", ".05"};
+  const std::string frames = input.path().string();
+  const Ran local = RunPartiemc(with({"replay", frames, "--local"}, with(what, files("local"))));
+  ASSERT_EQ(local.exit_code, 0) << local.error;
+
+  Program watch(PARTIEMC_PROGRAM, with({"watch", "balls", "--server", server.address(), "--wait",
+                                        "--from", "oldest", "--record", output.Path("balls.pemc")},
+                                       files("watched")));
+  const Ran served = RunPartiemc(with({"replay", frames, "--server", server.address(), "--name",
+                                       "balls", "--rate", "1", "--echo-particles", "--check"},
+                                      with(what, files("served"))));
+  ASSERT_EQ(served.exit_code, 0) << served.error;
+  ASSERT_EQ(watch.Wait(), 0) << watch.Error();
+  EXPECT_THAT(watch.Out(), AllOf(HasSubstr("triangles"), HasSubstr("--surface --simplify 0.05")));
+
+  // Attributes are not recorded, but the outlines and surfaces are those of the stream.
+  const Ran again = RunPartiemc(with({"replay", output.Path("balls.pemc"), "--local"},
+                                     {"--surface", "--simplify", "0.05", "--slice", "0,0,0,0,0,1",
+                                      "--stats", output.Path("again.csv")}));
+  ASSERT_EQ(again.exit_code, 0) << again.error;
+  const auto digests = [&](const std::string& name) {
+    return Column(Content(output.Path(name + ".csv")), "surface_digest");
+  };
+  EXPECT_EQ(digests("local").size(), 2u);
+  for (const std::string name : {"served", "watched", "again"}) {
+    EXPECT_EQ(digests(name), digests("local")) << name;
+  }
+  for (const std::string name : {"served", "watched"}) {
+    const auto made = FilesIn(output.Path("local"));
+    EXPECT_EQ(FilesIn(output.Path(name)), made);
+    for (const std::string& file : made) {
+      EXPECT_EQ(Content(output.Path(name + "/" + file)), Content(output.Path("local/" + file)))
+          << name << "/" << file;
+    }
+  }
+}
+
+TEST(SurfaceReplay, CompactCoordinatesAreNearThoseOfThisProcess) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const ServerProgram server;
+  const auto triangles = [&](const std::string& name, std::vector<std::string> flags) {
+    flags.insert(flags.begin(), {"replay", input.path().string(), "--surface", "--spacing", "1",
+                                 "--output-dir", output.Path(name), "--format", "stl"});
+    const Ran ran = RunPartiemc(flags);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return Content(output.Path(name + "/frame_000001.stl")).size();
+  };
+  const std::size_t exact = triangles("exact", {"--server", server.address()});
+  EXPECT_EQ(triangles("compact", {"--server", server.address(), "--coordinates", "compact"}),
+            exact);
+  EXPECT_NE(Content(output.Path("exact/frame_000001.stl")),
+            Content(output.Path("compact/frame_000001.stl")));
+  const Ran checked = RunPartiemc({"replay", input.path().string(), "--check", "--coordinates",
+                                   "compact", "--surface", "--spacing", "1"});
+  EXPECT_EQ(checked.exit_code, 2);
+  EXPECT_THAT(checked.error, HasSubstr("--check: requires --coordinates float64"));
 }
 
 }  // namespace

@@ -28,13 +28,24 @@
 
 namespace partiemc::client {
 
-/// Outputs of each frame. Rings and statistics are always included.
+/// How the server sends coordinates.
+enum class Coordinates : std::uint8_t {
+  kFloat64,  ///< Exact: the same bits as in process.
+  /// float32 relative to an origin: half the bytes. A frame is refused if it is so wide that a
+  /// vertex would move by more than 1e-4 spacings.
+  kRelativeFloat32,
+  /// Surfaces are compressed to about 5 bytes per triangle, with normals: coordinates move by at
+  /// most 0.0009 spacings, normals by a degree, and triangles may touch where they nearly did.
+  /// Points and triangles have another order within their shell. Rings and meshes as
+  /// `kRelativeFloat32`.
+  kCompact,
+};
+
+/// Outputs of each frame. Rings, surface and statistics are always included.
 struct Outputs {
   bool mesh = true;
-  bool normals = false;  ///< Outward unit normals at ring vertices.
-  /// The server sends coordinates as float32 relative to an origin: half the bytes. A frame is
-  /// refused if it is so wide that a vertex would move by more than 1e-4 spacings.
-  bool relative_float32 = false;
+  bool normals = false;  ///< Outward unit normals at ring vertices. Surfaces always have them.
+  Coordinates coordinates = Coordinates::kFloat64;
   bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
   /// Attributes to interpolate to the vertices (Result::attributes), by the names of
   /// Frame::attributes; at most 16. "velocity" names Frame::velocities. A frame with

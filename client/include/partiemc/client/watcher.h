@@ -76,7 +76,8 @@ struct WatchedFrame {
   std::uint64_t sequence = 0;  ///< Number of the producer's frame.
   double time = 0;
   FrameResult frame;
-  /// x0, y0, x1, y1, ... in the stream's plane; empty unless the producer echoes its particles.
+  /// x0, y0, x1, y1, ... in the stream's plane, or x0, y0, z0, ... if the stream has surfaces;
+  /// empty unless the producer echoes its particles.
   std::vector<double> particles;
   /// Other quantities of the echoed particles, velocities in the layout of `particles`. Each has
   /// one entry per particle, or is empty.

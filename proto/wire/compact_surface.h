@@ -1,0 +1,24 @@
+// Compact surfaces (proto/PROTOCOL.md, "Compact surfaces"): rounded coordinates and normals, and
+// arrays compressed by meshoptimizer.
+#pragma once
+
+#include "absl/status/status.h"
+#include "partiemc/surface.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "wire/result_parts.h"
+
+namespace partiemc::wire {
+
+/// Writes points, triangles, attributes and, if `has_normals`, normals. Points and triangles are
+/// reordered within their shells, so that they compress better. Sets `step`. meshoptimizer
+/// allocates memory. Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if a coordinate is more
+/// than 2^30 steps from the origin.
+absl::Status EncodeCompact(const Surface& surface, const Origin& origin, double spacing,
+                           bool has_normals, v1::Surface& message);
+
+/// Reads what EncodeCompact writes. Requires: `surface` has the offsets of `message`, checked.
+/// Indices may be out of range. Errors: DATA_LOSS for arrays that do not decompress. No array is
+/// allocated that its bytes could not fill.
+absl::Status DecodeCompact(const v1::Surface& message, const Origin& origin, Surface& surface);
+
+}  // namespace partiemc::wire
