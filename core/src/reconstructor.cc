@@ -10,12 +10,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
-#include "base/in_stage.h"
 #include "bins/cell_mask.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
+#include "in_stage.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "workspace.h"

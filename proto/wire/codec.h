@@ -32,7 +32,7 @@ enum class Coordinates : std::uint8_t { kFloat64, kRelativeFloat32, kCompact };
 struct Outputs {
   bool rings = true;
   bool mesh = true;
-  bool surface = true;  ///< Of a stream with Output::kSurface.
+  bool surface = true;  ///< For streams with Output::kSurface.
   bool normals = false;
   Coordinates coordinates = Coordinates::kFloat64;
   bool echo_particles = false;               ///< To watchers.

@@ -263,7 +263,7 @@ grpc::ByteBuffer FrameRequest::ToBytes() const {
       WriteRows(array.rows, out);
     }
     for (const AttributeRows& attribute : attributes_) WriteAttribute(attribute, out);
-  }  // Whose end gives back what is left of the last piece.
+  }  // The end of `out` returns the unused rest of the last piece.
   return bytes;
 }
 

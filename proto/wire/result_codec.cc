@@ -303,6 +303,9 @@ absl::Status DecodeShape(const v1::ReconstructedFrame& message, Result& result) 
   auto status = DecodeGeometry(message, result);
   if (status.ok()) status = DecodeSurface(message, result.surface);
   if (!status.ok() || !message.has_surface()) return status;
+  if (result.rings.PointCount() > 0 || result.mesh.PointCount() > 0) {
+    return Lost("surface", "must come without rings and mesh");
+  }
   const FrameStatistics& statistics = result.statistics;
   result.surface.statistics = {.dropped_cavities = statistics.dropped_holes,
                                .dropped_components = statistics.dropped_components,
@@ -364,6 +367,7 @@ absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFr
   if (!status.ok()) {
     frame.result.Clear();
     frame.result.attributes.clear();
+    frame.result.surface.attributes.clear();
     frame.result.sections.clear();
     frame.section_digests.clear();
   }

@@ -1,4 +1,4 @@
-// What the codecs of outlines and of surfaces share: coordinates and attributes.
+// Encodes and decodes coordinates and attributes, for outlines and for surfaces.
 #pragma once
 
 #include <algorithm>

@@ -172,7 +172,7 @@ absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
   EncodeMeasures(surface, to);
   const double spacing = result.statistics.spacing;
   if (outputs.coordinates == Coordinates::kCompact) {
-    return EncodeCompact(surface, origin, spacing, outputs.normals, to);
+    return EncodeCompact(surface, origin, spacing, outputs.normals && !surface.normals.empty(), to);
   }
   AssignBytes(std::span<const std::uint32_t>(surface.triangles), *to.mutable_triangles());
   if (outputs.normals) {

@@ -183,6 +183,7 @@ absl::Status ReconstructCall::OpenStream(const v1::OpenStream& open) {
             {"name", terms_.name},
             {"peer", channel().peer()},
             {"client", caller().name()},
+            {"output", std::string(Name(session_->parameters().output))},
             {"placement", std::string(Name(session_->parameters().placement))},
             {"fill", std::string(Name(session_->parameters().fill))},
             {"parts", std::uint64_t{open.parts()}}});

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "partiemc/result.h"
+#include "partiemc/surface.h"
 
 namespace partiemc {
 namespace {
@@ -44,6 +45,13 @@ TEST(Digest, IsTheOneOfTheProtocol) {
   EXPECT_EQ(DigestMesh(OneTriangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
   EXPECT_EQ(DigestRings(Rings{}), Fold({0, 1, 0, 0}));
   EXPECT_EQ(DigestMesh(Mesh{}), Fold({0, 0, 0}));
+  Surface surface;
+  surface.points = {0, 0, 1};
+  surface.triangles = {2};
+  surface.triangle_offsets = {0, 4};
+  surface.outer_of = {kNoShell};
+  EXPECT_EQ(DigestSurface(surface), Fold({3, 0, 0, kOne, 1, 2, 2, 0, 4, 1, 0xffffffffu}));
+  EXPECT_EQ(DigestSurface(Surface{}), Fold({0, 0, 1, 0, 0}));
 }
 
 // The worked example of proto/PROTOCOL.md, with which writers of clients test their arithmetic.
@@ -57,6 +65,11 @@ TEST(Digest, OfTheExampleOfTheProtocolIsTheOneThatStandsThere) {
   mesh.triangles = {0, 1, 6, 0, 6, 4, 0, 4, 5, 0, 5, 3, 3, 5, 2, 5, 6, 2, 6, 1, 2};
   mesh.classes.assign(7, TriangleClass::kBoundary);
   mesh.classes.back() = TriangleClass::kInterior;
+  Surface surface;
+  surface.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 2.5};
+  surface.triangles = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  surface.triangle_offsets = {0, 4};
+  surface.outer_of = {kNoShell};
   std::ifstream file(PARTIEMC_SOURCE_DIR "/proto/PROTOCOL.md");
   const std::string protocol{std::istreambuf_iterator<char>(file), {}};
   ASSERT_FALSE(protocol.empty());
@@ -67,6 +80,8 @@ TEST(Digest, OfTheExampleOfTheProtocolIsTheOneThatStandsThere) {
   };
   expect_told("rings_digest    0x%016llx\n", DigestRings(rings));
   expect_told("mesh_digest     0x%016llx\n", DigestMesh(mesh));
+  expect_told("surface_digest            0x%016llx\n", DigestSurface(surface));
+  expect_told("without a body, is 0x%016llx.", DigestSurface(Surface{}));
   expect_told("`rings_digest` is 0x%016llx;", DigestRings(Rings{}));
   expect_told("`mesh_digest` of an empty mesh is 0x%016llx.", DigestMesh(Mesh{}));
 }

@@ -72,6 +72,11 @@ def mesh_digest(mesh):
     return digest(unpack("Q", mesh.points), unpack("I", mesh.triangles), mesh.classes)
 
 
+def surface_digest(surface):
+    return digest(unpack("Q", surface.points), unpack("I", surface.triangles),
+                  unpack("I", surface.triangle_offsets), unpack("I", surface.outer_of))
+
+
 def check_example():
     """The worked example of PROTOCOL.md."""
     text = (ROOT / "proto/PROTOCOL.md").read_text()
@@ -86,9 +91,11 @@ def check_example():
         return unpack("Q", struct.pack(f"<{len(numbers(field))}d", *numbers(field)))
 
     told = [int(re.search(rf"^{name} +(0x\w+)$", text, re.M)[1], 16)
-            for name in ("rings_digest", "mesh_digest")]
+            for name in ("rings_digest", "mesh_digest", "surface_digest")]
     computed = [digest(bits("Rings.points"), words("Rings.offsets"), words("Rings.outer_of")),
-                digest(bits("Mesh.points"), words("Mesh.triangles"), words("Mesh.classes"))]
+                digest(bits("Mesh.points"), words("Mesh.triangles"), words("Mesh.classes")),
+                digest(bits("Surface.points"), words("Surface.triangles"),
+                       words("Surface.triangle_offsets"), words("Surface.outer_of"))]
     assert computed == told, f"the example's digests are {computed}, PROTOCOL.md says {told}"
 
 
@@ -205,6 +212,29 @@ def dam_break(pb, count):
     return [pb.ParticleFrame.FromString(message) for message in messages[1:]]
 
 
+def check_surface(pb, stub):
+    """A single call with a ball of particles in space."""
+    request = pb.ReconstructFrameRequest()
+    request.parameters.output = pb.OUTPUT_SURFACE
+    request.parameters.spacing = 1
+    places = [(x, y, z) for x in range(-4, 5) for y in range(-4, 5) for z in range(-4, 5)
+              if x * x + y * y + z * z <= 16]
+    request.frame.position_format = pb.POSITION_FORMAT_FLOAT32_3
+    request.frame.positions = b"".join(struct.pack("<3f", *place) for place in places)
+    frame = stub.ReconstructFrame(request, timeout=SECONDS).frame
+    surface = frame.surface
+    assert surface_digest(surface) == frame.surface_digest, "the surface has another digest"
+    points, triangles = unpack("d", surface.points), unpack("I", surface.triangles)
+    assert unpack("I", surface.point_offsets) == (0, len(points) // 3)
+    assert unpack("I", surface.triangle_offsets) == (0, len(triangles) // 3)
+    assert max(triangles) < len(points) // 3
+    edges = collections.Counter()
+    for a, b, c in zip(triangles[::3], triangles[1::3], triangles[2::3]):
+        edges.update([(a, b), (b, c), (c, a)])
+    assert all(count == 1 and edges[b, a] == 1 for (a, b), count in list(edges.items())), "not closed"
+    assert abs(frame.statistics.volume / len(places) - 1) < .05, "the volume is not the particles'"
+
+
 def start_server(program, folder):
     port_file = pathlib.Path(folder) / "address"
     server = subprocess.Popen([program, "--address", "127.0.0.1:0", "--port-file", str(port_file),
@@ -230,6 +260,7 @@ def main():
             channel = grpc.insecure_channel(
                 address, options=[("grpc.max_receive_message_length", -1)])
             stub = pb_grpc.ReconstructionServiceStub(channel)
+            check_surface(pb, stub)
             undisturbed = Stream(pb, stub, "undisturbed")
             stream_all(undisturbed, frames, set())
             # Before the first checkpoint, right at one, and between two.
@@ -250,7 +281,8 @@ def main():
             server.terminate()
             code = server.wait(SECONDS)
         assert code == 0, f"the server ends with {code}"
-    print(f"{len(frames)} frames, 3 losses, {lost.repeated} answers repeated: every digest is ours")
+    print(f"{len(frames)} frames, 3 losses, {lost.repeated} answers repeated, a surface: "
+          "every digest is ours")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ void RequireArrives(const Result& result, wire::Outputs outputs) {
   v1::ReconstructedFrame sent, received;
   const absl::Status encoded = wire::EncodeResult(result, {}, outputs, sent);
   if (!encoded.ok()) {
-    Require(outputs.relative_float32 && absl::IsOutOfRange(encoded), "float64 always fits");
+    Require(outputs.coordinates != wire::Coordinates::kFloat64 && absl::IsOutOfRange(encoded),
+            "float64 always fits");
     RequireViolation(encoded);
     return;
   }
@@ -28,7 +29,12 @@ void RequireArrives(const Result& result, wire::Outputs outputs) {
   if (outputs.mesh && result.mesh.PointCount() > 0) {
     Require(frame.result.attributes == result.attributes, "attributes arrive bit for bit");
   }
-  if (outputs.relative_float32) return;
+  Require(frame.surface_digest == DigestSurface(result.surface), "the surface's digest arrives");
+  if (outputs.coordinates != wire::Coordinates::kFloat64) return;
+  if (outputs.surface) {
+    Require(DigestSurface(frame.result.surface) == frame.surface_digest,
+            "the surface arrives bit for bit");
+  }
   if (outputs.rings) {
     Require(DigestRings(frame.result.rings) == frame.rings_digest, "rings arrive bit for bit");
   }

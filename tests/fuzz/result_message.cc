@@ -34,6 +34,21 @@ void RequireWhole(const Result& result) {
     Require(of_triangle == TriangleClass::kBoundary || of_triangle == TriangleClass::kInterior,
             "a triangle's class is known");
   }
+  const Surface& surface = result.surface;
+  Require(surface.point_offsets.back() == surface.PointCount() &&
+              surface.triangle_offsets.back() == surface.TriangleCount() &&
+              surface.point_offsets.size() == surface.ShellCount() + 1 &&
+              surface.triangle_offsets.size() == surface.ShellCount() + 1 &&
+              surface.measures.size() == surface.ShellCount(),
+          "shells have their points, triangles and measures");
+  for (const std::uint32_t point : surface.triangles) {
+    Require(point < surface.PointCount(), "a triangle's points are there");
+  }
+  Require(surface.normals.empty() || surface.normals.size() == surface.points.size(),
+          "normals are there for every point, or none");
+  for (const double coordinate : surface.points) {
+    Require(std::isfinite(coordinate), "finite points");
+  }
   for (const double coordinate : rings.points) Require(std::isfinite(coordinate), "finite points");
   for (const double coordinate : result.mesh.points) {
     Require(std::isfinite(coordinate), "finite points");
@@ -49,20 +64,23 @@ void AttackResultMessage(Bytes bytes) {
   const absl::Status status = wire::DecodeResult(message, frame);
   if (!status.ok()) {
     Require(absl::IsDataLoss(status), "a broken answer is DATA_LOSS");
-    Require(frame.result.rings.points.empty() && frame.result.mesh.points.empty(),
+    Require(frame.result.rings.points.empty() && frame.result.mesh.points.empty() &&
+                frame.result.surface == Surface{},
             "a broken answer leaves nothing");
     return;
   }
   RequireWhole(frame.result);
   // --check and the writers must not rely on a benign server.
   if (Validate(frame.result).ok()) CountTJunctions(frame.result);
+  (void)Validate(frame.result.surface);
   v1::ReconstructedFrame again;
   RequireOk(wire::EncodeResult(frame.result, frame.times, {.normals = true}, again),
             "what was decoded can be encoded");
   wire::ReconstructedFrame twice;
   RequireOk(wire::DecodeResult(again, twice), "and decoded again");
   Require(DigestRings(frame.result.rings) == DigestRings(twice.result.rings) &&
-              DigestMesh(frame.result.mesh) == DigestMesh(twice.result.mesh),
+              DigestMesh(frame.result.mesh) == DigestMesh(twice.result.mesh) &&
+              DigestSurface(frame.result.surface) == DigestSurface(twice.result.surface),
           "to the same bits");
 }
 

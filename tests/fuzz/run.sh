@@ -21,7 +21,7 @@ readonly round_seconds=30
 # Maximum sizes of inputs. Targets that make frames from a few bytes get small inputs, which are fast
 # and find nearly the same. Kept inputs are few and small, because the repository stores them.
 readonly large_bytes=1048576 small_bytes=2048 kept_bytes=400 kept_files=60
-readonly small_targets=' checkpoint expressions frames relay_peers sections state watch_requests '
+readonly small_targets=' checkpoint expressions frames relay_peers sections state surfaces watch_requests '
 
 seconds=60
 executions=0

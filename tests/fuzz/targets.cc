@@ -27,6 +27,7 @@ std::span<const Target> AllTargets() {
       {"sections", AttackSections},
       {"state", AttackState},
       {"stream_requests", AttackStreamRequests},
+      {"surfaces", AttackSurfaces},
       {"text_table", AttackTextTable},
       {"tokens", AttackTokens},
 #ifdef PARTIEMC_HAVE_VTK

@@ -37,6 +37,7 @@ Attack AttackResultMessage;   // A server's response, decoded by the client.
 Attack AttackSections;        // Frames with attributes, and streams with sections.
 Attack AttackState;           // A serialised State with a correct checksum, and a frame.
 Attack AttackStreamRequests;  // A producer's messages, into reused buffers.
+Attack AttackSurfaces;        // Frames in space, and their surfaces in every format.
 Attack AttackTextTable;
 Attack AttackTokens;         // The token file of a server.
 Attack AttackVtk;            // Legacy VTK, VTP and VTU; only if VTK is built in.

@@ -73,7 +73,7 @@ class Chaos : public testing::Test {
 TEST_F(Chaos, CutsAndResetsAtRandomMomentsAreSeenInNoAnswer) {
   const std::uint64_t faults = GetOptions().faults;
   std::printf("seed %llu\n", static_cast<unsigned long long>(GetOptions().seed));
-  for (const Workload& workload : {DamBreak(), Blob(), Leap()}) {
+  for (const Workload& workload : {DamBreak(), Blob(), Leap(), Merge()}) {
     support::Random random(GetOptions().seed);
     const auto outcome = Stream(workload, 0, [&] {
       for (std::uint64_t k = 0; k < faults; ++k) {

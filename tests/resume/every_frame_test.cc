@@ -22,7 +22,7 @@ constexpr FrameLimits kLimits{.max_particles = 100'000, .max_tiles = 10'000};
 
 // The result of one frame, and the checkpoint after it.
 struct Step {
-  std::uint64_t rings = 0, mesh = 0;
+  std::uint64_t rings = 0, mesh = 0, surface = 0;
   std::vector<std::uint64_t> identities;
   std::string checkpoint;
 
@@ -31,18 +31,20 @@ struct Step {
 
 Step Advance(Session& session, server::Worker& worker, const Workload& workload) {
   const std::uint64_t sequence = session.next_sequence();
-  const auto& particles = workload.at(sequence - 1);
-  Frame frame{.positions = std::span<const double>(particles.positions), .ids = particles.ids};
-  frame.time = 0.01 * static_cast<double>(sequence);
+  const Frame frame = workload.FrameAt(sequence - 1, 0.01 * static_cast<double>(sequence));
   Step step;
   const auto status =
       session.Answer(sequence, frame, worker, [&](const Result& result, const auto&) {
         step.rings = DigestRings(result.rings);
         step.mesh = DigestMesh(result.mesh);
+        step.surface = DigestSurface(result.surface);
         for (const auto& ring : result.rings.measures) step.identities.push_back(ring.identity);
+        for (const auto& shell : result.surface.measures) {
+          step.identities.push_back(shell.identity);
+        }
         return absl::OkStatus();
       });
-  EXPECT_EQ(status.ok(), !particles.is_bad) << status;
+  EXPECT_EQ(status.ok(), !workload.at(sequence - 1).is_bad) << status;
   step.checkpoint = session.MakeCheckpoint(kTerms, nullptr, ~std::uint64_t{0});
   return step;
 }
@@ -75,7 +77,7 @@ class EveryFrame : public testing::TestWithParam<Workload (*)()> {
   std::vector<Step> undisturbed_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Of, EveryFrame, testing::Values(&DamBreak, &Blob, &Leap),
+INSTANTIATE_TEST_SUITE_P(Of, EveryFrame, testing::Values(&DamBreak, &Blob, &Leap, &Merge),
                          [](const auto& test) { return "Sequence" + std::to_string(test.index); });
 
 TEST_P(EveryFrame, ANewSessionGoesOnFromItBitForBit) {

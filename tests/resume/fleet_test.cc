@@ -143,7 +143,7 @@ TEST_P(FleetTest, KillsAtRandomMomentsAreSeenInNoAnswer) {
   std::printf("seed %llu\n", static_cast<unsigned long long>(GetOptions().seed));
   support::Random random(GetOptions().seed);
   std::vector<Clock::time_point> disturbances;
-  const auto histories = Stream({DamBreak(), Blob(), Leap()}, [&] {
+  const auto histories = Stream({DamBreak(), Blob(), Leap(), Merge()}, [&] {
     for (std::uint64_t k = 0; k < kills; ++k) {
       std::this_thread::sleep_for(
           std::chrono::milliseconds(static_cast<int>(random.Uniform(200, 500))));
@@ -159,9 +159,9 @@ TEST_P(FleetTest, KillsAtRandomMomentsAreSeenInNoAnswer) {
 TEST_P(FleetTest, RollingTerminationsAreSeenByNoCaller) {
   const std::uint64_t terminations = GetOptions().terminations;
   std::vector<Clock::time_point> disturbances;
-  const std::vector<Workload> three = {DamBreak(), Blob(), Leap()};
+  const std::vector<Workload> four = {DamBreak(), Blob(), Leap(), Merge()};
   std::vector<Workload> eight;
-  for (std::size_t k = 0; k < 8; ++k) eight.push_back(three[k % 3]);
+  for (std::size_t k = 0; k < 8; ++k) eight.push_back(four[k % 4]);
   const auto histories = Stream(eight, [&] {
     for (std::uint64_t k = 0; k < terminations; ++k) {
       std::this_thread::sleep_for(std::chrono::milliseconds(150));

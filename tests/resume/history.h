@@ -19,8 +19,8 @@ using Clock = std::chrono::steady_clock;
 struct Answer {
   std::uint64_t sequence = 0;
   bool is_result = false;
-  std::uint64_t rings_digest = 0, mesh_digest = 0;
-  std::vector<std::uint64_t> identities;  ///< Identities of the rings, which digests do not cover.
+  std::uint64_t rings_digest = 0, mesh_digest = 0, surface_digest = 0;
+  std::vector<std::uint64_t> identities;  ///< Of rings or shells; digests do not cover them.
   double time = 0;
   Clock::time_point at;
 
@@ -28,7 +28,8 @@ struct Answer {
   bool SameAs(const Answer& other) const {
     return sequence == other.sequence && is_result == other.is_result &&
            rings_digest == other.rings_digest && mesh_digest == other.mesh_digest &&
-           identities == other.identities && time == other.time;
+           surface_digest == other.surface_digest && identities == other.identities &&
+           time == other.time;
   }
 };
 

@@ -61,7 +61,7 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
  protected:
   WatchAnywhere() : fleet_(kServers, {"--nats", nats_.url()}) {
     for (std::size_t k = 0; k < kProducers; ++k) {
-      workloads_.push_back(k % 2 == 0 ? DamBreak() : Leap());
+      workloads_.push_back(k % 2 == 0 ? DamBreak() : k == 1 ? Merge() : Leap());
       workloads_.back().name += "-" + std::to_string(k);
     }
   }

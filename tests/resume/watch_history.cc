@@ -24,6 +24,7 @@ WatchHistory WatchAll(client::Watcher& watcher) {
                             .gap = frame.gap,
                             .rings_digest = frame.frame.rings_digest,
                             .mesh_digest = frame.frame.mesh_digest,
+                            .surface_digest = frame.frame.surface_digest,
                             .rejoined = !frame.rejoined.empty(),
                             .at = Clock::now()});
   }
@@ -65,7 +66,8 @@ testing::AssertionResult Identical(const WatchHistory& history, const History& u
       return AssertionFailure() << "there is no frame " << seen.sequence;
     }
     const Answer& made = undisturbed.answers[seen.sequence - 1];
-    if (seen.rings_digest != made.rings_digest || seen.mesh_digest != made.mesh_digest) {
+    if (seen.rings_digest != made.rings_digest || seen.mesh_digest != made.mesh_digest ||
+        seen.surface_digest != made.surface_digest) {
       return AssertionFailure() << "frame " << seen.sequence << " is another one";
     }
   }

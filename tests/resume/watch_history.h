@@ -15,7 +15,7 @@ namespace partiemc::resume {
 
 struct WatchedAnswer {
   std::uint64_t sequence = 0, dropped = 0, gap = 0;
-  std::uint64_t rings_digest = 0, mesh_digest = 0;
+  std::uint64_t rings_digest = 0, mesh_digest = 0, surface_digest = 0;
   bool rejoined = false;  ///< The first frame after the watch was lost.
   Clock::time_point at;
 };

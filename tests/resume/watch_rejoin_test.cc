@@ -26,13 +26,18 @@ std::vector<std::string> Others(const std::vector<std::string>& addresses) {
   return {addresses.begin() + 1, addresses.end()};
 }
 
-TEST(WatchRejoin, KilledServersShowEachFrameOnceOrReportAGap) {
+class WatchRejoin : public testing::TestWithParam<Workload (*)()> {};
+
+INSTANTIATE_TEST_SUITE_P(Of, WatchRejoin, testing::Values(&DamBreak, &Merge),
+                         [](const auto& test) { return test.param().name.substr(0, 3); });
+
+TEST_P(WatchRejoin, KilledServersShowEachFrameOnceOrReportAGap) {
   constexpr std::size_t kServers = 3;
   constexpr double kRate = 40;
   std::printf("seed %llu\n", static_cast<unsigned long long>(GetOptions().seed));
   support::Random random(GetOptions().seed);
   Fleet fleet(kServers);
-  const Workload workload = DamBreak();
+  const Workload workload = GetParam()();
   client::StreamOptions options{.name = workload.name,
                                 .parameters = workload.parameters,
                                 .fallback_addresses = Others(fleet.addresses())};

@@ -2,9 +2,11 @@
 
 #include <limits>
 #include <thread>
+#include <utility>
 
 #include "client/recording/recording.h"
 #include "partiemc/client/local_stream.h"
+#include "server/merging_balls.h"
 #include "server/moving_blob.h"
 
 namespace partiemc::resume {
@@ -28,9 +30,13 @@ void Receive(client::FrameStream& stream, History& history) {
     if (is_result) {
       answer.rings_digest = event.frame.rings_digest;
       answer.mesh_digest = event.frame.mesh_digest;
+      answer.surface_digest = event.frame.surface_digest;
       answer.time = event.time;
       for (const auto& ring : event.frame.result.rings.measures) {
         answer.identities.push_back(ring.identity);
+      }
+      for (const auto& shell : event.frame.result.surface.measures) {
+        answer.identities.push_back(shell.identity);
       }
     }
     history.answers.push_back(std::move(answer));
@@ -82,6 +88,17 @@ Workload Leap() {
   return workload;
 }
 
+Workload Merge() {
+  Workload workload{.name = "merge", .parameters = server::MergingBallsParameters()};
+  workload.components = 3;
+  for (std::uint64_t k = 0; k < 18; ++k) {
+    server::SpaceParticles particles = server::MergingBalls(k);
+    workload.frames.push_back(
+        {.positions = std::move(particles.positions), .ids = std::move(particles.ids)});
+  }
+  return workload;
+}
+
 History RunThrough(client::FrameStream& stream, const Workload& workload, double per_second,
                    const std::function<bool(std::uint64_t)>& enough) {
   History history;
@@ -96,10 +113,8 @@ History RunThrough(client::FrameStream& stream, const Workload& workload, double
             std::chrono::duration_cast<Clock::duration>(
                 std::chrono::duration<double>(1 / per_second));
     }
-    const auto& particles = workload.at(sent);
-    const Frame frame{.positions = std::span<const double>(particles.positions),
-                      .ids = particles.ids};
-    const auto sequence = stream.Send(frame, kTimeStep * static_cast<double>(sent));
+    const double time = kTimeStep * static_cast<double>(sent);
+    const auto sequence = stream.Send(workload.FrameAt(sent, time), time);
     if (!sequence.ok()) break;  // The receiver gets the error, too.
     EXPECT_EQ(*sequence, sent + 1);
     ++sent;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,16 @@ struct Workload {
   std::string name;
   ReconstructionParameters parameters;
   std::vector<Particles> frames;
+  int components = 2;  ///< Of a position.
+
+  /// Frame `index` at `time`. Valid while this object exists.
+  Frame FrameAt(std::uint64_t index, double time) const {
+    const Particles& particles = at(index);
+    return {.positions = std::span<const double>(particles.positions),
+            .components = components,
+            .ids = particles.ids,
+            .time = time};
+  }
 
   const Particles& at(std::uint64_t index) const { return frames[index % frames.size()]; }
 };
@@ -35,6 +46,9 @@ Workload DamBreak();
 Workload Blob();
 /// A body and a drop that leaps over it; only ids distinguish them.
 Workload Leap();
+
+/// Surfaces: two balls in space that merge, with an outline on a plane.
+Workload Merge();
 
 /// Sends frames, at most `per_second` (0: no limit), until `enough` returns true for the number
 /// sent; receives concurrently until the stream ends.

@@ -35,7 +35,7 @@ enum class Coordinates : std::uint8_t {
   /// vertex would move by more than 1e-4 spacings.
   kRelativeFloat32,
   /// Surfaces are compressed to about 5 bytes per triangle, with normals: coordinates move by at
-  /// most 0.0009 spacings, normals by a degree, and triangles may touch where they nearly did.
+  /// most 0.0009 spacings, normals by 1.2 degrees, and triangles may touch where they nearly did.
   /// Points and triangles have another order within their shell. Rings and meshes as
   /// `kRelativeFloat32`.
   kCompact,
