@@ -86,12 +86,12 @@ class ChunkSearch {
     FindNear();
     FindLinks();
     LoadPlaces();
-    const std::size_t bytes = chunk_.Bytes();
+    const std::size_t words = chunk_.Words();
     chunk_.self.clear();
-    chunk_.bits.assign((chunk_.end - chunk_.begin) * bytes, 0);
+    chunk_.bits.assign((chunk_.end - chunk_.begin) * words, 0);
     for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
       chunk_.self.push_back(static_cast<std::uint16_t>(IndexOf(loop)));
-      FindWindow(chunk_.self.back(), chunk_.bits.data() + (loop - chunk_.begin) * bytes);
+      FindWindow(chunk_.self.back(), chunk_.bits.data() + (loop - chunk_.begin) * words);
     }
   }
 
@@ -148,11 +148,11 @@ class ChunkSearch {
       for (std::uint32_t n = windows_.link_first[loop]; n < windows_.link_first[loop + 1]; ++n) {
         const std::uint16_t to = IndexOf(windows_.links[n]);
         if (to == kFree) continue;
+        const std::uint32_t word = to / kWordBits, bit = std::uint32_t{1} << to % kWordBits;
         std::size_t k = first;
-        while (k < chunk_.links.size() && chunk_.links[k].byte != to / 8) ++k;
-        if (k == chunk_.links.size())
-          chunk_.links.push_back({static_cast<std::uint16_t>(to / 8), 0});
-        chunk_.links[k].bits |= static_cast<std::uint8_t>(1 << to % 8);
+        while (k < chunk_.links.size() && chunk_.links[k].word != word) ++k;
+        if (k == chunk_.links.size()) chunk_.links.push_back({word, 0});
+        chunk_.links[k].bits |= bit;
       }
     }
     chunk_.first.push_back(static_cast<std::uint16_t>(chunk_.links.size()));
@@ -168,38 +168,41 @@ class ChunkSearch {
       places_.z[k++] = static_cast<float>(at.z);
     }
     constexpr float kFar = 1e9f;
-    for (; k % 8 != 0; ++k) places_.x[k] = places_.y[k] = places_.z[k] = kFar;
+    for (; k % kWordBits != 0; ++k) places_.x[k] = places_.y[k] = places_.z[k] = kFar;
   }
 
   /// Sets the bits of the window of a near loop. Requires: they are 0.
-  void FindWindow(std::uint16_t loop, std::uint8_t* found) {
-    const std::size_t bytes = chunk_.Bytes();
-    FindWithin(places_, bytes, loop, static_cast<float>(square_), within_.data());
-    std::fill_n(done_.begin(), bytes, std::uint8_t{0});
-    found[loop / 8] |= static_cast<std::uint8_t>(1 << loop % 8);
+  void FindWindow(std::uint16_t loop, std::uint32_t* found) {
+    const std::size_t words = chunk_.Words();
+    FindWithin(places_, words, loop, static_cast<float>(square_), within_.data());
+    std::fill_n(done_.begin(), words, 0u);
+    found[loop / kWordBits] |= std::uint32_t{1} << loop % kWordBits;
     // Alternate directions reach all loops in few passes.
     for (bool is_up = true, has_new = true; has_new; is_up = !is_up) {
       has_new = false;
-      for (std::size_t k = 0; k < bytes; ++k) {
-        const std::size_t byte = is_up ? k : bytes - 1 - k;
-        while (found[byte] != done_[byte]) {
+      for (std::size_t k = 0; k < words; ++k) {
+        const std::size_t word = is_up ? k : words - 1 - k;
+        while (const std::uint32_t fresh = found[word] & ~done_[word]) {
           has_new = true;
-          Follow(byte, found);
+          done_[word] |= fresh;
+          Follow(word, fresh, found);
         }
       }
     }
   }
 
-  /// Follows the links from a found loop of a byte.
-  void Follow(std::size_t byte, std::uint8_t* found) {
-    const unsigned fresh = found[byte] & ~unsigned{done_[byte]};
-    done_[byte] |= static_cast<std::uint8_t>(fresh & -fresh);
-    const std::size_t from = 8 * byte + static_cast<std::size_t>(std::countr_zero(fresh));
-    for (std::size_t n = chunk_.first[from]; n < chunk_.first[from + 1]; ++n) {
-      const LoopWindows::Link& link = chunk_.links[n];
-      found[link.byte] |= static_cast<std::uint8_t>(link.bits & within_[link.byte]);
+  /// Follows the links from loops of a word.
+  void Follow(std::size_t word, std::uint32_t from, std::uint32_t* found) {
+    for (; from != 0; from &= from - 1) {
+      const std::size_t loop = kWordBits * word + static_cast<std::size_t>(std::countr_zero(from));
+      for (std::size_t n = chunk_.first[loop]; n < chunk_.first[loop + 1]; ++n) {
+        const LoopWindows::Link& link = chunk_.links[n];
+        found[link.word] |= link.bits & within_[link.word];
+      }
     }
   }
+
+  static constexpr std::size_t kWordBits = LoopWindows::kWordBits;
 
   const LoopWindows& windows_;
   std::span<const Vec3> centres_;
@@ -207,7 +210,7 @@ class ChunkSearch {
   LoopWindows::Chunk& chunk_;
   std::array<std::uint16_t, kSlots> slots_;
   NearLoops places_;  // Centres only.
-  std::array<std::uint8_t, LoopWindows::kMostNear / 8> within_, done_;
+  std::array<std::uint32_t, LoopWindows::kMostNear / kWordBits> within_, done_;
 };
 
 }  // namespace

@@ -23,26 +23,27 @@ struct LoopWindows {
   /// cells are small.
   static constexpr std::size_t kMostNear = 2048;
 
-  /// Loops that are linked with a loop: bits of one byte.
+  static constexpr std::size_t kWordBits = 32;
+
+  /// Loops that are linked with a loop: bits of one word.
   struct Link {
-    std::uint16_t byte;
-    std::uint8_t bits;
+    std::uint32_t word, bits;
   };
 
   /// The windows of consecutive loops of a brick, as bits for the loops near them.
   struct Chunk {
     std::uint32_t begin = 0, end = 0;  ///< The loops.
     std::vector<std::uint32_t> near;   ///< The union of the windows and more; sorted.
-    std::vector<std::uint8_t> bits;    ///< By loop: bit k % 8 of byte k / 8 is loop near[k].
+    std::vector<std::uint32_t> bits;   ///< By loop: bit k % 32 of word k / 32 is loop near[k].
     std::vector<std::uint16_t> self;   ///< By loop: its index in `near`.
 
     /// Scratch: the links of near loop k are [first[k], first[k + 1]).
     std::vector<std::uint16_t> first;
     std::vector<Link> links;
 
-    std::size_t Bytes() const { return (near.size() + 7) / 8; }
-    std::span<const std::uint8_t> Of(std::uint32_t loop) const {
-      return std::span(bits).subspan((loop - begin) * Bytes(), Bytes());
+    std::size_t Words() const { return (near.size() + kWordBits - 1) / kWordBits; }
+    std::span<const std::uint32_t> Of(std::uint32_t loop) const {
+      return std::span(bits).subspan((loop - begin) * Words(), Words());
     }
   };
   std::vector<Chunk> chunks;  ///< The first `chunk_count` are in use; others keep their memory.

@@ -59,8 +59,11 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
   pairs.self_x = hn::Set(d, loops.normal_x[self]);
   pairs.self_y = hn::Set(d, loops.normal_y[self]);
   pairs.self_z = hn::Set(d, loops.normal_z[self]);
-  for (std::size_t byte = 0; byte < window.bits.size(); ++byte) {
-    const auto bits = static_cast<std::uint8_t>(window.bits[byte] >> lane);
+  constexpr std::size_t kPerWord = LoopWindows::kWordBits / kAtOnce;
+  for (std::size_t byte = 0; byte < kPerWord * window.bits.size(); ++byte) {
+    const auto bits =
+        static_cast<std::uint8_t>(window.bits[byte / kPerWord] >>
+                                  (kAtOnce * (byte % kPerWord) + static_cast<unsigned>(lane)));
     if (bits == 0) continue;
     const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
     pairs.x = hn::Sub(hn::Load(d, loops.x.data() + k), x);
@@ -78,25 +81,25 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
   }
 }
 
-void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
-                std::uint8_t* bits) {
+void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
+                std::uint32_t* bits) {
   const Lanes d;
   const Vector x = hn::Set(d, loops.x[self]), y = hn::Set(d, loops.y[self]),
                z = hn::Set(d, loops.z[self]);
   const Vector most = hn::Set(d, square);
-  for (std::size_t byte = 0; byte < bytes; ++byte) {
-    unsigned found = 0;
-    for (int lane = 0; lane < kAtOnce; lane += kLanes) {
-      const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
-      const Vector dx = hn::Sub(hn::Load(d, loops.x.data() + k), x);
-      const Vector dy = hn::Sub(hn::Load(d, loops.y.data() + k), y);
-      const Vector dz = hn::Sub(hn::Load(d, loops.z.data() + k), z);
+  for (std::size_t word = 0; word < words; ++word) {
+    std::uint32_t found = 0;
+    for (std::size_t k = 0; k < LoopWindows::kWordBits; k += kLanes) {
+      const std::size_t first = word * LoopWindows::kWordBits + k;
+      const Vector dx = hn::Sub(hn::Load(d, loops.x.data() + first), x);
+      const Vector dy = hn::Sub(hn::Load(d, loops.y.data() + first), y);
+      const Vector dz = hn::Sub(hn::Load(d, loops.z.data() + first), z);
       const Vector to = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
       std::uint8_t part[8] = {};
       hn::StoreMaskBits(d, hn::Lt(to, most), part);
-      found |= unsigned{part[0]} << lane;
+      found |= std::uint32_t{part[0]} << k;
     }
-    bits[byte] = static_cast<std::uint8_t>(found);
+    bits[word] = found;
   }
 }
 
@@ -175,9 +178,9 @@ HWY_EXPORT(SumNormals);
 HWY_EXPORT(SumBends);
 HWY_EXPORT(SumPlanes);
 
-void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
-                std::uint8_t* bits) {
-  HWY_DYNAMIC_DISPATCH(FindWithin)(loops, bytes, self, square, bits);
+void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
+                std::uint32_t* bits) {
+  HWY_DYNAMIC_DISPATCH(FindWithin)(loops, words, self, square, bits);
 }
 Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges) {
   return HWY_DYNAMIC_DISPATCH(SumNormals)(loops, window, stops_at_edges);

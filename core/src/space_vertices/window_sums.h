@@ -23,14 +23,14 @@ struct NearLoops {
   std::array<float, kMost> base;  ///< Of SumPlanes.
 };
 
-/// Sets bit k % 8 of byte k / 8 if the squared distance of near loops k and `self` is below
-/// `square`. Reads 8 * `bytes` centres.
-void FindWithin(const NearLoops& loops, std::size_t bytes, std::size_t self, float square,
-                std::uint8_t* bits);
+/// Sets bit k % 32 of word k / 32 if the squared distance of near loops k and `self` is below
+/// `square`. Reads 32 * `words` centres.
+void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
+                std::uint32_t* bits);
 
 /// A loop and its window: one bit for each near loop.
 struct Window {
-  std::span<const std::uint8_t> bits;
+  std::span<const std::uint32_t> bits;
   std::size_t self;      ///< Its index among the near loops.
   float inverse_square;  ///< 1 / reach^2.
 };

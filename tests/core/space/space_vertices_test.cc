@@ -69,7 +69,7 @@ std::vector<std::uint32_t> WindowOf(const LoopWindows& windows, std::uint32_t lo
     if (loop < chunk.begin || loop >= chunk.end) continue;
     EXPECT_EQ(chunk.near[chunk.self[loop - chunk.begin]], loop);
     for (std::size_t k = 0; k < chunk.near.size(); ++k) {
-      if ((chunk.Of(loop)[k / 8] >> k % 8 & 1) != 0) found.push_back(chunk.near[k]);
+      if ((chunk.Of(loop)[k / 32] >> k % 32 & 1) != 0) found.push_back(chunk.near[k]);
     }
   }
   return found;
