@@ -150,6 +150,28 @@ TEST_F(LargeFrames, IdleStreamsKeepNobodyFromBeingReadFrom) {
   }
 }
 
+// Full bodies, particles without neighbours, and coordinates that are no places, as surfaces from
+// several streams at once. Every frame is answered: with a surface or a refusal.
+TEST_F(LargeFrames, OfSurfacesAreAnsweredWithinThePlan) {
+  Serve();
+  std::string nowhere = CubeFrame(3, 20, 1);
+  for (std::size_t k = 100; k + 4 < nowhere.size(); k += 1'000) {
+    nowhere.replace(k, 4, "\x7f\x7f\x7f\x7f");  // Numbers of 1e38.
+  }
+  const std::vector<std::string> frames = {CubeFrame(1, 60, 1), CubeFrame(2, 100, 50), nowhere,
+                                           CubeFrame(4, 100, 1), CubeFrame(5, 16, 9)};
+  std::atomic<int> ended_well = 0;
+  std::vector<std::thread> threads;
+  for (int stream = 0; stream < 3; ++stream) {
+    threads.emplace_back([&] {
+      Sender sender(address());
+      if (sender.OpenSurfaces() && Run(sender, frames) == 0) ++ended_well;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(ended_well, 3);
+}
+
 // Part 0 of twelve streams sends nothing, and four other parts send full frames.
 TEST_F(LargeFrames, PartsWithoutPart0StayWithinPlanAndQuotaUntilTheTimeout) {
   const support::TemporaryFolder folder;

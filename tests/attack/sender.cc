@@ -30,6 +30,21 @@ std::string SquareFrame(std::uint64_t sequence, std::size_t side, std::size_t by
   return request.SerializeAsString();
 }
 
+std::string CubeFrame(std::uint64_t sequence, std::size_t side, float gap) {
+  v1::ReconstructRequest request;
+  v1::ParticleFrame& frame = *request.mutable_frame();
+  frame.set_sequence(sequence);
+  frame.set_position_format(v1::POSITION_FORMAT_FLOAT32_3);
+  std::vector<float> positions;
+  for (std::size_t k = 0; k < side * side * side; ++k) {
+    positions.push_back(static_cast<float>(k % side) * gap);
+    positions.push_back(static_cast<float>(k / side % side) * gap);
+    positions.push_back(static_cast<float>(k / side / side) * gap);
+  }
+  frame.set_positions(positions.data(), positions.size() * sizeof(float));
+  return request.SerializeAsString();
+}
+
 Sender::Sender(const std::string& address, const std::string& token) : client_(address) {
   client_.OnFrame([this](const ReceivedFrame& frame) {
     if (frame.type == FrameType::kData) bytes_ += frame.payload.size();
@@ -46,9 +61,22 @@ bool Sender::Open(const PartOf& part) {
   request.mutable_open()->set_part(part.part);
   request.mutable_open()->set_parts(part.parts);
   request.mutable_open()->set_part_timeout_ms(part.timeout_ms);
-  if (!client_.SendData(call_, Prefixed(request.SerializeAsString()), false, kPatience)) {
-    return false;
-  }
+  return SendOpen(request.SerializeAsString());
+}
+
+bool Sender::OpenSurfaces() {
+  v1::ReconstructRequest request;
+  v1::OpenStream& open = *request.mutable_open();
+  open.mutable_parameters()->set_output(v1::OUTPUT_SURFACE);
+  open.mutable_parameters()->set_spacing(1);
+  open.mutable_outputs()->set_surface(true);
+  open.mutable_outputs()->set_normals(true);
+  open.mutable_outputs()->set_coordinate_format(v1::COORDINATE_FORMAT_COMPACT);
+  return SendOpen(request.SerializeAsString());
+}
+
+bool Sender::SendOpen(const std::string& message) {
+  if (!client_.SendData(call_, Prefixed(message), false, kPatience)) return false;
   return client_.Read(kPatience, [this] { return bytes_ > 0 || ended_; }) && !ended_;
 }
 

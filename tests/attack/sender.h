@@ -16,6 +16,9 @@ inline constexpr std::size_t kLarge = 32'900'000;
 /// A square of particles with attributes that make the frame `bytes` large.
 std::string SquareFrame(std::uint64_t sequence, std::size_t side, std::size_t bytes);
 
+/// Particles of spacing 1 in space, as float32: a full cube, or a lattice with wide gaps.
+std::string CubeFrame(std::uint64_t sequence, std::size_t side, float gap);
+
 struct PartOf {
   std::string stream;
   std::uint32_t part = 0, parts = 0, timeout_ms = 0;
@@ -29,6 +32,8 @@ class Sender {
   explicit Sender(const std::string& address, const std::string& token = "");
 
   bool Open(const PartOf& part = {});
+  /// Opens a stream of surfaces of spacing 1, in compact coordinates.
+  bool OpenSurfaces();
   /// Sends a message as fast as the server reads it. False if the call has ended.
   bool Send(const std::string& message, bool last, std::chrono::milliseconds time = kPatience);
   /// True if an answer to the last message has begun to arrive.
@@ -37,6 +42,8 @@ class Sender {
   int End();
 
  private:
+  bool SendOpen(const std::string& message);
+
   Http2Client client_;
   std::uint32_t call_ = 0;
   std::size_t bytes_ = 0, before_ = 0;
