@@ -1,13 +1,14 @@
 #!/bin/bash
 # Demo for a fresh clone on Debian 12: installs missing packages, builds, starts a server and
-# replays the bundled dam break through it. The results are in build/demo. Then plays the dam break
-# in a loop for a browser, until Ctrl-C.
+# replays the bundled recordings through it. The results are in build/demo. Then plays the
+# recordings in a loop for a browser, until Ctrl-C.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 readonly build=build/release-demo
 readonly output=build/demo
 readonly recording=client/recordings/dam_break.pemc
+readonly drops=client/recordings/colliding_drops.pemc
 
 fail() {
   echo "demo.sh: $*" >&2
@@ -20,9 +21,9 @@ case ${1:-} in
   --no-browser) browser=false ;;
   -h | --help)
     echo "usage: client/demo.sh [--no-browser]"
-    echo "Installs missing Debian packages, builds in $build, replays the bundled recording"
-    echo "through a server and writes the results to $output. Then plays it in a loop for a browser"
-    echo "at the printed address, until Ctrl-C."
+    echo "Installs missing Debian packages, builds in $build, replays the bundled recordings"
+    echo "through a server and writes the results to $output. Then plays them in a loop for a"
+    echo "browser at the printed addresses, until Ctrl-C."
     echo "  --no-browser  end after the replay, without the page and the packages that build it"
     exit 0
     ;;
@@ -42,14 +43,14 @@ build_jobs() {
 }
 
 work=$(mktemp -d)
-server= player=
+server= players=
 stop() {
   local process
-  for process in $player $server; do
+  for process in $players $server; do
     kill "$process" 2>/dev/null || true
     wait "$process" 2>/dev/null || true
   done
-  server= player=
+  server= players=
 }
 cleanup() {
   local code=$?
@@ -82,15 +83,24 @@ build_page() {
   docker/install.sh viewer && cmake --build "$build" --target partiemc_viewer
 }
 
+# loop RECORDING NAME [FLAG...]: streams a recording in the background.
+loop() {
+  "$build/bin/partiemc" replay "$1" --name "$2" "${@:3}" --server "$address" --loop \
+    --echo-particles --quiet >>"$work/player.log" 2>&1 &
+  players+=" $!"
+}
+
 # Until Ctrl-C.
 play() {
-  "$build/bin/partiemc" replay "$recording" --server "$address" --name dam-break --loop --rate 25 \
-    --echo-particles --quiet >"$work/player.log" 2>&1 &
-  player=$!
+  loop "$recording" dam-break --rate 25
+  loop "$drops" drops --rate 12 --surface --coordinates compact
   echo
-  echo "The dam break plays, until Ctrl-C:"
+  echo "The dam break and the drops play, until Ctrl-C:"
   echo "  http://$(<"$work/web")/#stream=dam-break"
-  wait "$player" || {
+  echo "  http://$(<"$work/web")/#stream=drops"
+  # Ends with the first of the two.
+  # shellcheck disable=SC2086
+  wait -n $players || {
     cat "$work/player.log" >&2
     fail "the replay ended; its words are above"
   }
@@ -126,10 +136,15 @@ rm -rf "$output"
 "$build/bin/partiemc" replay "$recording" --server "$address" --check \
   --output-dir "$output/frames" --format geojson,svg,obj \
   --stats "$output/statistics.csv" --report "$output/report.html"
+echo
+echo "$drops, as closed surfaces:"
+"$build/bin/partiemc" replay "$drops" --server "$address" --surface --check \
+  --output-dir "$output/surfaces" --format ply
 
 echo
 echo "The results are in $PWD/$output:"
 echo "  report.html       the whole replay to look at: open it in a browser"
 echo "  statistics.csv    numbers of every frame"
 echo "  frames/           GeoJSON, SVG and OBJ of every frame"
+echo "  surfaces/         PLY of the drops, for ParaView, Blender or MeshLab"
 ! $browser || play

@@ -66,8 +66,10 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
                    "Particle spacing in world units, stored in the recording")
       ->type_name("S");
   verb->add_option("--title", flags.title, "Title to store in the recording")->type_name("TEXT");
-  verb->add_flag("--in-space", flags.sequence.in_space,
-                 "Keep all three coordinates of particles in 3D, for `partiemc replay --slice`");
+  verb->add_flag(
+      "--in-space", flags.sequence.in_space,
+      "Keep all three coordinates of particles in 3D, for `partiemc replay --surface` or "
+      "`--slice`");
   verb->add_flag("--float64", flags.float64, "Store positions as float64 instead of float32");
   verb->add_option("--compression-level", flags.compression_level, "1 (fast) to 19 (small)")
       ->check(CLI::Range(1, 19))

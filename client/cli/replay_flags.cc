@@ -315,6 +315,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "--gauge level=height:0.5\n"
       "  partiemc replay splash.vtu --local --surface --spacing 0.05 --output-dir out "
       "--format ply,vtp\n"
+      "  partiemc replay colliding_drops.pemc --surface --name drops --coordinates compact\n"
       "  partiemc replay dam_break.pemc --local --isolines .2,.5,.8 --report dam_break.html\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "
       "watch "

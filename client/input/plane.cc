@@ -131,8 +131,9 @@ absl::Status PlaneProjection::Decide(const ParticleRows& rows, std::vector<std::
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(absl::StrFormat(
-      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): --surface --local makes closed surfaces; "
-      "--slice z=0, for example, the outline on a plane",
+      "%s: is 3D (extents %.3g x %.3g x %.3g in x, y, z): --surface makes closed surfaces, --slice "
+      "z=0, "
+      "for example, the outline on a plane; convert keeps three coordinates with --in-space",
       rows.source, intervals[0].Extent(), intervals[1].Extent(), intervals[2].Extent()));
 }
 

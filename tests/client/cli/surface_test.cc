@@ -101,6 +101,17 @@ TEST(SurfaceReplay, TellsWhatItRequires) {
   EXPECT_THAT(in_plane.error, HasSubstr("has two coordinates; leave --slice, --surface"));
 }
 
+TEST(SurfaceReplay, TheBundledDropsKeepTheVolumeOfTheirParticles) {
+  const support::TemporaryFolder output;
+  const Ran ran =
+      RunPartiemc({"replay", PARTIEMC_SOURCE_DIR "/client/recordings/colliding_drops.pemc",
+                   "--local", "--surface", "--check", "--stats", output.Path("s.csv")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  const std::vector<std::string> volumes = Column(Content(output.Path("s.csv")), "volume");
+  EXPECT_EQ(volumes.size(), 50u);
+  for (const std::string& volume : volumes) EXPECT_NEAR(std::stod(volume), 3.582, .01);
+}
+
 // The surfaces that a server made are those of this process, for the producer and for a watcher.
 TEST(SurfaceReplay, IsTheSameThroughAServer) {
   const support::TemporaryFolder input, output;
