@@ -109,14 +109,7 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
   CLI::Option* const echo =
       app.add_flag("--echo-particles", flags.echo_particles, "Send the particles to watchers too")
           ->group(kGroup);
-  CLI::Option* const coordinates =
-      app.add_option("--coordinates", flags.coordinates,
-                     "How the server sends coordinates: float64 (exact), float32 (half the bytes) "
-                     "or compact (surfaces in about 5 bytes per triangle, within .001 spacings)")
-          ->check(CLI::IsMember({"float64", "float32", "compact"}))
-          ->type_name("FORMAT")
-          ->capture_default_str()
-          ->group(kGroup);
+  CLI::Option* const coordinates = AddCoordinatesFlag(app, flags.coordinates)->group(kGroup);
   app.add_flag("--local", flags.local, "Reconstruct in this process, without a server")
       ->excludes(server)
       ->excludes(name)

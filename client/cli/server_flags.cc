@@ -52,6 +52,21 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
   return server;
 }
 
+CLI::Option* AddCoordinatesFlag(CLI::App& app, std::string& coordinates) {
+  return app
+      .add_option("--coordinates", coordinates,
+                  "How the server sends coordinates: float64 (exact), float32 (half the bytes) or "
+                  "compact (surfaces in about 5 bytes per triangle, within .001 spacings)")
+      ->check(CLI::IsMember({"float64", "float32", "compact"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
+}
+
+Coordinates CoordinatesOf(std::string_view name) {
+  if (name == "compact") return Coordinates::kCompact;
+  return name == "float32" ? Coordinates::kRelativeFloat32 : Coordinates::kFloat64;
+}
+
 std::chrono::milliseconds ToMilliseconds(double seconds) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double>(seconds));

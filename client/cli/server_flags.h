@@ -3,8 +3,10 @@
 
 #include <chrono>
 #include <string>
+#include <string_view>
 
 #include "partiemc/client/credentials.h"
+#include "partiemc/client/stream.h"
 
 namespace CLI {
 class App;
@@ -22,6 +24,10 @@ struct ServerFlags {
 /// Requires: `flags` outlives the parsing. The token itself comes from PARTIEMC_TOKEN only, because
 /// every user of the machine can read a command line.
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
+
+/// Adds --coordinates: float64, float32 or compact.
+CLI::Option* AddCoordinatesFlag(CLI::App& app, std::string& coordinates);
+Coordinates CoordinatesOf(std::string_view name);
 
 std::chrono::milliseconds ToMilliseconds(double seconds);
 

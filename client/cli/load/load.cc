@@ -89,6 +89,8 @@ class LoadedStream {
     StreamOptions options{.name = name_, .credentials = shared_.flags.server.credentials};
     options.reconnect.give_up_after = kShortPatience;
     options.parameters.spacing = 1;
+    if (shared_.flags.surface) options.parameters.output = Output::kSurface;
+    options.outputs.coordinates = CoordinatesOf(shared_.flags.coordinates);
     auto stream = Stream::Open(shared_.flags.server.address, options);
     if (!stream.ok()) return stream.status();
     stream_ = *std::move(stream);
@@ -135,8 +137,10 @@ class LoadedStream {
       }
       due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
       const std::vector<float>& frame = shared_.frames[k % shared_.frames.size()];
-      const auto sent = stream_->Send(
-          {.positions = std::span<const float>(frame), .ids = shared_.ids}, static_cast<double>(k));
+      const auto sent = stream_->Send({.positions = std::span<const float>(frame),
+                                       .components = shared_.flags.surface ? 3 : 2,
+                                       .ids = shared_.ids},
+                                      static_cast<double>(k));
       if (!sent.ok()) {
         shared_.Fail(sent.status());
         break;
@@ -288,9 +292,10 @@ absl::StatusOr<Figures> Measure(Shared& shared,
 std::string TextOf(const LoadFlags& flags, const Figures& figures) {
   const double reached = static_cast<double>(figures.frames) / figures.seconds;
   std::string text = absl::StrFormat(
-      "%d streams of %d particles%s, %s; %d watchers\n%s after %.0f s of measuring\n\n"
+      "%d streams of %d particles%s%s, %s; %d watchers\n%s after %.0f s of measuring\n\n"
       "                     p50      p90      p99      max\n",
       flags.streams, flags.particles, flags.no_ids ? "" : " with ids",
+      flags.surface ? Concat(", surfaces in ", flags.coordinates) : std::string(),
       flags.rate > 0 ? absl::StrFormat("%g frames/s each", flags.rate) : "as fast as they go",
       flags.watchers, figures.settled ? "settled" : "NOT settled", figures.seconds);
   const auto row = [&](const char* name, const Percentiles& p) {
@@ -324,7 +329,8 @@ std::string JsonOf(const LoadFlags& flags, const Figures& figures) {
   const auto number = [](std::optional<double> value) { return value ? Concat(*value) : "null"; };
   return Concat(
       "{\"streams\":", flags.streams, ",\"particles\":", flags.particles, ",\"rate\":", flags.rate,
-      ",\"watchers\":", flags.watchers, ",\"ids\":", flags.no_ids ? "false" : "true",
+      ",\"surface\":", flags.surface ? "true" : "false", ",\"coordinates\":\"", flags.coordinates,
+      "\",\"watchers\":", flags.watchers, ",\"ids\":", flags.no_ids ? "false" : "true",
       ",\"settled\":", figures.settled ? "true" : "false", ",\"seconds\":", figures.seconds,
       ",\"frames\":", figures.frames, ",\"late\":", figures.late, ",\"refused\":", figures.refused,
       ",\"answers\":", percentiles(figures.answers), ",\"watches\":", percentiles(figures.watches),
@@ -352,6 +358,9 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
       ->check(CLI::Range(0.0, 100'000.0))
       ->capture_default_str()
       ->type_name("FPS");
+  verb->add_flag("--surface", flags.surface,
+                 "Send balls of particles in space and receive their surfaces");
+  AddCoordinatesFlag(*verb, flags.coordinates);
   verb->add_option("--watchers", flags.watchers, "Number of watchers, distributed over the streams")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str()
@@ -384,15 +393,17 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
       "  partiemc load --streams 8 --metrics 127.0.0.1:9464\n"
       "  partiemc load --streams 1 --particles 1000000 --rate 0\n"
       "  partiemc load --streams 1 --watchers 50 --json\n"
+      "  partiemc load --streams 1 --surface --particles 100000 --coordinates compact --rate 5\n"
       "  partiemc load --streams 1 --watchers 60 --watch-servers one:50051,two:50051");
   return verb;
 }
 
 int Load(const LoadFlags& flags) {
-  Shared shared{.flags = flags, .frames = LoadFrames(flags.particles)};
-  for (std::size_t k = 0; !flags.no_ids && 2 * k < shared.frames[0].size(); ++k) {
-    shared.ids.push_back(k);
-  }
+  Shared shared{
+      .flags = flags,
+      .frames = flags.surface ? LoadFramesInSpace(flags.particles) : LoadFrames(flags.particles)};
+  const std::size_t particles = shared.frames[0].size() / (flags.surface ? 3 : 2);
+  for (std::size_t k = 0; !flags.no_ids && k < particles; ++k) shared.ids.push_back(k);
   if (!flags.metrics.empty()) {
     if (const auto server = AskFigures(flags.metrics); !server.ok()) {
       return ComplainOfServer(server.status());

@@ -17,7 +17,9 @@ struct LoadFlags {
   int streams = 4;
   int particles = 10'000;  ///< Per frame.
   double rate = 30;        ///< Frames per second and stream; 0: as fast as possible.
-  int watchers = 0;        ///< In total.
+  bool surface = false;    ///< A ball in space and its surface, instead of a disc.
+  std::string coordinates = "float64";
+  int watchers = 0;                        ///< In total.
   std::vector<std::string> watch_servers;  ///< Servers of the watchers, in turn; empty: `server`.
   bool no_ids = false;
   double seconds = 60;

@@ -36,12 +36,6 @@ std::string InputLabel(const std::string& input) {
   return label;
 }
 
-// The value of --coordinates.
-Coordinates CoordinatesOf(std::string_view name) {
-  if (name == "compact") return Coordinates::kCompact;
-  return name == "float32" ? Coordinates::kRelativeFloat32 : Coordinates::kFloat64;
-}
-
 absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags,
                                                         const ReconstructionParameters& parameters,
                                                         bool normals) {

@@ -68,6 +68,17 @@ nlohmann::json LoadOf(const ServerProgram& server, std::vector<std::string> flag
   return nlohmann::json::parse(ran.out);
 }
 
+TEST(Load, SendsBallsAndReceivesSurfaces) {
+  const ServerProgram server;
+  const auto load = LoadOf(server, {"--streams", "1", "--particles", "1000", "--rate", "20",
+                                    "--surface", "--coordinates", "compact", "--watchers", "1"});
+  EXPECT_EQ(load["surface"], true);
+  EXPECT_EQ(load["coordinates"], "compact");
+  EXPECT_EQ(load["refused"], 0);
+  EXPECT_GT(load["frames"], 0);
+  EXPECT_GT(load["watches"]["count"], 0);
+}
+
 TEST(Load, CountsWhatItMeasures) {
   const ServerProgram server;
   const auto load =
