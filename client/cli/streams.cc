@@ -67,6 +67,7 @@ std::string StreamsJson(std::span<const StreamSummary> streams, const std::strin
   for (const StreamSummary& stream : streams) {
     AppendAll(list, list.empty() ? "" : ",", "{\"stream_id\":", JsonString(stream.stream_id),
               ",\"name\":", JsonString(stream.name),
+              ",\"output\":", JsonString(Name(stream.parameters.output)),
               ",\"placement\":", JsonString(Name(stream.parameters.placement)),
               ",\"fill\":", JsonString(Name(stream.parameters.fill)),
               ",\"last_sequence\":", stream.last_sequence, ",\"frames\":", stream.frames,
