@@ -43,7 +43,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         `sections` is a slice.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
     threads: number of compute threads; one per processor if None.
-    placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
+    placement: "virtual-plane", "marching-squares" (surfaces: marching cubes), "qef" or
+        "farthest-particle" (outlines only).
     fill: "greedy", "conforming", "polygon", "grid" or "none": the triangles, and thereby the points
         at which attributes are given. client/python/README.md compares them.
     kernel_radius, cell_size, reference_radius: lengths in spacings.
