@@ -36,6 +36,7 @@ struct partiemc_stream {
   bool shows_normals = false;
   Event event;
   std::vector<partiemc_values> values;                             // Attributes of the last event.
+  partiemc_surface surface{};                                      // Surface of the last event.
   std::vector<std::vector<partiemc_values>> section_values;        // Attributes of its sections.
   std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Sender's thread only.
 };
@@ -51,6 +52,12 @@ std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds
   if (seconds == 0 || seconds != seconds) return otherwise;
   return std::chrono::milliseconds(
       static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
+}
+
+// A negative option switches off what 0 leaves at the default.
+template <typename T>
+T ZeroIfNegative(T number) {
+  return number < 0 ? T{0} : number;
 }
 
 // Reads six numbers; empty for a null pointer.
@@ -72,6 +79,16 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   if (options.attribute_tolerance != 0) {
     parameters.attribute_tolerance = options.attribute_tolerance;
   }
+  SurfaceOptions& surface = parameters.surface;
+  if (options.thinning_distance != 0) {
+    surface.thinning_distance = ZeroIfNegative(options.thinning_distance);
+  }
+  if (options.max_drop_particles != 0) {
+    surface.max_drop_particles =
+        static_cast<std::uint64_t>(ZeroIfNegative(options.max_drop_particles));
+  }
+  surface.simplify = options.simplify;
+  surface.min_component_volume = options.min_component_volume;
   for (std::size_t k = 0; k < options.section_count; ++k) {
     const partiemc_section& from = options.sections[k];
     Section& section = parameters.sections.emplace_back();
@@ -79,6 +96,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
     if (from.isovalue != 0) section.isovalue = from.isovalue;
   }
   absl::Status named;
+  if (options.output != nullptr) named.Update(SetByName(options.output, parameters.output));
   if (options.placement != nullptr)
     named.Update(SetByName(options.placement, parameters.placement));
   if (options.fill != nullptr) named.Update(SetByName(options.fill, parameters.fill));
@@ -109,12 +127,14 @@ client::Credentials CredentialsOf(const partiemc_options& options) {
 }
 
 client::StreamOptions StreamOptionsOf(const partiemc_options& options,
-                                      const ReconstructionParameters& parameters) {
+                                      const ReconstructionParameters& parameters,
+                                      client::Coordinates coordinates) {
   client::StreamOptions result;
   result.name = Text(options.name);
   result.parameters = parameters;
   result.outputs = {.mesh = parameters.fill != Fill::kNone,
                     .normals = options.normals != 0,
+                    .coordinates = coordinates,
                     .echo_particles = options.echo_particles != 0,
                     .attributes = NamesOf(options.attributes)};
   result.credentials = CredentialsOf(options);
@@ -133,6 +153,11 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
 absl::Status Open(const char* address, const partiemc_options& options, partiemc_stream& opened) {
   const auto parameters = ParametersOf(options);
   if (!parameters.ok()) return parameters.status();
+  client::Coordinates coordinates = client::Coordinates::kFloat64;
+  if (options.coordinates != nullptr) {
+    const absl::Status named = SetByName(options.coordinates, coordinates);
+    if (!named.ok()) return named;
+  }
   if (options.parts > 0 && (address == nullptr || options.latest != 0)) {
     return absl::InvalidArgumentError(
         "parts: needs an address and no `latest`: parts of a frame meet at a server");
@@ -145,7 +170,7 @@ absl::Status Open(const char* address, const partiemc_options& options, partiemc
     opened.stream = *std::move(stream);
   } else {
     auto stream = Stream::Open(*address == '\0' ? client::ServerFromEnvironment() : address,
-                               StreamOptionsOf(options, *parameters));
+                               StreamOptionsOf(options, *parameters, coordinates));
     if (!stream.ok()) return stream.status();
     opened.stream = *std::move(stream);
   }
@@ -165,7 +190,7 @@ absl::Status Send(partiemc_stream& stream, const partiemc_particles* particles, 
   return sent.status();
 }
 
-// RingMeasures are exposed without conversion.
+// RingMeasures and ShellMeasures are exposed without conversion.
 static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
               offsetof(RingMeasures, area) == offsetof(partiemc_ring, area) &&
               offsetof(RingMeasures, perimeter) == offsetof(partiemc_ring, perimeter) &&
@@ -174,6 +199,25 @@ static_assert(sizeof(RingMeasures) == sizeof(partiemc_ring) &&
               offsetof(RingMeasures, particle_count) == offsetof(partiemc_ring, particle_count) &&
               offsetof(RingMeasures, identity) == offsetof(partiemc_ring, identity));
 static_assert(kNoRing == PARTIEMC_NO_RING && sizeof(TriangleClass) == 1);
+static_assert(sizeof(ShellMeasures) == sizeof(partiemc_shell) &&
+              offsetof(ShellMeasures, area) == offsetof(partiemc_shell, area) &&
+              offsetof(ShellMeasures, volume) == offsetof(partiemc_shell, volume) &&
+              offsetof(ShellMeasures, centroid_x) == offsetof(partiemc_shell, centroid_x) &&
+              offsetof(ShellMeasures, centroid_y) == offsetof(partiemc_shell, centroid_y) &&
+              offsetof(ShellMeasures, centroid_z) == offsetof(partiemc_shell, centroid_z) &&
+              offsetof(ShellMeasures, particles) == offsetof(partiemc_shell, particle_count) &&
+              offsetof(ShellMeasures, identity) == offsetof(partiemc_shell, identity));
+static_assert(kNoShell == PARTIEMC_NO_SHELL);
+
+void AddAttributes(const std::vector<AttributeValues>& attributes,
+                   std::vector<partiemc_values>& values, partiemc_event& event) {
+  values.clear();
+  for (const AttributeValues& one : attributes) {
+    values.push_back({one.name.c_str(), one.components, one.values.data()});
+  }
+  event.attribute_count = values.size();
+  event.attributes = values.data();
+}
 
 void AddResult(const Result& result, const OutlineDigests& digests, bool shows_normals,
                std::vector<partiemc_values>& values, partiemc_event& event) {
@@ -199,12 +243,32 @@ void AddResult(const Result& result, const OutlineDigests& digests, bool shows_n
   event.cell_size = statistics.cell_size;
   event.rings_digest = digests.rings;
   event.mesh_digest = digests.mesh;
-  values.clear();
-  for (const AttributeValues& one : result.attributes) {
-    values.push_back({one.name.c_str(), one.components, one.values.data()});
-  }
-  event.attribute_count = values.size();
-  event.attributes = values.data();
+  AddAttributes(result.attributes, values, event);
+}
+
+partiemc_surface ViewOf(const Surface& surface) {
+  const bool is_tracked = surface.parent_offsets.size() == surface.ShellCount() + 1;
+  return {.shell_count = surface.ShellCount(),
+          .point_count = surface.PointCount(),
+          .triangle_count = surface.TriangleCount(),
+          .points = surface.points.data(),
+          .normals = surface.normals.data(),
+          .triangles = surface.triangles.data(),
+          .point_offsets = surface.point_offsets.data(),
+          .triangle_offsets = surface.triangle_offsets.data(),
+          .outer_of = surface.outer_of.data(),
+          .shells = reinterpret_cast<const partiemc_shell*>(surface.measures.data()),
+          .parents = is_tracked ? surface.parents.data() : nullptr,
+          .parent_offsets = is_tracked ? surface.parent_offsets.data() : nullptr};
+}
+
+// Requires: AddResult has filled `event`.
+void AddSurface(const client::FrameResult& frame, partiemc_stream& stream, partiemc_event& event) {
+  stream.surface = ViewOf(frame.result.surface);
+  event.surface = &stream.surface;
+  event.volume = frame.result.statistics.volume;
+  event.surface_digest = frame.surface_digest;
+  AddAttributes(frame.result.surface.attributes, stream.values, event);
 }
 
 partiemc_event Empty(std::int32_t kind) {
@@ -233,6 +297,9 @@ partiemc_event ViewOf(partiemc_stream& stream) {
     view.section_count = event.frame.result.sections.size();
     AddResult(event.frame.result, {event.frame.rings_digest, event.frame.mesh_digest},
               stream.shows_normals, stream.values, view);
+    if (stream.stream->info().parameters.output == Output::kSurface) {
+      AddSurface(event.frame, stream, view);
+    }
   }
   return view;
 }

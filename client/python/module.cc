@@ -5,7 +5,6 @@
 #include "client/python/research.h"
 #include "client/python/results.h"
 #include "client/python/streams.h"
-#include "client/python/surfaces.h"
 
 PYBIND11_MODULE(_native, module) {
   module.attr("version") = PARTIEMC_VERSION;
@@ -13,5 +12,4 @@ PYBIND11_MODULE(_native, module) {
   partiemc::python::DefineReconstructor(module);
   partiemc::python::DefineResearch(module);
   partiemc::python::DefineStreams(module);
-  partiemc::python::DefineSurfaces(module);
 }

@@ -175,6 +175,7 @@ client::StreamOptions TakeStreamOptions(py::dict arguments, bool latest) {
   options.credentials = TakeCredentials(arguments);
   options.outputs.mesh = options.parameters.fill != Fill::kNone;
   TakeInto(arguments, "normals", options.outputs.normals);
+  TakeNamed(arguments, "coordinates", options.outputs.coordinates);
   TakeInto(arguments, "echo_particles", options.outputs.echo_particles);
   TakeInto(arguments, "attributes", options.outputs.attributes);
   TakeInto(arguments, "name", options.name);

@@ -86,6 +86,7 @@ class Sequence {
     }
     result.frame.times = {.stages_ms = clock.stages_ms(), .total_ms = clock.TotalMs()};
     result.has_digests = false;
+    result.in_space = reconstructor_->parameters().output == Output::kSurface;
     if (status.ok()) result.sequence = ++frames_;
     return status;
   }

@@ -38,6 +38,14 @@ py::array RingPoints(const RingsView& rings, py::ssize_t index) {
                       {2 * sizeof(double), sizeof(double)}, rings.owner);
 }
 
+py::array RingOffsets(const RingsView& rings) {
+  static constexpr std::uint32_t kNoRings = 0;  // Messages with a surface have no offsets of rings.
+  if (rings.part.offsets.empty()) {
+    return View<std::uint32_t>(&kNoRings, {1}, {sizeof kNoRings}, rings.owner);
+  }
+  return View<std::uint32_t>(rings.part.offsets, 1, rings.owner);
+}
+
 // The discs of the gauge "packing", from keyword arguments.
 struct OwnedDiscs {
   std::vector<double> centres;
@@ -138,9 +146,8 @@ void DefineRings(py::module_& module) {
           "points", [](R r) { return View<double>(r.part.points, 2, r.owner); },
           "(P, 2) float64, world units. The inside lies on the left: outer rings run "
           "counter-clockwise, holes clockwise. The first point is not repeated at the end.")
-      .def_property_readonly(
-          "offsets", [](R r) { return View<std::uint32_t>(r.part.offsets, 1, r.owner); },
-          "(R + 1,) uint32: ring k has points[offsets[k]:offsets[k + 1]].")
+      .def_property_readonly("offsets", &RingOffsets,
+                             "(R + 1,) uint32: ring k has points[offsets[k]:offsets[k + 1]].")
       .def_property_readonly(
           "outer_of", [](R r) { return View<std::int32_t>(r.part.outer_of, 1, r.owner); },
           "(R,) int32: the outer ring of a hole, -1 for an outer ring.")
@@ -208,14 +215,17 @@ void DefineMesh(py::module_& module) {
 
 py::dict AttributesOf(const py::object& self) {
   py::dict attributes;
-  const Result& result = self.cast<const PythonResult&>().frame.result;
-  const bool is_surface = result.attributes.empty();
-  for (const AttributeValues& one : is_surface ? result.surface.attributes : result.attributes) {
+  const PythonResult& from = self.cast<const PythonResult&>();
+  const Result& result = from.frame.result;
+  for (const AttributeValues& one : from.in_space ? result.surface.attributes : result.attributes) {
     attributes[py::str(one.name)] =
         View<float>(one.values, static_cast<std::size_t>(one.components), self);
   }
   return attributes;
 }
+
+// Coordinates of a particle.
+std::size_t CoordinatesOf(const PythonResult& result) { return result.in_space ? 3 : 2; }
 
 template <typename T>
 auto Statistic(T FrameStatistics::*member) {
@@ -260,6 +270,7 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
       if (section->has_digests) {
         section->frame.rings_digest = result.frame.section_digests[k].rings;
         section->frame.mesh_digest = result.frame.section_digests[k].mesh;
+        section->frame.surface_digest = DigestSurface(section->frame.result.surface);  // Empty.
       }
       result.sections.push_back(std::move(section));
     }
@@ -272,9 +283,6 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
 py::tuple ToState(PythonResult& result) {
   const auto& sections = SectionsOf(result);  // Leaves empty results in their places in the frame.
   const client::FrameResult& frame = result.frame;
-  if (frame.result.surface != Surface{}) {
-    throw py::value_error("pickle: results with surfaces cannot be pickled; pickle their arrays");
-  }
   v1::ReconstructedFrame message;
   RaiseUnlessOk(wire::EncodeResult(frame.result, {frame.times.stages_ms, frame.times.total_ms},
                                    {.normals = true}, message));
@@ -283,6 +291,7 @@ py::tuple ToState(PythonResult& result) {
   if (result.has_digests) {
     message.set_rings_digest(frame.rings_digest);
     message.set_mesh_digest(frame.mesh_digest);
+    message.set_surface_digest(frame.surface_digest);
   }
   std::string bytes;
   if (!message.SerializeToString(&bytes)) {
@@ -291,26 +300,28 @@ py::tuple ToState(PythonResult& result) {
   const py::bytes particles(reinterpret_cast<const char*>(result.particles.data()),
                             result.particles.size() * sizeof(double));
   return py::make_tuple(py::bytes(bytes), sections, particles, result.dropped, result.gap,
-                        result.rejoined);
+                        result.rejoined, result.in_space);
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
-  if (state.size() != 6) throw py::value_error("pickle: not the state of a partiemc Result");
+  if (state.size() != 7) throw py::value_error("pickle: not the state of a partiemc Result");
+  auto result = std::make_shared<PythonResult>();
+  result->in_space = state[6].cast<bool>();
   v1::ReconstructedFrame message;
   const auto particles = state[2].cast<std::string_view>();
   if (!message.ParseFromString(state[0].cast<std::string>()) ||
-      particles.size() % (2 * sizeof(double)) != 0) {
+      particles.size() % (CoordinatesOf(*result) * sizeof(double)) != 0) {
     throw py::value_error("pickle: the state of a partiemc Result is damaged");
   }
   wire::ReconstructedFrame decoded;
   RaiseUnlessOk(wire::DecodeResult(message, decoded));
-  auto result = std::make_shared<PythonResult>();
   result->sequence = decoded.sequence;
   result->time = decoded.time;
   result->frame.result = std::move(decoded.result);
   result->frame.times = {decoded.times.stages_ms, decoded.times.total_ms};
   result->frame.rings_digest = decoded.rings_digest;
   result->frame.mesh_digest = decoded.mesh_digest;
+  result->frame.surface_digest = decoded.surface_digest;
   result->sections = state[1].cast<std::vector<std::shared_ptr<PythonResult>>>();
   result->particles.resize(particles.size() / sizeof(double));
   std::copy(particles.begin(), particles.end(), reinterpret_cast<char*>(result->particles.data()));
@@ -408,9 +419,11 @@ void DefineResults(py::module_& module) {
       .def_property_readonly(
           "particles",
           [](py::object self) {
-            return View<double>(self.cast<const PythonResult&>().particles, 2, self);
+            const PythonResult& result = self.cast<const PythonResult&>();
+            return View<double>(result.particles, CoordinatesOf(result), self);
           },
-          "(N, 2) float64: particles of a watched frame; (0, 2) unless its producer echoes them.")
+          "(N, 2) float64, or (N, 3) with output='surface': particles of a watched frame; N is 0 "
+          "unless its producer echoes them.")
       .def_readonly("dropped", &PythonResult::dropped,
                     "Watched frames: number of frames dropped since the previous one.")
       .def_readonly("gap", &PythonResult::gap,

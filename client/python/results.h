@@ -22,6 +22,8 @@ struct PythonResult {
   client::FrameResult frame;
   /// False if the digests are not computed yet; they are computed at the first access.
   bool has_digests = true;
+  /// True if the output of the stream is surfaces: particles then have three coordinates.
+  bool in_space = false;
   // Set for watched frames:
   std::vector<double> particles;
   std::uint64_t dropped = 0, gap = 0;

@@ -166,6 +166,7 @@ class ProducerStream {
       if (event.kind != Event::Kind::kResult) continue;
       ++answered_;
       result->sequence = event.sequence;
+      result->in_space = stream_->info().parameters.output == Output::kSurface;
       result->time = event.time;
       WarnOfDoubts(result, warned_);
       return result;
@@ -352,6 +353,7 @@ class Watch {
     }
     result->sequence = frame.sequence;
     result->time = frame.time;
+    result->in_space = watcher_->stream().parameters.output == Output::kSurface;
     result->particles = std::move(frame.particles);
     result->dropped = frame.dropped;
     result->gap = frame.gap;

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from partiemc import _native
+import partiemc
 
 try:
     import pysplashsurf
@@ -96,11 +96,13 @@ SCENES = {"ball": ball, "sheet": sheet, "drops": drops}
 
 
 def ours(placement: str, cell_size: float) -> Method:
-    method = _native._Surfaces(placement=placement, spacing=1.0, cell_size=cell_size)
+    sequence = partiemc.Reconstructor(output="surface", placement=placement, spacing=1.0,
+                                      cell_size=cell_size, threads=1)
 
     def run(positions: Points) -> tuple[Points, int]:
-        surface = method.reconstruct(positions, validate=False)
-        return surface["points"], len(surface["triangles"])
+        sequence.reset()  # Every run is a first frame.
+        surface = sequence.reconstruct(positions).surface
+        return surface.points, len(surface.triangles)
 
     return Method(f"{placement} {cell_size:g}", run)
 
@@ -150,7 +152,7 @@ def main() -> None:
     for count in (int(number) for number in options.particles.split(",")):
         for name in options.scenes.split(","):
             scene = SCENES[name](count, np.random.default_rng(1))
-            methods = [ours("virtual-plane", 1.0), ours("marching-cubes", 1.0), ours("virtual-plane", 0.5),
+            methods = [ours("virtual-plane", 1.0), ours("marching-squares", 1.0), ours("virtual-plane", 0.5),
                        splashsurf(0.5, True), splashsurf(0.5, False), splashsurf(1.0, True)]
             first = None
             for method in methods:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Callable, Iterator, Sequence as Seq
 
 import numpy as np
-from partiemc import _native
+import partiemc
 
 from .comparisons import compare_parts, compare_rows
 from .geometry import Bools, Floats, Points, dot, norm
@@ -20,6 +20,7 @@ from .tables import Table, fixed
 
 BASELINE, DEFAULT = "marching-cubes", "virtual-plane"
 PLACEMENTS = (BASELINE, "qef", DEFAULT)
+_NAMES_OF_OUTLINES = {BASELINE: "marching-squares"}  # The parameter `placement` where it has another name.
 ON_TRUTH = "points on the truth"  # The default's triangles with all points on the truth: a bound for this mesh.
 # Means over the frames of a scene; lengths in spacings, angles in radians, volumes relative.
 METRICS = ("mean_deviation", "hausdorff", "normal_error", "mean_jitter", "hausdorff_jitter", "volume_error",
@@ -260,13 +261,20 @@ def _row(recipe: Recipe, frames: Seq[Frame], method: str, surfaces: Seq[dict[str
     return Row(recipe.name, recipe.group, recipe.shape, recipe.sampler, True, method, "spacing", values, numbers)
 
 
+def _reconstruct(placement: str, positions: Points) -> dict[str, Any]:
+    """The surface of one frame. Raises partiemc.Error if it breaks a guarantee (S1 to S5)."""
+    surface = partiemc.reconstruct(positions, output="surface", spacing=1, threads=1,
+                                   placement=_NAMES_OF_OUTLINES.get(placement, placement)).surface
+    surface.check()
+    return {"points": surface.points, "triangles": surface.triangles, "normals": surface.normals,
+            "outer_of": surface.outer_of}
+
+
 def measure_scene(recipe: Recipe, placements: Seq[str] = PLACEMENTS) -> list[Row]:
-    """A row for each placement, and one for the default with its points on the truth. Raises partiemc.Error if a surface
-    breaks a guarantee (S1 to S5)."""
+    """A row for each placement, and one for the default with its points on the truth."""
     frames, rows = make_frames(recipe), []
     for placement in placements:
-        method = _native._Surfaces(placement=placement)
-        surfaces = [method.reconstruct(frame.positions, validate=True) for frame in frames]
+        surfaces = [_reconstruct(placement, frame.positions) for frame in frames]
         rows.append(_row(recipe, frames, placement, surfaces))
         if placement == DEFAULT:
             rows.append(_row(recipe, frames, ON_TRUTH, [_on_truth(surface, frame.truth)

@@ -1,10 +1,10 @@
-"""PartiEMC: temporally stable outlines and meshes of particle frames.
+"""PartiEMC: temporally stable surfaces, outlines and meshes of particle frames.
 
     import partiemc
-    result = partiemc.reconstruct(positions, spacing=0.01)     # in this process
-    result.rings.points, result.rings.offsets, result.mesh.triangles
-    result = partiemc.reconstruct(in_space, output="surface", spacing=0.01)
+    result = partiemc.reconstruct(in_space, output="surface", spacing=0.01)    # in this process
     result.surface.points, result.surface.triangles, result.surface.normals
+    result = partiemc.reconstruct(in_a_plane, spacing=0.01)
+    result.rings.points, result.rings.offsets, result.mesh.triangles
 
     with partiemc.connect("127.0.0.1:50051", spacing=0.01) as stream:   # on a server
         for result in stream.map(frames):
@@ -40,10 +40,11 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         `attribute_tolerance` decide how well triangles represent them.
     output: "outline", or "surface" for closed surfaces of particles in space (Result.surface).
         A surface requires (N, 3) positions and spacing; `volumes` are then volumes, and each of
-        `sections` is a slice. Only in this process; servers make outlines.
+        `sections` is a slice.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
     threads: number of compute threads; one per processor if None.
-    placement: "virtual-plane", "marching-squares", "qef" or "farthest-particle".
+    placement: "virtual-plane", "marching-squares" (surfaces: marching cubes), "qef" or
+        "farthest-particle" (outlines only).
     fill: "greedy", "conforming", "polygon", "grid" or "none": the triangles, and thereby the points
         at which attributes are given. client/python/README.md compares them.
     kernel_radius, cell_size, reference_radius: lengths in spacings.
@@ -59,9 +60,14 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
-    simplify: for output "surface": fewer triangles, within this error in spacings; .05 leaves a third
-        of those of large bodies. 0 by default.
-    thinning_distance, max_drop_particles, min_component_volume: only for output "surface".
+    simplify: for output "surface": fewer triangles, within this error in spacings, in [0, 1]; .05
+        leaves a third of those of large bodies. 0 by default.
+    thinning_distance: for output "surface": drops points on lattice edges that are at most this many
+        spacings from the triangles without them. 0.03 by default, 0 keeps all.
+    max_drop_particles: for output "surface": bodies of up to this many particles become ellipsoids. 30
+        by default, 0: none.
+    min_component_volume: for output "surface": drops bodies with less particle volume, in cubed
+        spacings. 0 by default.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 
@@ -82,7 +88,12 @@ def connect(address=None, *, latest=False, **options):
     name: name for watchers. labels: a dict of strings, shown in lists of streams.
     attributes: attributes given to send that results have at their vertices: names; "velocity" are
         the velocities.
-    normals: compute normals. echo_particles: send the particles to watchers.
+    normals: compute normals of outlines; surfaces always have them.
+    coordinates: how the server sends coordinates: "float64", the same bits as in this process;
+        "float32", half the bytes; "compact", surfaces in about 5 bytes per triangle: coordinates move by
+        at most 0.0009 spacings, normals by a degree, points and triangles have another order within
+        their shell, and outlines are as with "float32". Digests are those of "float64".
+    echo_particles: send the particles to watchers (Result.particles).
     tls, ca_file, cert_file, key_file, token, token_file: as on the command line. The defaults come
         from the environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...).
     fallback_addresses: servers to fail over to. checkpoint_interval, max_held_bytes,

@@ -1,20 +1,8 @@
 /* usage: c_calls [ADDRESS]. Every function of the C interface as a program in C99 calls it, with a
  * server or in process. Exits with 1 at the first thing that is not as the header says. */
+#include "c_calls.h"
+
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "partiemc/c/partiemc.h"
-
-#define EXPECT(condition)                                                            \
-  do {                                                                               \
-    if (!(condition)) {                                                              \
-      fprintf(stderr, "%s:%d: %s; last error: %s\n", __FILE__, __LINE__, #condition, \
-              partiemc_last_error()->message);                                       \
-      exit(1);                                                                       \
-    }                                                                                \
-  } while (0)
 
 enum { kSide = 30, kCount = kSide * kSide };
 
@@ -445,6 +433,28 @@ static void try_slice(const char* address) {
   partiemc_close(stream);
 }
 
+/* Programs of before there were surfaces: their structs end where surfaces begin. */
+static void try_former_sizes(const char* address) {
+  struct {
+    partiemc_event event;
+    char behind[16];
+  } former;
+  memset(&former, 1, sizeof former);
+  former.event.size = offsetof(partiemc_event, surface);
+  partiemc_options options;
+  partiemc_options_init(&options, offsetof(partiemc_options, output));
+  options.spacing = 1;
+  memset(&options.output, 1, sizeof options - offsetof(partiemc_options, output));
+  partiemc_stream* stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+  const partiemc_particles particles = plain();
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &former.event) == PARTIEMC_OK);
+  EXPECT(former.event.kind == PARTIEMC_RESULT && former.event.ring_count == 1);
+  const char* kept = (const char*)&former + offsetof(partiemc_event, surface);
+  for (; kept < (const char*)&former + sizeof former; ++kept) EXPECT(*kept == 1);
+  partiemc_close(stream);
+}
+
 int main(int argc, char** argv) {
   const char* address = argc > 1 ? argv[1] : NULL;
   EXPECT(partiemc_last_error()->code == PARTIEMC_OK && partiemc_last_error()->message[0] == 0);
@@ -458,6 +468,8 @@ int main(int argc, char** argv) {
   try_slice(address);
   try_parts(address);
   try_sizes(address);
+  try_surfaces(address);
+  try_former_sizes(address);
   try_options(address);
   puts("all is as the header says");
   return 0;

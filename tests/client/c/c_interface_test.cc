@@ -27,13 +27,13 @@ Ran RunFile(const std::string& name, const std::vector<std::string>& arguments) 
   return {exit_code, program.Out(), program.Error()};
 }
 
-// The last two words of each line with the digest of rings.
-std::vector<std::string> DigestsOf(const std::string& text) {
+// The last `length` letters of each line: its digests.
+std::vector<std::string> DigestsOf(const std::string& text, std::size_t length = 33) {
   std::vector<std::string> digests;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     for (char& letter : line) letter = static_cast<char>(std::tolower(letter));
-    digests.push_back(line.size() < 33 ? line : line.substr(line.size() - 33));
+    digests.push_back(line.size() < length ? line : line.substr(line.size() - length));
   }
   return digests;
 }
@@ -102,6 +102,55 @@ TEST(CInterface, TheExampleDrawsAndGivesTheDigestsOfReplay) {
   const Ran nowhere = RunFile(C_EXAMPLE, {picture, "unix:/nowhere.sock"});
   EXPECT_EQ(nowhere.exit_code, 14);  // UNAVAILABLE.
   EXPECT_THAT(nowhere.error, HasSubstr("/nowhere.sock"));
+}
+
+// Digests of `partiemc replay` for the particles of the example of surfaces.
+std::vector<std::string> SurfaceDigestsOfReplay() {
+  const support::TemporaryFolder folder;
+  for (int step = 0; step < 5; ++step) {
+    std::ofstream file(folder.Path("frame_" + std::to_string(step) + ".csv"));
+    file.precision(17);
+    file << "x,y,z\n";
+    const auto add_ball = [&file](int radius, double centre, double height) {
+      for (int x = -radius; x <= radius; ++x) {
+        for (int y = -radius; y <= radius; ++y) {
+          for (int z = -radius; z <= radius; ++z) {
+            if (x * x + y * y + z * z > radius * radius) continue;
+            file << centre + 0.01 * x << ',' << 0.01 * y << ',' << height + 0.01 * z << '\n';
+          }
+        }
+      }
+    };
+    add_ball(6, 0, -0.002 * step * step);
+    add_ball(2, 0.1, 0);
+  }
+  const Ran ran = RunPartiemc({"replay", folder.Path("frame_*.csv"), "--local", "--surface",
+                               "--spacing", "0.01", "--stats", folder.Path("statistics.csv")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  return Column(Content(folder.Path("statistics.csv")), "surface_digest");
+}
+
+TEST(CInterface, ExampleOfSurfacesGivesDigestsOfReplay) {
+  const support::TemporaryFolder folder;
+  const Ran local = RunFile(C_SURFACE, {folder.Path("local.obj")});
+  EXPECT_EQ(local.exit_code, 0) << local.error;
+  EXPECT_EQ(DigestsOf(local.out, 16), SurfaceDigestsOfReplay());
+  EXPECT_THAT(local.out, StartsWith("2 bodies, volume 0.0009"));
+  const ServerProgram server;
+  const Ran remote = RunFile(C_SURFACE, {folder.Path("remote.obj"), server.address()});
+  EXPECT_EQ(remote.out, local.out);
+  const std::string body = Content(folder.Path("local.obj"));
+  const auto lines_with = [&body](const char* begin) {
+    std::size_t count = 0;
+    std::istringstream lines(body);
+    for (std::string line; std::getline(lines, line);) count += line.starts_with(begin) ? 1 : 0;
+    return count;
+  };
+  // Two bodies without handles: V - T / 2 = 4.
+  EXPECT_GT(lines_with("f "), 1000u);
+  EXPECT_EQ(lines_with("v "), lines_with("f ") / 2 + 4);
+  EXPECT_EQ(lines_with("vn "), lines_with("v "));
+  EXPECT_TRUE(Content(folder.Path("remote.obj")) == body);
 }
 
 TEST(CInterface, TheExampleInFortranGivesTheDigestsOfReplay) {

@@ -235,5 +235,23 @@ TEST(StreamFailure, AStreamThatIsDroppedInTheMiddleIsCleanedUp) {
   }
 }
 
+// Servers of before there were surfaces ignore the output.
+TEST(StreamFailure, ServerWithoutSurfacesIsRefused) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    v1::ReconstructRequest request;
+    rpc.Read(&request);
+    v1::ReconstructResponse response;
+    *response.mutable_opened()->mutable_parameters() = request.open().parameters();
+    response.mutable_opened()->mutable_parameters()->clear_output();
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  const auto stream =
+      Stream::Open(server.address(), {.parameters = {.output = Output::kSurface, .spacing = 1}});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("does not support surfaces"));
+  ExpectOneLine(stream.status());
+}
+
 }  // namespace
 }  // namespace partiemc::client

@@ -28,7 +28,7 @@ def digests(result):
     return f"{result.rings_digest:016x} {result.mesh_digest:016x}"
 
 
-def digests_of_replay(frames, spacing=1.0, flags=()):
+def digests_of_replay(frames, spacing=1.0, flags=(), columns=("rings_digest", "mesh_digest")):
     """Digests of `partiemc replay` for the same frames."""
     with tempfile.TemporaryDirectory() as folder:
         for k, frame in enumerate(frames):
@@ -37,7 +37,31 @@ def digests_of_replay(frames, spacing=1.0, flags=()):
                         "--spacing", str(spacing), "--stats", f"{folder}/statistics.csv", *flags],
                        check=True, capture_output=True)
         with open(f"{folder}/statistics.csv", newline="") as file:
-            return [f"{row['rings_digest']} {row['mesh_digest']}" for row in csv.DictReader(file)]
+            return [" ".join(row[column] for column in columns) for row in csv.DictReader(file)]
+
+
+def assert_equal(case, one, other, but=()):
+    """`one` equals `other` in every public property, except for those named in `but`."""
+    for name in ("sequence", "time", "area", "perimeter", "volume", "spacing", "cell_size", "doubts",
+                 "times", "particle_count", "rings_digest", "mesh_digest", "surface_digest", "dropped",
+                 "gap", "rejoined"):
+        if name not in but:
+            case.assertEqual(getattr(one, name), getattr(other, name), name)
+    of_all = "points normals area centroids particle_counts identities parents parent_offsets outer_of"
+    for part, names in (("rings", f"{of_all} offsets perimeter"), ("mesh", "points triangles classes"),
+                        ("surface", f"{of_all} point_offsets triangle_offsets triangles volume")):
+        for name in names.split():
+            mine, its = (getattr(getattr(each, part), name) for each in (one, other))
+            case.assertEqual((mine.dtype, mine.shape, mine.tobytes()), (its.dtype, its.shape, its.tobytes()),
+                             f"{part}.{name}")
+    mine, its = ({name: (values.shape, values.tobytes()) for name, values in each.items()}
+                 for each in (one.attributes, other.attributes))
+    case.assertEqual(mine, its)
+    case.assertEqual(one.particles.shape, other.particles.shape)
+    case.assertEqual(one.particles.tobytes(), other.particles.tobytes())
+    case.assertEqual(len(one.sections), len(other.sections))
+    for mine, its in zip(one.sections, other.sections):
+        assert_equal(case, mine, its, but)
 
 
 class Server:

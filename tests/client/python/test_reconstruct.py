@@ -19,7 +19,7 @@ import warnings
 import numpy
 import partiemc
 
-from scenes import ball, block, digests, digests_of_replay, document
+from scenes import assert_equal, ball, block, digests, digests_of_replay, document
 
 
 class Layouts(unittest.TestCase):
@@ -241,24 +241,6 @@ class Results(unittest.TestCase):
             tracemalloc.stop()
         self.assertEqual(len(seen), 3)
 
-    def assert_equal(self, one, other):
-        """Equal in every public property."""
-        for name in ("sequence", "time", "area", "perimeter", "spacing", "cell_size", "doubts", "times",
-                     "particle_count", "rings_digest", "mesh_digest", "dropped", "gap", "rejoined"):
-            self.assertEqual(getattr(one, name), getattr(other, name), name)
-        for part, names in (("rings", "points offsets outer_of normals area perimeter centroids "
-                             "particle_counts identities parents parent_offsets"),
-                            ("mesh", "points triangles classes")):
-            for name in names.split():
-                mine, its = (getattr(getattr(each, part), name) for each in (one, other))
-                self.assertEqual((mine.dtype, mine.tolist()), (its.dtype, its.tolist()), name)
-        self.assertEqual(one.particles.tolist(), other.particles.tolist())
-        self.assertEqual({name: values.tolist() for name, values in one.attributes.items()},
-                         {name: values.tolist() for name, values in other.attributes.items()})
-        self.assertEqual(len(one.sections), len(other.sections))
-        for mine, its in zip(one.sections, other.sections):
-            self.assert_equal(mine, its)
-
     def test_they_pickle_and_copy(self):
         particles = block()
         x, y = particles.T
@@ -267,10 +249,10 @@ class Results(unittest.TestCase):
         result = sequence.reconstruct(particles, 1.5, attributes={"p": x, "v": (y, x)})
         for fresh in (True, False):  # Sections as Python objects are made at the first access.
             again = pickle.loads(pickle.dumps(result))
-            self.assert_equal(again, result)
+            assert_equal(self, again, result)
             self.assertIs(again.rings.points.base, again)
         for copied in (copy.copy(result), copy.deepcopy(result), pickle.loads(pickle.dumps(again))):
-            self.assert_equal(copied, result)
+            assert_equal(self, copied, result)
         for part in ("rings", "mesh"):
             mine = getattr(result, part)
             for its in (pickle.loads(pickle.dumps(mine)), copy.copy(mine), copy.deepcopy(mine)):
@@ -282,7 +264,7 @@ class Results(unittest.TestCase):
                 result.__class__.__new__(result.__class__).__setstate__(damaged)
         for outline in (partiemc.reconstruct(particles, spacing=1, fill="none", attributes={"p": x}),
                         partiemc.reconstruct(particles[:0], spacing=1)):
-            self.assert_equal(pickle.loads(pickle.dumps(outline)), outline)
+            assert_equal(self, pickle.loads(pickle.dumps(outline)), outline)
 
     def test_fills_have_attributes_as_the_readme_says(self):
         table = re.findall(r'^\| `"(\w+)"`.*?\| at `(\w+)\.points`(.*?) \| (.*?) \|$',
@@ -441,102 +423,6 @@ class Results(unittest.TestCase):
             read = meshio.read(f"{folder}/mesh.vtu")
         for name, values in result.attributes.items():
             numpy.testing.assert_array_equal(read.point_data[name], values)
-
-
-class Surfaces(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.particles = numpy.concatenate([ball((0, 0, 0), 5), ball((12, 0, 0), 3)])
-        x, y, z = cls.particles.T
-        cls.result = partiemc.reconstruct(
-            cls.particles, output="surface", spacing=1, ids=numpy.arange(len(x)),
-            attributes={"x": x, "where": cls.particles}, sections=[{"slice": ("z", 0.2)}])
-
-    def test_shapes_and_values_are_as_documented(self):
-        result, surface = self.result, self.result.surface
-        count, points = len(surface), len(surface.points)
-        self.assertEqual(count, 2)
-        self.assertEqual(surface.points.shape, (points, 3))
-        self.assertEqual(surface.normals.shape, (points, 3))
-        numpy.testing.assert_allclose(numpy.linalg.norm(surface.normals, axis=1), 1, atol=1e-6)
-        self.assertEqual(sum(len(triangles) for triangles in surface), len(surface.triangles))
-        self.assertEqual(surface.point_offsets[-1], points)
-        self.assertEqual(surface.outer_of.tolist(), [-1, -1])
-        self.assertEqual(surface.parent_offsets.tolist(), [0, 0, 0])
-        self.assertEqual(sorted(surface.identities), [1, 2])
-        self.assertEqual(surface.particle_counts.sum(), len(self.particles))
-        numpy.testing.assert_allclose(surface.volume, surface.particle_counts, rtol=.002)
-        numpy.testing.assert_allclose(result.volume, surface.volume.sum())
-        numpy.testing.assert_allclose(result.area, surface.area.sum())
-        numpy.testing.assert_allclose(numpy.sort(surface.centroids[:, 0]), [0, 12], atol=.1)
-        self.assertEqual((len(result.rings), len(result.mesh)), (0, 0))
-        surface.check()
-        for index in (2, -3):
-            with self.assertRaises(IndexError):
-                surface[index]
-        self.assertFalse(surface.points.flags.writeable)
-        self.assertIs(surface.points.base, result)
-
-    def test_triangles_enclose_the_volume(self):
-        surface = self.result.surface
-        for k, triangles in enumerate(surface):
-            a, b, c = surface.points[triangles].transpose(1, 0, 2)
-            volume = (a * numpy.cross(b, c)).sum() / 6
-            self.assertAlmostEqual(volume, surface.volume[k], delta=1e-6 * surface.volume[k])
-
-    def test_attributes_are_at_its_points(self):
-        points = self.result.surface.points
-        attributes = self.result.attributes
-        numpy.testing.assert_allclose(attributes["x"], points[:, 0], atol=.6)
-        numpy.testing.assert_allclose(attributes["where"], points, atol=.6)
-        self.assertEqual(len(self.result.sections[0].rings), 2)
-
-    def test_a_sequence_keeps_identities(self):
-        sequence = partiemc.Reconstructor(output="surface", spacing=1)
-        self.assertEqual(sequence.parameters["output"], "surface")
-        ids = numpy.arange(len(self.particles))
-        first = sequence.reconstruct(self.particles, ids=ids).surface
-        order = numpy.random.default_rng(1).permutation(len(ids))
-        moved = sequence.reconstruct((self.particles + .3)[order], ids=ids[order])
-        self.assertEqual(sorted(moved.surface.identities), sorted(first.identities))
-        self.assertEqual(sorted(moved.surface.parents), sorted(first.identities))
-        self.assertNotEqual(moved.surface_digest, 0)
-
-    def test_simplified_ones_have_fewer_triangles(self):
-        simplified = partiemc.reconstruct(self.particles, output="surface", spacing=1, simplify=.1)
-        simplified.surface.check()
-        self.assertLess(len(simplified.surface.triangles), .5 * len(self.result.surface.triangles))
-
-    def test_meshio_takes_them(self):
-        try:
-            import meshio
-        except ImportError:
-            self.skipTest("NOT TESTED: there is no meshio (Debian: python3-meshio)")
-        surface = self.result.surface
-        for extension in ("vtu", "ply", "obj", "stl"):
-            with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-                surface.to_meshio().write(f"{folder}/surface.{extension}")
-                read = meshio.read(f"{folder}/surface.{extension}")
-            self.assertEqual(sum(len(cells.data) for cells in read.cells), len(surface.triangles))
-        mesh = surface.to_meshio(self.result.attributes)
-        self.assertEqual(mesh.point_data["where"].shape, surface.points.shape)
-
-    def test_what_they_do_not_take_is_told(self):
-        for arguments, field in (({}, "parameters.spacing"),
-                                 ({"spacing": 1, "slice": ("z", 0)}, "parameters.slice"),
-                                 ({"spacing": 1, "thinning_distance": -1},
-                                  "parameters.surface.thinning_distance")):
-            with self.assertRaises(partiemc.Error) as raised:
-                partiemc.reconstruct(self.particles, output="surface", **arguments)
-            self.assertEqual(raised.exception.field, field)
-        with self.assertRaises(partiemc.Error) as raised:
-            partiemc.reconstruct(self.particles[:, :2], output="surface", spacing=1)
-        self.assertEqual(raised.exception.field, "components")
-        with self.assertRaises(partiemc.Error) as raised:
-            partiemc.connect("127.0.0.1:1", output="surface", spacing=1)
-        self.assertEqual(raised.exception.field, "parameters.output")
-        with self.assertRaisesRegex(ValueError, "cannot be pickled"):
-            pickle.dumps(self.result)
 
 
 class Errors(unittest.TestCase):

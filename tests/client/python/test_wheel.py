@@ -57,7 +57,7 @@ class Stub(unittest.TestCase):
         for name in partiemc.__all__:
             value = getattr(partiemc, name)
             self.assertTrue(value.__doc__, name)
-        for view in (partiemc.Rings, partiemc.Mesh):
+        for view in (partiemc.Rings, partiemc.Mesh, partiemc.Surface):
             for name, member in vars(view).items():
                 if isinstance(member, property):
                     self.assertIn("(", member.__doc__ or "", f"{view.__name__}.{name}")

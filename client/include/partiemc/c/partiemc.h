@@ -1,6 +1,6 @@
-/* PartiEMC's C99 interface, also for languages that call C: converts particles to outlines and
- * meshes, on a server or in this process. Example programs: client/c/example.c and, in Fortran,
- * client/c/example.f90.
+/* PartiEMC's C99 interface, also for languages that call C: converts particles to surfaces in
+ * space, or to outlines and meshes in a plane, on a server or in this process. Example programs:
+ * client/c/surface.c, client/c/example.c and, in Fortran, client/c/example.f90.
  *
  * A stream numbers its frames from 1 in the order of sending and answers each once, in that order.
  * One thread sends, another receives; any thread may call partiemc_cancel. A program with one
@@ -118,6 +118,23 @@ typedef struct partiemc_options {
   double attribute_tolerance; /* Largest error of attributes across triangles of "greedy", a
                                  fraction of their range, at most 1. 0: the default, .01; for
                                  the finest mesh set a tiny number, such as 1e-9. */
+  const char* output; /* "outline" or "surface"; NULL: outline. Surfaces require particles that have
+                         x, y and z and fill space, and `spacing`; `volumes` are then volumes, and
+                         each section needs a slice. */
+  /* Surfaces only: drops points on lattice edges that are at most this many spacings from the
+   * triangles without them. 0: the default, .03; negative: none. */
+  double thinning_distance;
+  int64_t max_drop_particles; /* Surfaces only: bodies of up to this many particles become
+                                 ellipsoids. 0: the default, 30; negative: none. */
+  double simplify; /* Surfaces only: removes points while the error stays below this many spacings,
+                      in [0, 1]; .05 leaves a third of the triangles of large bodies. */
+  double min_component_volume; /* Surfaces only: drops bodies with less particle volume, in cubed
+                                  spacings. */
+  const char* coordinates; /* How a server sends coordinates: "float64" (as in process), "float32"
+                              (half the bytes), or "compact" (surfaces in about 5 bytes per
+                              triangle: coordinates move by at most .0009 spacings, points and
+                              triangles have another order within their shell). Digests are those of
+                              float64. NULL: float64. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -167,8 +184,9 @@ typedef struct partiemc_particles {
   size_t count;
   partiemc_array x, y; /* World units, finite. */
   partiemc_array z;    /* Optional: all particles then lie in a plane parallel to `plane`, or fill
-                          space for a `slice`. */
-  partiemc_array volumes; /* Optional: area in world units squared; for a slice, cubed. */
+                          space for a `slice` or a surface. */
+  partiemc_array volumes; /* Optional: area in world units squared; for a slice or a surface, volume
+                             in world units cubed. */
   partiemc_array ids;     /* Optional: the same number for a particle in every frame. */
   /* Optional: world units per unit of time, in the components of the coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
@@ -222,7 +240,7 @@ typedef struct partiemc_ring {
 } partiemc_ring;
 
 enum {
-  PARTIEMC_RESULT = 0,      /* Outline and mesh of frame `sequence`. */
+  PARTIEMC_RESULT = 0,      /* Outline and mesh, or surface, of frame `sequence`. */
   PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and left no trace. */
   PARTIEMC_NOTICE = 2,      /* A notice from the server in `message`. */
   PARTIEMC_NOTHING_YET = 3, /* No event within the time to wait. */
@@ -232,12 +250,40 @@ enum {
 
 #define PARTIEMC_NO_RING 0xffffffffu
 
+typedef struct partiemc_shell {
+  double area;   /* World units squared. */
+  double volume; /* Enclosed, world units cubed; negative for cavities. */
+  double centroid_x, centroid_y, centroid_z; /* Of the enclosed volume. */
+  uint64_t particle_count;                   /* Particles of the shell's body; 0 for cavities. */
+  uint64_t identity;                         /* Constant from frame to frame; 0: not tracked. */
+} partiemc_shell;
+
+#define PARTIEMC_NO_SHELL 0xffffffffu
+
+/* Closed triangle surfaces in space, by shell: the outside of a body, or a cavity in one. The
+ * library allocates this struct; later versions may append members. */
+typedef struct partiemc_surface {
+  size_t shell_count, point_count, triangle_count;
+  const double* points;      /* x0, y0, z0, x1, ...: point_count triples, world units. */
+  const float* normals;      /* point_count triples: outward unit normals. */
+  const uint32_t* triangles; /* Three point indices each, counter-clockwise seen from outside. */
+  /* shell_count + 1: shell k has points point_offsets[k] to point_offsets[k + 1]. */
+  const uint32_t* point_offsets;
+  const uint32_t* triangle_offsets; /* The same for triangles. */
+  const uint32_t* outer_of; /* shell_count: a cavity's outer shell, otherwise PARTIEMC_NO_SHELL. */
+  const partiemc_shell* shells; /* shell_count. */
+  /* Identities, in the frame before, that shell k continues: parents[parent_offsets[k]] to
+   * parents[parent_offsets[k + 1]]. NULL if shells are not tracked. */
+  const uint64_t* parents;
+  const uint32_t* parent_offsets;
+} partiemc_surface;
+
 /* Values of an attribute at the vertices. This struct will not grow. */
 typedef struct partiemc_values {
   const char* name;
   int32_t components;  /* 1 to 3. */
-  const float* values; /* At the mesh vertices, which begin with the ring vertices; without a mesh
-                          at the ring vertices. */
+  const float* values; /* At the points of the surface; at the mesh vertices, which begin with the
+                          ring vertices; without a mesh at the ring vertices. */
 } partiemc_values;
 
 /* One event. Pointers are valid until the next call on this stream that fills an event. Empty
@@ -266,7 +312,7 @@ typedef struct partiemc_event {
   const uint8_t* triangle_classes; /* 0: in the band along the outline, 1: inside. */
 
   uint64_t particle_count;
-  double area, perimeter;             /* Sums over rings. */
+  double area, perimeter;             /* Sums over rings; `area` also over shells. */
   double spacing, cell_size;          /* As used in this frame, world units. */
   double milliseconds;                /* Computation time. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
@@ -275,6 +321,12 @@ typedef struct partiemc_event {
   const partiemc_values* attributes;
 
   size_t section_count; /* Results: sections of the options. */
+
+  /* Results of streams with the output "surface"; otherwise NULL and 0. Such results have no rings
+   * and no mesh. */
+  const partiemc_surface* surface;
+  double volume; /* Sum over shells. */
+  uint64_t surface_digest;
 } partiemc_event;
 /* Sets an empty event. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
