@@ -3,6 +3,7 @@
 
     partiemc-server &
     client/couplings/numpy_drops.py --every 10 --steps 1500
+    client/couplings/numpy_drops.py --dimensions 3 --every 10 --steps 800
 
 An example for your own loop. With Taichi or Warp, `positions` is the return value of
 `field.to_numpy()` or `array.numpy()`. One thread sends and receives.
@@ -17,20 +18,20 @@ SPACING = 0.05
 LENGTH = 1.3 * SPACING  # Kernel length; the kernel's support is twice as long.
 SOUND = 15.0  # Ten times the fastest motion.
 VISCOSITY = 0.3
+KERNEL = {2: 7 / (4 * numpy.pi), 3: 21 / (16 * numpy.pi)}  # Constant factor of Wendland's kernel.
 STEP = 0.001
 
 
-def disc(x, y, radius):
-    """Particles on a square lattice within a circle: (N, 2)."""
+def drop(centre, radius):
+    """Particles on a lattice within a circle or a sphere: (N, len(centre))."""
     line = numpy.arange(-radius, radius, SPACING) + SPACING / 2
-    points = numpy.stack(numpy.meshgrid(line, line), axis=-1).reshape(-1, 2)
-    return points[numpy.hypot(*points.T) < radius] + (x, y)
+    points = numpy.stack(numpy.meshgrid(*[line] * len(centre)), axis=-1).reshape(-1, len(centre))
+    return points[numpy.linalg.norm(points, axis=1) < radius] + centre
 
 
 def neighbours(positions):
     """Pairs that may interact within the next steps: two arrays of indices."""
-    x, y = positions.T
-    squared = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
+    squared = sum((along[:, None] - along) ** 2 for along in positions.T)
     return numpy.nonzero(numpy.triu(squared < (2.5 * LENGTH) ** 2, 1))
 
 
@@ -41,7 +42,8 @@ def accelerations(positions, velocities, first, second):
     squared = (apart ** 2).sum(axis=1)
     ratio = numpy.sqrt(squared) / LENGTH
     near = numpy.maximum(1 - ratio / 2, 0)
-    mass = SPACING ** 2 * 7 / (4 * numpy.pi * LENGTH ** 2)  # Includes the kernel's constant factor.
+    dimensions = positions.shape[1]
+    mass = (SPACING / LENGTH) ** dimensions * KERNEL[dimensions]
     kernel = mass * near ** 4 * (2 * ratio + 1)
     density = (mass + numpy.bincount(first, kernel, count) + numpy.bincount(second, kernel, count))
     pressure = SOUND ** 2 * numpy.maximum(density - 1, 0) / density ** 2
@@ -54,11 +56,14 @@ def accelerations(positions, velocities, first, second):
                         for along in apart.T], axis=1)
 
 
-def simulate(steps):
-    """Yields time, positions and velocities, (N, 2) each, after every step."""
-    drops = [disc(-0.6, 0.15, 0.5), disc(0.6, -0.15, 0.5)]
+def simulate(steps, dimensions=2):
+    """Yields time, positions and velocities, (N, dimensions) each, after every step."""
+    radius = 0.5 if dimensions == 2 else 0.25
+    apart = numpy.array([1.2 * radius, -0.3 * radius, 0][:dimensions])
+    drops = [drop(-apart, radius), drop(apart, radius)]
     positions = numpy.concatenate(drops)
-    velocities = numpy.repeat([(1.0, 0.0), (-1.0, 0.0)], [len(drop) for drop in drops], axis=0)
+    forward = numpy.eye(dimensions)[0]
+    velocities = numpy.repeat([forward, -forward], [len(one) for one in drops], axis=0)
     for step in range(1, steps + 1):
         if step % 10 == 1:
             pairs = neighbours(positions)
@@ -68,6 +73,10 @@ def simulate(steps):
 
 
 def show(result):
+    if len(result.surface):
+        print(f"t = {result.time!r}: {len(result.surface)} shells, volume {result.volume!r}, "
+              f"{result.surface_digest:016x}", flush=True)
+        return
     print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
           f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
 
@@ -77,10 +86,13 @@ def main():
     parser.add_argument("--server", help="Server address; default PARTIEMC_SERVER or this machine")
     parser.add_argument("--every", type=int, default=10, help="Steps between frames")
     parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--dimensions", type=int, choices=(2, 3), default=2,
+                        help="3: surfaces of two balls instead of outlines of two discs")
     options = parser.parse_args()
-    with partiemc.connect(options.server, name="drops", spacing=SPACING,
+    output = "surface" if options.dimensions == 3 else "outline"
+    with partiemc.connect(options.server, name="drops", spacing=SPACING, output=output,
                           echo_particles=True) as stream:
-        for step, time, positions, velocities in simulate(options.steps):
+        for step, time, positions, velocities in simulate(options.steps, options.dimensions):
             if step % options.every == 0:
                 stream.send(positions, time, velocities=velocities)
             # Waits only if the window is full.

@@ -10,7 +10,7 @@ import tempfile
 import time
 
 COUPLINGS = pathlib.Path(os.environ["PARTIEMC_SOURCE_DIR"], "client/couplings")
-LINE = re.compile(r"t = (\S+): (\d+) rings, area (\S+), ([0-9a-f]{16} [0-9a-f]{16})\n")
+LINE = re.compile(r"t = (\S+): (\d+) (?:rings, area|shells, volume) (\S+), ([0-9a-f ]{16,33})\n")
 
 
 def skip_unless(*modules):
@@ -57,8 +57,9 @@ class Answer:
     """The line that a simulation printed for one result."""
 
     def __init__(self, line):
-        time, rings, area, self.digests = LINE.fullmatch(line).groups()
-        self.time, self.rings, self.area = float(time), int(rings), float(area)
+        time, count, size, self.digests = LINE.fullmatch(line).groups()
+        self.time, self.rings, self.area = float(time), int(count), float(size)
+        self.shells, self.volume = self.rings, self.area  # Of a surface.
 
 
 def run(command, server, kill_after=None, **environment):
@@ -88,4 +89,6 @@ def _answers(running, server, kill_after):
 
 
 def digests(result):
+    if len(result.surface):
+        return f"{result.surface_digest:016x}"
     return f"{result.rings_digest:016x} {result.mesh_digest:016x}"

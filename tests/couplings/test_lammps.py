@@ -19,25 +19,28 @@ import partiemc
 
 EVERY, STEPS = 20, 10_000
 GRAINS = 20 * 50
+EVERY_IN_SPACE, STEPS_IN_SPACE = 100, 8_000
+GRAINS_IN_SPACE = 10 * 10 * 16
 
 
-def expected():
+def expected(script="lammps_column.in", every=EVERY, steps=STEPS, dimensions=2, **parameters):
     """Time and digests of every frame, computed in this process."""
     simulation = lammps.lammps(cmdargs=["-log", "none", "-screen", "none", "-var", "every",
-                                        str(EVERY)])
-    simulation.file(str(COUPLINGS / "lammps_column.in"))
-    sequence = partiemc.Reconstructor(spacing=1.0)
+                                        str(every)])
+    simulation.file(str(COUPLINGS / script))
+    sequence = partiemc.Reconstructor(spacing=1.0, **parameters)
     found = []
 
     def reconstruct(_, step, count, tags, positions, forces):
-        velocities = simulation.numpy.extract_atom("v")[:count, :2].copy()
+        forces[:] = 0
+        velocities = simulation.numpy.extract_atom("v")[:count, :dimensions].copy()
         time = step * simulation.extract_global("dt")
-        result = sequence.reconstruct(positions[:, :2].copy(), time, ids=tags.ravel(),
+        result = sequence.reconstruct(positions[:, :dimensions].copy(), time, ids=tags.ravel(),
                                       velocities=velocities)
         found.append((time, digests(result)))
 
     simulation.set_fix_external_callback("live", reconstruct)
-    simulation.command(f"run {STEPS}")
+    simulation.command(f"run {steps}")
     return found
 
 
@@ -111,6 +114,33 @@ class Column(unittest.TestCase):
                              capture_output=True, text=True)
         self.assertNotEqual(ran.returncode, 0)
         self.assertIn("partiemc", ran.stderr.splitlines()[-1])
+
+
+class ColumnInSpace(unittest.TestCase):
+    def run_with(self, *command, every=EVERY_IN_SPACE, steps=STEPS_IN_SPACE, kill_after=None):
+        with Server() as server:
+            return run([*command, COUPLINGS / "lammps_column.py", "--dimensions", "3", "--server",
+                        server.address, "--every", every, "--steps", steps], server, kill_after)
+
+    def test_every_frame_has_its_surface_though_the_server_is_killed(self):
+        answers = self.run_with(kill_after=20)
+        found = expected("lammps_column_3d.in", EVERY_IN_SPACE, STEPS_IN_SPACE, 3, output="surface")
+        self.assertEqual([(answer.time, answer.digests) for answer in answers], found)
+        self.assertEqual(len(answers), STEPS_IN_SPACE // EVERY_IN_SPACE + 1)
+        for answer in answers:
+            self.assertAlmostEqual(answer.volume / GRAINS_IN_SPACE, 1, delta=0.01)
+
+    def test_four_processes_have_the_surface_of_the_whole_frame(self):
+        # Processes sum forces in another order, so only the first frame has the same particles.
+        if shutil.which("mpirun") is None:
+            self.skipTest("Open MPI is not installed")
+        one = self.run_with(steps=400)
+        four = self.run_with("mpirun", "--allow-run-as-root", "--oversubscribe", "-np", "4",
+                             sys.executable, steps=400)
+        self.assertEqual([answer.time for answer in four], [answer.time for answer in one])
+        self.assertEqual(four[0].digests, one[0].digests)
+        for answer in four:
+            self.assertAlmostEqual(answer.volume / GRAINS_IN_SPACE, 1, delta=0.01)
 
 
 if __name__ == "__main__":
