@@ -14,7 +14,11 @@ import partiemc
 from pysph.examples.dam_break_2d import DamBreak2D
 
 
-class LiveDamBreak(DamBreak2D):
+class Live:
+    """Streams any PySPH application whose first particles are the fluid: class Mine(Live, Theirs)."""
+
+    dimensions = 2
+
     def add_user_options(self, group):
         super().add_user_options(group)
         group.add_argument("--server", help="Server address; default PARTIEMC_SERVER or this machine")
@@ -27,24 +31,32 @@ class LiveDamBreak(DamBreak2D):
         if (solver.count + 1) % self.options.every:
             return
         fluid = self.particles[0]  # Views of PySPH's memory; `send` copies each once.
-        self.stream.send((fluid.x, fluid.y), solver.t + solver.dt,
-                         volumes=fluid.m / fluid.rho, velocities=(fluid.u, fluid.v))
+        axes = slice(self.dimensions)
+        self.stream.send((fluid.x, fluid.y, fluid.z)[axes], solver.t + solver.dt,
+                         volumes=fluid.m / fluid.rho, velocities=(fluid.u, fluid.v, fluid.w)[axes])
+
+
+class LiveDamBreak(Live, DamBreak2D):
+    pass
 
 
 def receive(stream):
     for result in stream:
+        if len(result.surface):
+            print(f"t = {result.time!r}: {len(result.surface)} shells, volume {result.volume!r}, "
+                  f"{result.surface_digest:016x}", flush=True)
+            continue
         print(f"t = {result.time!r}: {len(result.rings)} rings, area {result.area!r}, "
               f"{result.rings_digest:016x} {result.mesh_digest:016x}", flush=True)
 
 
-def main():
-    simulation = LiveDamBreak()
+def run(simulation, **parameters):
     simulation.setup()
     options = simulation.options
     # Leaving `with` ends the stream first, then waits for the receiving thread.
     with ThreadPoolExecutor(1) as receiver, partiemc.connect(
             options.server, latest=options.latest, name="dam-break", spacing=simulation.dx,
-            echo_particles=True) as simulation.stream:
+            echo_particles=True, **parameters) as simulation.stream:
         received = receiver.submit(receive, simulation.stream)
         simulation.solve()
         simulation.stream.finish()
@@ -52,4 +64,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run(LiveDamBreak())

@@ -34,7 +34,7 @@ def camera(turn, tilt):
     """A rotation that maps world coordinates to right, up and towards the viewer."""
     c, s = np.cos(turn), np.sin(turn)
     a, b = np.cos(tilt), np.sin(tilt)
-    return np.array([[c, s, 0], [s * b, -c * b, a], [s * a, -c * a, -b]])
+    return np.array([[c, s, 0], [-s * b, c * b, a], [s * a, -c * a, b]])
 
 
 def draw(points, normals, triangles, width, height, scale):

@@ -18,6 +18,7 @@ from pysph.solver.utils import dump, load
 
 # PySPH takes 50 ms to write an HDF5 file.
 EVERY, STEPS, SPACING = 8, 400, 0.03
+STEPS_IN_SPACE = 240
 
 
 class Run:
@@ -33,6 +34,10 @@ def setUpModule():
         # PySPH compiles its equations to where HOME is, in both runs the same.
         Run.latest = run([*command, "--every", "1", "--max-steps", "104", "--disable-output",
                           "--latest", "-d", Run.folder / "latest"], server, HOME=folder.name)
+        Run.in_space = run([COUPLINGS / "pysph_dam_break_3d.py", "--quiet", "--server",
+                            server.address, "--dx", "0.1", "--every", EVERY, "--pfreq", EVERY,
+                            "--max-steps", STEPS_IN_SPACE, "-d", Run.folder / "in_space"],
+                           server, kill_after=10, HOME=folder.name)
         Run.answers = run([*command, "--every", EVERY, "--pfreq", EVERY, "--max-steps", STEPS, "-d",
                            Run.folder / "run"], server, kill_after=10, HOME=folder.name)
     _, *Run.frames = partiemc.read_pysph(Run.folder / "run")  # The first was no step.
@@ -69,6 +74,20 @@ class DamBreak(unittest.TestCase):
         self.assertEqual(times, sorted(set(times)))
         self.assertLessEqual(len(times), 104)
         self.assertEqual(times[-1], Run.answers[104 // EVERY - 1].time)
+
+
+class DamBreakInSpace(unittest.TestCase):
+    def test_every_frame_has_its_surface_though_the_server_is_killed(self):
+        _, *frames = partiemc.read_pysph(Run.folder / "in_space")
+        # PySPH also writes at times of its own.
+        frames = [frame for frame in frames if frame["time"] in {a.time for a in Run.in_space}]
+        self.assertEqual(len(Run.in_space), STEPS_IN_SPACE // EVERY)
+        self.assertEqual([answer.time for answer in Run.in_space],
+                         [frame["time"] for frame in frames])
+        sequence = partiemc.Reconstructor(spacing=0.1, output="surface")
+        for answer, frame in zip(Run.in_space, frames):
+            self.assertEqual(answer.digests, digests(sequence.reconstruct(**frame)))
+            self.assertAlmostEqual(answer.volume / frame["volumes"].sum(), 1, delta=0.01)
 
 
 class Files(unittest.TestCase):
