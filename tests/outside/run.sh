@@ -7,6 +7,7 @@
 # `go`: a client generated for Go streams the dam break.
 # `ghz`: 10,000 unary calls, beside the figures of `partiemc load`.
 # `numpy`: the Python package with NumPy, trimesh and PyVista of PyPI.
+# `splashsurf`: the calls of pysplashsurf and of this project in client/python/README.md.
 # `gltf`: readers of npm decode the GLB files of --compress-glb.
 # `kubernetes`: kustomize and kubeconform on docker/kubernetes.
 set -euo pipefail
@@ -189,10 +190,13 @@ check_numpy() {
   "$python" -c 'import numpy, trimesh, pyvista
 for module in (numpy, trimesh, pyvista): print(module.__name__, module.__version__)'
   export PYTHONPATH=$package PYTHONDONTWRITEBYTECODE=1
-  PARTIEMC_SOURCE_DIR=$root PARTIEMC_PYTHON_DIR=$package PARTIEMC_PROGRAM=$bin/partiemc \
-    PARTIEMC_SERVER_PROGRAM=$bin/partiemc-server \
-    "$python" "$root/tests/client/python/test_reconstruct.py" 2>&1 | grep -E '^(Ran|OK|FAIL|ERROR)' |
-    sed 's/ in .*//'
+  local name
+  for name in reconstruct surfaces; do
+    PARTIEMC_SOURCE_DIR=$root PARTIEMC_PYTHON_DIR=$package PARTIEMC_PROGRAM=$bin/partiemc \
+      PARTIEMC_SERVER_PROGRAM=$bin/partiemc-server \
+      "$python" "$root/tests/client/python/test_$name.py" 2>&1 | grep -E '^(Ran|OK|FAIL|ERROR)' |
+      sed 's/ in .*//'
+  done
   "$python" - <<'PYTHON'
 import numpy, partiemc, pyvista, trimesh
 axis = numpy.arange(-12.0, 13.0)
@@ -205,6 +209,31 @@ assert of_trimesh.is_watertight and of_trimesh.is_winding_consistent and of_pyvi
 for volume in (of_trimesh.volume, of_pyvista.volume, len(ball)):
     assert abs(volume - surface.volume[0]) < .002 * volume, (volume, surface.volume)
 print(f"{len(surface.triangles)} triangles, volume {surface.volume[0]:.1f} in all three")
+PYTHON
+}
+
+# Requires: pysplashsurf in the Python of $PYTHON, as check_numpy.
+check_splashsurf() {
+  PYTHONPATH=$(cd "$bin/../python" && pwd) "${PYTHON:-python3}" - "$root/client/python/README.md" <<'PYTHON'
+import sys
+import numpy, partiemc, pysplashsurf
+
+blocks = [text.split("```")[0] for text in open(sys.argv[1]).read().split("```python\n")[1:]]
+script = next(block for block in blocks if "pysplashsurf" in block)
+axis = numpy.arange(-16.0, 17.0)
+nodes = numpy.stack(numpy.meshgrid(axis, axis, axis), -1).reshape(-1, 3)
+nodes = nodes[(nodes ** 2).sum(axis=1) < 14.3 ** 2]
+positions = .01 * nodes + numpy.random.default_rng(1).uniform(-.001, .001, nodes.shape)
+density = 1000 + positions[:, 2]
+exec(script)
+for name, points, triangles, normals, values in (
+        ("pysplashsurf", mesh.mesh.vertices, mesh.mesh.triangles, *map(mesh.point_attributes.get, ("normals", "density"))),
+        ("partiemc", result.surface.points, result.surface.triangles, result.surface.normals, result.attributes["density"])):
+    assert normals.shape == points.shape and values.shape == points.shape[:1]
+    a, b, c = points[triangles.astype(int)].transpose(1, 0, 2)
+    volume = (a * numpy.cross(b, c)).sum() / 6 / (len(positions) * .01 ** 3)
+    print(f"{name}: {len(positions)} particles, {len(triangles)} triangles, {volume:.3f} of their volume")
+    assert abs(volume - 1) < .05
 PYTHON
 }
 

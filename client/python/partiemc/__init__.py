@@ -90,9 +90,10 @@ def connect(address=None, *, latest=False, **options):
         the velocities.
     normals: compute normals of outlines; surfaces always have them.
     coordinates: how the server sends coordinates: "float64", the same bits as in this process;
-        "float32", half the bytes; "compact", surfaces in about 5 bytes per triangle: coordinates move by
-        at most 0.0009 spacings, normals by a degree, points and triangles have another order within
-        their shell, and outlines are as with "float32". Digests are those of "float64".
+        "float32", coordinates of half the size; "compact", surfaces in about 5 bytes per triangle:
+        coordinates move by at most 0.0009 spacings, normals by a degree, points and triangles have
+        another order within their shell, and outlines are as with "float32". Digests are those of
+        "float64".
     echo_particles: send the particles to watchers (Result.particles).
     tls, ca_file, cert_file, key_file, token, token_file: as on the command line. The defaults come
         from the environment (PARTIEMC_TLS, PARTIEMC_TOKEN_FILE, ...).

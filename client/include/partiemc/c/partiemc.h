@@ -131,7 +131,7 @@ typedef struct partiemc_options {
   double min_component_volume; /* Surfaces only: drops bodies with less particle volume, in cubed
                                   spacings. */
   const char* coordinates; /* How a server sends coordinates: "float64" (as in process), "float32"
-                              (half the bytes), or "compact" (surfaces in about 5 bytes per
+                              (half the size), or "compact" (surfaces in about 5 bytes per
                               triangle: coordinates move by at most .0009 spacings, points and
                               triangles have another order within their shell). Digests are those of
                               float64. NULL: float64. */
