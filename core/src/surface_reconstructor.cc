@@ -171,17 +171,22 @@ void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
   }
 }
 
-/// Moves the vertices of the bodies whose triangles do not enclose the volume of their particles.
-/// Positions are in world units. Returns whether any vertex moved.
-bool CorrectVolumes(const Scale& scale, SurfaceWorkspace::Buffers& b) {
+/// Moves the vertices of the bodies whose triangles do not enclose the volume of their particles by
+/// at most `limit` spacings. Positions are in world units. Returns whether any vertex moved.
+bool CorrectVolumes(const Scale& scale, double limit, SurfaceWorkspace::Buffers& b) {
   space::BodyVolumes& volumes = b.virtual_plane.volumes;
   space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
                           volumes);
-  const double limit = kVolumeLimit * scale.spacing * scale.cell_size;
-  const bool has_moved = space::MatchVolumes(
-      b.bodies, {.limit = limit, .tolerance = kVolumeTolerance}, b.normals, volumes, b.positions);
-  if (has_moved) KeepFixedVertices(b);
-  return has_moved;
+  const space::VolumeMoves moves = space::SearchVolumes(
+      b.bodies, {.limit = limit * scale.spacing * scale.cell_size, .tolerance = kVolumeTolerance},
+      b.normals, volumes, b.positions);
+  if (moves.returns) {
+    space::ReturnToSavedSetbacks(b.certificate);
+  } else {
+    space::SaveSetbacks(b.certificate);
+  }
+  if (moves.any) KeepFixedVertices(b);
+  return moves.any;
 }
 
 /// Places vertices away from their anchors and connects them by quads that the certificate accepts.
@@ -202,7 +207,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   KeepFixedVertices(b);
   for (Vec3& position : b.positions) position = scale.cell_size * position;
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
-  const int rounds = placement == SurfacePlacement::kVirtualPlane ? kVolumeRounds : 0;
+  space::BeginSearch(b.bodies, b.positions, b.virtual_plane.volumes);
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     const auto certify = round == 0 ? space::Certify : space::CertifyAgain;
@@ -212,7 +217,8 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
     space::FindThinEdges(bricks, b.crossings, scale.cell_size, b.certificate, b.positions,
                          parameters.thinning_distance * scale.spacing, b.thin);
     space::EmitQuads(bricks, b.crossings, b.certificate, b.thin, b.mesh.triangles);
-    if (round == rounds || !CorrectVolumes(scale, b)) break;
+    if (placement != SurfacePlacement::kVirtualPlane || round > kVolumeRounds) break;
+    if (!CorrectVolumes(scale, round < kVolumeRounds ? kVolumeLimit : 0, b)) break;
   }
   return absl::OkStatus();
 }

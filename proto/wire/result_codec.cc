@@ -159,6 +159,7 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
   if (auto status = CheckRingCounts(from, rings.PointCount()); !status.ok()) return status;
   CopyBytes(from.offsets(), rings.offsets);
   if (auto status = CheckOffsets(rings.offsets, rings.PointCount()); !status.ok()) return status;
+  if (rings.offsets.empty()) rings.offsets.assign(1, 0);  // As without rings in process.
   CopyBytes(from.outer_of(), rings.outer_of);
   if (auto status = CheckNesting(rings.outer_of); !status.ok()) return status;
   CopyBytes(from.normals(), rings.normals);
@@ -287,7 +288,8 @@ absl::Status EncodeShape(const Result& result, const Outputs& outputs,
   message.set_rings_digest(DigestRings(result.rings));
   message.set_mesh_digest(DigestMesh(result.mesh));
   message.set_surface_digest(DigestSurface(result.surface));
-  if (result.surface.ShellCount() == 0) {
+  // A surface without bodies has the names of its attributes.
+  if (result.surface.ShellCount() == 0 && result.surface.attributes.empty()) {
     message.clear_surface();
     return EncodeOutline(result, outputs, message);
   }

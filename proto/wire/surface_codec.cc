@@ -155,10 +155,6 @@ absl::Status DecodePlain(const v1::Surface& message, const PointFormat& format, 
 absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message) {
   const Surface& surface = result.surface;
-  if (surface.ShellCount() == 0) {
-    message.clear_surface();
-    return absl::OkStatus();
-  }
   const std::span<const double> points = surface.points;
   Origin origin{};
   if (outputs.coordinates != Coordinates::kFloat64) origin = MiddleOf({&points, 1}, 3);

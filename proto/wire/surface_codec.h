@@ -8,8 +8,7 @@
 
 namespace partiemc::wire {
 
-/// Writes the surface of `result`, the coordinate format and the origin. A result without a surface
-/// gives no message. Errors: as EncodeResult.
+/// Writes the surface of `result`, the coordinate format and the origin. Errors: as EncodeResult.
 absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message);
 

@@ -79,7 +79,7 @@ class DamBreak(unittest.TestCase):
 class DamBreakInSpace(unittest.TestCase):
     def test_every_frame_has_its_surface_though_the_server_is_killed(self):
         _, *frames = partiemc.read_pysph(Run.folder / "in_space")
-        # PySPH also writes at times of its own.
+        # PySPH also writes at other times.
         frames = [frame for frame in frames if frame["time"] in {a.time for a in Run.in_space}]
         self.assertEqual(len(Run.in_space), STEPS_IN_SPACE // EVERY)
         self.assertEqual([answer.time for answer in Run.in_space],

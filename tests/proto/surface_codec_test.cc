@@ -143,6 +143,17 @@ TEST(SurfaceMessage, AReusedMessageAndResultHoldNothingOfTheFrameBefore) {
   }
 }
 
+TEST(SurfaceMessage, WithoutBodiesKeepsTheNamesOfItsAttributes) {
+  Result empty;
+  empty.Clear();
+  for (const Outputs& outputs : {kExact, kCompact}) {
+    EXPECT_EQ(Decoded(Encoded(empty, outputs)), empty);
+    Result named = empty;
+    named.surface.attributes = {{"place", 3, {}}, {"number", 1, {}}};
+    EXPECT_EQ(Decoded(Encoded(named, outputs)).surface, named.surface);
+  }
+}
+
 TEST(SurfaceMessage, RelativeCoordinatesAreWithinTheirLimit) {
   const Balls far({3e6, -1e5, 7});
   const Result result = Decoded(

@@ -281,6 +281,16 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return CertifyMoved(bricks, crossings, cell_size, anchors, positions, certificate);
 }
 
+void SaveSetbacks(Certificate& certificate) {
+  certificate.saved_setbacks = certificate.setbacks;
+  certificate.saved_node_setbacks = certificate.nodes.setbacks;
+}
+
+void ReturnToSavedSetbacks(Certificate& certificate) {
+  certificate.setbacks = certificate.saved_setbacks;
+  certificate.nodes.setbacks = certificate.saved_node_setbacks;
+}
+
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate) {

@@ -43,6 +43,8 @@ struct Certificate {
   std::vector<BrickBits> moved_nodes;   ///< Nodes by brick, in the last round.
   std::vector<std::uint8_t> has_moved;  ///< By brick: has moved cells.
   std::vector<Vec3> certified;          ///< Positions of the vertices, once certified.
+  /// The setbacks of vertices and nodes at the last call of SaveSetbacks.
+  std::vector<std::uint8_t> saved_setbacks, saved_node_setbacks;
 };
 
 /// Marks the vertices of cells with several loops, which have to stay at their anchors.
@@ -63,6 +65,11 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
+
+/// Stores the setbacks, and takes them back. Positions that were certified with them are certified
+/// again if they return.
+void SaveSetbacks(Certificate& certificate);
+void ReturnToSavedSetbacks(Certificate& certificate);
 
 /// The number of faces that are refused in their modes: 0 once certified. For tests.
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,16 @@ struct BodyVolumes {
   };
   std::vector<Part> parts;      ///< Scratch: by loop.
   std::vector<double> offsets;  ///< Scratch: by body.
+
+  /// The smallest error of a body so far.
+  struct Best {
+    double error = std::numeric_limits<double>::infinity();
+    bool is_new = false;    ///< Of these positions.
+    bool is_final = false;  ///< The body stays as it was then.
+    bool returns = false;
+  };
+  std::vector<Best> best;            ///< By body.
+  std::vector<Vec3> best_positions;  ///< By vertex: with the smallest error of its body.
 };
 
 /// Finds the body of each vertex.
@@ -59,5 +70,21 @@ struct VolumeStep {
 /// Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
 bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);
+
+struct VolumeMoves {
+  bool any = false;      ///< A body has moved.
+  bool returns = false;  ///< A body has returned.
+};
+
+/// Forgets the best positions of an earlier frame.
+void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
+
+/// MatchVolumes as a step of a search: a body whose error has grown returns to its positions with
+/// the smallest error, for good. Steps can fail, because the certificate sets vertices back: in
+/// sheets of one layer most of them. With `step.limit` 0, bodies only return.
+/// Requires: BeginSearch before the first step; otherwise as MatchVolumes.
+VolumeMoves SearchVolumes(const Bodies& bodies, const VolumeStep& step,
+                          const std::vector<Vec3>& normals, BodyVolumes& volumes,
+                          std::vector<Vec3>& positions);
 
 }  // namespace partiemc::space

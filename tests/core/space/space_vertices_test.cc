@@ -349,6 +349,56 @@ TEST(VirtualPlane, GivesDropsAndBallsTheVolumeOfTheirParticles) {
   }
 }
 
+TEST(VolumeSearch, ABodyWhoseErrorHasGrownReturnsForGood) {
+  Bodies bodies;
+  bodies.bodies.resize(2);
+  for (Body& body : bodies.bodies) body.volume = 1;
+  BodyVolumes volumes;
+  volumes.body_of = {0, 1};
+  const std::vector<Vec3> normals(2, Vec3{0, 0, 1});
+  std::vector<Vec3> positions(2);
+  BeginSearch(bodies, positions, volumes);
+  const auto search = [&](double first, double second, double limit = 1) {
+    volumes.measures = {{.area = 2, .volume = first}, {.area = 2, .volume = second}};
+    return SearchVolumes(bodies, {.limit = limit, .tolerance = .01}, normals, volumes, positions);
+  };
+  EXPECT_TRUE(search(1.5, 1.5).any);
+  EXPECT_DOUBLE_EQ(positions[0].z, -.25);
+  EXPECT_DOUBLE_EQ(positions[1].z, -.25);
+  EXPECT_FALSE(search(1.4, 1.3).returns);  // Both are better, and move on.
+  EXPECT_DOUBLE_EQ(positions[0].z, -.45);
+  EXPECT_DOUBLE_EQ(positions[1].z, -.4);
+  const VolumeMoves third = search(1.6, 1.2);
+  EXPECT_TRUE(third.any && third.returns);
+  EXPECT_DOUBLE_EQ(positions[0].z, -.25);
+  EXPECT_DOUBLE_EQ(positions[1].z, -.5);
+  EXPECT_TRUE(search(1.7, 1.1).any);
+  EXPECT_DOUBLE_EQ(positions[0].z, -.25) << "it stays";
+  EXPECT_DOUBLE_EQ(positions[1].z, -.55);
+  EXPECT_FALSE(search(1.7, 1.05, 0).any) << "a limit of 0 only returns bodies";
+  EXPECT_TRUE(search(1.7, 1.3, 0).returns);
+  EXPECT_DOUBLE_EQ(positions[1].z, -.55);
+}
+
+TEST(VirtualPlane, GivesSheetsOfOneLayerTheVolumeOfTheirParticles) {
+  const auto reconstructor =
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  Random random(9);
+  for (const double thickness : {.2, .6, 1.0}) {
+    for (int trial = 0; trial < 6; ++trial) {
+      constexpr int kCount = 600;
+      SpaceParticles sheet;
+      while (sheet.size() < kCount) {
+        sheet.Add({random.Uniform(0, 26), random.Uniform(0, 26), random.Uniform(0, thickness)});
+      }
+      ASSERT_TRUE(reconstructor->Reconstruct(sheet.AsFrame(), workspace, surface).ok());
+      EXPECT_NEAR(VolumeOf(surface) / kCount, 1, .005) << thickness;
+    }
+  }
+}
+
 // Darts in a ball anywhere in the lattice, without ellipsoids. Some of them are nearly apart.
 TEST(VirtualPlane, GivesMostDropsOfDartsTheVolumeOfTheirParticles) {
   const auto reconstructor = SurfaceReconstructor::Create(
