@@ -185,8 +185,11 @@ absl::Status DecodeValues(const NamedAttributes& messages, std::size_t points,
   return absl::OkStatus();
 }
 
-// The largest power of two that is at most `spacing` / kSteps, so that multiples are exact.
-double StepOf(double spacing) { return std::exp2(std::floor(std::log2(spacing / kSteps))); }
+// The largest power of two that is at most `spacing` / kSteps, so that multiples are exact. Without
+// a spacing there are no points, and any step will do.
+double StepOf(double spacing) {
+  return spacing > 0 ? std::exp2(std::floor(std::log2(spacing / kSteps))) : 1;
+}
 
 }  // namespace
 
