@@ -1,4 +1,4 @@
-// Surfaces for tests, made like those of the C++ program.
+// Messages of surfaces for tests, in the layout of the C++ program.
 import { CoordinateFormat } from '@proto/v1/reconstruction_pb';
 import { bytesOf } from '../src/protocol/arrays';
 import { NO_SHELL, type SurfaceMessage } from '../src/protocol/surface';

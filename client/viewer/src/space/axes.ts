@@ -27,8 +27,7 @@ function edgesAlong(axis: number, { low, high }: Box): Vector[] {
 }
 
 /**
- * Axes along three edges of a box: those at the border of the picture of the box. x and y are at its lower side, z at its
- * left side.
+ * Axes along three edges of a box. The edges lie at the border of its picture: x and y at the lower side, z at the left.
  */
 export function axesDrawing(camera: Camera, box: Box): AxesDrawing {
   const drawing: AxesDrawing = { lines: [], texts: [] };

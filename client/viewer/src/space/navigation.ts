@@ -38,7 +38,7 @@ function gripOf(pointers: ReadonlyMap<number, { x: number; y: number }>): Grip {
 
 /**
  * Turns by a drag, pans by a drag with Shift or another button or two fingers, zooms to the pointer by the wheel or two
- * fingers, and takes keys. A click that ends a drag is not passed on. Returns whether a drag is going on.
+ * fingers, and takes keys. A click that ends a drag is not passed on. Returns a function: true during a drag.
  */
 export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void): () => boolean {
   const pointers = new Map<number, { x: number; y: number }>();

@@ -33,8 +33,9 @@ export class SpacePicture {
   readonly scene = new SpaceScene(this.canvas);
   /** Whether the view follows the content. False once the user has moved it. */
   isFree = true;
-  /** Why nothing is shown, or empty. */
-  problem = '';
+  /** Why the browser cannot draw, and why the frame cannot be shown; or empty. */
+  private drawingProblem = '';
+  private frameProblem = '';
   private readonly axes = document.createElementNS(SVG, 'svg');
   private readonly readout = make('div', { class: 'readout' });
   private readonly scaleBar = new ScaleBar();
@@ -62,6 +63,9 @@ export class SpacePicture {
     void this.load();
   }
 
+  /** Why nothing is shown, or empty. */
+  get problem(): string { return this.drawingProblem || this.frameProblem; }
+
   /** Shows a frame as soon as it is decoded. */
   show(frame: Frame, outlines: readonly Outline[]): void {
     this.waiting = { frame, outlines };
@@ -70,7 +74,7 @@ export class SpacePicture {
 
   clear(): void {
     this.waiting = null;
-    this.problem = '';
+    this.frameProblem = '';
     this.scene.show(null, []);
     this.dirty = true;
   }
@@ -146,7 +150,7 @@ export class SpacePicture {
       const { createDrawing } = await loadSpace();
       if (!this.isClosed) this.scene.attach(createDrawing(this.canvas));
     } catch (error) {
-      this.problem = textOf(error);
+      this.drawingProblem = textOf(error);
     }
     this.dirty = true;
   }
@@ -160,11 +164,11 @@ export class SpacePicture {
       try {
         const surface = await decoder.decode(frame.surface);
         if (this.isClosed) break;
-        this.problem = '';
+        this.frameProblem = '';
         this.scene.show(spaceFrameOf(frame, surface), outlines);
         this.keepInView();
       } catch (error) {
-        this.problem = `Frame ${frame.sequence} cannot be shown: ${textOf(error)}`;
+        this.frameProblem = `Frame ${frame.sequence} cannot be shown: ${textOf(error)}`;
         this.scene.show(null, []);
       }
       this.events.shown(frame);

@@ -123,7 +123,7 @@ class Drawing implements SpaceDrawing {
     }
     this.sections = lines.filter(({ positions }) => positions.length > 0).flatMap(({ positions, colour }) => {
       const geometry = new LineSegmentsGeometry().setPositions(positions);
-      // What the surface hides is drawn, too, but fainter.
+      // Lines behind the surface are faint.
       return [false, true].map((isVisible, k) => {
         const material = new LineMaterial({ depthTest: isVisible, transparent: true, opacity: isVisible ? 1 : HIDDEN_LINES });
         material.color.setRGB(...colour);

@@ -103,7 +103,7 @@ export class Pane {
   private firstSpaceView: SpaceView | null = null;
 
   /**
-   * `variants`: for other settings than those of the track; null if they are not offered. `pictureOfSpace`: makes the
+   * `variants`: computes other settings; null if they are not offered. `pictureOfSpace`: makes the
    * picture of surfaces; null where there are none.
    */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,

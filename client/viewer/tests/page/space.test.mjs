@@ -95,7 +95,7 @@ test('a live surface is drawn and moves, in every format', async () => {
   const first = await viewer.frame();
   const picture = await viewer.picture();
   await viewer.shows(first + 3);
-  assert.notEqual(await viewer.picture(), picture);
+  await until('the picture moves', async () => await viewer.picture() !== picture);
   assert.equal(await viewer.status(), 'Live');
   for (const format of ['float64', 'float32']) {
     const name = `balls_${format}`;
@@ -255,6 +255,7 @@ test('a pane says why it shows no surface', async () => {
     ['space_worker.js', /cannot start the decoder of surfaces/],
   ];
   for (const [file, reason] of cases) {
+    await viewer?.close();
     viewer = await Viewer.open(browser, world.url);
     await viewer.page.route(`**/${file}`, (route) => route.abort());
     await viewer.page.goto(`${world.url}#stream=balls`);
@@ -264,9 +265,7 @@ test('a pane says why it shows no surface', async () => {
     assert.equal(await viewer.pane().locator('.state').textContent(), 'Refused');
     viewer.errors = viewer.errors.filter((text) => !/Failed to load resource/.test(text));
     assert.deepEqual(viewer.errors, []);
-    await viewer.close();
   }
-  viewer = null;
 });
 
 /** Overwrites the header of the compressed triangles of a frame. */
