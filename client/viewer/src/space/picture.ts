@@ -47,6 +47,8 @@ export class SpacePicture {
   private dirty = true;
   private isClosed = false;
   private isDecoding = false;
+  /** Counts calls of `clear`: a frame that was decoded before one is dropped. */
+  private era = 0;
   private waiting: { frame: Frame; outlines: readonly Outline[] } | null = null;
 
   constructor(private readonly events: SpaceEvents) {
@@ -74,6 +76,7 @@ export class SpacePicture {
 
   clear(): void {
     this.waiting = null;
+    ++this.era;
     this.frameProblem = '';
     this.scene.show(null, []);
     this.dirty = true;
@@ -159,15 +162,18 @@ export class SpacePicture {
     this.isDecoding = true;
     while (this.waiting && !this.isClosed) {
       const { frame, outlines } = this.waiting;
+      const { era } = this;
       this.waiting = null;
       if (!frame.surface) break;
       try {
         const surface = await decoder.decode(frame.surface);
         if (this.isClosed) break;
+        if (era !== this.era) continue;
         this.frameProblem = '';
         this.scene.show(spaceFrameOf(frame, surface), outlines);
         this.keepInView();
       } catch (error) {
+        if (era !== this.era) continue;
         this.frameProblem = `Frame ${frame.sequence} cannot be shown: ${textOf(error)}`;
         this.scene.show(null, []);
       }

@@ -19,6 +19,11 @@ const TITLES: Record<keyof typeof SWITCHES, string> = {
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
   normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
+/** Beside a picture of surfaces. */
+const SPACE_TITLES: Partial<Record<keyof typeof SWITCHES, string>> = {
+  fill: 'Draws the surface.', particles: 'Draws the particles as dots, which an opaque surface hides.',
+  sections: 'Draws the sections as lines in their planes.', axes: 'Shows coordinates along the box of the surface.',
+};
 const NO_OUTLINE = 'A surface has no outline, so choose a section under "Picture of".';
 export type Switch = keyof typeof SWITCHES;
 const NAMES = Object.keys(SWITCHES) as Switch[];
@@ -119,11 +124,11 @@ export class LookPanel {
     const remedy = (text: string) => (kind === 'watch' ? ` ${text}` : '');
     // For a dropped file, the page draws the particles of the file, so they are never missing.
     const missing: Partial<Record<Switch, string>> = isSpace ? {
-      outline: NO_OUTLINE, normals: NO_OUTLINE, edges: '',
+      outline: NO_OUTLINE, normals: NO_OUTLINE, edges: '', fill: '', sections: '', axes: '',
       particles: frame?.surface?.particles.length === 0
         ? `This frame has no particles.${remedy('Start its producer with --echo-particles.')}` : '',
     } : {
-      outline: '', edges: frame && !frame.mesh ? 'This frame has no mesh.' : '',
+      outline: '', fill: '', sections: '', axes: '', edges: frame && !frame.mesh ? 'This frame has no mesh.' : '',
       particles: frame && !frame.particles && kind !== 'file'
         ? `This frame has no particles.${remedy('Start its producer with --echo-particles.')}` : '',
       normals: frame && !frame.rings.normals
@@ -133,7 +138,8 @@ export class LookPanel {
       const control = input(SWITCHES[name]);
       control.disabled = reason !== '';
       const label = control.parentElement;
-      if (label && label.title !== (reason || TITLES[name])) label.title = reason || TITLES[name];
+      const title = reason || (isSpace && SPACE_TITLES[name]) || TITLES[name];
+      if (label && label.title !== title) label.title = title;
     }
     const ofRings = isSpace ? 'Measurements are of outlines, so choose a section under "Picture of".' : '';
     if (select('measure').disabled !== isSpace) block(select('measure'), ofRings);
