@@ -8,7 +8,7 @@ import { make, setText } from '../ui/dom';
 import { count, number } from '../ui/format';
 import { ScaleBar } from '../ui/scale_bar';
 import { axesDrawing, type AxesDrawing } from './axes';
-import { type SpaceView, unitsPerPixel, type Vector } from './camera';
+import { type SpaceView, unitsPerPixel, type Vector, viewText } from './camera';
 import { decoder } from './decoder';
 import { loadSpace } from './drawing';
 import type { SpaceLook } from './look';
@@ -185,8 +185,9 @@ export class SpacePicture {
 
   private keepInView(): void {
     if (!this.isFree) return;
+    const before = viewText(this.scene.view);
     this.scene.fitExtent();
-    this.events.moved(false);
+    if (viewText(this.scene.view) !== before) this.events.moved(false);
   }
 
   private resized(): void {

@@ -59,7 +59,9 @@ void main() {
   if (!gl_FrontFacing) base *= 0.62;
   vec3 light = normalize(vec3(-0.35, 0.55, 1.0));
   vec3 eye = isParallel ? vec3(0.0, 0.0, 1.0) : normalize(-seen);
-  float diffuse = max(dot(normal, light), 0.0);
+  // Falls off smoothly, so that shadows keep their shape.
+  float wrapped = 0.5 * dot(normal, light) + 0.5;
+  float diffuse = wrapped * wrapped;
   float shine = gl_FrontFacing ? 0.16 * pow(max(dot(normal, normalize(light + eye)), 0.0), 40.0) : 0.0;
   gl_FragColor = vec4(base * (ambient + (1.06 - ambient) * diffuse) + shine, opacity);
 }`;
