@@ -6,8 +6,10 @@
 namespace partiemc::server {
 namespace {
 
+// 'wasm-unsafe-eval' permits WebAssembly, which decodes compact surfaces. It does not permit eval.
 constexpr char kPolicy[] =
-    "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' data: blob:; "
+    "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws: wss:; "
+    "img-src 'self' data: blob:; "
     "media-src blob:; style-src 'self' 'unsafe-inline'; frame-ancestors 'self'";
 constexpr char kPlainText[] = "text/plain; charset=utf-8";
 

@@ -42,7 +42,9 @@ TEST_F(WebPage, FilesComeWithTheirTypeAndWhatKeepsAPageSafe) {
   EXPECT_EQ(index.headers.at("content-type"), "text/html; charset=utf-8");
   EXPECT_EQ(index.headers.at("cache-control"), "no-cache");
   EXPECT_EQ(index.headers.at("x-content-type-options"), "nosniff");
-  EXPECT_THAT(index.headers.at("content-security-policy"), HasSubstr("default-src 'self'"));
+  EXPECT_THAT(
+      index.headers.at("content-security-policy"),
+      HasSubstr("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'"));
   EXPECT_EQ(Ask(web(), "GET", "/index.html?stream=tank").body, index.body);
   EXPECT_EQ(Ask(web(), "GET", "/large.bin").body, large_);
   WebPipe pipe(web());

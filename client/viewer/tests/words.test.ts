@@ -25,10 +25,12 @@ test('an address holds streams, frame, view, settings and look', () => {
             { stream: 'other~1', settings: { ...AS_STREAMED } }],
     file: '', open: '',
     frame: 12, view: { x: 1.5, y: -2, scale: 300 }, look: 'outline,colour:p & q,width:2',
+    camera: { target: [1, -2, 3.5] as const, turn: -1.05, tilt: 0.4, height: 12 }, space: 'flat,clip:x:0.25:flipped',
   };
   const text = addressText(address);
-  assert.match(text, /^#stream=dam&frame=12&view=1\.5,-2,300&beside=~fill:grid&/);
+  assert.match(text, /^#stream=dam&frame=12&view=1\.5,-2,300&camera=1,-2,3\.5,-1\.05,0\.4,12&beside=~fill:grid&/);
   const back = parseAddress(text);
+  assert.deepEqual([back.camera, back.space], [address.camera, address.space]);
   assert.deepEqual([back.frame, back.view, back.look], [12, address.view, address.look]);
   assert.deepEqual(back.panes.slice(0, 2), address.panes.slice(0, 2));
 });
@@ -36,7 +38,7 @@ test('an address holds streams, frame, view, settings and look', () => {
 test('an address holds a file by its name', () => {
   const address = {
     panes: [{ stream: '', settings: { ...AS_STREAMED, fill: Fill.GRID } }, { stream: 'dam', settings: { ...AS_STREAMED } }],
-    file: 'drops 1.csv', open: '', frame: 0, view: null, look: '',
+    file: 'drops 1.csv', open: '', frame: 0, view: null, look: '', camera: null, space: '',
   };
   const text = addressText(address);
   assert.equal(text, '#file=drops%201.csv&frame=0&set=fill:grid&beside=dam~');

@@ -4,15 +4,22 @@ import { continuations } from './continuation';
 /** Largest gap between frames over which a ring is still found by its position. */
 const NEAR_FRAMES = 16n;
 
+/** What a selection needs of a frame: its rings, or the shells of a surface. */
+export interface Tracked { sequence: bigint; identities: BigUint64Array; parents: bigint[][] }
+
 /**
  * Follows a selected ring through splits and merges. Each identity that continues the ring counts
  * from the frame in which it took over: after a merge the merged ring, after a split all parts.
- * In earlier frames that identity belonged to another ring.
+ * In earlier frames that identity belonged to another ring. The shells of a surface are followed in the same way.
  */
-export class Selection {
+export class Tracking<F> {
   /** The first frame in which an identity counts. */
   private readonly since = new Map<bigint, bigint>();
-  private latest: { frame: Frame; rings: readonly number[] } | null = null;
+  private latest: { frame: F; sequence: bigint; rings: readonly number[] } | null = null;
+
+  /** `byPlace`: rings that continue `chosen` ones of an earlier frame, if parents are unknown. */
+  constructor(private readonly trackedOf: (frame: F) => Tracked,
+              private readonly byPlace: (before: F, chosen: readonly number[], after: F) => number[]) {}
 
   /** Selects one identity. Null and 0 (not tracked) select nothing. */
   start(identity: bigint | null): void {
@@ -22,32 +29,32 @@ export class Selection {
   }
 
   /** The selected rings of a frame. */
-  ringsOf(frame: Frame): number[] {
+  ringsOf(frame: F): number[] {
     if (this.since.size === 0) return [];
+    const { sequence, identities, parents } = this.trackedOf(frame);
     const rings = new Set<number>();
-    frame.rings.identities.forEach((identity, ring) => {
-      if (this.counts(identity, frame.sequence)) rings.add(ring);
+    identities.forEach((identity, ring) => {
+      if (this.counts(identity, sequence)) rings.add(ring);
     });
-    for (const ring of this.joining(frame)) {
+    for (const ring of this.joining(frame, sequence, parents)) {
       rings.add(ring);
-      this.add(frame.rings.identities[ring], frame.sequence);
+      this.add(identities[ring], sequence);
     }
     const selected = [...rings].sort((a, b) => a - b);
-    this.latest = { frame, rings: selected };
+    this.latest = { frame, sequence, rings: selected };
     return selected;
   }
 
   /** Rings that continue selected ones of the latest frame, by parents or else by position. */
-  private joining(frame: Frame): number[] {
+  private joining(frame: F, sequence: bigint, parents: bigint[][]): number[] {
     if (!this.latest || this.latest.rings.length === 0) return [];
-    const passed = frame.sequence - this.latest.frame.sequence;
+    const before = this.latest.sequence;
+    const passed = sequence - before;
     if (passed === 1n) {
-      const before = this.latest.frame.sequence;
-      return [...frame.rings.parents.keys()].filter((ring) =>
-        frame.rings.parents[ring].some((parent) => this.counts(parent, before)));
+      return [...parents.keys()].filter((ring) => parents[ring].some((parent) => this.counts(parent, before)));
     }
     if (passed < 1n || passed > NEAR_FRAMES) return [];
-    return continuations(this.latest.frame, this.latest.rings, frame);
+    return this.byPlace(this.latest.frame, this.latest.rings, frame);
   }
 
   private add(identity: bigint, sequence: bigint): void {
@@ -59,5 +66,12 @@ export class Selection {
   private counts(identity: bigint, sequence: bigint): boolean {
     const since = this.since.get(identity);
     return since !== undefined && since <= sequence;
+  }
+}
+
+/** Follows a ring. */
+export class Selection extends Tracking<Frame> {
+  constructor() {
+    super(({ sequence, rings: { identities, parents } }) => ({ sequence, identities, parents }), continuations);
   }
 }

@@ -6,6 +6,7 @@ import { arrayOf, bytesOf } from './arrays';
 import { AttributeChannels, type Channels } from './channels';
 import type { Frame, Mesh, Rings, Statistics } from './frame';
 import { relativePositions } from './positions';
+import { surfaceMessageOf } from './surface';
 
 const EMPTY = new Uint8Array(0);
 
@@ -106,6 +107,7 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
     selfIntersections: Number(statistics?.selfIntersections ?? 0),
     foldedTriangles: Number(statistics?.foldedTriangles ?? 0),
     doubts: statistics?.doubts ?? [],
+    volume: statistics?.volume ?? 0,
   };
 }
 
@@ -141,5 +143,24 @@ export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
     statistics: decodeStatistics(message),
     ringsDigest: message.ringsDigest,
     meshDigest: message.meshDigest,
+  };
+}
+
+/** Decodes a result of a stream of surfaces, except for the arrays of the surface. */
+export function decodeSpaceFrame(message: ReconstructedFrame): Frame {
+  const { sequence, time, sections, surfaceDigest, originX, originY } = message;
+  return {
+    sequence, time, surfaceDigest,
+    origin: [originX, originY],
+    rings: decodeRings(undefined, new Float32Array(0)),
+    sections: sections.map((section) => decodeSection(section, message)),
+    isolines: [],
+    mesh: null,
+    particles: null,
+    particleAttributes: echoedVelocities(message),
+    statistics: decodeStatistics(message),
+    ringsDigest: 0n,
+    meshDigest: null,
+    surface: surfaceMessageOf(message),
   };
 }

@@ -1,4 +1,5 @@
 import { AttributeChannels, type Channels } from './channels';
+import type { SurfaceMessage } from './surface';
 
 /** Class of a mesh triangle. */
 export const TRIANGLE_CLASS = { band: 0, interior: 1 } as const;
@@ -47,6 +48,8 @@ export interface Statistics {
   droppedSpray: number;
   selfIntersections: number;
   foldedTriangles: number;
+  /** Of surfaces only. */
+  volume?: number;
   /** Numbers for `Track.doubtText`. */
   doubts: number[];
 }
@@ -71,6 +74,9 @@ export interface Frame {
   ringsDigest: bigint;
   /** Null: not known. */
   meshDigest: bigint | null;
+  /** Surfaces in space, not decoded yet. The outlines of such a frame are its sections. */
+  surface?: SurfaceMessage;
+  surfaceDigest?: bigint;
 }
 
 /** Another outline of the frame, drawn as lines. */

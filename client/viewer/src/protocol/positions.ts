@@ -37,3 +37,13 @@ export function relativePositions(format: PositionFormat, bytes: Uint8Array, pla
   }
   return points;
 }
+
+/** x, y, z of every particle relative to `origin`; null for particles in a plane. */
+export function positionsInSpace(format: PositionFormat, bytes: Uint8Array,
+                                 origin: readonly [number, number, number]): Float32Array | null {
+  if (componentsOf(format) !== 3) return null;
+  const numbers = numbersOf(format, bytes);
+  const points = new Float32Array(numbers.length - numbers.length % 3);
+  for (let i = 0; i < points.length; ++i) points[i] = numbers[i] - origin[i % 3];
+  return points;
+}

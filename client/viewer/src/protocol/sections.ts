@@ -1,4 +1,4 @@
-import type { ReconstructionParameters, SlicePlane } from '@proto/v1/reconstruction_pb';
+import { Output, type ReconstructionParameters, type SlicePlane } from '@proto/v1/reconstruction_pb';
 import type { Frame, Isoline } from './frame';
 
 type Vector = readonly [number, number, number];
@@ -12,12 +12,15 @@ export interface Outline {
   plane: SectionPlane | null;
   /** Of the density; null: the outline of the body. */
   isovalue: number | null;
+  /** The surface in space of a stream of surfaces. */
+  isSurface?: boolean;
 }
 
 const AXES = ['x', 'y', 'z'];
 
 /** Name of an outline for the user: `z = 0.5, isovalue 0.3`. */
-export function outlineName({ plane, isovalue }: Outline): string {
+export function outlineName({ plane, isovalue, isSurface }: Outline): string {
+  if (isSurface) return 'Surface';
   const parts = [plane ? planeName(plane) : '', isovalue === null ? '' : `isovalue ${isovalue}`];
   return parts.filter(Boolean).join(', ') || 'Outline';
 }
@@ -30,7 +33,8 @@ function planeName({ origin, normal }: SectionPlane): string {
 
 /** The outlines of a stream's frames. */
 export function outlinesOf(parameters: ReconstructionParameters | null): Outline[] {
-  const own = { plane: planeOf(parameters?.slice) ?? null, isovalue: parameters?.isovalue ?? null };
+  const own: Outline = { plane: planeOf(parameters?.slice) ?? null, isovalue: parameters?.isovalue ?? null };
+  if (parameters?.output === Output.SURFACE) own.isSurface = true;
   return [own, ...(parameters?.sections ?? []).map(({ slice, isovalue }) =>
     ({ plane: planeOf(slice) ?? own.plane, isovalue: isovalue ?? null }))];
 }
@@ -106,6 +110,15 @@ function axesOf(normal: Vector): [Vector, Vector] {
     normal[2] * first[0] - normal[0] * first[2],
     normal[0] * first[1] - normal[1] * first[0],
   ]];
+}
+
+/** The point of a plane with the coordinates (u, v). */
+export function inSpace({ origin, normal }: SectionPlane, u: number, v: number): [number, number, number] {
+  const [first, second] = axesOf(unit(normal));
+  return [
+    origin[0] + u * first[0] + v * second[0], origin[1] + u * first[1] + v * second[1],
+    origin[2] + u * first[2] + v * second[2],
+  ];
 }
 
 /** Coordinates of a point in a plane, and its height above it. */

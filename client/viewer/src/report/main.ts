@@ -143,6 +143,7 @@ class Report {
     this.ownAddress = addressText({
       panes: [], file: '', open: '', frame: Number(this.track.labelOf(player.sequence)),
       view: this.pane.isFree ? null : this.pane.scene.view, look: this.look.text,
+      camera: null, space: '',
     });
     try {
       history.replaceState(null, '', this.ownAddress);

@@ -3,9 +3,12 @@ import type { Frame } from '../protocol/frame';
 /** Figures of a frame for the curves. NaN: unknown. */
 export interface Summary {
   area: number;
-  /** Outer rings. */
+  /** Outer rings, or bodies. */
   rings: number;
+  /** Holes, or cavities. */
   holes: number;
+  /** Of surfaces only. */
+  volume?: number;
   triangles: number;
   trianglesGrid: number;
   milliseconds: number;

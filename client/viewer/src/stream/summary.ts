@@ -15,17 +15,17 @@ export function reductionOf({ triangles, trianglesGrid }: Pick<Summary, 'triangl
   return trianglesGrid > 0 ? 100 * (1 - triangles / trianglesGrid) : NaN;
 }
 
-/** Rings and holes, by the sign of their areas. */
+/** Rings and holes, by the sign of their areas; bodies and cavities, by the sign of their volumes. */
 export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
   const holes = areas.filter((area) => area < 0).length;
   return { rings: areas.length - holes, holes };
 }
 
 /** Computes the figures of a frame outside the history: a frame with other settings, or a section. */
-export function summaryOf({ statistics, rings }: Frame): Summary {
+export function summaryOf({ statistics, rings, surface }: Frame): Summary {
   const { area, triangles, trianglesGrid, milliseconds } = statistics;
   return {
-    area, ...ringCounts([...rings.area]), triangles, trianglesGrid, milliseconds,
+    area, ...ringCounts([...surface?.measures.volume ?? rings.area]), volume: statistics.volume, triangles, trianglesGrid, milliseconds,
     stages: STAGES.map(() => NaN), received: NaN, drawn: NaN, dropped: NaN, latency: NaN,
   };
 }
@@ -37,7 +37,8 @@ export function summarise(frame: ReconstructedFrame, counts: Counts | null): Sum
     (name) => statistics?.stages.find(({ stage }) => stage === name)?.milliseconds ?? 0);
   return {
     area: statistics?.area ?? 0,
-    ...ringCounts(frame.rings?.measures.map(({ area }) => area) ?? []),
+    ...ringCounts(frame.surface?.measures.map(({ volume }) => volume) ?? frame.rings?.measures.map(({ area }) => area) ?? []),
+    volume: statistics?.volume,
     triangles: Number(statistics?.triangles ?? 0),
     trianglesGrid: Number(statistics?.trianglesGrid ?? 0),
     milliseconds: statistics?.milliseconds ?? 0,

@@ -1,5 +1,5 @@
 import {
-  WatchMode, type ReconstructedFrame, type ReconstructionParameters, type WatchEnded,
+  Output, WatchMode, type ReconstructedFrame, type ReconstructionParameters, type WatchEnded,
   type WatchOpened, type WatchedFrame,
 } from '@proto/v1/reconstruction_pb';
 import { Backoff } from './backoff';
@@ -7,7 +7,7 @@ import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { PlayoutClock } from './playout_clock';
 import { Player, type Range } from './player';
-import { decodeFrame } from '../protocol/decode';
+import { decodeFrame, decodeSpaceFrame } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
 import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf } from './settings';
@@ -246,7 +246,8 @@ export class WatchTrack implements Track {
       bytes: message.length,
       summary: summarise(frame, live ? this.counts : null),
       message: parse,
-      frame: () => decodeFrame(parse(), this.parameters?.plane ?? 0),
+      frame: () => (this.parameters?.output === Output.SURFACE
+        ? decodeSpaceFrame(parse()) : decodeFrame(parse(), this.parameters?.plane ?? 0)),
     }, keepFrom);
   }
 

@@ -1,4 +1,5 @@
 import type { View } from '../draw';
+import { parseSpaceView, type SpaceView, viewText } from '../space/camera';
 import { parseSettings, settingsText, type Settings } from '../stream/settings';
 
 /** Content of a pane. Empty `stream`: the stream of the first pane. */
@@ -14,7 +15,11 @@ export interface Address {
   /** Null: the newest frame. */
   frame: number | null;
   view: View | null;
+  /** The view of a picture of surfaces. */
+  camera: SpaceView | null;
   look: string;
+  /** The look of surfaces (space/look.ts). */
+  space: string;
 }
 
 /** `#file=dam.csv` or `#stream=dam&frame=12&view=1,2,300&set=placement:qef&beside=~fill:none&look=...` */
@@ -30,9 +35,11 @@ export function addressText(address: Address): string {
   add('frame', address.frame === null ? '' : String(address.frame));
   const view = address.view;
   add('view', view ? [view.x, view.y, view.scale].map((v) => Number(v.toPrecision(6))).join(',') : '');
+  add('camera', address.camera ? viewText(address.camera) : '');
   add('set', first ? settingsText(first.settings) : '');
   for (const pane of others) add('beside', `${pane.stream}~${settingsText(pane.settings)}`);
   add('look', address.look);
+  add('space', address.space);
   return parts.length > 0 ? `#${parts.join('&')}` : '';
 }
 
@@ -63,6 +70,8 @@ export function parseAddress(hash: string): Address {
     panes: [...first, ...first.length > 0 ? others : []],
     frame: Number.isInteger(frame) ? frame : null,
     view: parseView(values.get('view')),
+    camera: parseSpaceView(values.get('camera')),
     look: values.get('look') ?? '',
+    space: values.get('space') ?? '',
   };
 }

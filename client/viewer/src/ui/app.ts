@@ -17,6 +17,7 @@ import { Layout } from './layout';
 import { LookPanel } from './look_panel';
 import type { Pane } from './pane';
 import { SettingsPanel } from './settings_panel';
+import { SpacePanel } from './space_panel';
 import { Stage } from './stage';
 import { StatusLine } from './status_line';
 import { StreamsPanel } from './streams_panel';
@@ -36,6 +37,7 @@ export class App {
   private readonly link = new TimeLink();
   private readonly gauges = new Gauges();
   private readonly look: LookPanel;
+  private readonly space: SpacePanel;
   private readonly settings: SettingsPanel;
   private readonly stage: Stage;
   private readonly streams: StreamsPanel;
@@ -43,6 +45,7 @@ export class App {
   private readonly curves: CurvesPanel;
   private readonly exports: ExportPanel;
   private readonly files: FilesPanel;
+  private readonly gaugesPanel: GaugesPanel;
   /** The files of tracks. */
   private readonly opened = new Map<Track, OpenFile>();
   /** The address that was read or written last. */
@@ -62,6 +65,10 @@ export class App {
       moved: () => this.writeAddress(),
       released: (track) => this.released(track),
     });
+    this.space = new SpacePanel(() => {
+      this.stage.setSpaceLook(this.space.look);
+      this.writeAddress();
+    });
     this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
       (cells) => this.cellSizeFor(cells));
     this.time = new TimePanel(() => this.track, () => {
@@ -73,7 +80,7 @@ export class App {
       this.look.setDark(dark);
       this.curves.setDark(dark);
     });
-    new GaugesPanel(this.gauges, (curves) => this.curves.setFirst(curves));
+    this.gaugesPanel = new GaugesPanel(this.gauges, (curves) => this.curves.setFirst(curves));
     this.exports = new ExportPanel(() => this.stage.chosen, () => this.look.look, this.gauges,
                     (text, isError, isGone) => this.status.report(text, isError, isGone));
     this.files = new FilesPanel({
@@ -282,6 +289,7 @@ export class App {
     this.address = location.hash;
     const address = parseAddress(this.address);
     this.look.text = address.look;
+    if (address.space) this.space.text = address.space;
     this.linkedFile = address.file ? address : null;
     if (address.file) {
       this.status.report(`This link shows the file ${address.file}. Open it here.`, true, () => !this.linkedFile);
@@ -297,6 +305,7 @@ export class App {
       const track = file && !stream ? file : this.watchTrack(stream || address.panes[0].stream);
       const pane = this.stage.add(track, settings);
       if (address.view) pane.setView(address.view);
+      if (address.camera) pane.setSpaceView(address.camera);
     }
     this.stage.choose(this.stage.panes[0]);
     if (file) {
@@ -327,6 +336,7 @@ export class App {
     const player = first?.track.player;
     const leader = first && this.link.holds(first.track) ? this.track : first?.track;
     const isPaused = leader?.player.mode === 'paused';
+    const camera = first?.spaceView;
     const address: Address = {
       panes: panes.map(({ track, settings }, k) => ({
         stream: track === file || (k > 0 && track === first.track) ? '' : track.title, settings,
@@ -334,8 +344,10 @@ export class App {
       file: file?.title ?? '',
       open: optionsText((file && this.opened.get(file)?.options) ?? NO_OPTIONS),
       frame: isPaused && player && player.sequence !== null ? Number(first.track.labelOf(player.sequence)) : null,
-      view: first && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
+      view: first && !camera && (!first.isFree || (first.frame && isPaused)) ? first.scene.view : null,
+      camera: camera && (camera.isMoved || isPaused) ? camera.view : null,
       look: this.look.text,
+      space: this.space.text,
     };
     const text = addressText(address);
     if (text === this.address) return;
@@ -385,11 +397,16 @@ export class App {
     byId('linked-label', HTMLElement).hidden = this.stage.panes.length < 2;
     const pane: Pane | null = this.stage.chosen;
     const isVariant = (pane?.variantStream ?? null) !== null;
-    this.look.setAttributes(pane?.scene.channels ?? [], this.track);
-    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true);
-    this.exports.offer(pane?.scene.hasWebgl ?? true);
+    const isSpace = pane?.isSpace ?? false;
+    this.look.setAttributes(pane?.channels ?? [], this.track);
+    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true, isSpace);
+    this.exports.offer(pane?.scene.hasWebgl ?? true, isSpace);
+    this.space.offer(isSpace);
+    this.settings.offer(pane?.hasSurfaces ?? false);
+    this.gaugesPanel.offer(pane?.hasSurfaces ?? false);
+    this.curves.setKind(pane?.hasSurfaces ? 'space' : 'plane');
     this.look.setOutlines(pane?.outlines ?? []);
-    this.look.setLegend(pane?.scene.legend() ?? null);
+    this.look.setLegend(pane?.legend ?? null);
     this.time.refresh();
     const end = performance.now() + GAUGES_MS;
     this.gauges.measure(this.curves.shownEntries, () => performance.now() > end);

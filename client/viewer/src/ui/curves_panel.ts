@@ -14,6 +14,8 @@ export interface Curve {
   title: string;
   lines: Line[];
   isWide?: boolean;
+  /** The kind of results that have the curve; both, if absent. */
+  of?: 'plane' | 'space';
   /** Draws the lines as bands on top of each other, and shows this sum. */
   total?(summary: Summary): number;
 }
@@ -23,15 +25,21 @@ const milliseconds = (value: number) => number(value, 3);
 /** Curves of results. */
 export const RESULT_CURVES: Curve[] = [
   { title: 'Area', lines: [{ name: 'area', value: (s) => s.area, text: (value) => number(value, 7) }] },
-  { title: 'Rings, holes', lines: [
+  { title: 'Volume', of: 'space', lines: [{ name: 'volume', value: (s) => s.volume ?? NaN, text: (value) => number(value, 7) }] },
+  { title: 'Bodies, cavities', of: 'space', lines: [
+    { name: 'bodies', value: (s) => s.rings, text: count },
+    { name: 'cavities', value: (s) => s.holes, text: count },
+  ] },
+  { title: 'Triangles', of: 'space', lines: [{ name: 'triangles', value: (s) => s.triangles, text: count }] },
+  { title: 'Rings, holes', of: 'plane', lines: [
     { name: 'rings', value: (s) => s.rings, text: count },
     { name: 'holes', value: (s) => s.holes, text: count },
   ] },
-  { title: 'Triangles', lines: [
+  { title: 'Triangles', of: 'plane', lines: [
     { name: 'merged', value: (s) => s.triangles, text: count },
     { name: 'unmerged', value: (s) => s.trianglesGrid, text: count },
   ] },
-  { title: 'Reduction, %', lines: [{ name: 'reduction', value: reductionOf, text: (value) => number(value, 3) }] },
+  { title: 'Reduction, %', of: 'plane', lines: [{ name: 'reduction', value: reductionOf, text: (value) => number(value, 3) }] },
   {
     title: 'Milliseconds',
     lines: STAGES.map((name, k) => ({ name, value: (s: Summary) => s.stages[k], text: milliseconds })),
@@ -102,6 +110,7 @@ export class CurvesPanel {
   /** Index of the entry under the pointer. */
   private hovered: number | null = null;
   private colours = COLOURS.light;
+  private kind: 'plane' | 'space' = 'plane';
 
   /** `isDetailed`: captions have the value of every band. */
   constructor(private readonly curves: readonly Curve[], private readonly isDetailed: boolean,
@@ -119,6 +128,15 @@ export class CurvesPanel {
     const items = first.map((curve) => this.makeItem(curve));
     this.items[0].figure.before(...items.map(({ figure }) => figure));
     this.items.unshift(...items);
+    this.resize();
+    this.lastRefresh = -Infinity;
+  }
+
+  /** Shows the curves that results of this kind have. */
+  setKind(kind: 'plane' | 'space'): void {
+    if (kind === this.kind) return;
+    this.kind = kind;
+    for (const { curve, figure } of this.items) figure.hidden = curve.of !== undefined && curve.of !== kind;
     this.resize();
     this.lastRefresh = -Infinity;
   }
@@ -184,6 +202,7 @@ export class CurvesPanel {
     const caption = make('figcaption', {}, curve.title);
     const holder = make('div', { class: 'plot' });
     const figure = make('figure', { class: curve.isWide ? 'curve wide' : 'curve', 'aria-label': curve.title }, caption, holder);
+    figure.hidden = curve.of !== undefined && curve.of !== this.kind;
     this.panel.append(figure);
     return { curve, figure, caption, holder, plot: this.makePlot(curve, holder) };
   }

@@ -23,3 +23,11 @@ export function make<K extends keyof HTMLElementTagNameMap>(
 export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
+
+/** Disables a control with the reason as its tooltip, or enables it with its own tooltip. */
+export function block(control: HTMLInputElement | HTMLSelectElement | HTMLButtonElement, reason: string): void {
+  control.disabled = reason !== '';
+  control.dataset.title ??= control.title;
+  const title = reason || control.dataset.title;
+  if (control.title !== title) control.title = title;
+}

@@ -4,9 +4,10 @@ import { NO_WEBGL } from '../draw';
 import type { Gauges } from '../gauges/gauges';
 import type { CurveSource } from '../stream/track';
 import { curvesCsv } from './curve_data';
-import { button, input, setText } from './dom';
+import { block, button, input, setText } from './dom';
 import type { Pane } from './pane';
 
+const OF_OUTLINES = 'A surface has no outline to save, so choose a section under "Picture of" first.';
 const PNG_TITLE = 'Saves the picture with legend, scale and time in pixels.';
 
 /** The button that records. A running recording can always be stopped. */
@@ -28,7 +29,7 @@ export class ExportPanel {
 
   constructor(private readonly pane: () => Pane | null, private readonly look: () => Look, gauges: Gauges,
               private readonly report: (text: string, isError: boolean, isGone?: () => boolean) => void) {
-    this.on('export-png', async (shown) => download(this.name(shown, 'png'), await png(shown.scene, this.marks(shown))));
+    this.on('export-png', async (shown) => download(this.name(shown, 'png'), await png(shown.drawn, this.marks(shown))));
     this.on('export-svg', async (shown) => {
       if (!shown.frame) return;
       const { view, size } = shown.scene;
@@ -53,7 +54,8 @@ export class ExportPanel {
   }
 
   /** Offers only what the browser can export. */
-  offer(hasWebgl: boolean): void {
+  offer(hasWebgl: boolean, isSpace: boolean): void {
+    for (const id of ['export-svg', 'export-geojson']) block(button(id), isSpace ? OF_OUTLINES : '');
     const png = button('export-png');
     png.disabled = !hasWebgl;
     png.title = hasWebgl ? PNG_TITLE : `${NO_WEBGL} Save the picture as SVG.`;
@@ -99,7 +101,7 @@ export class ExportPanel {
   }
 
   private startClip(pane: Pane): void {
-    const started = clip(pane.scene, () => this.marks(pane));
+    const started = clip(pane.drawn, () => this.marks(pane));
     started.start();
     this.recording = { clip: started, pane };
   }
@@ -110,9 +112,10 @@ export class ExportPanel {
   }
 
   /** Caption, scale, legend, axes and measurement of the picture. */
-  private marks({ scene, caption, measured }: Pane) {
+  private marks(pane: Pane) {
     const { dark, axes } = this.look();
-    return marksOf(caption, scene.size, scene.view, scene.legend(), dark, { axes, ...measured });
+    const { scene, caption, measured } = pane;
+    return pane.spaceMarks(dark) ?? marksOf(caption, scene.size, scene.view, scene.legend(), dark, { axes, ...measured });
   }
 
   private name(pane: Pane, suffix: string): string {

@@ -1,7 +1,7 @@
 import type { Gauges } from '../gauges/gauges';
 import { columnsOf, type Gauge, kindOf, parseGauge } from '../gauges/kinds';
 import type { Curve } from './curves_panel';
-import { byId, input, make, setText } from './dom';
+import { block, button, byId, input, make, setText } from './dom';
 import { number } from './format';
 
 /** The curve of a gauge. */
@@ -15,11 +15,22 @@ export function curveOf(gauges: Gauges, gauge: Gauge): Curve {
 
 /** A form that adds gauges, and their list. */
 export class GaugesPanel {
+  private isBlocked = false;
+
   constructor(private readonly gauges: Gauges, private readonly changed: (curves: Curve[]) => void) {
     byId('gauge-form', HTMLFormElement).addEventListener('submit', (event) => {
       event.preventDefault();
       this.add();
     });
+  }
+
+  /** Gauges measure outlines, which surfaces lack. */
+  offer(hasSurfaces: boolean): void {
+    if (hasSurfaces === this.isBlocked) return;
+    this.isBlocked = hasSurfaces;
+    for (const control of [input('gauge'), button('add-gauge')]) {
+      block(control, hasSurfaces ? 'Gauges measure outlines, and this stream has surfaces.' : '');
+    }
   }
 
   private add(): void {

@@ -7,7 +7,7 @@ import { MAP_NAMES, type MapName } from '../draw/ramp';
 import { channelLabel } from '../protocol/channels';
 import { outlineName, shiftBetween, type Outline } from '../protocol/sections';
 import type { Track } from '../stream/track';
-import { byId, input, make, select, setText } from './dom';
+import { block, byId, input, make, select, setText } from './dom';
 import { number } from './format';
 
 const SWITCHES = {
@@ -19,6 +19,12 @@ const TITLES: Record<keyof typeof SWITCHES, string> = {
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
   normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
+/** Beside a picture of surfaces. */
+const SPACE_TITLES: Partial<Record<keyof typeof SWITCHES, string>> = {
+  fill: 'Draws the surface.', particles: 'Draws the particles as dots, which an opaque surface hides.',
+  sections: 'Draws the sections as lines in their planes.', axes: 'Shows coordinates along the box of the surface.',
+};
+const NO_OUTLINE = 'A surface has no outline, so choose a section under "Picture of".';
 export type Switch = keyof typeof SWITCHES;
 const NAMES = Object.keys(SWITCHES) as Switch[];
 
@@ -92,10 +98,11 @@ export class LookPanel {
     const shown = outlineShown < outlines.length ? outlineShown : 0;
     picture.value = String(shown);
     byId('outline-list', HTMLElement).replaceChildren(...outlines.map((outline, k) =>
-      this.outlineItem(names[k], k, shown, shiftBetween(outline.plane, outlines[shown].plane) !== null)));
+      this.outlineItem(names[k], k, shown, outlines[shown].isSurface || shiftBetween(outline.plane, outlines[shown].plane) !== null,
+        outline.isSurface ?? false)));
   }
 
-  private outlineItem(name: string, index: number, shown: number, isParallel: boolean): HTMLElement {
+  private outlineItem(name: string, index: number, shown: number, isParallel: boolean, isSurface: boolean): HTMLElement {
     const { dark, hidden } = this.chosen;
     const box = make('input', { type: 'checkbox' });
     box.checked = index !== shown && isParallel && !hidden.includes(index);
@@ -104,20 +111,24 @@ export class LookPanel {
       hidden: box.checked ? hidden.filter((one) => one !== index) : [...hidden, index].sort((a, b) => a - b),
     }));
     const swatch = make('i', { style: `background: ${hex(isolineColour(index, dark))}` });
-    const note = index === shown ? ', the picture' : isParallel ? '' : ', another plane';
+    const note = index === shown ? ', the picture' : isParallel ? '' : isSurface ? ', in space' : ', another plane';
     const label = make('label', {}, box, swatch, name + note);
     label.title = index === shown ? 'This outline is the picture.'
       : isParallel ? `Draws ${name} as lines.`
-        : 'Its plane is not parallel to the plane of the picture, so choose it under "Picture of".';
+        : isSurface ? 'Choose it under "Picture of" to see it in space.' : 'Its plane is not parallel to the plane of the picture, so choose it under "Picture of".';
     return make('li', {}, label);
   }
 
   /** Disables the switches of parts that the frame lacks, with the reason. Without WebGL, says so. */
-  offer(frame: Frame | null, kind: Track['kind'], hasWebgl: boolean): void {
+  offer(frame: Frame | null, kind: Track['kind'], hasWebgl: boolean, isSpace = false): void {
     const remedy = (text: string) => (kind === 'watch' ? ` ${text}` : '');
     // For a dropped file, the page draws the particles of the file, so they are never missing.
-    const missing: Partial<Record<Switch, string>> = {
-      edges: frame && !frame.mesh ? 'This frame has no mesh.' : '',
+    const missing: Partial<Record<Switch, string>> = isSpace ? {
+      outline: NO_OUTLINE, normals: NO_OUTLINE, edges: '', fill: '', sections: '', axes: '',
+      particles: frame?.surface?.particles.length === 0
+        ? `This frame has no particles.${remedy('Start its producer with --echo-particles.')}` : '',
+    } : {
+      outline: '', fill: '', sections: '', axes: '', edges: frame && !frame.mesh ? 'This frame has no mesh.' : '',
       particles: frame && !frame.particles && kind !== 'file'
         ? `This frame has no particles.${remedy('Start its producer with --echo-particles.')}` : '',
       normals: frame && !frame.rings.normals
@@ -127,8 +138,11 @@ export class LookPanel {
       const control = input(SWITCHES[name]);
       control.disabled = reason !== '';
       const label = control.parentElement;
-      if (label && label.title !== (reason || TITLES[name])) label.title = reason || TITLES[name];
+      const title = reason || (isSpace && SPACE_TITLES[name]) || TITLES[name];
+      if (label && label.title !== title) label.title = title;
     }
+    const ofRings = isSpace ? 'Measurements are of outlines, so choose a section under "Picture of".' : '';
+    if (select('measure').disabled !== isSpace) block(select('measure'), ofRings);
     byId('no-webgl', HTMLElement).hidden = hasWebgl;
     setText(byId('no-webgl', HTMLElement), hasWebgl ? '' : NO_WEBGL);
   }

@@ -1,9 +1,15 @@
-import { attachNavigation, Scene, type Look, type Picked } from '../draw';
+import { Output } from '@proto/v1/reconstruction_pb';
+import { attachNavigation, Scene, type Legend, type Look, type Picked } from '../draw';
 import { valuesAt } from '../draw/values';
 import { boundsOf, fitBounds, toCss, union, type Bounds } from '../draw/view';
+import type { Drawn } from '../export/canvas_copy';
+import type { Mark } from '../export/marks';
 import type { Frame } from '../protocol/frame';
 import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
+import type { SpaceView, Vector } from '../space/camera';
+import { DEFAULT_SPACE_LOOK, type SpaceLook } from '../space/look';
+import type { SpaceEvents, SpacePicture } from '../space/picture';
 import type { Entry, Summary } from '../stream/history';
 import {
   cellSizeOf, FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
@@ -29,8 +35,8 @@ export interface PaneEvents {
   closed(pane: Pane): void;
   /** The view changed, by the user or because the picture has grown. */
   moved(pane: Pane, byUser: boolean): void;
-  /** The user selected the ring at a world position, or none. */
-  selected?(pane: Pane, point: Point | null): void;
+  /** The user selected the ring or the body at a world position, or none. */
+  selected?(pane: Pane, point: Point | Vector | null): void;
 }
 
 /** Makes the computations of a pane with other settings than those of its track. */
@@ -90,10 +96,19 @@ export class Pane {
   private pointer: [number, number] | null = null;
   private picked: Picked | null = null;
   private selected: bigint | null = null;
+  /** The picture of surfaces; null until there is one. */
+  private space: SpacePicture | null = null;
+  private spaceLook: SpaceLook = DEFAULT_SPACE_LOOK;
+  /** The view for the picture of surfaces before there is one. */
+  private firstSpaceView: SpaceView | null = null;
 
-  /** `variants`: for other settings than those of the track; null if they are not offered. */
+  /**
+   * `variants`: computes other settings; null if they are not offered. `pictureOfSpace`: makes the
+   * picture of surfaces; null where there are none.
+   */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
-              private readonly variants: Variants | null) {
+              private readonly variants: Variants | null,
+              private readonly pictureOfSpace: ((events: SpaceEvents) => SpacePicture) | null = null) {
     this.element = make('section', { class: 'pane' },
       make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
       make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.readout, this.notice),
@@ -121,6 +136,7 @@ export class Pane {
     this.element.setAttribute('aria-label', label);
     this.element.classList.toggle('active', active);
     this.canvas.setAttribute('aria-label', `${label}: outline of ${this.track.title}`);
+    this.space?.canvas.setAttribute('aria-label', `${label}: surface of ${this.track.title}`);
     this.closeButton.setAttribute('aria-label', `Close ${label.toLowerCase()}`);
     this.closeButton.hidden = count === 1;
   }
@@ -131,6 +147,9 @@ export class Pane {
     this.isFree = true;
     this.resetVariant();
     this.select(null);
+    this.space?.select(null);
+    if (this.space) this.space.isFree = true;
+    this.showSpace(false);
   }
 
   setSettings(settings: Settings): void {
@@ -147,12 +166,55 @@ export class Pane {
     const isOther = look.outlineShown !== this.look?.outlineShown;
     this.look = look;
     this.dirty = true;
+    this.space?.setLook(look, this.spaceLook);
     if (isOther && this.whole && this.whole.sections.length > 0) this.showOutline(this.whole);
     if (isNew && this.frame) void this.addParticles(this.frame);
   }
 
+  setSpaceLook(spaceLook: SpaceLook): void {
+    this.spaceLook = spaceLook;
+    if (this.look) this.space?.setLook(this.look, spaceLook);
+  }
+
+  /** Whether the pane shows surfaces in space. */
+  get isSpace(): boolean { return this.space !== null && !this.space.element.hidden; }
+
+  /** The canvas of the picture, for exports. */
+  get drawn(): Drawn { return this.space && this.isSpace ? this.space.scene : this.scene; }
+
+  get legend(): Legend | null { return this.space && this.isSpace ? this.space.scene.legend() : this.scene.legend(); }
+
+  /** Names of the numbers that the frame can be coloured by. */
+  get channels(): string[] { return this.space && this.isSpace ? this.space.scene.channels : this.scene.channels; }
+
+  /** The camera of a picture of surfaces; null for another picture. `isMoved`: whether the user has moved it. */
+  get spaceView(): { view: SpaceView; isMoved: boolean } | null {
+    return this.space && this.isSpace ? { view: this.space.scene.view, isMoved: !this.space.isFree } : null;
+  }
+
+  setSpaceView(view: SpaceView): void {
+    if (this.space) this.space.setView(view);
+    else this.firstSpaceView = view;
+  }
+
+  /** Adopts the view of another pane that shows the same kind of picture. */
+  followView(other: Pane): void {
+    const { spaceView } = other;
+    if (spaceView) this.setSpaceView(spaceView.view);
+    else if (!this.isSpace) this.setView(other.scene.view);
+  }
+
+  /** What lies over a picture of surfaces, for exports; null for another picture. */
+  spaceMarks(dark: boolean): Mark[] | null {
+    return this.space && this.isSpace ? this.space.marks(this.caption, dark) : null;
+  }
+
   /** Lets the view follow the content again. */
   fit(): void {
+    if (this.isSpace) {
+      this.space?.fit();
+      return;
+    }
     this.isFree = true;
     this.extent = null;
     this.keepInView();
@@ -194,6 +256,9 @@ export class Pane {
   /** Whether the frame shown is one of the track, and not of other settings or a section. */
   get isStreamed(): boolean { return this.frame === null || this.entry !== null; }
 
+  /** Whether the stream is one of surfaces. */
+  get hasSurfaces(): boolean { return this.track.parameters?.output === Output.SURFACE; }
+
   private get entry(): Entry | null {
     const isOwn = this.frame !== null && (this.frame === this.whole || (this.look?.outlineShown ?? 0) === 0);
     return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
@@ -216,7 +281,8 @@ export class Pane {
 
   get state(): PaneState {
     const doubts = this.frame?.statistics.doubts ?? [];
-    return paneState(this.track, this.refusal, doubts.map((doubt) => this.track.doubtText(doubt)).join(' '),
+    const problem = this.isSpace ? this.space?.problem ?? '' : '';
+    return paneState(this.track, this.refusal || problem, doubts.map((doubt) => this.track.doubtText(doubt)).join(' '),
       this.frame !== null && !this.isPending);
   }
 
@@ -231,7 +297,8 @@ export class Pane {
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');
     this.showState();
-    if (!this.dirty) return;
+    if (this.isSpace) this.space?.refresh();
+    if (!this.dirty || this.isSpace) return;
     this.dirty = false;
     this.pick();
     this.scene.draw();
@@ -244,6 +311,7 @@ export class Pane {
     this.detach();
     this.resetVariant();
     this.observer.disconnect();
+    this.space?.destroy();
     this.scene.destroy();
     this.element.remove();
   }
@@ -257,6 +325,7 @@ export class Pane {
     this.refusal = '';
     this.isPending = false;
     this.scene.show(null);
+    this.space?.clear();
     this.numbers.clear();
     this.dirty = true;
   }
@@ -276,6 +345,7 @@ export class Pane {
   }
 
   private get isVariant(): boolean {
+    if (this.hasSurfaces) return false;
     return this.track.kind === 'watch' ? !isAsStreamed(this.settings)
       : !isAsStreamed(this.settings) &&
         settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
@@ -337,14 +407,51 @@ export class Pane {
     this.shown = source;
     this.isPending = false;
     this.whole = frame;
+    const isSpace = this.pictureOfSpace !== null && frame.surface !== undefined && (this.look?.outlineShown ?? 0) === 0;
+    this.showSpace(isSpace);
+    if (isSpace) {
+      this.space?.show(frame, this.outlines);
+      return;
+    }
     frame = pictureOf(frame, this.outlines, this.look?.outlineShown ?? 0);
     this.frame = frame;
     this.scene.show(frame);
     this.keepInView();
-    this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), this.method());
-    this.shownText = this.description();
+    this.showNumbers(frame);
     this.dirty = true;
     if (this.look?.particles) void this.addParticles(frame);
+  }
+
+  private showNumbers(frame: Frame): void {
+    this.frame = frame;
+    this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), this.method());
+    this.shownText = this.description();
+  }
+
+  /** Switches between the pictures of surfaces and of outlines. */
+  private showSpace(isSpace: boolean): void {
+    if (isSpace === this.isSpace) return;
+    if (isSpace) this.space ??= this.newSpacePicture(this.pictureOfSpace);
+    if (this.space) this.space.element.hidden = !isSpace;
+    for (const element of [this.canvas, this.overlay.element, this.scaleBar.element, this.readout]) {
+      element.toggleAttribute('hidden', isSpace);
+    }
+    if (!isSpace) this.scene.resize();
+  }
+
+  private newSpacePicture(make: Pane['pictureOfSpace']): SpacePicture | null {
+    if (!make) return null;
+    const space = make({
+      moved: (byUser) => this.events.moved(this, byUser),
+      selected: (point) => this.events.selected?.(this, point),
+      shown: (frame) => { if (this.isSpace) this.showNumbers(frame); },
+    });
+    space.element.hidden = true;
+    space.canvas.setAttribute('aria-label', `Surface of ${this.track.title}`);
+    this.canvas.before(space.element);
+    if (this.look) space.setLook(this.look, this.spaceLook);
+    if (this.firstSpaceView) space.setView(this.firstSpaceView);
+    return space;
   }
 
   /** Shows another outline of the frame, in the coordinates of its plane. */
@@ -369,7 +476,7 @@ export class Pane {
 
   private async addParticles(frame: Frame): Promise<void> {
     const source = this.stream ?? this.track;
-    if (frame.particles || !source.drawnParticles) return;
+    if (frame.surface || frame.particles || !source.drawnParticles) return;
     const particles = await source.drawnParticles(Number(frame.sequence), frame.origin);
     if (frame !== this.frame || !particles) return;
     frame.particles = particles.points;
@@ -445,8 +552,12 @@ export class Pane {
     }
   }
 
-  /** Selects the ring at a world position, or none. */
-  selectAt(point: Point | null): void {
+  /** Selects the ring or the body at a world position, or none. A picture of the other kind selects nothing. */
+  selectAt(point: Point | Vector | null): void {
+    if (this.isSpace || point?.length === 3) {
+      this.space?.selectAt(point?.length === 3 ? point : null);
+      return;
+    }
     const ring = point && this.scene.pick(...toCss(this.scene.view, this.scene.size, ...point)).ring;
     this.select(ring === null ? null : this.frame?.rings.identities[ring] ?? null);
   }

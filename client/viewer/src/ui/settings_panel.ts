@@ -1,18 +1,20 @@
 import { Placement } from '@proto/v1/reconstruction_pb';
 import { AS_STREAMED, FILLS, nameOf, PLACEMENTS, SHARES, type Settings } from '../stream/settings';
-import { byId, button, input, select, setText } from './dom';
+import { block, byId, button, input, select, setText } from './dom';
 
 const NUMBERS = {
   kernelRadius: 'kernel', referenceRadius: 'reference', cellSize: 'cell', surfaceOffset: 'offset',
 } as const;
 /** Cells across the outline in the paper's comparisons. */
 const GRIDS = [32, 64];
+const OF_OUTLINES = 'A stream of surfaces is shown with the settings of its producer.';
 type NumberName = keyof typeof NUMBERS;
 
 /** Settings of the chosen pane. */
 export class SettingsPanel {
   /** The last valid settings. */
   private valid: Settings = AS_STREAMED;
+  private isBlocked = false;
 
   /** `cellSize`: for a number of cells across the outline; null without an outline. */
   constructor(private readonly changed: (settings: Settings) => void,
@@ -40,6 +42,18 @@ export class SettingsPanel {
     select('share').value = String(settings.share);
     setText(byId('settings-of', HTMLElement), pane);
     this.offerOffset();
+  }
+
+  /** Surfaces have no other settings than those of their stream. */
+  offer(hasSurfaces: boolean): void {
+    if (hasSurfaces === this.isBlocked) return;
+    this.isBlocked = hasSurfaces;
+    const controls = [
+      select('placement'), select('fill'), select('share'), ...Object.values(NUMBERS).map(input),
+      ...GRIDS.map((cells) => button(`grid-${cells}`)), button('reset-settings'),
+    ];
+    for (const control of controls) block(control, hasSurfaces ? OF_OUTLINES : '');
+    if (!hasSurfaces) this.offerOffset();
   }
 
   private setGrid(cells: number): void {
@@ -72,6 +86,7 @@ export class SettingsPanel {
 
   /** The surface offset applies to one placement only. */
   private offerOffset(): void {
+    if (this.isBlocked) return;
     input('offset').disabled = PLACEMENTS[select('placement').value] !== Placement.FARTHEST_PARTICLE;
   }
 }

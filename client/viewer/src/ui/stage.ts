@@ -6,6 +6,9 @@ import { Variant } from '../stream/variant';
 import { VariantStream } from '../stream/variant_stream';
 import { byId } from './dom';
 import type { Point } from './measure';
+import type { Vector } from '../space/camera';
+import { DEFAULT_SPACE_LOOK, type SpaceLook } from '../space/look';
+import { SpacePicture } from '../space/picture';
 import { Pane } from './pane';
 
 /** More pictures would be too small to compare. */
@@ -17,6 +20,7 @@ export class Stage {
   chosen: Pane | null = null;
   /** Whether panes of different tracks share view and selection. */
   isLinked = true;
+  private spaceLook: SpaceLook = DEFAULT_SPACE_LOOK;
   private readonly element = byId('stage', HTMLElement);
 
   constructor(private readonly gateway: Gateway, private look: Look, private readonly events: {
@@ -39,12 +43,13 @@ export class Stage {
     }, {
       frame: (changed) => new Variant(this.gateway, changed),
       stream: (of, other) => new VariantStream(this.gateway, of, other),
-    });
+    }, (events) => new SpacePicture(events));
     pane.setLook(this.look);
+    pane.setSpaceLook(this.spaceLook);
     this.panes.push(pane);
     this.element.append(pane.element);
     const sibling = this.panes.find((other) => other.track === track && other.frame);
-    if (sibling) pane.setView(sibling.scene.view);
+    if (sibling) pane.followView(sibling);
     this.choose(pane);
     return pane;
   }
@@ -79,17 +84,22 @@ export class Stage {
     for (const pane of this.panes) pane.setLook(look);
   }
 
+  setSpaceLook(look: SpaceLook): void {
+    this.spaceLook = look;
+    for (const pane of this.panes) pane.setSpaceLook(look);
+  }
+
   /** Panes of the same track share their view. Linked panes share it as soon as the user moves one. */
   linkViews(moved: Pane, byUser: boolean): void {
     for (const pane of this.panes) {
       const isShared = pane.track === moved.track || (byUser && this.isLinked);
-      if (pane !== moved && isShared) pane.setView(moved.scene.view);
+      if (pane !== moved && isShared) pane.followView(moved);
     }
     this.events.moved(moved);
   }
 
-  /** Linked panes select the ring at the same place. */
-  private linkSelection(source: Pane, point: Point | null): void {
+  /** Linked panes select the ring or the body at the same place. */
+  private linkSelection(source: Pane, point: Point | Vector | null): void {
     for (const pane of this.panes) {
       if (pane !== source && this.isLinked) pane.selectAt(point);
     }

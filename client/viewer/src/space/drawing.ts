@@ -1,0 +1,77 @@
+import type { Rgb } from '../draw/colours';
+import type { Surface } from '../protocol/surface';
+import type { Camera, Vector } from './camera';
+import type { SpaceLook } from './look';
+import type { Clip } from './pick';
+
+/** The outlines of a section as lines: pairs of points relative to the surface's origin. */
+export interface SectionLines { positions: Float32Array; colour: Rgb }
+
+/** Colours of one picture. */
+export interface SpaceTheme {
+  background: Rgb;
+  edge: Rgb;
+  particle: Rgb;
+  accent: Rgb;
+  missing: Rgb;
+  /** Light on faces that do not face the light, from 0 to 1. */
+  ambient: number;
+}
+
+/** Numbers to colour by; null for tints. */
+export interface ValueColours {
+  points: Float32Array | null;
+  particles: Float32Array | null;
+  min: number;
+  max: number;
+  /** 256 colours as RGBA. */
+  texels: Uint8Array;
+}
+
+/** What is drawn besides the surface. */
+export interface SpaceState {
+  camera: Camera;
+  look: SpaceLook;
+  theme: SpaceTheme;
+  hasSurface: boolean;
+  hasEdges: boolean;
+  hasParticles: boolean;
+  /** Spacing of the particles in world units. */
+  spacing: number;
+  lineWidth: number;
+  clip: Clip | null;
+  values: ValueColours | null;
+  /** Device pixels per CSS pixel. */
+  ratio: number;
+  /** Distances from the camera between which everything lies. */
+  near: number;
+  far: number;
+  /** World coordinates of the surface's origin. */
+  origin: Vector;
+}
+
+/** The part of the drawing that the page loads when it shows a surface (renderer.ts). */
+export interface SpaceDrawing {
+  /** Uploads a surface, or removes the former one. */
+  show(surface: Surface | null): void;
+  /** RGBA of each point; alpha is 255 for selected shells. */
+  setTints(tints: Uint8Array): void;
+  setSections(lines: readonly SectionLines[]): void;
+  draw(state: SpaceState): void;
+  destroy(): void;
+}
+
+/** The content of space.js. */
+export interface SpaceModule { createDrawing(canvas: HTMLCanvasElement): SpaceDrawing }
+
+let loading: Promise<SpaceModule> | null = null;
+
+/** Loads space.js once. Throws an Error with a sentence. */
+export function loadSpace(): Promise<SpaceModule> {
+  const address: string = new URL('space.js', document.baseURI).href;
+  loading ??= (import(address) as Promise<SpaceModule>).catch(() => {
+    loading = null;
+    throw new Error('The part of the page that draws surfaces, space.js, cannot be loaded.');
+  });
+  return loading;
+}

@@ -1,0 +1,247 @@
+// Draws surfaces by three.js. Bundled as space.js, which the page loads when it shows a surface.
+import {
+  BufferAttribute, BufferGeometry, Color, ColorManagement, DataTexture, DoubleSide, FrontSide, BackSide,
+  LinearSRGBColorSpace, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera, Points, Scene, ShaderMaterial,
+  Vector2, Vector3, Vector4, WebGLRenderer, type Camera as ThreeCamera, type IUniform, type Side,
+} from 'three';
+import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
+import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
+import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
+import type { Rgb } from '../draw/colours';
+import { dotDiameter } from '../draw/style';
+import type { Surface } from '../protocol/surface';
+import { axesOf, distanceOf, FIELD_OF_VIEW, minus, plus, unitsPerPixel } from './camera';
+import type { SectionLines, SpaceDrawing, SpaceState } from './drawing';
+import {
+  COLOUR_MODE, EDGE_FRAGMENT, EDGE_VERTEX, POINT_FRAGMENT, POINT_VERTEX, SURFACE_FRAGMENT, SURFACE_VERTEX,
+} from './shaders';
+
+const TRANSLUCENT = 0.4;
+const TRANSLUCENT_EDGES = 0.35;
+const HIDDEN_LINES = 0.35;
+const MAP_COLOURS = 256;
+/** Cuts nothing: no point is above an infinite height. */
+const NO_CLIP = 1e30;
+const SMALLEST_DOT = 1.5;
+
+// The shaders use sRGB throughout.
+ColorManagement.enabled = false;
+
+type Uniforms = Record<string, IUniform>;
+
+/** Uniforms that several materials share. */
+function commonUniforms(): Uniforms {
+  return {
+    clip: { value: new Vector4(0, 0, 0, NO_CLIP) }, ramp: { value: null }, range: { value: new Vector2() },
+    missing: { value: new Color() }, mode: { value: COLOUR_MODE.tint },
+  };
+}
+
+function setColour(uniform: IUniform, [red, green, blue]: Rgb): void {
+  (uniform.value as Color).setRGB(red, green, blue);
+}
+
+class Drawing implements SpaceDrawing {
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly perspective = new PerspectiveCamera(FIELD_OF_VIEW);
+  private readonly parallel = new OrthographicCamera();
+  private readonly common = commonUniforms();
+  private readonly surfaceUniforms: Uniforms = {
+    ...this.common, isFlat: { value: false }, isParallel: { value: false }, opacity: { value: 1 },
+    accent: { value: new Color() }, ambient: { value: 0.3 },
+  };
+  private readonly pointUniforms: Uniforms = {
+    ...this.common, mode: { value: COLOUR_MODE.tint }, colour: { value: new Color() }, diameter: { value: 1 },
+    smallest: { value: 1 }, distance: { value: 0 },
+  };
+  private readonly edgeUniforms: Uniforms = { clip: this.common.clip, colour: { value: new Color() }, opacity: { value: 1 } };
+  private readonly background = new Color();
+  private ramp: DataTexture | null = null;
+  private rampOf: Uint8Array | null = null;
+  private surface: Surface | null = null;
+  private geometry = new BufferGeometry();
+  private edgeGeometry = new BufferGeometry();
+  private pointGeometry = new BufferGeometry();
+  /** Inside and outside of the surface. A translucent one is drawn in two steps. */
+  private readonly inside: Mesh<BufferGeometry, ShaderMaterial>;
+  private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
+  private readonly edges: LineSegments;
+  private readonly points: Points;
+  private sections: LineSegments2[] = [];
+
+  constructor(canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: false });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    // Parts are drawn in the order of `add`. Sorting would compute the bounding sphere of each frame: 4 ms of 200,000 triangles.
+    this.renderer.sortObjects = false;
+    const material = (side: Side) => new ShaderMaterial({
+      vertexShader: SURFACE_VERTEX, fragmentShader: SURFACE_FRAGMENT, uniforms: this.surfaceUniforms, side,
+      // Edges and sections lie in the surface, and must be in front of it.
+      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+    });
+    this.inside = new Mesh(this.geometry, material(BackSide));
+    this.outside = new Mesh(this.geometry, material(DoubleSide));
+    this.edges = new LineSegments(this.edgeGeometry, new ShaderMaterial({
+      vertexShader: EDGE_VERTEX, fragmentShader: EDGE_FRAGMENT, uniforms: this.edgeUniforms, transparent: true, depthWrite: false,
+    }));
+    this.points = new Points(this.pointGeometry, new ShaderMaterial({
+      vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, uniforms: this.pointUniforms,
+    }));
+    for (const one of [this.points, this.inside, this.outside, this.edges]) {
+      one.frustumCulled = false;
+      one.matrixAutoUpdate = false;
+      this.scene.add(one);
+    }
+  }
+
+  show(surface: Surface | null): void {
+    this.surface = surface;
+    for (const geometry of [this.geometry, this.edgeGeometry, this.pointGeometry]) geometry.dispose();
+    this.geometry = this.inside.geometry = this.outside.geometry = new BufferGeometry();
+    this.edgeGeometry = this.edges.geometry = new BufferGeometry();
+    this.pointGeometry = this.points.geometry = new BufferGeometry();
+    if (!surface) return;
+    const { positions, normals, triangles, particles } = surface;
+    const places = new BufferAttribute(positions, 3);
+    this.geometry.setAttribute('position', places);
+    this.geometry.setAttribute('normal', normals instanceof Int8Array
+      ? new BufferAttribute(normals, 4, true) : new BufferAttribute(normals, 3));
+    this.geometry.setIndex(new BufferAttribute(triangles, 1));
+    this.edgeGeometry.setAttribute('position', places);
+    if (particles) this.pointGeometry.setAttribute('position', new BufferAttribute(particles, 3));
+  }
+
+  setTints(tints: Uint8Array): void {
+    this.geometry.setAttribute('tint', new BufferAttribute(tints, 4, true));
+  }
+
+  setSections(lines: readonly SectionLines[]): void {
+    for (const section of this.sections) {
+      this.scene.remove(section);
+      section.geometry.dispose();
+      section.material.dispose();
+    }
+    this.sections = lines.filter(({ positions }) => positions.length > 0).flatMap(({ positions, colour }) => {
+      const geometry = new LineSegmentsGeometry().setPositions(positions);
+      // Lines behind the surface are faint.
+      return [false, true].map((isVisible) => {
+        const material = new LineMaterial({ depthTest: isVisible, transparent: true, opacity: isVisible ? 1 : HIDDEN_LINES });
+        material.color.setRGB(...colour);
+        const section = new LineSegments2(geometry, material);
+        section.frustumCulled = false;
+        this.scene.add(section);
+        return section;
+      });
+    });
+  }
+
+  draw(state: SpaceState): void {
+    const { camera: { size, isPerspective }, ratio, theme, lineWidth } = state;
+    this.renderer.setPixelRatio(ratio);
+    const held = this.renderer.getSize(new Vector2());
+    if (held.x !== size.width || held.y !== size.height) this.renderer.setSize(size.width, size.height, false);
+    this.renderer.setClearColor(this.background.setRGB(...theme.background), 1);
+    this.setUniforms(state);
+    this.setParts(state);
+    for (const { material } of this.sections) {
+      material.linewidth = lineWidth;
+      material.resolution.set(size.width, size.height);
+    }
+    this.renderer.render(this.scene, this.placed(isPerspective ? this.perspective : this.parallel, state));
+  }
+
+  destroy(): void {
+    this.show(null);
+    this.setSections([]);
+    this.ramp?.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+
+  private setUniforms(state: SpaceState): void {
+    const { look, theme, clip, values, camera, spacing, ratio } = state;
+    const { common, surfaceUniforms, pointUniforms, edgeUniforms } = this;
+    if (clip) (common.clip.value as Vector4).set(...clip.normal, clip.at);
+    else (common.clip.value as Vector4).set(0, 0, 0, NO_CLIP);
+    setColour(common.missing, theme.missing);
+    this.setValues(state);
+    common.mode.value = values?.points ? COLOUR_MODE.values : COLOUR_MODE.tint;
+    pointUniforms.mode.value = values?.particles ? COLOUR_MODE.values : COLOUR_MODE.tint;
+    surfaceUniforms.isFlat.value = look.shading === 'flat';
+    surfaceUniforms.isParallel.value = !look.isPerspective;
+    surfaceUniforms.opacity.value = look.isTranslucent ? TRANSLUCENT : 1;
+    surfaceUniforms.ambient.value = theme.ambient;
+    setColour(surfaceUniforms.accent, theme.accent);
+    setColour(pointUniforms.colour, theme.particle);
+    pointUniforms.diameter.value = ratio * dotDiameter(spacing / unitsPerPixel(camera));
+    pointUniforms.smallest.value = ratio * SMALLEST_DOT;
+    pointUniforms.distance.value = camera.isPerspective ? distanceOf(camera.view) : 0;
+    setColour(edgeUniforms.colour, theme.edge);
+    edgeUniforms.opacity.value = look.isTranslucent ? TRANSLUCENT_EDGES : 0.8;
+  }
+
+  private setValues({ values }: SpaceState): void {
+    const set = (geometry: BufferGeometry, numbers: Float32Array | null) => {
+      if ((geometry.getAttribute('value') as BufferAttribute | undefined)?.array === numbers) return;
+      if (numbers) geometry.setAttribute('value', new BufferAttribute(numbers, 1));
+      else geometry.deleteAttribute('value');
+    };
+    set(this.geometry, values?.points ?? null);
+    set(this.pointGeometry, values?.particles ?? null);
+    if (!values) return;
+    (this.common.range.value as Vector2).set(values.min, values.max);
+    if (values.texels === this.rampOf) return;
+    this.ramp?.dispose();
+    this.rampOf = values.texels;
+    this.ramp = new DataTexture(values.texels, MAP_COLOURS, 1);
+    this.ramp.needsUpdate = true;
+    this.common.ramp.value = this.ramp;
+  }
+
+  private setParts({ look, hasSurface, hasEdges, hasParticles }: SpaceState): void {
+    const { surface } = this;
+    const hasTriangles = (surface?.triangles.length ?? 0) > 0;
+    this.inside.visible = hasSurface && hasTriangles && look.isTranslucent;
+    this.outside.visible = hasSurface && hasTriangles;
+    this.edges.visible = hasEdges && hasTriangles;
+    this.points.visible = hasParticles && (surface?.particles?.length ?? 0) > 0;
+    if (this.edges.visible && surface && !this.edgeGeometry.index) {
+      this.edgeGeometry.setIndex(new BufferAttribute(surface.edges, 1));
+    }
+    for (const material of [this.inside.material, this.outside.material]) {
+      material.transparent = look.isTranslucent;
+      material.depthWrite = !look.isTranslucent;
+    }
+    this.outside.material.side = look.isTranslucent ? FrontSide : DoubleSide;
+  }
+
+  private placed(camera: PerspectiveCamera | OrthographicCamera, { camera: { view, size }, near, far, origin }: SpaceState): ThreeCamera {
+    const { up, back } = axesOf(view);
+    const target = minus(view.target, origin);
+    camera.position.set(...plus(target, back, distanceOf(view)));
+    camera.up.set(...up);
+    camera.lookAt(new Vector3(...target));
+    camera.near = near;
+    camera.far = far;
+    const aspect = Math.max(1, size.width) / Math.max(1, size.height);
+    if (camera instanceof PerspectiveCamera) {
+      camera.aspect = aspect;
+    } else {
+      camera.top = view.height / 2;
+      camera.bottom = -camera.top;
+      camera.right = camera.top * aspect;
+      camera.left = -camera.right;
+    }
+    camera.updateProjectionMatrix();
+    return camera;
+  }
+}
+
+/** Throws an Error with a sentence if the browser cannot draw. */
+export function createDrawing(canvas: HTMLCanvasElement): SpaceDrawing {
+  if (!canvas.getContext('webgl2', { antialias: true, alpha: false })) {
+    throw new Error('This browser cannot draw surfaces, because WebGL 2 is missing.');
+  }
+  return new Drawing(canvas);
+}

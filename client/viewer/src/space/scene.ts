@@ -1,0 +1,287 @@
+import { identityColour, mix, packed, theme } from '../draw/colours';
+import { attributeOf, DEFAULT_LOOK, type Look } from '../draw/look';
+import { chosenRange, type Range, rampTexels, rangeOf } from '../draw/ramp';
+import { type Legend, legendOf } from '../draw/scene';
+import { Tracking } from '../draw/selection';
+import type { Size } from '../draw/view';
+import { bytesOf } from '../protocol/arrays';
+import { AttributeChannels, type Channels } from '../protocol/channels';
+import type { Frame } from '../protocol/frame';
+import type { Outline } from '../protocol/sections';
+import type { Surface } from '../protocol/surface';
+import {
+  axesOf, type Box, type Camera, cornersOf, DEFAULT_VIEW, distanceOf, dot, fitBox, minus, plus, rayAt, type SpaceView,
+  unionOf, type Vector,
+} from './camera';
+import type { SpaceDrawing, SpaceTheme, ValueColours } from './drawing';
+import { DEFAULT_SPACE_LOOK, type SpaceLook } from './look';
+import { type Clip, pickShell } from './pick';
+import { sectionLines } from './sections';
+
+/** A frame with its decoded surface. */
+export interface SpaceFrame { frame: Frame; surface: Surface; channels: Channels }
+
+/** A shell under the pointer, and the point of it in world coordinates. */
+export interface PickedShell { shell: number; point: Vector }
+
+const MAP_COLOURS = 256;
+/** The camera never shows what is nearer than this share of its distance. */
+const NEAREST = 1e-3;
+const SELECTED = 0xff000000;
+
+/** A frame with a surface, ready to draw. */
+export function spaceFrameOf(frame: Frame, surface: Surface): SpaceFrame {
+  const attributes = surface.attributes.map(({ name, components, values }) => ({ name, components, values: bytesOf(values) }));
+  return { frame, surface, channels: new AttributeChannels(attributes) };
+}
+
+/** The box around all points of a surface; around the particles if there is no body. Null without both. */
+export function boxOf({ boxes, particles, origin, positions }: Surface): Box | null {
+  const low: [number, number, number] = [Infinity, Infinity, Infinity];
+  const high: [number, number, number] = [-Infinity, -Infinity, -Infinity];
+  const points = positions.length > 0 ? boxes : particles ?? new Float32Array(0);
+  for (let k = 0; k + 2 < points.length; k += 3) {
+    for (let axis = 0; axis < 3; ++axis) {
+      low[axis] = Math.min(low[axis], points[k + axis]);
+      high[axis] = Math.max(high[axis], points[k + axis]);
+    }
+  }
+  return low[0] <= high[0] ? { low: plus(origin, low), high: plus(origin, high) } : null;
+}
+
+/** Shells that continue chosen ones of an earlier frame, if frames between them were missed: by the place of their boxes. */
+export function shellsByPlace(before: SpaceFrame, chosen: readonly number[], after: SpaceFrame): number[] {
+  const [old, now] = [before.surface, after.surface];
+  const known = new Set(old.identities);
+  const surviving = new Set(now.identities);
+  const found = new Set<number>();
+  for (const shell of chosen) {
+    const around = surviving.has(old.identities[shell]) ? null : shellAround(old, shell, now);
+    if (around !== null) found.add(around);
+  }
+  now.identities.forEach((identity, shell) => {
+    const from = known.has(identity) ? null : shellAround(now, shell, old);
+    if (from !== null && chosen.includes(from)) found.add(shell);
+  });
+  return [...found];
+}
+
+/** The smallest shell of another frame whose box contains the middle of this shell's box. */
+function shellAround(own: Surface, shell: number, other: Surface): number | null {
+  const middle = [0, 1, 2].map((axis) =>
+    own.origin[axis] - other.origin[axis] + (own.boxes[6 * shell + axis] + own.boxes[6 * shell + 3 + axis]) / 2);
+  let [best, least]: [number | null, number] = [null, Infinity];
+  for (let k = 0; k < other.outerOf.length; ++k) {
+    const box = other.boxes.subarray(6 * k, 6 * k + 6);
+    if (middle.some((at, axis) => at < box[axis] || at > box[axis + 3])) continue;
+    const size = (box[3] - box[0]) * (box[4] - box[1]) * (box[5] - box[2]);
+    if (size < least) [best, least] = [k, size];
+  }
+  return best;
+}
+
+function themeOf(dark: boolean): SpaceTheme {
+  const { background, outline, edge, particle, accent, missing } = theme(dark);
+  return { background, edge: dark ? mix(background, edge, 0.6) : outline, particle, accent, missing, ambient: dark ? 0.3 : 0.42 };
+}
+
+/** A canvas that shows one surface after another. Only `draw` draws. */
+export class SpaceScene {
+  view: SpaceView = { ...DEFAULT_VIEW };
+  /** Called after each drawing, in the same task. */
+  drawn: (() => void) | null = null;
+  /** The box around all frames so far. */
+  extent: Box | null = null;
+  /** Main-thread time of the last `show` and the last `draw`, milliseconds. */
+  lastUploadMs = 0;
+  lastDrawMs = 0;
+  private drawing: SpaceDrawing | null = null;
+  private look: Look = DEFAULT_LOOK;
+  private spaceLook: SpaceLook = DEFAULT_SPACE_LOOK;
+  private shown: SpaceFrame | null = null;
+  private outlines: readonly Outline[] = [];
+  private range: Range | null = null;
+  private texels: Uint8Array = new Uint8Array(0);
+  private selected: readonly number[] = [];
+  private readonly selection = new Tracking<SpaceFrame>(({ frame: { sequence }, surface: { identities, measures } }) =>
+    ({ sequence, identities, parents: measures.parents }), shellsByPlace);
+
+  constructor(readonly canvas: HTMLCanvasElement) {}
+
+  get size(): Size { return { width: this.canvas.clientWidth, height: this.canvas.clientHeight }; }
+  get frame(): SpaceFrame | null { return this.shown; }
+  get camera(): Camera { return { view: this.view, isPerspective: this.spaceLook.isPerspective, size: this.size }; }
+  get selectedShells(): readonly number[] { return this.selected; }
+
+  /** Begins to draw by `drawing`. */
+  attach(drawing: SpaceDrawing): void {
+    this.drawing = drawing;
+    this.upload();
+  }
+
+  show(shown: SpaceFrame | null, outlines: readonly Outline[]): void {
+    const begin = performance.now();
+    this.shown = shown;
+    this.outlines = outlines;
+    this.selected = shown ? this.selection.ringsOf(shown) : [];
+    const box = shown && boxOf(shown.surface);
+    if (!shown) this.extent = null;
+    else if (box) this.extent = unionOf(this.extent, box);
+    this.widenRange(shown === null);
+    this.upload();
+    this.lastUploadMs = performance.now() - begin;
+  }
+
+  setLook(look: Look, spaceLook: SpaceLook): void {
+    const isOtherColour = look.colour !== this.look.colour;
+    const isOtherMap = look.map !== this.look.map || look.dark !== this.look.dark || this.texels.length === 0;
+    this.look = { ...look };
+    this.spaceLook = { ...spaceLook };
+    if (isOtherMap) this.texels = rampTexels(MAP_COLOURS, look);
+    this.widenRange(isOtherColour);
+    this.tint();
+    this.showSections();
+  }
+
+  /** Shows everything from the same direction. */
+  fit(): void {
+    const box = this.shown && boxOf(this.shown.surface);
+    if (this.shown) this.extent = box;
+    if (box) this.view = fitBox(this.camera, box);
+  }
+
+  /** While the view follows the content: shows the box of all frames so far. */
+  fitExtent(): void {
+    if (this.extent) this.view = fitBox(this.camera, this.extent);
+  }
+
+  resize(): void {}
+
+  draw(): void {
+    const begin = performance.now();
+    const { look, spaceLook, shown, size, camera } = this;
+    const [near, far] = this.depths();
+    this.drawing?.draw({
+      camera, look: spaceLook, theme: themeOf(look.dark), near, far,
+      hasSurface: look.fill, hasEdges: look.edges, hasParticles: look.particles,
+      spacing: shown?.frame.statistics.spacing ?? 0, lineWidth: look.lineWidth,
+      clip: this.clip(), values: this.values(),
+      ratio: devicePixelRatio, origin: shown?.surface.origin ?? [0, 0, 0],
+    });
+    this.lastDrawMs = performance.now() - begin;
+    if (size.width > 0) this.drawn?.();
+  }
+
+  /** Selects the shell of this identity and follows it through splits and merges; null for none. */
+  select(identity: bigint | null): void {
+    this.selection.start(identity);
+    this.selected = this.shown ? this.selection.ringsOf(this.shown) : [];
+    this.tint();
+  }
+
+  /** The shell at a CSS position. */
+  pick(x: number, y: number): PickedShell | null {
+    if (!this.shown || !this.look.fill) return null;
+    const { surface } = this.shown;
+    const { from, along } = rayAt(this.camera, x, y);
+    const hit = pickShell(surface, minus(from, surface.origin), along, !this.spaceLook.isPerspective, this.clip());
+    return hit && { shell: hit.shell, point: plus(surface.origin, hit.point) };
+  }
+
+  legend(): Legend | null {
+    return legendOf(this.look, this.colourRange, this.channels);
+  }
+
+  /** Names of the numbers that the frame can be coloured by. */
+  get channels(): string[] {
+    if (!this.shown) return [];
+    return [...new Set([...this.shown.channels.keys(), ...this.shown.frame.particleAttributes?.keys() ?? []])];
+  }
+
+  destroy(): void {
+    this.drawing?.destroy();
+    this.drawing = null;
+    this.shown = null;
+  }
+
+  private upload(): void {
+    this.drawing?.show(this.shown?.surface ?? null);
+    this.tint();
+    this.showSections();
+  }
+
+  private showSections(): void {
+    const { shown } = this;
+    this.drawing?.setSections(shown ? sectionLines(shown.frame, this.outlines, this.look, shown.surface.origin) : []);
+  }
+
+  /** Writes the colour of each shell to its points. */
+  private tint(): void {
+    if (!this.shown || !this.drawing) return;
+    const { pointOffsets, identities, outerOf, positions } = this.shown.surface;
+    const { dark, colour } = this.look;
+    const tints = new Uint32Array(positions.length / 3);
+    const plain = packed(theme(dark).hole);
+    const halves = new Uint32Array(identities.buffer, identities.byteOffset, 2 * identities.length);
+    for (let shell = 0; shell < outerOf.length; ++shell) {
+      const rgba = colour === 'identity'
+        ? packed(identityColour(halves[2 * shell], halves[2 * shell + 1], dark)) : plain;
+      const alpha = this.selected.includes(shell) ? SELECTED : 0;
+      tints.fill(((rgba & 0xffffff) | alpha) >>> 0, pointOffsets[shell], pointOffsets[shell + 1]);
+    }
+    this.drawing.setTints(new Uint8Array(tints.buffer));
+  }
+
+  private clip(): Clip | null {
+    const { clipAxis, clipAt, isClipFlipped } = this.spaceLook;
+    if (clipAxis === 'none' || !this.extent || !this.shown) return null;
+    const axis = 'xyz'.indexOf(clipAxis);
+    const { low, high } = this.extent;
+    const sign = isClipFlipped ? -1 : 1;
+    const normal: Vector = [axis === 0 ? sign : 0, axis === 1 ? sign : 0, axis === 2 ? sign : 0];
+    return { normal, at: sign * (low[axis] + clipAt * (high[axis] - low[axis]) - this.shown.surface.origin[axis]) };
+  }
+
+  private values(): ValueColours | null {
+    const name = attributeOf(this.look);
+    const range = this.colourRange;
+    if (name === null || !this.shown || !range) return null;
+    return {
+      points: this.shown.channels.get(name) ?? null, particles: this.shown.frame.particleAttributes?.get(name) ?? null,
+      ...range, texels: this.texels,
+    };
+  }
+
+  private get colourRange(): Range | null {
+    return this.range && chosenRange(this.range, this.look.from, this.look.to);
+  }
+
+  /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
+  private widenRange(restart: boolean): void {
+    if (restart) this.range = null;
+    const name = attributeOf(this.look);
+    if (name === null || !this.shown) return;
+    for (const values of [this.shown.channels.get(name), this.shown.frame.particleAttributes?.get(name)]) {
+      const range = values && rangeOf(values);
+      if (!range) continue;
+      this.range = this.range
+        ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) } : range;
+    }
+  }
+
+  /** The depths between which everything lies, seen from the camera. */
+  private depths(): [number, number] {
+    const distance = distanceOf(this.view);
+    const box = this.extent;
+    if (!box) return [NEAREST * distance, 2 * distance];
+    const { back } = axesOf(this.view);
+    const nearer = cornersOf(box).map((corner) => dot(minus(corner, this.view.target), back));
+    // Sections may end outside of the box.
+    const room = Math.hypot(...minus(box.high, box.low)) / 4;
+    const near = distance - Math.max(...nearer) - room;
+    const far = distance - Math.min(...nearer) + room;
+    if (!this.spaceLook.isPerspective) return [near, far];
+    const nearest = Math.max(near, NEAREST * distance);
+    return [nearest, Math.max(far, 2 * nearest)];
+  }
+}

@@ -1,0 +1,32 @@
+import { isolineColour } from '../draw/look_colours';
+import type { Look } from '../draw/look';
+import type { Frame } from '../protocol/frame';
+import { inSpace, type Outline } from '../protocol/sections';
+import { minus, type Vector } from './camera';
+import type { SectionLines } from './drawing';
+
+/** The sections of a frame that the look draws, as lines on their planes. Points are relative to `origin`. */
+export function sectionLines(frame: Frame, outlines: readonly Outline[], look: Look, origin: Vector): SectionLines[] {
+  if (!look.sections) return [];
+  return frame.sections.flatMap(({ rings, origin: middle }, k) => {
+    const plane = outlines[k + 1]?.plane;
+    if (!plane || look.hidden.includes(k + 1)) return [];
+    const start = minus(inSpace(plane, middle[0], middle[1]), origin);
+    const zero = inSpace(plane, 0, 0);
+    const [first, second] = [minus(inSpace(plane, 1, 0), zero), minus(inSpace(plane, 0, 1), zero)];
+    const { points, offsets } = rings;
+    const positions = new Float32Array(3 * points.length);
+    let at = 0;
+    const add = (point: number) => {
+      const [u, v] = [points[2 * point], points[2 * point + 1]];
+      for (let axis = 0; axis < 3; ++axis) positions[at++] = start[axis] + u * first[axis] + v * second[axis];
+    };
+    for (let ring = 0; ring + 1 < offsets.length; ++ring) {
+      for (let point = offsets[ring]; point < offsets[ring + 1]; ++point) {
+        add(point);
+        add(point + 1 < offsets[ring + 1] ? point + 1 : offsets[ring]);
+      }
+    }
+    return [{ positions, colour: isolineColour(k + 1, look.dark) }];
+  });
+}

@@ -1,0 +1,313 @@
+// Tests surfaces in space in the page. Leaves screenshots in build/screenshots.
+import assert from 'node:assert/strict';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { after, afterEach, before, test } from 'node:test';
+import { launch, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
+
+const FLAGS = ['--surface', '--spacing', '1', '--echo-particles', '--attributes', 'p', '--slice', 'z=0', '--slice', 'y=2',
+  '--loop', '--rate', '5'];
+const FRAMES = 8;
+let world, browser, viewer, folder;
+
+/** Two balls that approach each other and merge; the first one has a cavity. */
+function balls(frame) {
+  const lines = ['x,y,z,p'];
+  for (const [centre, speed] of [[-8, 1], [8, -1]]) {
+    for (let x = -6; x <= 6; ++x) {
+      for (let y = -6; y <= 6; ++y) {
+        for (let z = -6; z <= 6; ++z) {
+          const square = x * x + y * y + z * z;
+          if (square > 36 || (centre < 0 && square < 9)) continue;
+          lines.push([x + centre + speed * frame * 0.4, y, z, x + y].join(','));
+        }
+      }
+    }
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+before(async () => {
+  mkdirSync(screenshots, { recursive: true });
+  world = await World.start();
+  folder = path.join(world.folder, 'balls');
+  mkdirSync(folder);
+  for (let k = 0; k < FRAMES; ++k) writeFileSync(path.join(folder, `b_${k}.csv`), balls(k));
+  world.replayOf(folder, 'balls', ...FLAGS, '--coordinates', 'compact');
+  browser = await launch();
+});
+after(async () => {
+  await browser?.close();
+  await world?.close();
+});
+afterEach(async () => {
+  const errors = viewer?.errors;
+  await viewer?.close();
+  viewer = null;
+  assert.deepEqual(errors, [], 'the console has no errors');
+});
+
+const space = (k = 0) => viewer.pane(k).locator('.space canvas');
+
+async function open(options = {}) {
+  viewer = await Viewer.open(browser, world.url, { hash: '#stream=balls', ...options });
+  await viewer.shows();
+  await until('the surface is drawn', () => isDrawn());
+}
+
+/** Whether the picture has more than its background. */
+const isDrawn = async (k = 0) => (await space(k).screenshot()).length > 6000;
+
+/** Pauses at the first frame of the recording that the server holds. */
+async function pauseAtFirst() {
+  await viewer.button('Pause').click();
+  const slider = viewer.page.getByLabel('Frame', { exact: true });
+  const first = Number(await slider.getAttribute('min'));
+  const begin = first + (FRAMES - (first - 1) % FRAMES) % FRAMES;
+  await viewer.scrubTo(begin);
+  await still();
+  return begin;
+}
+
+/** Waits until the picture no longer changes. */
+async function still(k = 0) {
+  let last = '';
+  await until('the picture is still', async () => {
+    const now = await viewer.picture(k);
+    const isSame = now === last;
+    last = now;
+    return isSame;
+  });
+  return last;
+}
+
+/** Does something, and waits until the picture differs. */
+async function changes(what, act, k = 0) {
+  const before = await still(k);
+  await act();
+  await until(`${what} changes the picture`, async () => await viewer.picture(k) !== before);
+}
+
+const shot = (name) => viewer.page.screenshot({ path: path.join(screenshots, `space_${name}.png`) });
+
+test('a live surface is drawn and moves, in every format', async () => {
+  await open();
+  const first = await viewer.frame();
+  const picture = await viewer.picture();
+  await viewer.shows(first + 3);
+  await until('the picture moves', async () => await viewer.picture() !== picture);
+  assert.equal(await viewer.status(), 'Live');
+  for (const format of ['float64', 'float32']) {
+    const name = `balls_${format}`;
+    const producer = world.replayOf(folder, name, ...FLAGS, '--coordinates', format);
+    await viewer.button(`Watch ${name}`).click();
+    await until(`${name} is shown`, async () => await viewer.pane().locator('.name').textContent() === name);
+    await viewer.shows();
+    await until(`${name} is drawn`, () => isDrawn());
+    await producer.stop();
+  }
+});
+
+test('numbers and curves are those of surfaces', async () => {
+  await open();
+  const at = await pauseAtFirst();
+  const truth = (await world.statistics(folder, '--surface', '--spacing', '1', '--attributes', 'p'))[(at - 1) % FRAMES];
+  const numbers = await viewer.numbers();
+  assert.equal(numbers.bodies, '2, 1');
+  assert.equal(numbers['surface-digest'], truth.surface_digest);
+  assert.equal(numbers.triangles, truth.triangles.toLocaleString('en'));
+  assert.equal(Number(numbers.area), Number(truth.area.toPrecision(7)));
+  assert.equal(Number(numbers.volume), Number(truth.volume.toPrecision(7)));
+  assert.equal(await viewer.pane().locator('[data-key="rings"]').isVisible(), false);
+  for (const curve of ['Volume', 'Bodies, cavities']) {
+    assert.ok(await viewer.page.getByRole('figure', { name: curve }).isVisible(), curve);
+  }
+  assert.equal(await viewer.page.getByRole('figure', { name: 'Rings, holes' }).isVisible(), false);
+});
+
+test('every control changes the picture', async () => {
+  await open();
+  await pauseAtFirst();
+  const { page } = viewer;
+  const choose = (label, value) => page.getByLabel(label, { exact: true }).selectOption(value);
+  const toggle = (label) => page.getByLabel(label, { exact: true }).click();
+  await changes('flat shading', () => choose('Shading', 'flat'));
+  await changes('a parallel projection', () => choose('Projection', 'parallel'));
+  await changes('edges', () => toggle('Mesh edges'));
+  await changes('translucent', () => toggle('Translucent'));
+  await changes('particles', () => toggle('Particles'));
+  await changes('no surface', () => toggle('Filled'));
+  await changes('the surface', () => toggle('Filled'));
+  await changes('colour by body', () => choose('Colour', 'identity'));
+  await changes('colour by p', () => choose('Colour', 'p'));
+  assert.ok(await page.locator('#legend').isVisible());
+  await changes('another map', () => choose('Colour map', 'blue-red'));
+  await changes('axes', () => toggle('Axes'));
+  assert.ok(await viewer.pane().locator('.space .overlay text').count() > 6);
+  await changes('no sections', () => toggle('Sections'));
+  await changes('sections', () => toggle('Sections'));
+  await changes('one section', () => page.locator('#outline-list input:enabled').first().click());
+  await changes('a clip plane', () => choose('Clip plane', 'x'));
+  await changes('its position', () => page.getByLabel('Position', { exact: true }).fill('0.3'));
+  await changes('its other side', () => toggle('Other side'));
+  await shot('controls');
+  const address = new URL(page.url()).hash;
+  assert.match(decodeURIComponent(address), /space=flat,translucent,parallel,clip:x:0.3:flipped/);
+  const frame = await viewer.frame();
+  await page.goto('about:blank');
+  await page.goto(world.url + address);
+  await until('the link shows the frame', async () => await viewer.frame() === frame && await isDrawn());
+  assert.equal(new URL(page.url()).hash, address);
+  assert.equal(await page.getByLabel('Clip plane').inputValue(), 'x');
+  assert.equal(await page.getByLabel('Projection').inputValue(), 'parallel');
+});
+
+test('a picture turns, pans, zooms to the pointer and fits', async () => {
+  await open();
+  await pauseAtFirst();
+  const { page } = viewer;
+  const box = await space().boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const drag = async (key) => {
+    if (key) await page.keyboard.down(key);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + 90, y + 40, { steps: 4 });
+    await page.mouse.up();
+    if (key) await page.keyboard.up(key);
+    await page.mouse.move(box.x + 4, box.y + 4);
+  };
+  const first = await still();
+  await changes('a drag', () => drag());
+  await changes('a drag with Shift', () => drag('Shift'));
+  await changes('the wheel', async () => {
+    await page.mouse.wheel(0, -300);
+  });
+  await changes('fit', () => viewer.button('Fit').click());
+  assert.notEqual(await still(), first, 'the direction stays');
+  await space().focus();
+  for (const key of ['ArrowLeft', 'Shift+ArrowUp', '+', '-', '0']) await changes(key, () => page.keyboard.press(key));
+});
+
+test('a body is selected, described, and followed through its merge', async () => {
+  await open();
+  const begin = await pauseAtFirst();
+  const box = await space().boundingBox();
+  await viewer.page.getByLabel('Shading', { exact: true }).selectOption('flat');
+  const readout = viewer.pane().locator('.space .readout');
+  for (const share of [0.3, 0.25, 0.35, 0.2]) {
+    await space().click({ position: { x: box.width * share, y: box.height * 0.55 } });
+    if (/Selected/.test(await readout.textContent())) break;
+  }
+  await until('the body is described', async () => /Selected: body \d+: area [\d.]+, volume [\d.]+, particles \d+/.test(await readout.textContent()));
+  await shot('selected');
+  await viewer.scrubTo(begin + FRAMES - 1);
+  await until('the merged body is selected', async () => /Selected: body \d+:.*, from \d+, \d+|Selected: body \d+: area/.test(await readout.textContent()));
+  assert.doesNotMatch(await readout.textContent(), /not in this frame/);
+  assert.match((await viewer.numbers()).bodies, /^1, 1$/);
+  await space().focus();
+  await viewer.page.keyboard.press('Escape');
+  await until('nothing is selected', async () => !/Selected/.test(await readout.textContent()));
+});
+
+test('a section is shown in its plane, and the surface again', async () => {
+  await open();
+  await pauseAtFirst();
+  const { page } = viewer;
+  await page.getByLabel('Picture of').selectOption({ label: 'z = 0' });
+  await until('the outline is shown', async () => Number((await viewer.numbers()).vertices) > 10);
+  assert.ok(!await space().isVisible());
+  assert.ok(await viewer.button('SVG').isEnabled());
+  await page.getByLabel('Picture of').selectOption({ label: 'Surface' });
+  await until('the surface is shown', async () => await space().isVisible() && await isDrawn());
+});
+
+test('controls of outlines are disabled with a reason', async () => {
+  await open();
+  for (const name of ['SVG', 'GeoJSON', 'Add', '32 × 32 cells']) {
+    assert.ok(await viewer.button(name).isDisabled(), name);
+  }
+  for (const label of ['Outline', 'Normals', 'Measure', 'Placement', 'Surface offset', 'New gauge']) {
+    assert.ok(await viewer.page.getByLabel(label, { exact: true }).isDisabled(), label);
+  }
+  assert.deepEqual(await withoutTooltip(viewer.page), []);
+  const loaded = viewer.page.waitForEvent('download');
+  await viewer.button('PNG').click();
+  assert.match((await loaded).suggestedFilename(), /^balls_\d+\.png$/);
+});
+
+test('two pictures share the camera, and can show a section beside the surface', async () => {
+  await open();
+  await pauseAtFirst();
+  await viewer.button('Side by side').click();
+  await until('two pictures', async () => await viewer.page.locator('.pane').count() === 2);
+  await until('both are drawn', async () => await isDrawn(0) && await isDrawn(1));
+  const other = await still(1);
+  await viewer.pane(0).locator('.space canvas').focus();
+  await viewer.page.keyboard.press('ArrowRight');
+  await until('the other picture turns', async () => await viewer.picture(1) !== other);
+  await shot('pair');
+});
+
+test('a pane says why it shows no surface', async () => {
+  const cases = [
+    ['space.js', /space\.js, cannot be loaded/],
+    ['space_worker.js', /cannot start the decoder of surfaces/],
+  ];
+  for (const [file, reason] of cases) {
+    await viewer?.close();
+    viewer = await Viewer.open(browser, world.url);
+    await viewer.page.route(`**/${file}`, (route) => route.abort());
+    await viewer.page.goto(`${world.url}#stream=balls`);
+    await viewer.page.reload();
+    const notice = viewer.pane().locator('.notice');
+    await until(`the notice without ${file}`, async () => reason.test(await notice.textContent()) && await notice.isVisible());
+    assert.equal(await viewer.pane().locator('.state').textContent(), 'Refused');
+    viewer.errors = viewer.errors.filter((text) => !/Failed to load resource/.test(text));
+    assert.deepEqual(viewer.errors, []);
+  }
+});
+
+/** Overwrites the header of the compressed triangles of a frame. */
+function damaged(message) {
+  const bytes = Buffer.from(message);
+  for (let at = 0; at + 4 < bytes.length; ++at) {
+    if (bytes[at] !== 0x12) continue;  // Field 2 of Surface, with a length of two or three bytes.
+    for (const size of [2, 3]) {
+      const header = bytes[at + 1 + size];
+      const isLength = bytes[at + size] < 0x80 && bytes.subarray(at + 1, at + size).every((byte) => byte >= 0x80);
+      if (isLength && (header & 0xf0) === 0xe0) bytes[at + 1 + size] = 0;
+    }
+  }
+  return bytes;
+}
+
+test('a damaged frame is refused by name, and the next one is shown', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  let isDamaging = true;
+  await viewer.page.routeWebSocket(/v1\/watch/, (socket) => {
+    const server = socket.connectToServer();
+    server.onMessage((message) => socket.send(isDamaging && message.length > 2000 ? damaged(message) : message));
+  });
+  await viewer.page.goto(`${world.url}#stream=balls`);
+  await viewer.page.reload();
+  const notice = viewer.pane().locator('.notice');
+  await until('the notice', async () => /Frame \d+ cannot be shown: surface\.triangles does not decompress/.test(await notice.textContent()));
+  assert.equal(await viewer.pane().locator('.state').textContent(), 'Refused');
+  isDamaging = false;
+  await until('a whole frame is shown', async () => await viewer.pane().locator('.state').textContent() === 'Live');
+  await until('it is drawn', () => isDrawn());
+});
+
+for (const colorScheme of ['light', 'dark']) {
+  test(`the page looks right, ${colorScheme}`, async () => {
+    for (const [name, width, height] of [['wide', 1600, 900], ['narrow', 390, 800]]) {
+      await open({ colorScheme, width, height });
+      await until('frames', async () => await viewer.frame() > 2);
+      await viewer.page.evaluate(() => document.querySelector('#axes').click());
+      assert.deepEqual(await violations(viewer.page), []);
+      await shot(`${name}_${colorScheme}`);
+      if (name === 'wide') await viewer.close();
+    }
+  });
+}

@@ -1,0 +1,177 @@
+// Tests of the picture of surfaces: camera, keys, picking, axes, selection, sections, look.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { DEFAULT_LOOK } from '../src/draw/look';
+import { decodeSurface } from '../src/protocol/surface';
+import type { Frame } from '../src/protocol/frame';
+import { inPlane, inSpace } from '../src/protocol/sections';
+import { axesDrawing } from '../src/space/axes';
+import {
+  type Camera, cornersOf, DEFAULT_VIEW, fitBox, panBy, parseSpaceView, pointAt, project, rayAt, type SpaceView, turnBy,
+  type Vector, viewText, zoomAt,
+} from '../src/space/camera';
+import { DEFAULT_SPACE_LOOK, parseSpaceLook, spaceLookText } from '../src/space/look';
+import { applySpaceKey } from '../src/space/navigation';
+import { pickShell } from '../src/space/pick';
+import { boxOf, spaceFrameOf, SpaceScene } from '../src/space/scene';
+import { sectionLines } from '../src/space/sections';
+import { plainMessage } from './surface_message';
+
+const size = { width: 800, height: 600 };
+const view: SpaceView = { target: [3, -2, 1], turn: 0.7, tilt: 0.3, height: 10 };
+const cameras = [true, false].map((isPerspective): Camera => ({ view, isPerspective, size }));
+const codec = { decodeVertexBuffer() {}, decodeIndexBuffer() {} };
+const surfaceAt = (...centres: Vector[]) => decodeSurface(plainMessage(centres), codec);
+const isNear = (a: readonly number[], b: readonly number[], within = 1e-9) =>
+  assert.ok(a.every((value, k) => Math.abs(value - b[k]) <= within), `${a} is not ${b}`);
+
+test('the target is in the middle, and x is to the right of a camera in front', () => {
+  for (const camera of cameras) {
+    const at = project(camera, view.target);
+    isNear([at?.x ?? NaN, at?.y ?? NaN], [400, 300]);
+    const front: Camera = { ...camera, view: { ...view, turn: -Math.PI / 2, tilt: 0 } };
+    const [right, up] = [project(front, [4, -2, 1]), project(front, [3, -2, 2])];
+    isNear([right?.x ?? NaN, right?.y ?? NaN, up?.x ?? NaN, up?.y ?? NaN], [460, 300, 400, 240]);
+  }
+});
+
+test('a ray meets the point under the pointer', () => {
+  for (const camera of cameras) {
+    const { from, along } = rayAt(camera, 123, 456);
+    for (const share of [0.5, 1, 1.4]) {
+      const at = project(camera, [0, 1, 2].map((k) => from[k] + share * along[k]) as unknown as Vector);
+      isNear([at?.x ?? NaN, at?.y ?? NaN], [123, 456], 1e-6);
+    }
+  }
+});
+
+test('a zoom keeps the point under the pointer, a pan moves by pixels', () => {
+  for (const camera of cameras) {
+    const point = pointAt(camera, 150, 500);
+    const zoomed = { ...camera, view: zoomAt(camera, 150, 500, 3) };
+    assert.equal(zoomed.view.height, 10 / 3);
+    const at = project(zoomed, point);
+    isNear([at?.x ?? NaN, at?.y ?? NaN], [150, 500], 1e-6);
+    const moved = project({ ...camera, view: panBy(camera, 30, -20) }, view.target);
+    isNear([moved?.x ?? NaN, moved?.y ?? NaN], [430, 280], 1e-6);
+  }
+});
+
+test('a drag turns, and stops above the target', () => {
+  const turned = turnBy(view, size, 60, 0);
+  isNear([turned.turn, turned.tilt], [view.turn - Math.PI / 10, view.tilt]);
+  assert.equal(turnBy(view, size, 0, 1e6).tilt, Math.PI / 2);
+  assert.equal(turnBy(view, size, 0, -1e6).tilt, -Math.PI / 2);
+});
+
+test('a fitted box is in the picture, and fills it', () => {
+  for (const box of [{ low: [0, 0, 0], high: [1, 2, 3] }, { low: [-5, 0, 0], high: [5, 0.1, 0.1] }] as { low: Vector; high: Vector }[]) {
+    for (const camera of cameras) {
+      for (const turn of [0, 1, 2.5]) {
+        const fitted = { ...camera, view: fitBox({ ...camera, view: { ...view, turn } }, box) };
+        const shares = cornersOf(box).map((corner) => {
+          const at = project(fitted, corner);
+          assert.ok(at);
+          return Math.max(Math.abs(at.x - 400) / 400, Math.abs(at.y - 300) / 300);
+        });
+        assert.ok(Math.max(...shares) < 1 && Math.max(...shares) > 0.8, `${shares}`);
+      }
+    }
+  }
+});
+
+test('keys turn, pan, zoom and fit', () => {
+  let fits = 0;
+  const scene = { view: { ...view }, get camera(): Camera { return { view: this.view, isPerspective: true, size }; }, fit() { ++fits; } };
+  assert.ok(applySpaceKey(scene, 'ArrowLeft', false));
+  assert.notEqual(scene.view.turn, view.turn);
+  assert.ok(applySpaceKey(scene, 'ArrowLeft', true));
+  assert.notDeepEqual(scene.view.target, view.target);
+  assert.ok(applySpaceKey(scene, '+', false) && scene.view.height < 10);
+  assert.ok(applySpaceKey(scene, '0', false) && fits === 1);
+  assert.equal(applySpaceKey(scene, 'x', false), false);
+});
+
+test('a view and a look survive an address', () => {
+  assert.deepEqual(parseSpaceView(viewText(view)), view);
+  for (const text of ['', '1,2,3', '1,2,3,4,5,0', '1,2,3,4,5,x']) assert.equal(parseSpaceView(text), null);
+  assert.equal(spaceLookText(DEFAULT_SPACE_LOOK), '');
+  const look = { shading: 'flat', isTranslucent: true, isPerspective: false, clipAxis: 'y', clipAt: 0.25, isClipFlipped: true } as const;
+  assert.deepEqual(parseSpaceLook(spaceLookText(look)), look);
+  assert.deepEqual(parseSpaceLook('clip:w:7,nonsense'), DEFAULT_SPACE_LOOK);
+});
+
+test('the nearest shell that is not cut away is picked', () => {
+  const surface = surfaceAt([0, 0, 0], [5, 0, 0]);
+  const from: Vector = [-9 - surface.origin[0], 0.1, 0.1];
+  const pick = (along: Vector, isLine = false, at: number | null = null) =>
+    pickShell(surface, from, along, isLine, at === null ? null : { normal: [-1, 0, 0], at: -at + surface.origin[0] });
+  const hit = pick([1, 0, 0]);
+  assert.equal(hit?.shell, 0);
+  isNear([(hit?.point[0] ?? NaN) + surface.origin[0]], [-0.8], 1e-6);
+  assert.equal(pick([1, 0, 0], false, 2)?.shell, 1, 'a plane at x = 2 cuts the first body away');
+  assert.equal(pick([1, 0, 0], false, 0)?.shell, 0, 'a plane through a body shows its inside');
+  assert.equal(pick([-1, 0, 0]), null);
+  assert.equal(pick([-1, 0, 0], true)?.shell, 1, 'a line goes both ways, and the nearest is the last one');
+  assert.equal(pick([0, 1, 0]), null);
+});
+
+test('axes lie at the border of the box and have numbers', () => {
+  for (const camera of cameras) {
+    const box = { low: [0, 0, 0], high: [10, 10, 10] } as const;
+    const fitted = { ...camera, view: fitBox({ ...camera, view: { ...DEFAULT_VIEW } }, box) };
+    const { lines, texts } = axesDrawing(fitted, box);
+    assert.ok(['x', 'y', 'z'].every((name) => texts.some(({ text }) => text === name)));
+    assert.ok(texts.length > 6 && lines.length > 9);
+    const left = Math.min(...cornersOf(box).map((corner) => project(fitted, corner)?.x ?? NaN));
+    const z = texts.find(({ text }) => text === 'z');
+    assert.ok(z && z.x < left + 1, 'z is at the left');
+  }
+});
+
+const frame = (sequence: number): Frame => ({ sequence: BigInt(sequence), sections: [] }) as unknown as Frame;
+
+test('a selected body is followed through a merge, also over missed frames', () => {
+  const canvas = { clientWidth: 0, clientHeight: 0 } as HTMLCanvasElement;
+  const shown = (sequence: number, identities: bigint[], parents: bigint[][], ...centres: Vector[]) => {
+    const surface = surfaceAt(...centres);
+    surface.identities = BigUint64Array.from(identities);
+    surface.measures.parents = parents;
+    return spaceFrameOf(frame(sequence), surface);
+  };
+  for (const next of [2, 5]) {
+    const scene = new SpaceScene(canvas);
+    scene.show(shown(1, [1n, 2n], [[], []], [0, 0, 0], [3, 0, 0]), []);
+    scene.select(2n);
+    assert.deepEqual(scene.selectedShells, [1]);
+    scene.show(shown(next, [7n, 1n], [[1n, 2n], []], [3, 0, 0], [9, 0, 0]), []);
+    assert.deepEqual(scene.selectedShells, [0], `frame ${next}`);
+    scene.show(shown(1, [1n, 2n], [[], []], [0, 0, 0], [3, 0, 0]), []);
+    assert.deepEqual(scene.selectedShells, [1], 'back in the first frame');
+  }
+});
+
+test('the box of a frame grows with its bodies, or has its particles', () => {
+  const surface = surfaceAt([0, 0, 0], [5, 0, 0]);
+  assert.deepEqual(boxOf(surface), { low: [-1, -1, -1], high: [6, 1, 1] });
+  const empty = decodeSurface({ ...plainMessage([]), hasSurface: false }, codec);
+  assert.equal(boxOf(empty), null);
+  assert.deepEqual(boxOf({ ...empty, particles: Float32Array.of(1, 2, 3, 0, 5, 1) }), { low: [0, 2, 1], high: [1, 5, 3] });
+});
+
+test('sections lie in their planes', () => {
+  const plane = { origin: [1, 2, 3], normal: [1, -2, 0.5] } as const;
+  const rings = { points: Float32Array.of(0, 0, 1, 0, 0, 2), offsets: Uint32Array.of(0, 3) };
+  const withSection = { sections: [{ rings, origin: [4, 5] }] } as unknown as Frame;
+  const outlines = [{ plane: null, isovalue: null, isSurface: true }, { plane, isovalue: null }];
+  const [{ positions }] = sectionLines(withSection, outlines, DEFAULT_LOOK, [1, 1, 1]);
+  assert.equal(positions.length, 3 * 6);
+  const expected = [[4, 5], [5, 5], [5, 5], [4, 7], [4, 7], [4, 5]];
+  expected.forEach(([u, v], k) => {
+    const at = [0, 1, 2].map((axis) => positions[3 * k + axis] + 1) as unknown as Vector;
+    isNear(inPlane(plane, at), [u, v, 0], 1e-5);
+    isNear(at, inSpace(plane, u, v), 1e-5);
+  });
+  assert.deepEqual(sectionLines(withSection, outlines, { ...DEFAULT_LOOK, hidden: [1] }, [0, 0, 0]), []);
+  assert.deepEqual(sectionLines(withSection, outlines, { ...DEFAULT_LOOK, sections: false }, [0, 0, 0]), []);
+});
