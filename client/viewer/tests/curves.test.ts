@@ -69,6 +69,9 @@ test('the curves are saved as CSV, with empty cells for unknown numbers', () => 
   assert.equal(head, `frame,time,area,rings,holes,triangles,triangles_unmerged,reduction_percent,milliseconds,${
     STAGES.map((name) => `${name}_ms`).join()},received,drawn,dropped,latency_ms`);
   assert.match(first, /^1,0\.25,2\.5,3,1,10,20,50,1\.5,0,0\.125,/);
+  const [ofSurfaces, surface] = curvesCsv(track([1, 2]), new Gauges(), true).trimEnd().split('\n');
+  assert.match(ofSurfaces, /^frame,time,area,volume,bodies,cavities,triangles,milliseconds,bins_ms,/);
+  assert.match(surface, /^1,0\.25,2\.5,,3,1,10,1\.5,0,0\.125,/);
   assert.match(second, /^2,0\.5,,3,1/);
   assert.match(second, /,2,0,0,$/);
   assert.deepEqual(rest, []);

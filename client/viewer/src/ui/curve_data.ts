@@ -37,16 +37,27 @@ export function entriesOf(other: Pick<CurveSource, 'history'>, entries: readonly
   return entries.map((entry) => entry && other.history.get(entry.sequence));
 }
 
-/** Columns of the file of curves. */
-const COLUMNS: [string, (summary: Summary) => number][] = [
+type Column = [string, (summary: Summary) => number];
+
+/** Columns of the file of curves: of outlines, of surfaces, and of both. */
+const OF_OUTLINES: Column[] = [
   ['area', (s) => s.area],
   ['rings', (s) => s.rings],
   ['holes', (s) => s.holes],
   ['triangles', (s) => s.triangles],
   ['triangles_unmerged', (s) => s.trianglesGrid],
   ['reduction_percent', reductionOf],
+];
+const OF_SURFACES: Column[] = [
+  ['area', (s) => s.area],
+  ['volume', (s) => s.volume ?? NaN],
+  ['bodies', (s) => s.rings],
+  ['cavities', (s) => s.holes],
+  ['triangles', (s) => s.triangles],
+];
+const OF_BOTH: Column[] = [
   ['milliseconds', (s) => s.milliseconds],
-  ...STAGES.map((name, k): [string, (summary: Summary) => number] => [`${name}_ms`, (s) => s.stages[k]]),
+  ...STAGES.map((name, k): Column => [`${name}_ms`, (s) => s.stages[k]]),
   ['received', (s) => s.received],
   ['drawn', (s) => s.drawn],
   ['dropped', (s) => s.dropped],
@@ -54,11 +65,11 @@ const COLUMNS: [string, (summary: Summary) => number][] = [
 ];
 
 /** All frames of the history as CSV, with the values of the gauges. A number that is unknown is empty. */
-export function curvesCsv(track: Pick<Track, 'history' | 'labelOf'>, gauges: Gauges): string {
+export function curvesCsv(track: Pick<Track, 'history' | 'labelOf'>, gauges: Gauges, isSpace = false): string {
   const { history } = track;
   gauges.measure(Array.from({ length: history.size }, (_, k) => history.entry(k)), () => false);
-  const columns = [...COLUMNS, ...gauges.all.flatMap((gauge) => columnsOf(gauge).map(
-    (name, k): [string, (summary: Summary) => number] => [name, (s) => gauges.value(s, gauge, k)]))];
+  const columns = [...isSpace ? OF_SURFACES : OF_OUTLINES, ...OF_BOTH, ...gauges.all.flatMap((gauge) => columnsOf(gauge).map(
+    (name, k): Column => [name, (s) => gauges.value(s, gauge, k)]))];
   const cell = (value: number) => (Number.isFinite(value) ? String(value) : '');
   const rows = Array.from({ length: history.size }, (_, k) => {
     const { sequence, time, summary } = history.entry(k);

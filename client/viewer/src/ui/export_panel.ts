@@ -42,7 +42,9 @@ export class ExportPanel {
       const blob = new Blob([geojson(shown.frame)], { type: 'application/geo+json' });
       download(this.name(shown, 'geojson'), blob);
     });
-    this.on('export-csv', async ({ track, curves }) => downloadCurves(curves, track.title, gauges));
+    this.on('export-csv', async ({ track, curves, hasSurfaces }) => {
+      downloadCurves(curves, track.title, gauges, hasSurfaces);
+    });
     button('export-clip').addEventListener('click', () => {
       // The picture that is recorded may be closed by now.
       if (this.recording) this.run(this.stopClip(this.recording));
@@ -124,8 +126,8 @@ export class ExportPanel {
 }
 
 /** Saves the numbers of all frames of a track. */
-export function downloadCurves(track: CurveSource, title: string, gauges: Gauges): void {
-  download(`${fileName(title)}_curves.csv`, new Blob([curvesCsv(track, gauges)], { type: 'text/csv' }));
+export function downloadCurves(track: CurveSource, title: string, gauges: Gauges, isSpace = false): void {
+  download(`${fileName(title)}_curves.csv`, new Blob([curvesCsv(track, gauges, isSpace)], { type: 'text/csv' }));
 }
 
 function fileName(title: string): string {
