@@ -77,6 +77,10 @@ absl::Status FrameOutputs::Check(const Places& places) {
     return absl::InvalidArgumentError("--compress-glb: requires --output-dir and --format glb");
   }
   if (auto gauges = ParseGauges(places.gauges); !gauges.ok()) return gauges.status();
+  if (!places.stats.empty()) {
+    auto status = StatisticsWriter::CheckExtension(places.stats);
+    if (!status.ok()) return status;
+  }
   return CheckSurfaces(places, formats);
 }
 

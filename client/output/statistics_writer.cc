@@ -174,6 +174,10 @@ class Row {
   std::vector<std::string> values_;
 };
 
+std::string ExtensionOf(const std::filesystem::path& path) {
+  return absl::AsciiStrToLower(path.extension().native());
+}
+
 }  // namespace
 
 std::span<const std::string_view> StatisticsColumns(StatisticsOf what) {
@@ -211,16 +215,18 @@ StatisticsWriter::StatisticsWriter(AtomicFile file, bool json, std::vector<Gauge
   for (const Gauge& gauge : gauges_) AppendColumns(gauge, columns_);
 }
 
+absl::Status StatisticsWriter::CheckExtension(const std::filesystem::path& path) {
+  const std::string extension = ExtensionOf(path);
+  if (extension == ".csv" || extension == ".json") return absl::OkStatus();
+  return absl::InvalidArgumentError(Concat("stats: '", absl::Utf8SafeCHexEscape(path.native()),
+                                           "' has no known extension; must end in .csv or .json"));
+}
+
 absl::StatusOr<StatisticsWriter> StatisticsWriter::Create(const std::filesystem::path& path,
                                                           std::vector<Gauge> gauges,
                                                           StatisticsOf what) {
-  const std::string extension = absl::AsciiStrToLower(path.extension().native());
-  const bool json = extension == ".json";
-  if (!json && extension != ".csv") {
-    return absl::InvalidArgumentError(
-        Concat("stats: '", absl::Utf8SafeCHexEscape(path.native()),
-               "' has no known extension; must end in .csv or .json"));
-  }
+  if (absl::Status status = CheckExtension(path); !status.ok()) return status;
+  const bool json = ExtensionOf(path) == ".json";
   if (what == StatisticsOf::kSurfaces && !gauges.empty()) {
     return absl::InvalidArgumentError(
         Concat("gauge ", gauges.front().name, ": cannot measure surfaces; must be of outlines"));

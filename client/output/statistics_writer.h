@@ -49,9 +49,12 @@ absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& t
 /// numbers are null. Rows are written at once; the file appears with Finish.
 class StatisticsWriter {
  public:
+  /// INVALID_ARGUMENT if `path` ends neither in .csv nor in .json.
+  static absl::Status CheckExtension(const std::filesystem::path& path);
+
   /// Selects CSV or JSON by the extension of `path`.
-  /// Errors: INVALID_ARGUMENT for other extensions, and for gauges of surfaces, since gauges
-  /// measure outlines; as for AtomicFile.
+  /// Errors: as CheckExtension; INVALID_ARGUMENT for gauges of surfaces, since gauges measure
+  /// outlines; as for AtomicFile.
   static absl::StatusOr<StatisticsWriter> Create(const std::filesystem::path& path,
                                                  std::vector<Gauge> gauges = {},
                                                  StatisticsOf what = StatisticsOf::kOutlines);

@@ -61,17 +61,7 @@ class KeyRotation : public testing::Test {
         if (event.kind != client::Event::Kind::kReconnected) break;
         history.reconnections.push_back(Clock::now());
       }
-      Answer answer{.sequence = event.sequence,
-                    .is_result = event.kind == client::Event::Kind::kResult};
-      if (answer.is_result) {
-        answer.rings_digest = event.frame.rings_digest;
-        answer.mesh_digest = event.frame.mesh_digest;
-        answer.time = event.time;
-        for (const auto& ring : event.frame.result.rings.measures) {
-          answer.identities.push_back(ring.identity);
-        }
-      }
-      history.answers.push_back(std::move(answer));
+      history.answers.push_back(AnswerOf(event));
     }
   }
 

@@ -24,26 +24,31 @@ void Receive(client::FrameStream& stream, History& history) {
     if (event.kind == client::Event::Kind::kReconnected) {
       history.reconnections.push_back(Clock::now());
     }
-    const bool is_result = event.kind == client::Event::Kind::kResult;
-    if (!is_result && event.kind != client::Event::Kind::kRefusal) continue;
-    Answer answer{.sequence = event.sequence, .is_result = is_result, .at = Clock::now()};
-    if (is_result) {
-      answer.rings_digest = event.frame.rings_digest;
-      answer.mesh_digest = event.frame.mesh_digest;
-      answer.surface_digest = event.frame.surface_digest;
-      answer.time = event.time;
-      for (const auto& ring : event.frame.result.rings.measures) {
-        answer.identities.push_back(ring.identity);
-      }
-      for (const auto& shell : event.frame.result.surface.measures) {
-        answer.identities.push_back(shell.identity);
-      }
-    }
+    const bool is_refusal = event.kind == client::Event::Kind::kRefusal;
+    if (event.kind != client::Event::Kind::kResult && !is_refusal) continue;
+    Answer answer = AnswerOf(event);
+    answer.at = Clock::now();
     history.answers.push_back(std::move(answer));
   }
 }
 
 }  // namespace
+
+Answer AnswerOf(const client::Event& event) {
+  if (event.kind != client::Event::Kind::kResult) return {.sequence = event.sequence};
+  const client::FrameResult& frame = event.frame;
+  Answer answer{.sequence = event.sequence,
+                .is_result = true,
+                .rings_digest = frame.rings_digest,
+                .mesh_digest = frame.mesh_digest,
+                .surface_digest = frame.surface_digest,
+                .time = event.time};
+  for (const auto& ring : frame.result.rings.measures) answer.identities.push_back(ring.identity);
+  for (const auto& shell : frame.result.surface.measures) {
+    answer.identities.push_back(shell.identity);
+  }
+  return answer;
+}
 
 Workload DamBreak() {
   const std::string path = PARTIEMC_SOURCE_DIR "/client/recordings/dam_break.pemc";

@@ -50,6 +50,9 @@ Workload Leap();
 /// Surfaces: two balls in space that merge, with an outline on a plane.
 Workload Merge();
 
+/// The answer of a result or refusal, without the time of its arrival.
+Answer AnswerOf(const client::Event& event);
+
 /// Sends frames, at most `per_second` (0: no limit), until `enough` returns true for the number
 /// sent; receives concurrently until the stream ends.
 History RunThrough(client::FrameStream& stream, const Workload& workload, double per_second,
