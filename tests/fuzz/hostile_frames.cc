@@ -15,10 +15,11 @@ namespace {
 constexpr std::size_t kMostParticles = 96;
 
 // A difficult coordinate near `origin`: on nodes and halfway between them (ties), slightly beside
-// them, anywhere, or with arbitrary bits.
-double HostileCoordinate(Choices& choices, double origin, double spacing) {
+// them, anywhere, or with arbitrary bits. `reach`: see HostileFrame.
+double HostileCoordinate(Choices& choices, double origin, double spacing, int reach = 0) {
   const auto kind = choices.Take<std::uint8_t>();
-  const auto step = choices.Take<std::int8_t>();
+  int step = choices.Take<std::int8_t>();
+  if (reach > 0) step %= reach;
   const double place = origin + spacing * step;
   switch (kind % 16) {
     case 0:
@@ -87,17 +88,22 @@ void RequireNoTrace(const absl::Status& status, const Result& result, const Stat
 
 }  // namespace
 
-HostileFrame::HostileFrame(Choices& choices, double spacing) {
+HostileFrame::HostileFrame(Choices& choices, double spacing, int reach) {
   const auto shape = choices.Take<std::uint8_t>();
   is_float_ = shape & 1;
-  components_ = (shape & 6) == 2 ? 3 : 2;
+  components_ = ((shape & 6) == 2) != (reach > 0) ? 3 : 2;
   const std::size_t count = choices.Below(kMostParticles + 1);
   const double x = HostileOrigin(choices), y = HostileOrigin(choices);
   for (std::size_t k = 0; k < count && !choices.empty(); ++k) {
-    doubles_.push_back(HostileCoordinate(choices, x * spacing, spacing));
-    doubles_.push_back(HostileCoordinate(choices, y * spacing, spacing));
-    if (components_ == 3) doubles_.push_back(shape & 128 ? HostileCoordinate(choices, 0, 1) : 0);
-    if (shape & 8) volumes_.push_back(static_cast<float>(spacing * spacing));
+    doubles_.push_back(HostileCoordinate(choices, x * spacing, spacing, reach));
+    doubles_.push_back(HostileCoordinate(choices, y * spacing, spacing, reach));
+    if (components_ == 3 && reach > 0) {
+      doubles_.push_back(HostileCoordinate(choices, 0, spacing, reach));
+    } else if (components_ == 3) {
+      doubles_.push_back(shape & 128 ? HostileCoordinate(choices, 0, 1) : 0);
+    }
+    const double volume = spacing * spacing * (reach > 0 ? spacing : 1);
+    if (shape & 8) volumes_.push_back(static_cast<float>(volume));
     if (shape & 16) ids_.push_back(HostileId(choices, k));
     if (shape & 32) {
       for (int axis = 0; axis < components_; ++axis) velocities_.push_back(choices.Take<float>());

@@ -17,7 +17,9 @@ inline constexpr FrameLimits kHostileLimits{.max_particles = 256, .max_tiles = 4
 /// A frame that owns its arrays of difficult numbers.
 class HostileFrame {
  public:
-  HostileFrame(Choices& choices, double spacing);
+  /// `reach`: 0, or the number of spacings within which the particles of a frame in space lie
+  /// around their origin, so that they make bodies.
+  HostileFrame(Choices& choices, double spacing, int reach = 0);
   /// Valid while this object exists.
   Frame AsFrame() const;
 

@@ -15,15 +15,17 @@ namespace {
 
 // Enough bricks for two bodies with the default parameters.
 constexpr FrameLimits kLimits{.max_particles = 256, .max_tiles = 160};
+constexpr int kReach = 5;
 
 // Mostly valid.
 ReconstructionParameters HostileSurface(Choices& choices) {
-  ReconstructionParameters parameters = HostileParameters(choices);
-  parameters.output = Output::kSurface;
-  if (choices.Below(16) != 15) {
-    if (!parameters.spacing) parameters.spacing = 1;
-    if (!KeepsGuarantees(parameters.placement)) parameters.placement = Placement::kVirtualPlane;
+  ReconstructionParameters parameters{.spacing = 1};
+  if (choices.Below(4) == 0) {
+    parameters = HostileParameters(choices);
+  } else {
+    parameters.placement = AllPlacements()[choices.Below(AllPlacements().size())];
   }
+  parameters.output = Output::kSurface;
   constexpr std::array kDistances = {.03, .0, .3, 1e-9, -1.0, 1e300};
   parameters.surface.thinning_distance = kDistances[choices.Below(kDistances.size())];
   if (choices.Flip()) parameters.surface.max_drop_particles = choices.Take<std::uint8_t>();
@@ -79,7 +81,7 @@ void AttackSurfaces(Bytes bytes) {
   State state;
   Result result, again;
   for (std::size_t left = 1 + choices.Below(3); left > 0; --left) {
-    const HostileFrame frame(choices, parameters.spacing.value_or(1));
+    const HostileFrame frame(choices, parameters.spacing.value_or(1), kReach);
     const std::string before = Serialize(state);
     const absl::Status status =
         reconstructor->Reconstruct(frame.AsFrame(), state, *workspace, result);

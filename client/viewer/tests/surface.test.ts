@@ -1,7 +1,6 @@
 // Tests the decoder of surfaces: against bytes of the C++ program, and with hostile bytes.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
-import path from 'node:path';
 import { before, test } from 'node:test';
 import { fromBinary } from '@bufbuild/protobuf';
 import { CoordinateFormat, WatchStreamResponseSchema } from '@proto/v1/reconstruction_pb';
@@ -12,7 +11,7 @@ import { decodeSurface, NO_SHELL, type Surface, type SurfaceMessage } from '../s
 import { plainMessage } from './surface_message';
 
 /** One frame in each format, from `partiemc replay --surface` through a server: two balls of 81 particles. */
-const recorded = JSON.parse(readFileSync(path.join(process.cwd(), 'tests/surface_frames.json'), 'utf8')) as Record<string, string>;
+const recorded = JSON.parse(readFileSync(new URL('../../tests/surface_frames.json', import.meta.url), 'utf8')) as Record<string, string>;
 
 before(() => MeshoptDecoder.ready);
 
