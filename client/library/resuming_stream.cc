@@ -390,8 +390,7 @@ absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
   if (!opened.ok()) return opened.status();
   if (!*opened) return false;
   const auto info = ReadOpened((*opened)->message, options_.parameters.output);
-  if (!info.ok()) return info.status();
-  if (auto suits = CheckReplica(**opened, *info); !suits.ok()) {
+  if (auto suits = info.ok() ? CheckReplica(**opened, *info) : info.status(); !suits.ok()) {
     LoseCall(std::move((*opened)->call), {.status = suits, .why = "does not suit"});
     return true;
   }

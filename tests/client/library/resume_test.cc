@@ -256,7 +256,8 @@ TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
 }
 
 // Expects that a replica with these differences is skipped.
-void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise) {
+void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise,
+                      const ReconstructionParameters& parameters = {}) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1);
     return Lost(grpc::StatusCode::UNAVAILABLE);
@@ -274,6 +275,7 @@ void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise) {
   });
   StreamOptions options = Options(&other);
   options.fallback_addresses.push_back(good.address());
+  options.parameters = parameters;
   const auto stream = Stream::Open(first.address(), options);
   ASSERT_TRUE(stream.ok()) << stream.status();
   EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
@@ -287,6 +289,11 @@ TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
 TEST(Resume, AReplicaThatResolvesTheParametersOtherwiseIsPassedOver) {
   ExpectPassedOver(
       [](v1::StreamOpened& opened) { opened.mutable_parameters()->set_kernel_radius(4); });
+}
+
+TEST(Resume, AReplicaWithoutSurfacesIsPassedOver) {
+  ExpectPassedOver([](v1::StreamOpened& opened) { opened.mutable_parameters()->clear_output(); },
+                   {.output = Output::kSurface, .spacing = 1});
 }
 
 TEST(Resume, GivesUpInTimeWithTheLastError) {
