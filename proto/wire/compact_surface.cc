@@ -19,6 +19,14 @@
 namespace partiemc::wire {
 namespace {
 
+// The versions that PROTOCOL.md names. They are global in meshoptimizer, so they are set before any
+// thread encodes.
+[[maybe_unused]] const bool kVersionsAreSet = [] {
+  meshopt_encodeVertexVersion(0);
+  meshopt_encodeIndexVersion(1);
+  return true;
+}();
+
 // Steps per spacing, at least: an error of at most .0009 spacings.
 constexpr double kSteps = 1024;
 constexpr double kMostSteps = 1 << 30;
@@ -29,6 +37,9 @@ constexpr int kNormalBits = 8;
 
 // The vertex codec stores at least 2 bits for 16 bytes.
 constexpr std::size_t kMostExpansion = 64;
+
+// Limits the memory that one array of a message takes.
+constexpr std::size_t kMostArrayBytes = std::size_t{1} << 30;
 
 const unsigned char* Data(const std::string& bytes) {
   return reinterpret_cast<const unsigned char*>(bytes.data());
@@ -49,6 +60,10 @@ absl::Status DecodeVertices(const std::string& bytes, std::size_t count, std::si
   if (count * vertex_bytes / kMostExpansion > bytes.size()) {
     return Lost(field, absl::StrCat("has ", bytes.size(), " bytes, too few for ", count,
                                     " compressed points"));
+  }
+  if (count * vertex_bytes > kMostArrayBytes) {
+    return Lost(field, absl::StrCat("has ", count, " points, which take more than ",
+                                    kMostArrayBytes, " bytes"));
   }
   values.resize(count * vertex_bytes / sizeof(T));
   if (meshopt_decodeVertexBuffer(values.data(), count, vertex_bytes, Data(bytes), bytes.size()) !=
@@ -188,7 +203,7 @@ absl::Status DecodeValues(const NamedAttributes& messages, std::size_t points,
 // The largest power of two that is at most `spacing` / kSteps, so that multiples are exact. Without
 // a spacing there are no points, and any step will do.
 double StepOf(double spacing) {
-  return spacing > 0 ? std::exp2(std::floor(std::log2(spacing / kSteps))) : 1;
+  return spacing > 0 ? std::ldexp(1.0, std::ilogb(spacing / kSteps)) : 1;
 }
 
 }  // namespace

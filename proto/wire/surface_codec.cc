@@ -170,6 +170,7 @@ absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
   if (outputs.coordinates == Coordinates::kCompact) {
     return EncodeCompact(surface, origin, spacing, outputs.normals && !surface.normals.empty(), to);
   }
+  to.clear_step();
   AssignBytes(std::span<const std::uint32_t>(surface.triangles), *to.mutable_triangles());
   if (outputs.normals) {
     AssignBytes(std::span<const float>(surface.normals), *to.mutable_normals());

@@ -134,6 +134,9 @@ TEST(SurfaceMessage, AReusedMessageAndResultHoldNothingOfTheFrameBefore) {
     v1::ReconstructedFrame reused = Encoded(outline, outputs);
     ASSERT_TRUE(EncodeResult(BallsResult(), {}, outputs, reused).ok());
     EXPECT_EQ(reused.SerializeAsString(), Encoded(BallsResult(), outputs).SerializeAsString());
+    ASSERT_TRUE(EncodeResult(BallsResult(), {}, kCompact, reused).ok());  // Of another stream.
+    ASSERT_TRUE(EncodeResult(BallsResult(), {}, outputs, reused).ok());
+    EXPECT_EQ(reused.SerializeAsString(), Encoded(BallsResult(), outputs).SerializeAsString());
     ReconstructedFrame frame;
     ASSERT_TRUE(DecodeResult(reused, frame).ok());
     ASSERT_TRUE(EncodeResult(outline, {}, outputs, reused).ok());
@@ -258,6 +261,29 @@ TEST(CompactSurface, TakesAtMostFiveBytesPerTriangle) {
   EXPECT_GT(Encoded(result, kExact).surface().ByteSizeLong(), 25 * triangles);
 }
 
+// A decoder of another language may know these versions only.
+TEST(CompactSurface, HasTheVersionsOfTheCodecsThatTheProtocolNames) {
+  const v1::ReconstructedFrame message = Encoded(BallsResult(), kCompact);
+  constexpr char kVertexVersion0 = '\xa0', kIndexVersion1 = '\xe1';
+  EXPECT_EQ(message.surface().points().front(), kVertexVersion0);
+  EXPECT_EQ(message.surface().normals().front(), kVertexVersion0);
+  EXPECT_EQ(message.surface().attributes(0).values().front(), kVertexVersion0);
+  EXPECT_EQ(message.surface().triangles().front(), kIndexVersion1);
+}
+
+TEST(CompactSurface, StepIsTheLargestPowerOfTwoThatIsSmallEnough) {
+  Result result;
+  result.Clear();
+  result.surface.attributes = {{"p", 1, {}}};  // Is sent even without bodies.
+  for (const double power : {1.0, 0x1p-49, 0x1p60}) {
+    const double below = std::nextafter(power, 0);
+    result.statistics.spacing = 1024 * below;
+    EXPECT_EQ(Encoded(result, kCompact).surface().step(), power / 2);
+    result.statistics.spacing = 1024 * power;
+    EXPECT_EQ(Encoded(result, kCompact).surface().step(), power);
+  }
+}
+
 TEST(CompactSurface, ThatIsTooWideIsRefused) {
   for (const double far : {3e6, std::numeric_limits<double>::max()}) {
     Result result = BallsResult();
@@ -360,6 +386,18 @@ TEST(HostileSurface, IsRefusedWithTheFieldAndNothingOfItIsKept) {
   Put(*message.mutable_surface()->mutable_triangles(), 0,
       static_cast<std::uint32_t>(BallsResult().surface.PointCount() - 1));
   ExpectRefused(message, "surface.triangles");
+}
+
+TEST(HostileSurface, CannotMakeTheReaderAllocateMoreThanAGibibyte) {
+  v1::ReconstructedFrame message = Encoded(BallsResult(), kCompact);
+  v1::Surface& surface = *message.mutable_surface();
+  // As many bytes as 90 million points may be compressed to.
+  const std::uint32_t points = 90'000'000;
+  Put(*surface.mutable_point_offsets(), 3, points);
+  surface.mutable_points()->resize(points / 5);
+  ExpectRefused(message, "surface.points");
+  ReconstructedFrame frame;
+  EXPECT_THAT(std::string(DecodeResult(message, frame).message()), HasSubstr("1073741824 bytes"));
 }
 
 TEST(HostileSurface, RandomBytesNeverReachPastAnArray) {

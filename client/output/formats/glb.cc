@@ -24,6 +24,13 @@ std::string JsonText(std::string_view text) {
 // Primitive modes of glTF.
 constexpr int kLines = 1, kTriangles = 4;
 
+// The only versions that EXT_meshopt_compression permits. They are global in meshoptimizer.
+[[maybe_unused]] const bool kVersionsAreSet = [] {
+  meshopt_encodeVertexVersion(0);
+  meshopt_encodeIndexVersion(1);
+  return true;
+}();
+
 // The codecs of EXT_meshopt_compression. They lose no bit; TRIANGLES may rotate the three indices
 // of a triangle.
 std::string PackVertices(std::string_view bytes, std::size_t count) {
@@ -35,7 +42,6 @@ std::string PackVertices(std::string_view bytes, std::size_t count) {
 }
 
 std::string PackIndices(std::span<const std::uint32_t> indices, int mode) {
-  meshopt_encodeIndexVersion(1);  // The only version that the extension permits.
   const std::size_t count = indices.size();
   const std::size_t vertices = std::size_t{*std::ranges::max_element(indices)} + 1;
   const bool triangles = mode == kTriangles;
