@@ -177,16 +177,12 @@ bool CorrectVolumes(const Scale& scale, double limit, SurfaceWorkspace::Buffers&
   space::BodyVolumes& volumes = b.virtual_plane.volumes;
   space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
                           volumes);
-  const space::VolumeMoves moves = space::SearchVolumes(
+  const bool has_moved = space::SearchVolumes(
       b.bodies, {.limit = limit * scale.spacing * scale.cell_size, .tolerance = kVolumeTolerance},
       b.normals, volumes, b.positions);
-  if (moves.returns) {
-    space::ReturnToSavedSetbacks(b.certificate);
-  } else {
-    space::SaveSetbacks(b.certificate);
-  }
-  if (moves.any) KeepFixedVertices(b);
-  return moves.any;
+  space::SaveOrReturnSetbacks(volumes.body_of, volumes.steps, b.certificate);
+  if (has_moved) KeepFixedVertices(b);
+  return has_moved;
 }
 
 /// Places vertices away from their anchors and connects them by quads that the certificate accepts.
@@ -218,6 +214,9 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
                          parameters.thinning_distance * scale.spacing, b.thin);
     space::EmitQuads(bricks, b.crossings, b.certificate, b.thin, b.mesh.triangles);
     if (placement != SurfacePlacement::kVirtualPlane || round > kVolumeRounds) break;
+    if (round == 0) {
+      space::FindBodyOfNodes(bricks, b.crossings, b.virtual_plane.volumes.body_of, b.certificate);
+    }
     if (!CorrectVolumes(scale, round < kVolumeRounds ? kVolumeLimit : 0, b)) break;
   }
   return absl::OkStatus();

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cmath>
 
 #include "base/parallel.h"
 #include "space/brick_layers.h"
@@ -281,14 +282,43 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return CertifyMoved(bricks, crossings, cell_size, anchors, positions, certificate);
 }
 
-void SaveSetbacks(Certificate& certificate) {
-  certificate.saved_setbacks = certificate.setbacks;
-  certificate.saved_node_setbacks = certificate.nodes.setbacks;
+void FindBodyOfNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                     std::span<const std::uint32_t> body_of_vertex, Certificate& certificate) {
+  const MovedNodes& nodes = certificate.nodes;
+  certificate.body_of_node.resize(nodes.count);
+  ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
+    ForEachMovedNode(nodes, brick, [&](std::uint32_t node, int i, int j, int k) {
+      // A node that may move is a corner of an active cell.
+      for (int side = 0; side < 8; ++side) {
+        const BrickPlace place =
+            Normalise(bricks, brick, i - (side & 1), j - (side >> 1 & 1), k - (side >> 2));
+        if ((crossings.bricks[place.brick].active[place.k] >> place.Bit() & 1) == 0) continue;
+        const ActiveCell& cell = crossings.cells[crossings.CellAt(place)];
+        certificate.body_of_node[node] = body_of_vertex[cell.first_loop];
+        break;
+      }
+    });
+  });
+  certificate.saved_setbacks.resize(certificate.setbacks.size() + nodes.count);
 }
 
-void ReturnToSavedSetbacks(Certificate& certificate) {
-  certificate.setbacks = certificate.saved_setbacks;
-  certificate.nodes.setbacks = certificate.saved_node_setbacks;
+void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
+                          std::span<const BodyStep> steps, Certificate& certificate) {
+  const std::size_t vertices = certificate.setbacks.size();
+  const auto save_or_return = [&](BodyStep step, std::uint8_t& setbacks, std::uint8_t& saved) {
+    if (step == BodyStep::kIsSaved) saved = setbacks;
+    if (step == BodyStep::kReturns) setbacks = saved;
+  };
+  ParallelFor(static_cast<std::uint32_t>(vertices), [&](std::uint32_t v) {
+    const BodyStep step = steps[body_of_vertex[v]];
+    save_or_return(step, certificate.setbacks[v], certificate.saved_setbacks[v]);
+    // No position equals NaN.
+    if (step == BodyStep::kReturns) certificate.certified[v].x = std::nan("");
+  });
+  ParallelFor(certificate.nodes.count, [&](std::uint32_t node) {
+    save_or_return(steps[certificate.body_of_node[node]], certificate.nodes.setbacks[node],
+                   certificate.saved_setbacks[vertices + node]);
+  });
 }
 
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,

@@ -18,6 +18,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/vec3.h"
@@ -40,11 +41,11 @@ struct Certificate {
   /// Cells by brick. Moved: with a vertex or node that moved, or with a refused face. Changed:
   /// moved cells, and cells with a node that followed them. Their faces are tested.
   std::vector<BrickBits> moved, changed;
-  std::vector<BrickBits> moved_nodes;   ///< Nodes by brick, in the last round.
-  std::vector<std::uint8_t> has_moved;  ///< By brick: has moved cells.
-  std::vector<Vec3> certified;          ///< Positions of the vertices, once certified.
-  /// The setbacks of vertices and nodes at the last call of SaveSetbacks.
-  std::vector<std::uint8_t> saved_setbacks, saved_node_setbacks;
+  std::vector<BrickBits> moved_nodes;        ///< Nodes by brick, in the last round.
+  std::vector<std::uint8_t> has_moved;       ///< By brick: has moved cells.
+  std::vector<Vec3> certified;               ///< Positions of the vertices, once certified.
+  std::vector<std::uint32_t> body_of_node;   ///< By node.
+  std::vector<std::uint8_t> saved_setbacks;  ///< By vertex, then by node.
 };
 
 /// Marks the vertices of cells with several loops, which have to stay at their anchors.
@@ -66,10 +67,18 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// Stores the setbacks, and takes them back. Positions that were certified with them are certified
-/// again if they return.
-void SaveSetbacks(Certificate& certificate);
-void ReturnToSavedSetbacks(Certificate& certificate);
+/// What happens to the vertices and nodes of a body between two certifications.
+enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
+
+/// Finds the body of each node that may move. Requires: Certify.
+void FindBodyOfNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+                     std::span<const std::uint32_t> body_of_vertex, Certificate& certificate);
+
+/// Stores the setbacks of the bodies that are saved, and takes back those of the bodies that
+/// return, all of whose vertices then count as moved. Positions that were certified with these
+/// setbacks are certified again. Requires: FindBodyOfNodes.
+void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
+                          std::span<const BodyStep> steps, Certificate& certificate);
 
 /// The number of faces that are refused in their modes: 0 once certified. For tests.
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,

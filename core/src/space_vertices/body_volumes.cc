@@ -137,39 +137,38 @@ void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyV
   volumes.best_positions.resize(positions.size());
 }
 
-VolumeMoves SearchVolumes(const Bodies& bodies, const VolumeStep& step,
-                          const std::vector<Vec3>& normals, BodyVolumes& volumes,
-                          std::vector<Vec3>& positions) {
+bool SearchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                   BodyVolumes& volumes, std::vector<Vec3>& positions) {
   volumes.offsets.assign(bodies.bodies.size(), 0);
-  VolumeMoves moves;
+  volumes.steps.assign(bodies.bodies.size(), BodyStep::kGoesOn);
+  bool has_moved = false;
   for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
     const BodyMeasure& measure = volumes.measures[body];
     BodyVolumes::Best& best = volumes.best[body];
-    best.is_new = best.returns = false;
     const double wanted = bodies.bodies[body].volume;
     if (best.is_final || !(wanted > 0) || !(measure.area > 0)) continue;
     const double missing = wanted - measure.volume, error = std::abs(missing) / wanted;
     if (error > best.error) {
-      best.is_final = best.returns = moves.any = moves.returns = true;
+      volumes.steps[body] = BodyStep::kReturns;
+      best.is_final = has_moved = true;
       continue;
     }
-    best.is_new = true;
+    volumes.steps[body] = BodyStep::kIsSaved;
     best.error = error;
     if (error <= step.tolerance) continue;
     volumes.offsets[body] = std::clamp(missing / measure.area, -step.limit, step.limit);
-    moves.any = moves.any || volumes.offsets[body] != 0;
+    has_moved = has_moved || volumes.offsets[body] != 0;
   }
   ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
     const std::uint32_t body = volumes.body_of[v];
-    const BodyVolumes::Best& best = volumes.best[body];
-    if (best.is_new) volumes.best_positions[v] = positions[v];
-    if (best.returns) {
+    if (volumes.steps[body] == BodyStep::kReturns) {
       positions[v] = volumes.best_positions[v];
-    } else {
-      positions[v] = positions[v] + volumes.offsets[body] * normals[v];
+      return;
     }
+    if (volumes.steps[body] == BodyStep::kIsSaved) volumes.best_positions[v] = positions[v];
+    positions[v] = positions[v] + volumes.offsets[body] * normals[v];
   });
-  return moves;
+  return has_moved;
 }
 
 }  // namespace partiemc::space

@@ -8,6 +8,7 @@
 
 #include "base/vec3.h"
 #include "space/bodies.h"
+#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
@@ -35,11 +36,10 @@ struct BodyVolumes {
   /// The smallest error of a body so far.
   struct Best {
     double error = std::numeric_limits<double>::infinity();
-    bool is_new = false;    ///< Of these positions.
     bool is_final = false;  ///< The body stays as it was then.
-    bool returns = false;
   };
   std::vector<Best> best;            ///< By body.
+  std::vector<BodyStep> steps;       ///< By body: what SearchVolumes did.
   std::vector<Vec3> best_positions;  ///< By vertex: with the smallest error of its body.
 };
 
@@ -71,20 +71,15 @@ struct VolumeStep {
 bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);
 
-struct VolumeMoves {
-  bool any = false;      ///< A body has moved.
-  bool returns = false;  ///< A body has returned.
-};
-
 /// Forgets the best positions of an earlier frame.
 void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
 /// MatchVolumes as a step of a search: a body whose error has grown returns to its positions with
 /// the smallest error, for good. Steps can fail, because the certificate sets vertices back: in
-/// sheets of one layer most of them. With `step.limit` 0, bodies only return.
+/// sheets of one layer most of them. With `step.limit` 0, bodies only return. Returns whether a
+/// body has moved.
 /// Requires: BeginSearch before the first step; otherwise as MatchVolumes.
-VolumeMoves SearchVolumes(const Bodies& bodies, const VolumeStep& step,
-                          const std::vector<Vec3>& normals, BodyVolumes& volumes,
-                          std::vector<Vec3>& positions);
+bool SearchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+                   BodyVolumes& volumes, std::vector<Vec3>& positions);
 
 }  // namespace partiemc::space

@@ -362,21 +362,23 @@ TEST(VolumeSearch, ABodyWhoseErrorHasGrownReturnsForGood) {
     volumes.measures = {{.area = 2, .volume = first}, {.area = 2, .volume = second}};
     return SearchVolumes(bodies, {.limit = limit, .tolerance = .01}, normals, volumes, positions);
   };
-  EXPECT_TRUE(search(1.5, 1.5).any);
+  EXPECT_TRUE(search(1.5, 1.5));
   EXPECT_DOUBLE_EQ(positions[0].z, -.25);
   EXPECT_DOUBLE_EQ(positions[1].z, -.25);
-  EXPECT_FALSE(search(1.4, 1.3).returns);  // Both are better, and move on.
+  EXPECT_TRUE(search(1.4, 1.3));  // Both are better, and move on.
   EXPECT_DOUBLE_EQ(positions[0].z, -.45);
   EXPECT_DOUBLE_EQ(positions[1].z, -.4);
-  const VolumeMoves third = search(1.6, 1.2);
-  EXPECT_TRUE(third.any && third.returns);
+  EXPECT_EQ(volumes.steps, (std::vector{BodyStep::kIsSaved, BodyStep::kIsSaved}));
+  EXPECT_TRUE(search(1.6, 1.2));
+  EXPECT_EQ(volumes.steps, (std::vector{BodyStep::kReturns, BodyStep::kIsSaved}));
   EXPECT_DOUBLE_EQ(positions[0].z, -.25);
   EXPECT_DOUBLE_EQ(positions[1].z, -.5);
-  EXPECT_TRUE(search(1.7, 1.1).any);
+  EXPECT_TRUE(search(1.7, 1.1));
+  EXPECT_EQ(volumes.steps, (std::vector{BodyStep::kGoesOn, BodyStep::kIsSaved}));
   EXPECT_DOUBLE_EQ(positions[0].z, -.25) << "it stays";
   EXPECT_DOUBLE_EQ(positions[1].z, -.55);
-  EXPECT_FALSE(search(1.7, 1.05, 0).any) << "a limit of 0 only returns bodies";
-  EXPECT_TRUE(search(1.7, 1.3, 0).returns);
+  EXPECT_FALSE(search(1.7, 1.05, 0)) << "a limit of 0 only returns bodies";
+  EXPECT_TRUE(search(1.7, 1.3, 0));
   EXPECT_DOUBLE_EQ(positions[1].z, -.55);
 }
 
@@ -396,6 +398,44 @@ TEST(VirtualPlane, GivesSheetsOfOneLayerTheVolumeOfTheirParticles) {
       ASSERT_TRUE(reconstructor->Reconstruct(sheet.AsFrame(), workspace, surface).ok());
       EXPECT_NEAR(VolumeOf(surface) / kCount, 1, .005) << thickness;
     }
+  }
+}
+
+/// The corners of all triangles, sorted by the triangles' first corners.
+std::vector<std::array<double, 9>> CornersOf(const Surface& surface) {
+  std::vector<std::array<double, 9>> corners(surface.TriangleCount());
+  for (std::size_t i = 0; i < 9 * corners.size(); ++i) {
+    corners[i / 9][i % 9] = surface.points[3 * std::size_t{surface.triangles[i / 3]} + i % 3];
+  }
+  std::sort(corners.begin(), corners.end());
+  return corners;
+}
+
+// Steps of the search for volumes fail most in sheets of one layer, and in drops of darts.
+TEST(VirtualPlane, BodiesFarApartDoNotInfluenceEachOther) {
+  const auto reconstructor = SurfaceReconstructor::Create(
+      {.placement = SurfacePlacement::kVirtualPlane, .max_drop_particles = 0});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  Random random(12);
+  for (int trial = 0; trial < support::Tries(10); ++trial) {
+    SpaceParticles all;
+    std::vector<std::array<double, 9>> apart;
+    for (int body = 0; body < 4; ++body) {
+      const Vec3 low{100.0 * body, 0, 0};
+      const double thickness = random.Uniform(.1, body < 2 ? 1.2 : 4);
+      SpaceParticles particles;
+      while (particles.size() < 200) {
+        particles.Add(
+            low + Vec3{random.Uniform(0, 14), random.Uniform(0, 14), random.Uniform(0, thickness)});
+      }
+      all.Add(particles);
+      ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
+      const auto corners = CornersOf(surface);
+      apart.insert(apart.end(), corners.begin(), corners.end());
+    }
+    ASSERT_TRUE(reconstructor->Reconstruct(all.AsFrame(), workspace, surface).ok());
+    EXPECT_TRUE(CornersOf(surface) == apart) << trial;
   }
 }
 
