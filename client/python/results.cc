@@ -304,12 +304,16 @@ py::tuple ToState(PythonResult& result) {
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
-  if (state.size() != 7) throw py::value_error("pickle: not the state of a partiemc Result");
+  // Without surfaces, the state had 6 parts.
+  if (state.size() != 6 && state.size() != 7) {
+    throw py::value_error("pickle: not the state of a partiemc Result");
+  }
   auto result = std::make_shared<PythonResult>();
-  result->in_space = state[6].cast<bool>();
+  result->in_space = state.size() == 7 && state[6].cast<bool>();
   v1::ReconstructedFrame message;
   const auto particles = state[2].cast<std::string_view>();
   if (!message.ParseFromString(state[0].cast<std::string>()) ||
+      (message.has_surface() && !result->in_space) ||
       particles.size() % (CoordinatesOf(*result) * sizeof(double)) != 0) {
     throw py::value_error("pickle: the state of a partiemc Result is damaged");
   }
