@@ -135,8 +135,8 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
 void AddSurfaceFlags(CLI::App& app, ReplayFlags& flags, const char* group) {
   CLI::Option* const surface =
       app.add_flag("--surface", flags.surface,
-                   "Closed surfaces of 3D particles instead of outlines; requires --spacing and "
-                   "--local. Each --slice adds the outline on a plane")
+                   "Closed surfaces of 3D particles instead of outlines; requires --spacing. "
+                   "Each --slice adds the outline on a plane")
           ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
           ->group(group);
   app.add_option("--thinning-distance", flags.surface_options.thinning_distance,
