@@ -391,7 +391,7 @@ TEST(HostileSurface, IsRefusedWithTheFieldAndNothingOfItIsKept) {
 TEST(HostileSurface, CannotMakeTheReaderAllocateMoreThanAGibibyte) {
   v1::ReconstructedFrame message = Encoded(BallsResult(), kCompact);
   v1::Surface& surface = *message.mutable_surface();
-  // As many bytes as 90 million points may be compressed to.
+  // Enough bytes for 90 million compressed points.
   const std::uint32_t points = 90'000'000;
   Put(*surface.mutable_point_offsets(), 3, points);
   surface.mutable_points()->resize(points / 5);
