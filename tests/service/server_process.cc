@@ -98,13 +98,15 @@ std::size_t ServerProcess::ThreadCount() const {
   return static_cast<std::size_t>(StatusNumber("Threads:"));
 }
 
-std::size_t ServerProcess::ThreadCount(std::string_view name) const {
-  const std::filesystem::directory_iterator tasks("/proc/" + std::to_string(process_) + "/task");
-  return static_cast<std::size_t>(
-      std::count_if(begin(tasks), end(tasks), [&](const std::filesystem::directory_entry& task) {
-        std::string own;
-        return std::getline(std::ifstream(task.path() / "comm"), own) && own == name;
-      }));
+std::vector<std::string> ServerProcess::ThreadNames() const {
+  std::vector<std::string> names;
+  for (const auto& task :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(process_) + "/task")) {
+    // A thread that has ended meanwhile has no name.
+    std::string name;
+    if (std::getline(std::ifstream(task.path() / "comm"), name)) names.push_back(name);
+  }
+  return names;
 }
 
 std::size_t ServerProcess::OpenFileCount() const {

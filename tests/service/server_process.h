@@ -47,8 +47,8 @@ class ServerProcess {
   // Requires that it runs:
   double ResidentMib() const;
   std::size_t ThreadCount() const;
-  std::size_t ThreadCount(
-      std::string_view name) const;  // The kernel truncates names to 15 characters.
+  /// The kernel truncates names to 15 characters.
+  std::vector<std::string> ThreadNames() const;
   std::size_t OpenFileCount() const;
 
  private:
