@@ -63,6 +63,8 @@ if has c; then
   if command -v gfortran >/dev/null; then
     built_by_comment "$c/example.f90"
     (($("$work/pkg-config/example_fortran" | tee /dev/stderr | wc -l) == 5))
+    built_by_comment "$c/surface.f90"
+    (($("$work/pkg-config/surface_fortran" "$work/bodies.obj" | tee /dev/stderr | wc -l) == 5))
   fi
 fi
 

@@ -130,6 +130,16 @@ std::vector<std::string> SurfaceDigestsOfReplay() {
   return Column(Content(folder.Path("statistics.csv")), "surface_digest");
 }
 
+// The lines of the triangles of an OBJ file.
+std::vector<std::string> FacesOf(const std::string& path) {
+  std::vector<std::string> faces;
+  std::istringstream lines(Content(path));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("f ")) faces.push_back(line);
+  }
+  return faces;
+}
+
 TEST(CInterface, ExampleOfSurfacesGivesDigestsOfReplay) {
   const support::TemporaryFolder folder;
   const Ran local = RunFile(C_SURFACE, {folder.Path("local.obj")});
@@ -153,13 +163,20 @@ TEST(CInterface, ExampleOfSurfacesGivesDigestsOfReplay) {
   EXPECT_TRUE(Content(folder.Path("remote.obj")) == body);
 }
 
-TEST(CInterface, TheExampleInFortranGivesTheDigestsOfReplay) {
+TEST(CInterface, ExamplesInFortranGiveDigestsOfReplay) {
   if (std::string(FORTRAN_EXAMPLE).empty()) {
     GTEST_SKIP() << "NOT TESTED: there is no Fortran compiler (Debian: gfortran)";
   }
   const Ran ran = RunFile(FORTRAN_EXAMPLE, {});
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
   EXPECT_EQ(DigestsOf(ran.out), DigestsOfReplay());
+
+  const support::TemporaryFolder folder;
+  const Ran in_space = RunFile(FORTRAN_SURFACE, {folder.Path("fortran.obj")});
+  EXPECT_EQ(in_space.exit_code, 0) << in_space.error;
+  EXPECT_EQ(DigestsOf(in_space.out, 16), SurfaceDigestsOfReplay());
+  EXPECT_EQ(RunFile(C_SURFACE, {folder.Path("c.obj")}).exit_code, 0);
+  EXPECT_EQ(FacesOf(folder.Path("fortran.obj")), FacesOf(folder.Path("c.obj")));
 }
 
 TEST(CInterface, TheLibraryShowsItsFunctionsAndNothingElse) {
