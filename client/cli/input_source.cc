@@ -1,11 +1,16 @@
 #include "client/cli/input_source.h"
 
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
 #include "client/recording/recording.h"
+#include "partiemc/spacing.h"
 
 namespace partiemc::client {
 
@@ -31,6 +36,27 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
   if (!reader.ok()) return reader.status();
   const auto spacing = (*reader)->header().spacing;
   return InputSource{.frames = *std::move(reader), .spacing = spacing};
+}
+
+absl::StatusOr<double> EstimatedSpacing(const std::string& input, const SequenceOptions& options) {
+  auto source = OpenInput(input, options);
+  if (!source.ok()) return source.status();
+  RecordedFrame recorded;
+  while (true) {
+    const auto more = source->frames->Next(recorded);
+    if (!more.ok()) return more.status();
+    if (!*more) {
+      return absl::InvalidArgumentError(
+          "--spacing: absent; must be given, because no frame has two different particles");
+    }
+    const Frame frame{.positions = std::span<const double>(recorded.positions),
+                      .components = recorded.components};
+    if (const auto spacing = EstimateSpacing(frame)) {
+      char text[32];
+      std::snprintf(text, sizeof text, "%.4g", *spacing);
+      return std::strtod(text, nullptr);
+    }
+  }
 }
 
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what) {

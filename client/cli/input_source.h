@@ -24,6 +24,10 @@ struct InputSource {
 /// Errors: as Sequence::Open.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
 
+/// The spacing that the first frame with two different particles shows, to four digits.
+/// Errors: as Sequence::Open and Next; INVALID_ARGUMENT if no frame shows one.
+absl::StatusOr<double> EstimatedSpacing(const std::string& input, const SequenceOptions& options);
+
 /// Adds --attributes, a list of names.
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
 

@@ -135,8 +135,8 @@ void AddPlaceFlags(CLI::App& app, ReplayFlags& flags) {
 void AddSurfaceFlags(CLI::App& app, ReplayFlags& flags, const char* group) {
   CLI::Option* const surface =
       app.add_flag("--surface", flags.surface,
-                   "Closed surfaces of 3D particles instead of outlines; requires --spacing. "
-                   "Each --slice adds the outline on a plane")
+                   "Closed surfaces of 3D particles instead of outlines. Each --slice adds the "
+                   "outline on a plane")
           ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
           ->group(group);
   app.add_option("--thinning-distance", flags.surface_options.thinning_distance,
@@ -182,15 +182,15 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->group(kGroup);
   app.add_option(
          "--spacing", flags.spacing,
-         "Particle spacing in world units; first-frame or every-frame estimate it. Default: the "
-         "spacing of the recording, else first-frame")
+         "Particle spacing in world units; first-frame or every-frame estimate it (slices and "
+         "surfaces: first-frame). Default: the spacing of the recording, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
   AddSurfaceFlags(app, flags, kGroup);
-  app.add_option("--slice", flags.slices,
-                 "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal; requires "
-                 "--spacing. "
-                 "Repeat for more planes")
+  app.add_option(
+         "--slice", flags.slices,
+         "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "
+         "more planes")
       ->type_name("z=C|OX,OY,OZ,NX,NY,NZ")
       ->allow_extra_args(false)
       ->each([&flags](const std::string&) { flags.sequence.in_space = true; })

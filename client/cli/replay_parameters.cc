@@ -93,10 +93,15 @@ std::optional<double> PositiveNumber(std::string_view text) {
   return value && *value > 0 ? value : std::nullopt;
 }
 
+bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing) {
+  if (!flags.sequence.in_space) return false;
+  return flags.spacing.empty() ? !recorded_spacing : flags.spacing == "first-frame";
+}
+
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
-                                                      std::optional<double> recorded_spacing) {
+                                                      std::optional<double> spacing) {
   ReconstructionParameters parameters{.output = flags.surface ? Output::kSurface : Output::kOutline,
-                                      .spacing = recorded_spacing,
+                                      .spacing = spacing,
                                       .kernel_radius = flags.kernel_radius,
                                       .cell_size = flags.cell_size,
                                       .reference_radius = flags.reference_radius,
@@ -114,7 +119,8 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   parameters.fill = *fill;
 
   if (flags.spacing == "first-frame" || flags.spacing == "every-frame") {
-    parameters.spacing.reset();
+    // In space, the spacing of the first frame is given.
+    if (!IsEstimatedInSpace(flags, std::nullopt)) parameters.spacing.reset();
     parameters.spacing_rule =
         flags.spacing == "first-frame" ? SpacingRule::kFirstFrame : SpacingRule::kEveryFrame;
   } else if (!flags.spacing.empty()) {

@@ -10,10 +10,13 @@
 
 namespace partiemc::client {
 
-/// Uses `recorded_spacing` if the flags give no spacing.
+/// Whether the spacing is estimated before the stream opens: surfaces and slices require one.
+bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing);
+
+/// Uses `spacing` if the flags give none: that of the recording, or the estimate.
 /// Errors: INVALID_ARGUMENT, one line that names the flag.
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
-                                                      std::optional<double> recorded_spacing);
+                                                      std::optional<double> spacing);
 
 /// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
 absl::StatusOr<std::optional<double>> RateOf(std::string_view text);

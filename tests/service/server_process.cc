@@ -102,7 +102,7 @@ std::vector<std::string> ServerProcess::ThreadNames() const {
   std::vector<std::string> names;
   for (const auto& task :
        std::filesystem::directory_iterator("/proc/" + std::to_string(process_) + "/task")) {
-    // A thread that has ended meanwhile has no name.
+    // A thread may end meanwhile.
     std::string name;
     if (std::getline(std::ifstream(task.path() / "comm"), name)) names.push_back(name);
   }

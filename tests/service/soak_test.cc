@@ -39,11 +39,11 @@ constexpr std::size_t kFrames = 8;          // Distinct frames, repeated.
 constexpr Seconds kWarmUp(15);
 // Below this duration the slope is noise, and memory may vary by this amount instead.
 constexpr double kMinutesForSlope = 10;
-// Pools by the names of their threads, which start on demand. Those of gRPC: the two callback pools
-// grow up to two threads per processor (src/core/lib/iomgr/executor.cc), timers to one more than
-// are busy at once (timer_manager.cc), events to the number of waiting ones. Only the last shrinks,
-// to one per processor. Of the server: `compute` with the threads that oneTBB starts, and
-// `hand-over`.
+// Pools by the names of their threads, which start on demand.
+// - gRPC: the two callback pools grow up to two threads per processor
+//   (src/core/lib/iomgr/executor.cc), timers to one more than are busy at once (timer_manager.cc),
+//   events to the number of waiting ones. Only the last shrinks, to one per processor.
+// - The server: `compute`, with the threads that oneTBB starts, and `hand-over`.
 struct Pool {
   std::string_view name;
   std::size_t per_processor, more;  // Its most threads.
@@ -218,8 +218,8 @@ class Soak : public ::testing::Test {
     }
     return holds;
   }
-  // Figures after all clients have disconnected, which the server may notice a moment later. Until
-  // a new thread has a name of its own, it has the name of the thread that started it.
+  // Figures after all clients have disconnected, which the server may notice a moment later. A new
+  // thread first has the name of the thread that started it.
   Holds WhenQuiet(std::size_t expected_files, std::size_t expected_threads) const {
     const auto give_up = Clock::now() + std::chrono::seconds(20);
     while (true) {

@@ -249,8 +249,8 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
 int Replay(const ReplayFlags& flags) {
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
-  // Checks the flags before the input is opened. A slice requires a spacing, which the recording
-  // may provide, so 1.0 stands for it here.
+  // Checks the flags before the input is opened. Slices and surfaces require a spacing, which the
+  // input will provide, so 1.0 stands for it here.
   const auto without_input = ParametersOf(flags, 1.0);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
@@ -258,6 +258,15 @@ int Replay(const ReplayFlags& flags) {
   if (!input.ok()) {
     const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kInput, input.status());
+  }
+  if (IsEstimatedInSpace(flags, input->spacing)) {
+    const auto spacing = EstimatedSpacing(flags.input, flags.sequence);
+    if (!spacing.ok()) return Complain(kInput, spacing.status());
+    input->spacing = *spacing;
+    if (!flags.quiet) {
+      Complain(kGood,
+               Concat("spacing ", *spacing, " estimated from the first frame; --spacing sets it"));
+    }
   }
   const auto parameters = ParametersOf(flags, input->spacing);
   if (!parameters.ok()) return Complain(kUsage, parameters.status());

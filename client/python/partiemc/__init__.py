@@ -19,11 +19,11 @@ that keep the memory of their result alive.
 
 from . import _convert
 from ._errors import Error, PartiemcWarning
-from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Surface, Watch, server, streams,
-                      version as __version__)
+from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Surface, Watch, estimate_spacing,
+                      server, streams, version as __version__)
 
 __all__ = ["Error", "Mesh", "PartiemcWarning", "Reconstructor", "Result", "Rings", "Stream", "Surface",
-           "Watch", "connect", "read_pysph", "reconstruct", "server", "streams", "watch"]
+           "Watch", "connect", "estimate_spacing", "read_pysph", "reconstruct", "server", "streams", "watch"]
 
 
 def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attributes=None,
@@ -39,8 +39,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}. `fill` and
         `attribute_tolerance` decide how well triangles represent them.
     output: "outline", or "surface" for closed surfaces of particles in space (Result.surface).
-        A surface requires (N, 3) positions and spacing; `volumes` are then volumes, and each of
-        `sections` is a slice.
+        A surface requires (N, 3) positions and spacing, such as estimate_spacing(positions);
+        `volumes` are then volumes, and each of `sections` is a slice.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
     threads: number of compute threads; one per processor if None.
     placement: "virtual-plane", "marching-squares" (surfaces: marching cubes), "qef" or

@@ -18,6 +18,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/result.h"
+#include "partiemc/spacing.h"
 #include "partiemc/stage.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"

@@ -93,12 +93,38 @@ TEST(SurfaceReplay, TellsWhatItRequires) {
   const Ran flat = RunPartiemc({"replay", frames, "--local"});
   EXPECT_EQ(flat.exit_code, 3);
   EXPECT_THAT(flat.error, AllOf(HasSubstr("is 3D"), HasSubstr("--surface"), HasSubstr("--slice")));
-  const Ran without_spacing = RunPartiemc({"replay", frames, "--local", "--surface"});
-  EXPECT_EQ(without_spacing.exit_code, 2);
-  EXPECT_THAT(without_spacing.error, HasSubstr("--spacing: absent; must be given"));
   const Ran in_plane = RunPartiemc({"replay", kDamBreak, "--local", "--surface"});
   EXPECT_EQ(in_plane.exit_code, 3);
   EXPECT_THAT(in_plane.error, HasSubstr("has two coordinates; leave --slice, --surface"));
+}
+
+TEST(SurfaceReplay, EstimatesTheSpacingOfTheFirstFrame) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const auto digests = [&](std::vector<std::string> flags) {
+    flags.insert(flags.begin(),
+                 {"replay", input.path().string(), "--local", "--stats", output.Path("s.csv")});
+    const Ran ran = RunPartiemc(flags);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    const bool is_told =
+        ran.error.find("spacing 1 estimated from the first frame") != std::string::npos;
+    EXPECT_EQ(is_told, flags.back() != "1") << ran.error;
+    const std::string statistics = Content(output.Path("s.csv"));
+    return Column(statistics, statistics.find("surface_digest") != std::string::npos
+                                  ? "surface_digest"
+                                  : "rings_digest");
+  };
+  const auto given = digests({"--surface", "--spacing", "1"});
+  EXPECT_FALSE(given.empty());
+  EXPECT_EQ(digests({"--surface"}), given);
+  EXPECT_EQ(digests({"--surface", "--spacing", "first-frame"}), given);
+  EXPECT_EQ(digests({"--slice", "z=0"}), digests({"--slice", "z=0", "--spacing", "1"}));
+
+  const support::TemporaryFolder one;
+  std::ofstream(one.Path("a.csv")) << "x,y,z\n1,2,3\n";
+  const Ran without = RunPartiemc({"replay", one.path().string(), "--local", "--surface"});
+  EXPECT_EQ(without.exit_code, 3);
+  EXPECT_THAT(without.error, HasSubstr("--spacing: absent; must be given, because no frame has"));
 }
 
 TEST(SurfaceReplay, TheBundledDropsKeepTheVolumeOfTheirParticles) {

@@ -27,6 +27,15 @@ class Surfaces(unittest.TestCase):
             cls.particles, output="surface", spacing=1, ids=numpy.arange(len(x)),
             attributes={"x": x, "where": cls.particles}, sections=[{"slice": ("z", 0.2)}])
 
+    def test_spacing_is_estimated_on_request(self):
+        self.assertAlmostEqual(partiemc.estimate_spacing(self.particles), 1)
+        self.assertAlmostEqual(
+            partiemc.estimate_spacing((.01 * self.particles).astype(numpy.float32)), .01)
+        self.assertAlmostEqual(partiemc.estimate_spacing(self.particles.T[0:2].copy().T[:9]), 1)
+        self.assertIsNone(partiemc.estimate_spacing(self.particles[:1]))
+        with self.assertRaises(partiemc.Error):
+            partiemc.estimate_spacing(numpy.zeros((3, 4)))
+
     def test_shapes_and_values_are_as_documented(self):
         result, surface = self.result, self.result.surface
         count, points = len(surface), len(surface.points)
