@@ -7,6 +7,7 @@ import { createRequire } from 'node:module';
 import path from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
+import { build } from 'esbuild';
 import { chromium } from 'playwright-core';
 
 export const viewer = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../..');
@@ -36,6 +37,14 @@ export async function until(what, value, patienceMs = PATIENCE_MS) {
     if (Date.now() > end) throw new Error(`${what}: not within ${patienceMs} ms`);
     await sleep(20);
   }
+}
+
+/** A module of the page, for computations in tests. */
+export async function moduleOf(file) {
+  const { outputFiles: [{ text }] } = await build({
+    entryPoints: [path.join(viewer, file)], bundle: true, format: 'esm', write: false, logLevel: 'warning',
+  });
+  return import(`data:text/javascript,${encodeURIComponent(text)}`);
 }
 
 function start(program, args, log) {
@@ -195,12 +204,16 @@ export class Viewer {
     return image.toString('base64');
   }
 
+  /** Waits until the page has drawn all changes so far. */
+  refreshes() {
+    return this.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+  }
+
   status() { return this.page.getByRole('status').textContent(); }
 
   /** Drops files and folders on the page. */
   async drop(...paths) {
-    // A page takes drag events after its first picture only.
-    await this.page.evaluate(() => new Promise((shown) => requestAnimationFrame(() => requestAnimationFrame(shown))));
+    await this.refreshes();  // A page takes drag events after its first picture only.
     const session = await this.page.context().newCDPSession(this.page);
     const data = { items: [], files: paths, dragOperationsMask: 1 };
     for (const type of ['dragEnter', 'dragOver', 'drop']) {
