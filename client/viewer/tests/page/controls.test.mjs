@@ -3,24 +3,16 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, screenshots, until, Viewer, World } from './support.mjs';
 
 let browser, world, viewer;
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   browser = await launch();
   world = await World.start();
   world.loop('dam');
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  await viewer?.close();
-  viewer = null;
-});
+cleansUp(() => ({ world, browser, viewer }), { makesErrors: true });
 
 const open = async (hash = '#stream=dam', from = browser) => {
   viewer = await Viewer.open(from, world.url, { hash });

@@ -1,10 +1,10 @@
 // Files of NumPy, VTK and XYZ, and kinds that the page refuses. Leaves a screenshot in build/screenshots.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, root, screenshots, until, Viewer, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, root, screenshots, until, Viewer, World } from './support.mjs';
 
 let world, browser, viewer;
 const place = (name) => path.join(world.folder, name);
@@ -30,21 +30,11 @@ with open(folder + '/drop.xyz', 'w') as out:
 `;
 
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
   browser = await launch();
   execFileSync('/usr/bin/python3', ['-c', WRITE, world.folder]);
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 test('NPY, NPZ and XYZ have the digests of the command line', async () => {
   viewer = await Viewer.open(browser, world.url);

@@ -1,15 +1,14 @@
 // Options of files, truncated recordings and closed files. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser, viewer;
 const place = (name) => path.join(world.folder, name);
 
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
   browser = await launch();
   // A ball of particles 0.1 apart: type 1 on the left, type 2 on the right.
@@ -29,16 +28,7 @@ before(async () => {
   const whole = readFileSync(recording);
   writeFileSync(place('cut.pemc'), whole.subarray(0, whole.length / 2));
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const field = (label) => viewer.page.locator('#file-options').getByLabel(label, { exact: true });
 const errorOf = (name) => viewer.page.locator(`#file-${name}-error`);

@@ -2,8 +2,8 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, recording, until, Viewer, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, recording, until, Viewer, World } from './support.mjs';
 
 const FRAMES = 12;
 let world, browser, viewer, folder;
@@ -37,16 +37,7 @@ before(async () => {
   }
   writeFileSync(path.join(folder, 'times.csv'), `${times.join('\n')}\n`);
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const drop = (...paths) => viewer.drop(...paths);
 

@@ -1,27 +1,16 @@
 // Layouts: folded side panel, phone, embedded. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, violations, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, screenshots, until, Viewer, violations, World } from './support.mjs';
 
 let world, browser, viewer;
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
   browser = await launch();
   world.loop('dam');
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const shot = (name) => viewer.page.screenshot({ path: path.join(screenshots, `${name}.png`) });
 const widthOf = async (locator) => (await locator.boundingBox())?.width ?? 0;

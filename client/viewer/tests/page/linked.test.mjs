@@ -2,8 +2,8 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
 
 let world, browser, viewer;
 const place = (name) => path.join(world.folder, name);
@@ -24,22 +24,12 @@ function square(name, count, step) {
 }
 
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
   browser = await launch();
   square('slow', 9, 0.25);
   square('fast', 17, 0.125);
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const canvas = (k) => viewer.pane(k).locator('canvas');
 const scale = (k) => viewer.pane(k).locator('.scale').textContent();

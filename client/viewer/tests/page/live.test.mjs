@@ -1,7 +1,7 @@
 // Tests of a live stream in the page: history, pause, settings, export.
 import assert from 'node:assert/strict';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, recording, until, Viewer, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, recording, until, Viewer, World } from './support.mjs';
 
 let world, browser, viewer, truth;
 
@@ -12,16 +12,7 @@ before(async () => {
   truth = await world.statistics(recording);
   world.loop('dam');
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const open = async (hash = '#stream=dam') => { viewer = await Viewer.open(browser, world.url, { hash }); };
 

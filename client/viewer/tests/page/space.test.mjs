@@ -1,108 +1,21 @@
 // Tests surfaces in space in the page. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, moduleOf, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { ballsOf, FRAMES, SpaceViewer, streamBalls, SURFACE } from './space_support.mjs';
+import { cleansUp, launch, screenshots, until, violations, withoutTooltip, World } from './support.mjs';
 
-const FLAGS = ['--surface', '--spacing', '1', '--echo-particles', '--attributes', 'p', '--slice', 'z=0', '--slice', 'y=2',
-  '--loop', '--rate', '5'];
-const FRAMES = 8;
-const { parseSpaceView, project } = await moduleOf('src/space/camera.ts');
-let world, browser, viewer, folder;
-
-/** Two balls that approach each other and merge; the first one has a cavity. */
-function balls(frame) {
-  const lines = ['x,y,z,p'];
-  for (const [centre, speed] of [[-8, 1], [8, -1]]) {
-    for (let x = -6; x <= 6; ++x) {
-      for (let y = -6; y <= 6; ++y) {
-        for (let z = -6; z <= 6; ++z) {
-          const square = x * x + y * y + z * z;
-          if (square > 36 || (centre < 0 && square < 9)) continue;
-          lines.push([x + centre + speed * frame * 0.4, y, z, x + y].join(','));
-        }
-      }
-    }
-  }
-  return `${lines.join('\n')}\n`;
-}
+let world, browser, viewer;
 
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
-  folder = path.join(world.folder, 'balls');
-  mkdirSync(folder);
-  for (let k = 0; k < FRAMES; ++k) writeFileSync(path.join(folder, `b_${k}.csv`), balls(k));
-  world.replayOf(folder, 'balls', ...FLAGS, '--coordinates', 'compact');
+  streamBalls(world);
   browser = await launch();
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
-const space = (k = 0) => viewer.pane(k).locator('.space canvas');
-
-async function open(options = {}) {
-  viewer = await Viewer.open(browser, world.url, { hash: '#stream=balls', ...options });
-  await viewer.shows();
-  await until('the surface is drawn', () => isDrawn());
-}
-
-/** Whether the picture has more than its background. */
-const isDrawn = async (k = 0) => (await space(k).screenshot()).length > 6000;
-
-/** Pauses at the first frame of the recording that the server holds. */
-async function pauseAtFirst() {
-  await viewer.button('Pause').click();
-  const first = Number(await viewer.page.getByLabel('Frame', { exact: true }).getAttribute('min'));
-  const begin = first + (FRAMES - (first - 1) % FRAMES) % FRAMES;
-  await scrubTo(begin);
-  await still();
-  return begin;
-}
-
-/** Goes to a frame of the stream, which may not have arrived yet. */
-async function scrubTo(frame) {
-  const slider = viewer.page.getByLabel('Frame', { exact: true });
-  await until(`frame ${frame} arrives`, async () => Number(await slider.getAttribute('max')) >= frame);
-  await viewer.scrubTo(frame);
-}
-
-/** Waits until the picture no longer changes. */
-async function still(k = 0) {
-  let last = '';
-  await until('the picture is still', async () => {
-    await viewer.refreshes();
-    const now = await viewer.picture(k);
-    const isSame = now === last;
-    last = now;
-    return isSame;
-  });
-  return last;
-}
-
-/** Where a paused picture shows a point, by the camera in the page's address. */
-async function placeOf(point) {
-  const { width, height } = await space().boundingBox();
-  const view = parseSpaceView(new URLSearchParams(new URL(viewer.page.url()).hash.slice(1)).get('camera'));
-  return project({ view, isPerspective: true, size: { width, height } }, point);
-}
-
-/** Does something, and waits until the picture differs. */
-async function changes(what, act, k = 0) {
-  const before = await still(k);
-  await act();
-  await until(`${what} changes the picture`, async () => await viewer.picture(k) !== before);
-}
-
+const open = async (options = {}) => { viewer = await SpaceViewer.ofBalls(browser, world.url, options); };
+const changes = (what, act) => viewer.changes(what, act);
 const shot = (name) => viewer.page.screenshot({ path: path.join(screenshots, `space_${name}.png`) });
 
 test('a live surface is drawn and moves, in every format', async () => {
@@ -114,19 +27,19 @@ test('a live surface is drawn and moves, in every format', async () => {
   await until('the stream is live', async () => await viewer.status() === 'Live');
   for (const format of ['float64', 'float32']) {
     const name = `balls_${format}`;
-    const producer = world.replayOf(folder, name, ...FLAGS, '--coordinates', format);
+    const producer = streamBalls(world, name, format);
     await viewer.button(`Watch ${name}`).click();
     await until(`${name} is shown`, async () => await viewer.pane().locator('.name').textContent() === name);
     await viewer.shows();
-    await until(`${name} is drawn`, () => isDrawn());
+    await until(`${name} is drawn`, () => viewer.isDrawn());
     await producer.stop();
   }
 });
 
 test('numbers and curves are those of surfaces', async () => {
   await open();
-  const at = await pauseAtFirst();
-  const truth = (await world.statistics(folder, '--surface', '--spacing', '1', '--attributes', 'p'))[(at - 1) % FRAMES];
+  const at = await viewer.pauseAtFirst();
+  const truth = (await world.statistics(ballsOf(world), ...SURFACE))[(at - 1) % FRAMES];
   const numbers = await viewer.numbers();
   assert.equal(numbers.bodies, '2, 1');
   assert.equal(numbers['surface-digest'], truth.surface_digest);
@@ -142,7 +55,7 @@ test('numbers and curves are those of surfaces', async () => {
 
 test('every control changes the picture', async () => {
   await open();
-  await pauseAtFirst();
+  await viewer.pauseAtFirst();
   const { page } = viewer;
   const choose = (label, value) => page.getByLabel(label, { exact: true }).selectOption(value);
   const toggle = (label) => page.getByLabel(label, { exact: true }).click();
@@ -171,7 +84,7 @@ test('every control changes the picture', async () => {
   const frame = await viewer.frame();
   await page.goto('about:blank');
   await page.goto(world.url + address);
-  await until('the link shows the frame', async () => await viewer.frame() === frame && await isDrawn());
+  await until('the link shows the frame', async () => await viewer.frame() === frame && await viewer.isDrawn());
   assert.equal(new URL(page.url()).hash, address);
   assert.equal(await page.getByLabel('Clip plane').inputValue(), 'x');
   assert.equal(await page.getByLabel('Projection').inputValue(), 'parallel');
@@ -179,9 +92,9 @@ test('every control changes the picture', async () => {
 
 test('a picture turns, pans, zooms to the pointer and fits', async () => {
   await open();
-  await pauseAtFirst();
+  await viewer.pauseAtFirst();
   const { page } = viewer;
-  const box = await space().boundingBox();
+  const box = await viewer.space().boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
   const drag = async (key) => {
     if (key) await page.keyboard.down(key);
@@ -192,45 +105,45 @@ test('a picture turns, pans, zooms to the pointer and fits', async () => {
     if (key) await page.keyboard.up(key);
     await page.mouse.move(box.x + 4, box.y + 4);
   };
-  const first = await still();
+  const first = await viewer.still();
   await changes('a drag', () => drag());
   await changes('a drag with Shift', () => drag('Shift'));
   await changes('the wheel', async () => {
     await page.mouse.wheel(0, -300);
   });
   await changes('fit', () => viewer.button('Fit').click());
-  assert.notEqual(await still(), first, 'the direction stays');
-  await space().focus();
+  assert.notEqual(await viewer.still(), first, 'the direction stays');
+  await viewer.space().focus();
   for (const key of ['ArrowLeft', 'Shift+ArrowUp', '+', '-', '0']) await changes(key, () => page.keyboard.press(key));
 });
 
 test('a body is selected, described, and followed through its merge', async () => {
   await open();
-  const begin = await pauseAtFirst();
+  const begin = await viewer.pauseAtFirst();
   const readout = viewer.pane().locator('.space .readout');
   const says = (what, rule) => until(what, async () => rule.test(await readout.textContent()));
-  await space().click({ position: await placeOf([-8, 0, 0]) });
+  await viewer.space().click({ position: await viewer.placeOf([-8, 0, 0]) });
   await says('the body is described', /Selected: body \d+: area [\d.]+, volume [\d.]+, particles \d+$/);
   await shot('selected');
-  await scrubTo(begin + FRAMES - 1);
+  await viewer.goTo(begin + FRAMES - 1);
   const { particles, bodies } = await viewer.numbers();
   assert.match(bodies, /^1, 1$/);
   await says('the merged body is selected', new RegExp(`Selected: body \\d+: .*particles ${particles}\\b`));
-  await space().focus();
+  await viewer.space().focus();
   await viewer.page.keyboard.press('Escape');
   await says('nothing is selected', /^((?!Selected)[^])*$/);
 });
 
 test('a section is shown in its plane, and the surface again', async () => {
   await open();
-  await pauseAtFirst();
+  await viewer.pauseAtFirst();
   const { page } = viewer;
   await page.getByLabel('Picture of').selectOption({ label: 'z = 0' });
   await until('the outline is shown', async () => Number((await viewer.numbers()).vertices) > 10);
-  assert.ok(!await space().isVisible());
+  assert.ok(!await viewer.space().isVisible());
   assert.ok(await viewer.button('SVG').isEnabled());
   await page.getByLabel('Picture of').selectOption({ label: 'Surface' });
-  await until('the surface is shown', async () => await space().isVisible() && await isDrawn());
+  await until('the surface is shown', async () => await viewer.space().isVisible() && await viewer.isDrawn());
 });
 
 test('controls of outlines are disabled with a reason', async () => {
@@ -249,11 +162,11 @@ test('controls of outlines are disabled with a reason', async () => {
 
 test('two pictures share the camera, and can show a section beside the surface', async () => {
   await open();
-  await pauseAtFirst();
+  await viewer.pauseAtFirst();
   await viewer.button('Side by side').click();
   await until('two pictures', async () => await viewer.page.locator('.pane').count() === 2);
-  await until('both are drawn', async () => await isDrawn(0) && await isDrawn(1));
-  const other = await still(1);
+  await until('both are drawn', async () => await viewer.isDrawn(0) && await viewer.isDrawn(1));
+  const other = await viewer.still(1);
   await viewer.pane(0).locator('.space canvas').focus();
   await viewer.page.keyboard.press('ArrowRight');
   await until('the other picture turns', async () => await viewer.picture(1) !== other);
@@ -267,7 +180,7 @@ test('a pane says why it shows no surface', async () => {
   ];
   for (const [file, reason] of cases) {
     await viewer?.close();
-    viewer = await Viewer.open(browser, world.url);
+    viewer = await SpaceViewer.open(browser, world.url);
     await viewer.page.route(`**/${file}`, (route) => route.abort());
     await viewer.page.goto(`${world.url}#stream=balls`);
     await viewer.page.reload();
@@ -294,7 +207,7 @@ function damaged(message) {
 }
 
 test('a damaged frame is refused by name, and the next one is shown', async () => {
-  viewer = await Viewer.open(browser, world.url);
+  viewer = await SpaceViewer.open(browser, world.url);
   let isDamaging = true;
   await viewer.page.routeWebSocket(/v1\/watch/, (socket) => {
     const server = socket.connectToServer();
@@ -307,7 +220,7 @@ test('a damaged frame is refused by name, and the next one is shown', async () =
   assert.equal(await viewer.pane().locator('.state').textContent(), 'Refused');
   isDamaging = false;
   await until('a whole frame is shown', async () => await viewer.pane().locator('.state').textContent() === 'Live');
-  await until('it is drawn', () => isDrawn());
+  await until('it is drawn', () => viewer.isDrawn());
 });
 
 for (const colorScheme of ['light', 'dark']) {

@@ -3,23 +3,15 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, screenshots, until, Viewer, violations, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, screenshots, until, Viewer, violations, World } from './support.mjs';
 
 let browser, world, viewer;
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   browser = await launch();
   world = await World.start();
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  await viewer?.close();
-  viewer = null;
-});
+cleansUp(() => ({ world, browser, viewer }), { makesErrors: true });
 
 const open = async (hash, options = {}) => { viewer = await Viewer.open(browser, world.url, { hash, ...options }); };
 const badge = (k = 0) => viewer.pane(k).locator('.state').textContent();

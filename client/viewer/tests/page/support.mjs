@@ -1,10 +1,12 @@
 // Common parts of the page's tests: a server, streams, Chromium, and the page.
+import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { createRequire } from 'node:module';
 import path from 'node:path';
+import { after, afterEach } from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
@@ -152,6 +154,27 @@ export class World {
 
 export const launch = (flags = CHROMIUM_FLAGS) => chromium.launch({ executablePath: chromiumPath, args: flags });
 
+/**
+ * Closes the page after each test, and browser and server after all. `opened`: what is open then, as
+ * { world, browser, viewer }. The console of the page must have no errors, unless a test of the file makes some.
+ */
+export function cleansUp(opened, { makesErrors = false } = {}) {
+  mkdirSync(screenshots, { recursive: true });
+  let closed = null;
+  afterEach(async () => {
+    const { viewer } = opened();
+    if (!viewer || viewer === closed) return;
+    closed = viewer;
+    await viewer.close();
+    if (!makesErrors) assert.deepEqual(viewer.errors, [], 'the console has no errors');
+  });
+  after(async () => {
+    const { browser, world } = opened();
+    await browser?.close();
+    await world?.close();
+  });
+}
+
 /** Runs `partiemc replay --local` to its end. */
 export async function replay(input, ...options) {
   const log = [];
@@ -170,7 +193,7 @@ export class Viewer {
     const context = await browser.newContext({
       viewport: { width, height }, colorScheme, acceptDownloads: true,
     });
-    const it = new Viewer();
+    const it = new this();
     it.page = await context.newPage();
     it.page.setDefaultTimeout(PATIENCE_MS);
     it.page.on('console', (message) => {

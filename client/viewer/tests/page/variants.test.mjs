@@ -1,27 +1,16 @@
 // Other settings on a live stream: a stream of its own, compared over time. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { after, afterEach, before, test } from 'node:test';
-import { launch, recording, screenshots, until, Viewer, World } from './support.mjs';
+import { before, test } from 'node:test';
+import { cleansUp, launch, recording, screenshots, until, Viewer, World } from './support.mjs';
 
 let world, browser, viewer;
 before(async () => {
-  mkdirSync(screenshots, { recursive: true });
   world = await World.start();
   browser = await launch();
   world.loop('dam');
 });
-after(async () => {
-  await browser?.close();
-  await world?.close();
-});
-afterEach(async () => {
-  const errors = viewer?.errors;
-  await viewer?.close();
-  viewer = null;
-  assert.deepEqual(errors, [], 'the console has no errors');
-});
+cleansUp(() => ({ world, browser, viewer }));
 
 const open = async (hash = '#stream=dam') => { viewer = await Viewer.open(browser, world.url, { hash }); };
 const choose = (label, value) => viewer.page.getByLabel(label, { exact: true }).selectOption(value);
