@@ -13,8 +13,10 @@ import {
 import { DEFAULT_SPACE_LOOK, parseSpaceLook, spaceLookText } from '../src/space/look';
 import { applySpaceKey } from '../src/space/navigation';
 import { pickShell } from '../src/space/pick';
+import type { SpaceDrawing, SpaceState } from '../src/space/drawing';
 import { boxOf, spaceFrameOf, SpaceScene } from '../src/space/scene';
 import { sectionLines } from '../src/space/sections';
+import { type PlacedShells, shellAt, shellsByPlace } from '../src/space/shells';
 import { plainMessage } from './surface_message';
 
 const size = { width: 800, height: 600 };
@@ -95,6 +97,7 @@ test('keys turn, pan, zoom and fit', () => {
 test('a view and a look survive an address', () => {
   assert.deepEqual(parseSpaceView(viewText(view)), view);
   for (const text of ['', '1,2,3', '1,2,3,4,5,0', '1,2,3,4,5,x']) assert.equal(parseSpaceView(text), null);
+  assert.equal(parseSpaceView('1,2,3,4,0,1e300')?.height, 1e30, 'the camera stays within reach');
   assert.equal(spaceLookText(DEFAULT_SPACE_LOOK), '');
   const look = { shading: 'flat', isTranslucent: true, isPerspective: false, clipAxis: 'y', clipAt: 0.25, isClipFlipped: true } as const;
   assert.deepEqual(parseSpaceLook(spaceLookText(look)), look);
@@ -129,7 +132,7 @@ test('axes lie at the border of the box and have numbers', () => {
   }
 });
 
-const frame = (sequence: number): Frame => ({ sequence: BigInt(sequence), sections: [] }) as unknown as Frame;
+const frame = (sequence: number): Frame => ({ sequence: BigInt(sequence), sections: [], statistics: { spacing: 1 } }) as unknown as Frame;
 
 test('a selected body is followed through a merge, also over missed frames', () => {
   const canvas = { clientWidth: 0, clientHeight: 0 } as HTMLCanvasElement;
@@ -148,6 +151,74 @@ test('a selected body is followed through a merge, also over missed frames', () 
     assert.deepEqual(scene.selectedShells, [0], `frame ${next}`);
     scene.show(shown(1, [1n, 2n], [[], []], [0, 0, 0], [3, 0, 0]), []);
     assert.deepEqual(scene.selectedShells, [1], 'back in the first frame');
+  }
+});
+
+/** Shells with cubic boxes of width 2. */
+function cubesAt(centres: readonly Vector[], firstIdentity: number, origin: [number, number, number] = [0, 0, 0]): PlacedShells {
+  const boxes = centres.flatMap((centre) => [-1, 1].flatMap((side) => centre.map((at, axis) => at - origin[axis] + side)));
+  return {
+    origin, boxes: Float32Array.from(boxes), outerOf: new Uint32Array(centres.length),
+    identities: BigUint64Array.from(centres, (_, k) => BigInt(firstIdentity + k)),
+  };
+}
+
+test('the shell at a place is the smallest one around it', () => {
+  const shells = cubesAt([[0, 0, 0], [5, 0, 0]], 1, [100, 0, 0]);
+  const around: PlacedShells = { ...shells, outerOf: new Uint32Array(3), boxes: Float32Array.of(-999, -9, -9, 9, 9, 9, ...shells.boxes) };
+  assert.equal(shellAt(around, [0.5, 0.5, 0.5]), 1);
+  assert.equal(shellAt(around, [5.5, 0.5, 0.5]), 2);
+  assert.equal(shellAt(around, [2, 0, 0]), 0);
+  assert.equal(shellAt(shells, [1.001, 0, 0]), null);
+  assert.equal(shellAt(shells, [1.001, 0, 0], 1e-3), 0, 'within the rounding');
+});
+
+test('a spray of new bodies is searched for the selected one in a moment', () => {
+  const spray = (firstIdentity: number) => cubesAt(Array.from({ length: 20_000 }, (_, k): Vector => [4 * k, 0, 0]), firstIdentity);
+  const begin = performance.now();
+  assert.deepEqual(shellsByPlace(spray(1), [7], spray(1e6)), [7]);
+  // Comparing all pairs of bodies takes ten times as long.
+  assert.ok(performance.now() - begin < 1000, `${performance.now() - begin} ms`);
+});
+
+const hiddenCanvas = { clientWidth: 0, clientHeight: 0 } as HTMLCanvasElement;
+
+test('a frame that is refused keeps the box of the frames before it', () => {
+  const scene = new SpaceScene(hiddenCanvas);
+  scene.show(spaceFrameOf(frame(1), surfaceAt([0, 0, 0])), []);
+  const { extent } = scene;
+  scene.show(null, []);
+  scene.show(spaceFrameOf(frame(2), surfaceAt([0, 0, 0.5])), []);
+  assert.deepEqual(extent, { low: [-1, -1, -1], high: [1, 1, 1] });
+  assert.deepEqual(scene.extent, { low: [-1, -1, -1], high: [1, 1, 1.5] });
+  scene.clear();
+  assert.equal(scene.extent, null);
+});
+
+test('particles are coloured only by numbers of each of them', () => {
+  Object.assign(globalThis, { devicePixelRatio: 1 });
+  const surface = { ...surfaceAt([0, 0, 0]), particles: new Float32Array(9) };
+  for (const [count, isColoured] of [[3, true], [2, false]] as const) {
+    const particleAttributes = new Map([['p', new Float32Array(count)]]);
+    const scene = new SpaceScene(hiddenCanvas);
+    const states: SpaceState[] = [];
+    const drawing = { show() {}, setTints() {}, setSections() {}, draw: (state: SpaceState) => { states.push(state); }, destroy() {} };
+    scene.attach(drawing satisfies SpaceDrawing);
+    scene.setLook({ ...DEFAULT_LOOK, colour: 'p' }, DEFAULT_SPACE_LOOK);
+    scene.show(spaceFrameOf({ ...frame(1), particleAttributes }, surface), []);
+    scene.draw();
+    assert.equal(states[0].values?.points?.length, 6);
+    assert.equal(states[0].values?.particles !== null, isColoured, `${count} numbers for 3 particles`);
+  }
+});
+
+test('a section with other points than its rings is refused by name', () => {
+  const points = Float32Array.of(0, 0, 1, 0, 0, 2);
+  for (const [offsets, isRight] of [[[0, 3], true], [[0, 4_000_000_000], false], [[0, 2], false], [[1, 3], false], [[0, 3, 2, 3], false]] as const) {
+    const sections = [{ rings: { points, offsets: Uint32Array.from(offsets) }, origin: [0, 0] }];
+    const show = () => spaceFrameOf({ ...frame(1), sections } as unknown as Frame, surfaceAt([0, 0, 0]));
+    if (isRight) assert.doesNotThrow(show);
+    else assert.throws(show, /sections\[0\]\.offsets/, `${offsets}`);
   }
 });
 

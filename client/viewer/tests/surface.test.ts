@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { before, test } from 'node:test';
 import { fromBinary } from '@bufbuild/protobuf';
-import { CoordinateFormat, WatchStreamResponseSchema } from '@proto/v1/reconstruction_pb';
+import { CoordinateFormat, PositionFormat, WatchStreamResponseSchema } from '@proto/v1/reconstruction_pb';
 import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import { bytesOf } from '../src/protocol/arrays';
 import { decodeSpaceFrame } from '../src/protocol/decode';
@@ -110,6 +110,18 @@ test('float32 is relative to the origin of the frame', () => {
 test('a frame without bodies is empty', () => {
   const message: SurfaceMessage = { ...plainMessage([]), hasSurface: false };
   assert.equal(decodeSurface(message, MeshoptDecoder).positions.length, 0);
+});
+
+test('particles without any body are relative to the origin of the frame', () => {
+  const particles = bytesOf(Float32Array.of(11, 22, 33));
+  const none: SurfaceMessage = {
+    ...plainMessage([]), origin: [1, 2, 3], attributes: [], particles, particleFormat: PositionFormat.FLOAT32_3,
+  };
+  for (const hasSurface of [true, false]) {
+    const surface = decodeSurface({ ...none, hasSurface }, MeshoptDecoder);
+    assert.deepEqual(surface.origin, [1, 2, 3]);
+    assert.deepEqual([...surface.particles ?? []], [10, 20, 30]);
+  }
 });
 
 test('contradictions in a message are refused by name', () => {

@@ -206,9 +206,9 @@ function decodeCompact(message: SurfaceMessage, points: number, triangles: numbe
   return { origin: message.origin, positions, triangles: indices, normals, attributes };
 }
 
-/** float64 in world coordinates, relative to the first point. */
-function relativeTo(world: Float64Array): { origin: [number, number, number]; positions: Float32Array } {
-  const origin: [number, number, number] = [world[0], world[1], world[2]];
+/** float64 in world coordinates, relative to the first point; to `other` without points. */
+function relativeToFirst(world: Float64Array, other: [number, number, number]): Pick<Surface, 'origin' | 'positions'> {
+  const origin: [number, number, number] = world.length > 0 ? [world[0], world[1], world[2]] : other;
   const positions = new Float32Array(world.length);
   for (let i = 0; i < world.length; ++i) positions[i] = world[i] - origin[i % 3];
   return { origin, positions };
@@ -226,7 +226,7 @@ function decodePlain(message: SurfaceMessage, points: number, triangles: number)
   }
   const { origin, positions } = isRelative
     ? { origin: message.origin, positions: copyOf(Float32Array, message.points) }
-    : relativeTo(arrayOf(Float64Array, message.points));
+    : relativeToFirst(arrayOf(Float64Array, message.points), message.origin);
   const attributes = message.attributes.map(({ name, values, components = 1 }, k) => {
     check(values, 4 * components * points, `attributes[${k}]`, `must have values for each of the ${points} points`);
     return { name, components, values: copyOf(Float32Array, values) };

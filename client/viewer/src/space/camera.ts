@@ -31,6 +31,8 @@ const STEEPEST = Math.PI / 2;
 const SMALLEST_HEIGHT = 1e-30;
 const LARGEST_HEIGHT = 1e30;
 
+const limited = (height: number) => Math.min(Math.max(height, SMALLEST_HEIGHT), LARGEST_HEIGHT);
+
 export const plus = (a: Vector, b: Vector, share = 1): Vector =>
   [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
 export const minus = (a: Vector, b: Vector): Vector => plus(a, b, -1);
@@ -75,7 +77,7 @@ export function pointAt(camera: Camera, x: number, y: number): Vector {
 /** The view zoomed by `factor`. The point under the CSS position stays there. */
 export function zoomAt(camera: Camera, x: number, y: number, factor: number): SpaceView {
   const { view } = camera;
-  const height = Math.min(Math.max(view.height / factor, SMALLEST_HEIGHT), LARGEST_HEIGHT);
+  const height = limited(view.height / factor);
   const fixed = pointAt(camera, x, y);
   return { ...view, height, target: plus(fixed, minus(view.target, fixed), height / view.height) };
 }
@@ -99,7 +101,7 @@ export function fitBox(camera: Camera, box: Box): SpaceView {
     const nearer = isPerspective ? HALF_ANGLE * dot(apart, back) : 0;
     height = Math.max(height, 2 * (reach + nearer));
   }
-  return { ...view, target, height: height > 0 ? Math.min(Math.max(height, SMALLEST_HEIGHT), LARGEST_HEIGHT) : 1 };
+  return { ...view, target, height: height > 0 ? limited(height) : 1 };
 }
 
 /** CSS position of a point, and its distance from the target's plane towards the camera. Null: behind the camera. */
@@ -139,5 +141,5 @@ export function viewText({ target, turn, tilt, height }: SpaceView): string {
 export function parseSpaceView(text: string | null): SpaceView | null {
   const [x, y, z, turn, tilt, height] = (text ?? '').split(',').map(Number);
   if (![x, y, z, turn, tilt, height].every(Number.isFinite) || !(height > 0)) return null;
-  return { target: [x, y, z], turn, tilt: Math.min(Math.max(tilt, -STEEPEST), STEEPEST), height };
+  return { target: [x, y, z], turn, tilt: Math.min(Math.max(tilt, -STEEPEST), STEEPEST), height: limited(height) };
 }

@@ -18,7 +18,7 @@ export interface SpaceTheme {
   ambient: number;
 }
 
-/** Numbers to colour by; null for tints. */
+/** Numbers to colour by, one for each point and each particle; null for tints. */
 export interface ValueColours {
   points: Float32Array | null;
   particles: Float32Array | null;

@@ -14,6 +14,7 @@ import { loadSpace } from './drawing';
 import type { SpaceLook } from './look';
 import { attachSpaceNavigation } from './navigation';
 import { type PickedShell, spaceFrameOf, SpaceScene } from './scene';
+import { shellAt } from './shells';
 
 export interface SpaceEvents {
   /** The view changed, by the user or because the picture has grown. */
@@ -24,6 +25,8 @@ export interface SpaceEvents {
   shown(frame: Frame): void;
 }
 
+/** A selected point lies in its surface, so rounding may put it beside the box: by this share of the box. */
+const ROUNDING = 1e-3;
 const SVG = 'http://www.w3.org/2000/svg';
 
 /** The picture of surfaces in a pane. It decodes frames one at a time; a newer frame replaces a waiting one. */
@@ -78,7 +81,7 @@ export class SpacePicture {
     this.waiting = null;
     ++this.era;
     this.frameProblem = '';
-    this.scene.show(null, []);
+    this.scene.clear();
     this.dirty = true;
   }
 
@@ -103,23 +106,26 @@ export class SpacePicture {
   /** Selects the shell at a world position, or none: the smallest one whose box contains it. */
   selectAt(point: Vector | null): void {
     const { frame } = this.scene;
-    this.select(frame && point ? frame.surface.identities[shellAt(frame.surface, point)] ?? null : null);
+    const shell = frame && point && shellAt(frame.surface, point, ROUNDING);
+    this.select(frame && shell !== null ? frame.surface.identities[shell] : null);
   }
 
+  /** Selects the shell of this identity. Null, and 0 for a shell without identity, select nothing. */
   select(identity: bigint | null): void {
-    this.selected = identity;
+    this.selected = identity || null;
     this.scene.select(identity);
     this.dirty = true;
   }
 
-  /** Draws if anything has changed. */
-  refresh(): void {
-    if (!this.dirty || this.element.hidden) return;
+  /** Draws if anything has changed. Returns the frame that it has drawn, if any. */
+  refresh(): Frame | null {
+    if (!this.dirty || this.element.hidden) return null;
     this.dirty = false;
     this.scene.draw();
     this.scaleBar.show(this.flatView);
     this.drawAxes();
     this.updateReadout();
+    return this.scene.isDrawing ? this.scene.frame?.frame ?? null : null;
   }
 
   /** Caption, scale, legend and axes for exports. */
@@ -173,7 +179,7 @@ export class SpacePicture {
         this.scene.show(spaceFrameOf(frame, surface), outlines);
         this.keepInView();
       } catch (error) {
-        if (era !== this.era) continue;
+        if (this.isClosed || era !== this.era) continue;
         this.frameProblem = `Frame ${frame.sequence} cannot be shown: ${textOf(error)}`;
         this.scene.show(null, []);
       }
@@ -191,7 +197,7 @@ export class SpacePicture {
   }
 
   private resized(): void {
-    if (this.isFree) this.scene.fitExtent();
+    if (this.scene.size.width > 0) this.keepInView();
     this.dirty = true;
   }
 
@@ -206,6 +212,7 @@ export class SpacePicture {
       this.pointer = null;
       this.dirty = true;
     });
+    canvas.addEventListener('webglcontextrestored', () => { this.dirty = true; });
     canvas.addEventListener('click', (event) => this.selectAtCss(event.offsetX, event.offsetY));
     canvas.addEventListener('keydown', (event) => {
       if (event.key === 'Enter') this.selectAtCss(canvas.clientWidth / 2, canvas.clientHeight / 2);
@@ -267,23 +274,6 @@ export class SpacePicture {
       `volume ${number(Math.abs(volume[shell]))}, particles ${count(particles[shell])}` +
       (former.length > 0 ? `, from ${parents[shell].join(', ')}` : '');
   }
-}
-
-/** The smallest shell whose box contains a world position; -1 for none. */
-function shellAt({ boxes, origin, outerOf }: { boxes: Float32Array; origin: Vector; outerOf: Uint32Array }, point: Vector): number {
-  let [best, least] = [-1, Infinity];
-  for (let k = 0; k < outerOf.length; ++k) {
-    let size = 1;
-    for (let axis = 0; axis < 3; ++axis) {
-      const [low, high] = [boxes[6 * k + axis], boxes[6 * k + 3 + axis]];
-      const at = point[axis] - origin[axis];
-      // The point lies in the surface, so rounding may put it beside the box.
-      const room = 1e-3 * (high - low);
-      size *= at >= low - room && at <= high + room ? high - low : Infinity;
-    }
-    if (size < least) [best, least] = [k, size];
-  }
-  return best;
 }
 
 function textOf(error: unknown): string {

@@ -9,6 +9,7 @@ import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
 import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
 import type { Rgb } from '../draw/colours';
 import { dotDiameter } from '../draw/style';
+import type { Size } from '../draw/view';
 import type { Surface } from '../protocol/surface';
 import { axesOf, distanceOf, FIELD_OF_VIEW, minus, plus, unitsPerPixel } from './camera';
 import type { SectionLines, SpaceDrawing, SpaceState } from './drawing';
@@ -35,6 +36,60 @@ function commonUniforms(): Uniforms {
     clip: { value: new Vector4(0, 0, 0, NO_CLIP) }, ramp: { value: null }, range: { value: new Vector2() },
     missing: { value: new Color() }, mode: { value: COLOUR_MODE.tint },
   };
+}
+
+/** Replaces the numbers of an attribute, and keeps its buffer: three.js deletes buffers with their geometry only. */
+function setNumbers(geometry: BufferGeometry, name: string, numbers: Float32Array | Uint8Array, size: number): void {
+  const held = geometry.getAttribute(name) as BufferAttribute | undefined;
+  if (held?.array === numbers) return;
+  if (held?.array.length !== numbers.length) {
+    geometry.setAttribute(name, new BufferAttribute(numbers, size, numbers instanceof Uint8Array));
+    return;
+  }
+  held.array = numbers;
+  held.needsUpdate = true;
+}
+
+/** A section in the picture: its lines in front of the surface, and behind it, where they are faint. */
+class SectionPart {
+  private readonly parts: readonly LineSegments2[];
+
+  /** The materials stay from frame to frame, so that their program is compiled once. */
+  constructor(private readonly scene: Scene) {
+    this.parts = [false, true].map((isVisible) => {
+      const material = new LineMaterial({ depthTest: isVisible, transparent: true, opacity: isVisible ? 1 : HIDDEN_LINES });
+      const part = new LineSegments2(new LineSegmentsGeometry(), material);
+      part.frustumCulled = false;
+      scene.add(part);
+      return part;
+    });
+  }
+
+  show({ positions, colour }: SectionLines): void {
+    const geometry = new LineSegmentsGeometry();
+    if (positions.length > 0) geometry.setPositions(positions);
+    for (const part of this.parts) {
+      part.geometry.dispose();
+      part.geometry = geometry;
+      part.visible = positions.length > 0;
+      part.material.color.setRGB(...colour);
+    }
+  }
+
+  setStyle(lineWidth: number, { width, height }: Size): void {
+    for (const { material } of this.parts) {
+      material.linewidth = lineWidth;
+      material.resolution.set(width, height);
+    }
+  }
+
+  destroy(): void {
+    for (const part of this.parts) {
+      this.scene.remove(part);
+      part.geometry.dispose();
+      part.material.dispose();
+    }
+  }
 }
 
 function setColour(uniform: IUniform, [red, green, blue]: Rgb): void {
@@ -68,7 +123,7 @@ class Drawing implements SpaceDrawing {
   private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly edges: LineSegments;
   private readonly points: Points;
-  private sections: LineSegments2[] = [];
+  private readonly sections: SectionPart[] = [];
 
   constructor(canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: false });
@@ -113,41 +168,22 @@ class Drawing implements SpaceDrawing {
   }
 
   setTints(tints: Uint8Array): void {
-    this.geometry.setAttribute('tint', new BufferAttribute(tints, 4, true));
+    setNumbers(this.geometry, 'tint', tints, 4);
   }
 
   setSections(lines: readonly SectionLines[]): void {
-    for (const section of this.sections) {
-      this.scene.remove(section);
-      section.geometry.dispose();
-      section.material.dispose();
-    }
-    this.sections = lines.filter(({ positions }) => positions.length > 0).flatMap(({ positions, colour }) => {
-      const geometry = new LineSegmentsGeometry().setPositions(positions);
-      // Lines behind the surface are faint.
-      return [false, true].map((isVisible) => {
-        const material = new LineMaterial({ depthTest: isVisible, transparent: true, opacity: isVisible ? 1 : HIDDEN_LINES });
-        material.color.setRGB(...colour);
-        const section = new LineSegments2(geometry, material);
-        section.frustumCulled = false;
-        this.scene.add(section);
-        return section;
-      });
-    });
+    while (this.sections.length > lines.length) this.sections.pop()?.destroy();
+    while (this.sections.length < lines.length) this.sections.push(new SectionPart(this.scene));
+    lines.forEach((section, k) => this.sections[k].show(section));
   }
 
   draw(state: SpaceState): void {
-    const { camera: { size, isPerspective }, ratio, theme, lineWidth } = state;
-    this.renderer.setPixelRatio(ratio);
-    const held = this.renderer.getSize(new Vector2());
-    if (held.x !== size.width || held.y !== size.height) this.renderer.setSize(size.width, size.height, false);
+    const { camera: { size, isPerspective }, theme, lineWidth } = state;
+    this.resize(state);
     this.renderer.setClearColor(this.background.setRGB(...theme.background), 1);
     this.setUniforms(state);
     this.setParts(state);
-    for (const { material } of this.sections) {
-      material.linewidth = lineWidth;
-      material.resolution.set(size.width, size.height);
-    }
+    for (const section of this.sections) section.setStyle(lineWidth, size);
     this.renderer.render(this.scene, this.placed(isPerspective ? this.perspective : this.parallel, state));
   }
 
@@ -157,6 +193,13 @@ class Drawing implements SpaceDrawing {
     this.ramp?.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
+  }
+
+  /** Both setters allocate the picture anew, even for the size that it has. */
+  private resize({ camera: { size: { width, height } }, ratio }: SpaceState): void {
+    const held = this.renderer.getSize(new Vector2());
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    if (held.x !== width || held.y !== height) this.renderer.setSize(width, height, false);
   }
 
   private setUniforms(state: SpaceState): void {
@@ -182,14 +225,9 @@ class Drawing implements SpaceDrawing {
   }
 
   private setValues({ values }: SpaceState): void {
-    const set = (geometry: BufferGeometry, numbers: Float32Array | null) => {
-      if ((geometry.getAttribute('value') as BufferAttribute | undefined)?.array === numbers) return;
-      if (numbers) geometry.setAttribute('value', new BufferAttribute(numbers, 1));
-      else geometry.deleteAttribute('value');
-    };
-    set(this.geometry, values?.points ?? null);
-    set(this.pointGeometry, values?.particles ?? null);
     if (!values) return;
+    if (values.points) setNumbers(this.geometry, 'value', values.points, 1);
+    if (values.particles) setNumbers(this.pointGeometry, 'value', values.particles, 1);
     (this.common.range.value as Vector2).set(values.min, values.max);
     if (values.texels === this.rampOf) return;
     this.ramp?.dispose();

@@ -16,7 +16,8 @@ import {
 import type { SpaceDrawing, SpaceTheme, ValueColours } from './drawing';
 import { DEFAULT_SPACE_LOOK, type SpaceLook } from './look';
 import { type Clip, pickShell } from './pick';
-import { sectionLines } from './sections';
+import { checkSections, sectionLines } from './sections';
+import { shellsByPlace } from './shells';
 
 /** A frame with its decoded surface. */
 export interface SpaceFrame { frame: Frame; surface: Surface; channels: Channels }
@@ -29,8 +30,9 @@ const MAP_COLOURS = 256;
 const NEAREST = 1e-3;
 const SELECTED = 0xff000000;
 
-/** A frame with a surface, ready to draw. */
+/** A frame with a surface, ready to draw. Throws an Error with a sentence if its sections contradict themselves. */
 export function spaceFrameOf(frame: Frame, surface: Surface): SpaceFrame {
+  checkSections(frame.sections);
   const attributes = surface.attributes.map(({ name, components, values }) => ({ name, components, values: bytesOf(values) }));
   return { frame, surface, channels: new AttributeChannels(attributes) };
 }
@@ -47,37 +49,6 @@ export function boxOf({ boxes, particles, origin, positions }: Surface): Box | n
     }
   }
   return low[0] <= high[0] ? { low: plus(origin, low), high: plus(origin, high) } : null;
-}
-
-/** Shells that continue chosen ones of an earlier frame, if frames between them were missed: by the place of their boxes. */
-export function shellsByPlace(before: SpaceFrame, chosen: readonly number[], after: SpaceFrame): number[] {
-  const [old, now] = [before.surface, after.surface];
-  const known = new Set(old.identities);
-  const surviving = new Set(now.identities);
-  const found = new Set<number>();
-  for (const shell of chosen) {
-    const around = surviving.has(old.identities[shell]) ? null : shellAround(old, shell, now);
-    if (around !== null) found.add(around);
-  }
-  now.identities.forEach((identity, shell) => {
-    const from = known.has(identity) ? null : shellAround(now, shell, old);
-    if (from !== null && chosen.includes(from)) found.add(shell);
-  });
-  return [...found];
-}
-
-/** The smallest shell of another frame whose box contains the middle of this shell's box. */
-function shellAround(own: Surface, shell: number, other: Surface): number | null {
-  const middle = [0, 1, 2].map((axis) =>
-    own.origin[axis] - other.origin[axis] + (own.boxes[6 * shell + axis] + own.boxes[6 * shell + 3 + axis]) / 2);
-  let [best, least]: [number | null, number] = [null, Infinity];
-  for (let k = 0; k < other.outerOf.length; ++k) {
-    const box = other.boxes.subarray(6 * k, 6 * k + 6);
-    if (middle.some((at, axis) => at < box[axis] || at > box[axis + 3])) continue;
-    const size = (box[3] - box[0]) * (box[4] - box[1]) * (box[5] - box[2]);
-    if (size < least) [best, least] = [k, size];
-  }
-  return best;
 }
 
 function themeOf(dark: boolean): SpaceTheme {
@@ -104,13 +75,16 @@ export class SpaceScene {
   private texels: Uint8Array = new Uint8Array(0);
   private selected: readonly number[] = [];
   private readonly selection = new Tracking<SpaceFrame>(({ frame: { sequence }, surface: { identities, measures } }) =>
-    ({ sequence, identities, parents: measures.parents }), shellsByPlace);
+    ({ sequence, identities, parents: measures.parents }),
+  (before, chosen, after) => shellsByPlace(before.surface, chosen, after.surface));
 
   constructor(readonly canvas: HTMLCanvasElement) {}
 
   get size(): Size { return { width: this.canvas.clientWidth, height: this.canvas.clientHeight }; }
   get frame(): SpaceFrame | null { return this.shown; }
   get camera(): Camera { return { view: this.view, isPerspective: this.spaceLook.isPerspective, size: this.size }; }
+  /** Whether `draw` draws: space.js is loaded. */
+  get isDrawing(): boolean { return this.drawing !== null; }
   get selectedShells(): readonly number[] { return this.selected; }
 
   /** Begins to draw by `drawing`. */
@@ -119,17 +93,24 @@ export class SpaceScene {
     this.upload();
   }
 
+  /** Shows a frame, or null for none. */
   show(shown: SpaceFrame | null, outlines: readonly Outline[]): void {
     const begin = performance.now();
     this.shown = shown;
     this.outlines = outlines;
     this.selected = shown ? this.selection.ringsOf(shown) : [];
     const box = shown && boxOf(shown.surface);
-    if (!shown) this.extent = null;
-    else if (box) this.extent = unionOf(this.extent, box);
-    this.widenRange(shown === null);
+    if (box) this.extent = unionOf(this.extent, box);
+    this.widenRange(false);
     this.upload();
     this.lastUploadMs = performance.now() - begin;
+  }
+
+  /** Shows nothing, and forgets the frames so far. */
+  clear(): void {
+    this.extent = null;
+    this.range = null;
+    this.show(null, []);
   }
 
   setLook(look: Look, spaceLook: SpaceLook): void {
@@ -222,11 +203,12 @@ export class SpaceScene {
     const { dark, colour } = this.look;
     const tints = new Uint32Array(positions.length / 3);
     const plain = packed(theme(dark).hole);
+    const selected = new Set(this.selected);
     const halves = new Uint32Array(identities.buffer, identities.byteOffset, 2 * identities.length);
     for (let shell = 0; shell < outerOf.length; ++shell) {
       const rgba = colour === 'identity'
         ? packed(identityColour(halves[2 * shell], halves[2 * shell + 1], dark)) : plain;
-      const alpha = this.selected.includes(shell) ? SELECTED : 0;
+      const alpha = selected.has(shell) ? SELECTED : 0;
       tints.fill(((rgba & 0xffffff) | alpha) >>> 0, pointOffsets[shell], pointOffsets[shell + 1]);
     }
     this.drawing.setTints(new Uint8Array(tints.buffer));
@@ -246,8 +228,12 @@ export class SpaceScene {
     const name = attributeOf(this.look);
     const range = this.colourRange;
     if (name === null || !this.shown || !range) return null;
+    const { channels, surface: { positions, particles }, frame: { particleAttributes } } = this.shown;
+    const forEach = (numbers: Float32Array | undefined, coordinates = 0) =>
+      (numbers?.length === coordinates / 3 ? numbers : null);
     return {
-      points: this.shown.channels.get(name) ?? null, particles: this.shown.frame.particleAttributes?.get(name) ?? null,
+      points: forEach(channels.get(name), positions.length),
+      particles: forEach(particleAttributes?.get(name), particles?.length),
       ...range, texels: this.texels,
     };
   }

@@ -5,6 +5,16 @@ import { inSpace, type Outline } from '../protocol/sections';
 import { minus, type Vector } from './camera';
 import type { SectionLines } from './drawing';
 
+/** Throws an Error with a sentence if the rings of a section have other points than it. */
+export function checkSections(sections: readonly Frame[]): void {
+  sections.forEach(({ rings: { points, offsets } }, k) => {
+    const isRising = offsets.every((offset, ring) => ring === 0 ? offset === 0 : offset >= offsets[ring - 1]);
+    if (!isRising || (offsets[offsets.length - 1] ?? 0) !== points.length / 2) {
+      throw new Error(`sections[${k}].offsets must rise from 0 to the number of points.`);
+    }
+  });
+}
+
 /** The sections of a frame that the look draws, as lines on their planes. Points are relative to `origin`. */
 export function sectionLines(frame: Frame, outlines: readonly Outline[], look: Look, origin: Vector): SectionLines[] {
   if (!look.sections) return [];

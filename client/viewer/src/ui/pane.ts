@@ -260,12 +260,18 @@ export class Pane {
   get hasSurfaces(): boolean { return this.track.parameters?.output === Output.SURFACE; }
 
   private get entry(): Entry | null {
-    const isOwn = this.frame !== null && (this.frame === this.whole || (this.look?.outlineShown ?? 0) === 0);
+    const isOwn = this.frame !== null && (this.frame === this.whole || this.outlineShown === 0);
     return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
   }
 
   /** The outlines of the frame. */
   get outlines(): readonly Outline[] { return this.track.outlines; }
+
+  /** The outline that the pane shows: the first one if the frame lacks the chosen one. */
+  private get outlineShown(): number {
+    const chosen = this.look?.outlineShown ?? 0;
+    return chosen < this.outlines.length ? chosen : 0;
+  }
 
   /** The measurement over the picture, for exports. */
   get measured(): { points: readonly Point[]; text: string } {
@@ -297,14 +303,23 @@ export class Pane {
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');
     this.showState();
-    if (this.isSpace) this.space?.refresh();
-    if (!this.dirty || this.isSpace) return;
+    if (this.isSpace) {
+      this.refreshSpace(now);
+      return;
+    }
+    if (!this.dirty) return;
     this.dirty = false;
     this.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
     this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement, this.measured.text);
     this.updateReadout();
+  }
+
+  private refreshSpace(now: number): void {
+    const drawn = this.space?.refresh() ?? null;
+    const entry = drawn && this.track.history.get(Number(drawn.sequence));
+    if (entry) this.countDrawn(entry, now);
   }
 
   destroy(): void {
@@ -386,11 +401,8 @@ export class Pane {
     if (entry) {
       this.refusal = '';
       if (entry === this.shown) return;
-      if (Number.isNaN(entry.summary.latency)) {
-        entry.summary.latency = now - entry.receivedAt;
-        this.track.counts.drawn++;
-      }
       this.show(entry, entry.frame());
+      if (!this.isSpace) this.countDrawn(entry, now);
       return;
     }
     const isFailed = this.track.state.kind === 'failed';
@@ -403,17 +415,24 @@ export class Pane {
     this.show(result, result);
   }
 
+  /** Counts a frame when it is drawn for the first time. A surface is drawn once it is decoded, and space.js loaded. */
+  private countDrawn({ summary, receivedAt }: Entry, now: number): void {
+    if (!Number.isNaN(summary.latency)) return;
+    summary.latency = now - receivedAt;
+    this.track.counts.drawn++;
+  }
+
   private show(source: Entry | Frame, frame: Frame): void {
     this.shown = source;
     this.isPending = false;
     this.whole = frame;
-    const isSpace = this.pictureOfSpace !== null && frame.surface !== undefined && (this.look?.outlineShown ?? 0) === 0;
+    const isSpace = this.pictureOfSpace !== null && frame.surface !== undefined && this.outlineShown === 0;
     this.showSpace(isSpace);
     if (isSpace) {
       this.space?.show(frame, this.outlines);
       return;
     }
-    frame = pictureOf(frame, this.outlines, this.look?.outlineShown ?? 0);
+    frame = pictureOf(frame, this.outlines, this.outlineShown);
     this.frame = frame;
     this.scene.show(frame);
     this.keepInView();
@@ -464,8 +483,7 @@ export class Pane {
   /** While the view follows the content, it grows to include each frame. */
   private keepInView(): void {
     if (!this.isFree || !this.frame) return;
-    const isOwn = this.frame === null || (this.look?.outlineShown ?? 0) === 0;
-    const bounds = (isOwn ? this.track.bounds : null) ?? boundsOf(this.frame.rings.points, this.frame.origin);
+    const bounds = (this.outlineShown === 0 ? this.track.bounds : null) ?? boundsOf(this.frame.rings.points, this.frame.origin);
     if (!bounds) return;
     const extent = this.extent ? union(this.extent, bounds) : bounds;
     if (this.extent && sameBounds(extent, this.extent)) return;
@@ -498,7 +516,7 @@ export class Pane {
     const text = settings ? settings.replaceAll(';', ', ').replaceAll(':', ' ') : 'as streamed';
     const isAlone = this.shown !== null && this.shown === this.variant?.result;
     const outline = this.outlines.length > 1
-      ? `${outlineName(this.outlines[this.look?.outlineShown ?? 0] ?? this.outlines[0])}, ` : '';
+      ? `${outlineName(this.outlines[this.outlineShown])}, ` : '';
     return outline + (isAlone ? `${text} (this frame alone)` : text);
   }
 
@@ -563,7 +581,7 @@ export class Pane {
   }
 
   private select(identity: bigint | null): void {
-    this.selected = identity;
+    this.selected = identity || null;
     this.scene.select(identity);
     this.dirty = true;
   }

@@ -1,5 +1,6 @@
 // Tests surfaces in space in the page. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import path from 'node:path';
 import { before, test } from 'node:test';
 import { ballsOf, FRAMES, SpaceViewer, streamBalls, SURFACE } from './space_support.mjs';
@@ -173,6 +174,41 @@ test('two pictures share the camera, and can show a section beside the surface',
   await shot('pair');
 });
 
+/** The different counts of drawn frames in the file of curves. */
+async function drawnCounts() {
+  const loaded = viewer.page.waitForEvent('download');
+  await viewer.button('CSV of curves').click();
+  const [names, ...rows] = readFileSync(await (await loaded).path(), 'utf8').trim().split('\n').map((row) => row.split(','));
+  const column = names.indexOf('drawn');
+  return [...new Set(rows.map((cells) => cells[column]).filter((cell) => cell !== '').map(Number))];
+}
+
+test('a frame counts as drawn once its surface is', async () => {
+  await open();
+  await viewer.shows(await viewer.frame() + 3);
+  const drawn = await drawnCounts();
+  assert.ok(Math.max(...drawn) > 2, `${drawn}`);
+});
+
+test('an outline that the frames lack is the surface', async () => {
+  await open({ hash: '#stream=balls&look=fill,of:7' });
+  assert.ok(await viewer.space().isVisible());
+  assert.match((await viewer.numbers()).bodies, /^[12], [01]$/);
+});
+
+test('the link has the camera that fits the window', async () => {
+  await open();
+  await viewer.pauseAtFirst();
+  const camera = () => /camera=([^&]*)/.exec(viewer.page.url())?.[1];
+  const before = camera();
+  await viewer.page.setViewportSize({ width: 900, height: 900 });
+  await until('the camera of the link changes', () => camera() !== before);
+  await viewer.still();
+  const middle = await viewer.placeOf([0, 0, 0]);
+  const { width, height } = await viewer.space().boundingBox();
+  assert.ok(Math.abs(middle.x - width / 2) < 0.2 * width && Math.abs(middle.y - height / 2) < 0.2 * height);
+});
+
 test('a pane says why it shows no surface', async () => {
   const cases = [
     ['space.js', /space\.js, cannot be loaded/],
@@ -187,6 +223,8 @@ test('a pane says why it shows no surface', async () => {
     const notice = viewer.pane().locator('.notice');
     await until(`the notice without ${file}`, async () => reason.test(await notice.textContent()) && await notice.isVisible());
     assert.equal(await viewer.pane().locator('.state').textContent(), 'Refused');
+    await viewer.shows(await viewer.frame() + 2);
+    assert.deepEqual(await drawnCounts(), [0], `no frame is drawn without ${file}`);
     viewer.errors = viewer.errors.filter((text) => !/Failed to load resource/.test(text));
     assert.deepEqual(viewer.errors, []);
   }
