@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { applyKey, attachNavigation, wheelFactor, type Navigable } from '../src/draw/navigation';
+import { wheelFactor } from '../src/draw/gestures';
+import { applyKey, attachNavigation, type Navigable } from '../src/draw/navigation';
 import { toCss, toWorld } from '../src/draw/view';
 
 class FakeScene implements Navigable {
@@ -70,6 +71,14 @@ test('a drag pans by its distance', () => {
   assert.ok(Math.hypot(at[0] - 250, at[1] - 160) < 1e-9);
   canvas.pointer('pointermove', 1, 0, 0);
   assert.deepEqual(toCss(scene.view, scene.size, ...held), at, 'released');
+});
+
+test('a drag ends when the canvas loses the pointer', () => {
+  const { canvas, changes } = attached();
+  canvas.pointer('pointerdown', 1, 50, 60);
+  canvas.pointer('lostpointercapture', 1, 50, 60);
+  canvas.pointer('pointermove', 1, 90, 20);
+  assert.equal(changes(), 0);
 });
 
 test('two fingers zoom about their centre', () => {

@@ -1,18 +1,11 @@
-import { wheelFactor } from '../draw/navigation';
+import { ARROWS, attachGestures, FAST, KEY_ZOOM } from '../draw/gestures';
 import { type Camera, panBy, type SpaceView, turnBy, zoomAt } from './camera';
 
 /** The part of a scene that navigation uses. */
 export interface Turnable { view: SpaceView; readonly camera: Camera; fit(): void }
 
-const KEY_ZOOM = 1.25;
+/** Turn and pan per key press, in CSS pixels of a drag. */
 const KEY_PIXELS = 24;
-const FAST = 4;
-/** A pointer that moves farther between press and release drags instead of clicking. */
-const CLICK_PIXELS = 4;
-
-const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
-  ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-};
 
 /** Applies a key: arrows turn, with Shift they pan; + and - zoom, 0 fits. Returns false for other keys. */
 export function applySpaceKey(scene: Turnable, key: string, shift: boolean): boolean {
@@ -28,61 +21,23 @@ export function applySpaceKey(scene: Turnable, key: string, shift: boolean): boo
   return true;
 }
 
-interface Grip { x: number; y: number; apart: number }
-
-function gripOf(pointers: ReadonlyMap<number, { x: number; y: number }>): Grip {
-  const [first, second] = pointers.values();
-  if (!second) return { ...first, apart: 0 };
-  return { x: (first.x + second.x) / 2, y: (first.y + second.y) / 2, apart: Math.hypot(first.x - second.x, first.y - second.y) };
-}
-
 /**
- * Turns by a drag, pans by a drag with Shift or another button or two fingers, zooms to the pointer by the wheel or two
- * fingers, and takes keys. A click that ends a drag is not passed on. Returns a function: true during a drag.
+ * Turns by a drag; pans by a drag with Shift or another button or two fingers; zooms and takes keys (`attachGestures`).
+ * Returns a function: true during a drag.
  */
 export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void): () => boolean {
-  const pointers = new Map<number, { x: number; y: number }>();
   let isPanning = false;
-  let travelled = 0;
-  canvas.style.touchAction = 'none';
-  canvas.addEventListener('pointerdown', (event) => {
-    if (pointers.size === 0) travelled = 0;
-    isPanning = event.shiftKey || event.button !== 0;
-    pointers.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
-    canvas.setPointerCapture(event.pointerId);
-  });
-  canvas.addEventListener('pointermove', (event) => {
-    if (!pointers.has(event.pointerId)) return;
-    const before = gripOf(pointers);
-    pointers.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
-    const after = gripOf(pointers);
-    const [right, down] = [after.x - before.x, after.y - before.y];
-    travelled += Math.hypot(right, down) + Math.abs(after.apart - before.apart);
-    if (isPanning || after.apart > 0) scene.view = panBy(scene.camera, right, down);
-    else scene.view = turnBy(scene.view, scene.camera.size, right, down);
-    if (before.apart > 0 && after.apart > 0) {
-      scene.view = zoomAt(scene.camera, after.x, after.y, after.apart / before.apart);
-    }
-    onChange();
-  });
-  for (const name of ['pointerup', 'pointercancel'] as const) {
-    canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
-  }
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-  canvas.addEventListener('click', (event) => {
-    if (travelled > CLICK_PIXELS) event.stopImmediatePropagation();
-    travelled = 0;
-  }, { capture: true });
-  canvas.addEventListener('wheel', (event) => {
-    event.preventDefault();
-    scene.view = zoomAt(scene.camera, event.offsetX, event.offsetY, wheelFactor(event));
-    onChange();
-  }, { passive: false });
-  canvas.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (!applySpaceKey(scene, event.key, event.shiftKey)) return;
-    event.preventDefault();
-    onChange();
-  });
-  return () => pointers.size > 0;
+  const { isDragging } = attachGestures(canvas, {
+    press: ({ shiftKey, button }) => {
+      isPanning = shiftKey || button !== 0;
+      return true;
+    },
+    drag: (right, down, hasTwo) => {
+      scene.view = isPanning || hasTwo ? panBy(scene.camera, right, down) : turnBy(scene.view, scene.camera.size, right, down);
+    },
+    zoom: (x, y, factor) => { scene.view = zoomAt(scene.camera, x, y, factor); },
+    key: (key, shift) => applySpaceKey(scene, key, shift),
+  }, onChange);
+  return isDragging;
 }

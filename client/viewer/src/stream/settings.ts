@@ -78,6 +78,11 @@ function numberOf(text: string | undefined): number | null {
   return Number.isFinite(value) ? value : null;
 }
 
+/** Settings for the user: `placement qef, fill none`. */
+export function settingsPhrase(settings: Settings): string {
+  return settingsText(settings).replaceAll(';', ', ').replaceAll(':', ' ') || 'as streamed';
+}
+
 /** The inverse of settingsText. Ignores unknown names and values. */
 export function parseSettings(text: string): Settings {
   const values = new Map(text.split(';').map((part) => {
@@ -100,6 +105,13 @@ export function parseSettings(text: string): Settings {
 export function methodOf(parameters: ReconstructionParameters | null): Method | null {
   return parameters && {
     placement: nameOf(PLACEMENTS, parameters.placement), fill: nameOf(FILLS, parameters.fill),
+  };
+}
+
+/** The method with the choices of the settings. */
+export function methodWith(method: Method | null, { placement, fill }: Settings): Method | null {
+  return method && {
+    placement: nameOf(PLACEMENTS, placement) || method.placement, fill: nameOf(FILLS, fill) || method.fill,
   };
 }
 

@@ -1,33 +1,29 @@
 import { Output } from '@proto/v1/reconstruction_pb';
-import { attachNavigation, Scene, type Legend, type Look, type Picked } from '../draw';
-import { valuesAt } from '../draw/values';
-import { boundsOf, fitBounds, toCss, union, type Bounds } from '../draw/view';
+import { attachNavigation, Scene, type Legend, type Look } from '../draw';
+import { boundsOf } from '../draw/view';
 import type { Drawn } from '../export/canvas_copy';
 import type { Mark } from '../export/marks';
 import type { Frame } from '../protocol/frame';
-import { channelLabel } from '../protocol/channels';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
 import type { SpaceView, Vector } from '../space/camera';
 import { DEFAULT_SPACE_LOOK, type SpaceLook } from '../space/look';
 import type { SpaceEvents, SpacePicture } from '../space/picture';
 import type { Entry, Summary } from '../stream/history';
-import {
-  cellSizeOf, FILLS, isAsStreamed, nameOf, PLACEMENTS, settingsText, type Settings,
-} from '../stream/settings';
-import type { CurveSource, Method, Track } from '../stream/track';
+import { cellSizeOf, isAsStreamed, methodWith, type Settings, settingsPhrase, settingsText } from '../stream/settings';
+import type { CurveSource, Track } from '../stream/track';
 import { summaryOf } from '../stream/summary';
 import type { Variant } from '../stream/variant';
 import type { VariantStream } from '../stream/variant_stream';
-import { make, select, setText } from './dom';
-import { count, number } from './format';
-import { Measurement, type MeasureMode, type Point } from './measure';
+import { make, setText } from './dom';
+import { FollowedView } from './followed_view';
+import { number } from './format';
+import type { Point } from './measure';
 import { Numbers } from './numbers';
+import { OutlinePointer } from './outline_pointer';
 import { Overlay } from './overlay';
+import { PaneNotice } from './pane_notice';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
-
-/** Distance of the readout from the pointer, in CSS pixels. */
-const POINTER_GAP = 14;
 
 export interface PaneEvents {
   /** The user chose the pane: settings and time apply to it. */
@@ -52,25 +48,14 @@ export class Pane {
   frame: Frame | null = null;
   /** A notice of the page over the picture, or empty. */
   note = '';
-  /** Whether the view follows the content. False once the user has moved it. */
-  isFree = true;
 
   private readonly canvas = make('canvas', {
     tabindex: '0', role: 'application', 'aria-roledescription': 'picture',
   });
-  private readonly readout = make('div', { class: 'readout' });
   private readonly name = make('span', { class: 'name' });
   private readonly badge = make('span', { class: 'state' });
   private readonly subtitle = make('span', { class: 'quiet' });
-  private readonly noticeText = make('span');
-  private readonly switchButton = make('button', { type: 'button', title: 'Shows the stream that has this name now.' },
-    'Switch to the new run');
-  private readonly hideButton = make('button', {
-    type: 'button', class: 'icon', 'aria-label': 'Hide notice', title: 'Hides this notice.',
-  }, '✕');
-  private readonly notice = make('div', { class: 'notice' }, this.noticeText, this.switchButton, this.hideButton);
-  /** The notice of the files that the user has hidden. */
-  private hiddenNotice = '';
+  private readonly notice = new PaneNotice(() => this.track);
   /** Settings and method of the frame shown. */
   private shownText = '';
   /** Why the frame of the track is refused, or empty. */
@@ -79,23 +64,19 @@ export class Pane {
   private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
   private readonly overlay = new Overlay();
-  private readonly measurement = new Measurement();
+  private readonly pointer: OutlinePointer;
   private readonly variant: Variant | null;
   private stream: VariantStream | null = null;
   private readonly detach: () => void;
   private readonly observer: ResizeObserver;
   private shown: Entry | Frame | null = null;
-  /** Bounds of all frames shown since the view follows the content. */
-  private extent: Bounds | null = null;
+  private readonly followed: FollowedView;
   /** The frame with all its outlines, of which `frame` shows one. */
   private whole: Frame | null = null;
   /** Whether the frame shown still has the former settings. */
   private isPending = false;
   private dirty = true;
   private look: Look | null = null;
-  private pointer: [number, number] | null = null;
-  private picked: Picked | null = null;
-  private selected: bigint | null = null;
   /** The picture of surfaces; null until there is one. */
   private space: SpacePicture | null = null;
   private spaceLook: SpaceLook = DEFAULT_SPACE_LOOK;
@@ -109,23 +90,25 @@ export class Pane {
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
               private readonly variants: Variants | null,
               private readonly pictureOfSpace: ((events: SpaceEvents) => SpacePicture) | null = null) {
-    this.element = make('section', { class: 'pane' },
-      make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.readout, this.notice),
-      this.numbers.element);
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
-    this.hideButton.addEventListener('click', () => { this.hiddenNotice = this.track.notice ?? ''; });
-    this.switchButton.addEventListener('click', () => this.track.switchRun?.());
-    this.element.addEventListener('pointerdown', () => events.chosen(this));
-    this.element.addEventListener('focusin', () => events.chosen(this));
     this.scene = new Scene(this.canvas);
+    this.followed = new FollowedView(this.scene, () => events.moved(this, false));
     this.detach = attachNavigation(this.canvas, this.scene, () => {
-      this.isFree = false;
+      this.followed.isFree = false;
       this.dirty = true;
       events.moved(this, true);
     }, track.kind === 'report');
-    this.listenForRings();
+    this.pointer = new OutlinePointer(this.scene, this.canvas, () => this.frame, {
+      changed: () => { this.dirty = true; },
+      selected: (point) => this.events.selected?.(this, point),
+    });
+    this.element = make('section', { class: 'pane' },
+      make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
+      make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout, this.notice.element),
+      this.numbers.element);
+    this.element.addEventListener('pointerdown', () => events.chosen(this));
+    this.element.addEventListener('focusin', () => events.chosen(this));
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
   }
@@ -144,9 +127,9 @@ export class Pane {
   showTrack(track: Track): void {
     this.track = track;
     this.clear();
-    this.isFree = true;
+    this.followed.follow();
     this.resetVariant();
-    this.select(null);
+    this.pointer.select(null);
     this.space?.select(null);
     if (this.space) this.space.isFree = true;
     this.showSpace(false);
@@ -209,21 +192,23 @@ export class Pane {
     return this.space && this.isSpace ? this.space.marks(this.caption, dark) : null;
   }
 
+  /** Whether the view follows the content. */
+  get isFree(): boolean { return this.followed.isFree; }
+
   /** Lets the view follow the content again. */
   fit(): void {
     if (this.isSpace) {
       this.space?.fit();
       return;
     }
-    this.isFree = true;
-    this.extent = null;
+    this.followed.follow();
     this.keepInView();
     this.dirty = true;
   }
 
   setView(view: Scene['view']): void {
     this.scene.view = { ...view };
-    this.isFree = false;
+    this.followed.isFree = false;
     this.dirty = true;
   }
 
@@ -275,7 +260,7 @@ export class Pane {
 
   /** The measurement over the picture, for exports. */
   get measured(): { points: readonly Point[]; text: string } {
-    return { points: this.measurement.points, text: this.measurement.text((identity) => this.areaText(identity)) };
+    return { points: this.pointer.measurement.points, text: this.pointer.measuredText };
   }
 
   /** Name, frame, time and settings, for exports. */
@@ -303,17 +288,14 @@ export class Pane {
     setText(this.name, this.track.title);
     setText(this.subtitle, this.frame ? this.shownText : '');
     this.showState();
-    if (this.isSpace) {
-      this.refreshSpace(now);
-      return;
-    }
+    if (this.isSpace) return this.refreshSpace(now);
     if (!this.dirty) return;
     this.dirty = false;
-    this.pick();
+    this.pointer.pick();
     this.scene.draw();
     this.scaleBar.show(this.scene.view);
-    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.measurement, this.measured.text);
-    this.updateReadout();
+    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.pointer.measurement, this.pointer.measuredText);
+    this.pointer.updateReadout();
   }
 
   private refreshSpace(now: number): void {
@@ -336,7 +318,7 @@ export class Pane {
     this.shown = null;
     this.whole = null;
     this.frame = null;
-    this.extent = null;
+    this.followed.restart();
     this.refusal = '';
     this.isPending = false;
     this.scene.show(null);
@@ -350,20 +332,14 @@ export class Pane {
     this.badge.dataset.state = state.kind;
     setText(this.badge, stateName(state, this.track));
     if (this.badge.title !== state.text) this.badge.title = state.text;
-    const isOfFiles = state.kind === 'doubtful' && (this.track.notice ?? '') !== '' && this.track.notice !== this.hiddenNotice;
-    const isNoted = this.note !== '' || isOfFiles || this.track.hasNewRun || state.kind === 'lost' || state.kind === 'refused' ||
-      (state.kind === 'waiting' && !this.frame);
-    this.notice.hidden = !isNoted || this.track.kind === 'report';
-    this.switchButton.hidden = !this.track.hasNewRun;
-    this.hideButton.hidden = !isOfFiles || this.note !== '';
-    if (isNoted) setText(this.noticeText, this.note || (isOfFiles ? this.track.notice ?? '' : state.text));
+    this.notice.show(state, this.note, this.frame !== null);
   }
 
   private get isVariant(): boolean {
     if (this.hasSurfaces) return false;
-    return this.track.kind === 'watch' ? !isAsStreamed(this.settings)
-      : !isAsStreamed(this.settings) &&
-        settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
+    const isOther = this.track.kind === 'watch' ||
+      settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
+    return isOther && !isAsStreamed(this.settings);
   }
 
   /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
@@ -443,7 +419,7 @@ export class Pane {
 
   private showNumbers(frame: Frame): void {
     this.frame = frame;
-    this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), this.method());
+    this.numbers.show(frame, this.track.labelOf(Number(frame.sequence)), methodWith(this.track.method, this.settings));
     this.shownText = this.description();
   }
 
@@ -452,7 +428,7 @@ export class Pane {
     if (isSpace === this.isSpace) return;
     if (isSpace) this.space ??= this.newSpacePicture(this.pictureOfSpace);
     if (this.space) this.space.element.hidden = !isSpace;
-    for (const element of [this.canvas, this.overlay.element, this.scaleBar.element, this.readout]) {
+    for (const element of [this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout]) {
       element.toggleAttribute('hidden', isSpace);
     }
     if (!isSpace) this.scene.resize();
@@ -475,21 +451,15 @@ export class Pane {
 
   /** Shows another outline of the frame, in the coordinates of its plane. */
   private showOutline(whole: Frame): void {
-    this.isFree = true;
-    this.extent = null;
+    this.followed.follow();
     this.show(this.shown ?? whole, whole);
   }
 
   /** While the view follows the content, it grows to include each frame. */
   private keepInView(): void {
-    if (!this.isFree || !this.frame) return;
-    const bounds = (this.outlineShown === 0 ? this.track.bounds : null) ?? boundsOf(this.frame.rings.points, this.frame.origin);
-    if (!bounds) return;
-    const extent = this.extent ? union(this.extent, bounds) : bounds;
-    if (this.extent && sameBounds(extent, this.extent)) return;
-    this.extent = extent;
-    this.scene.view = fitBounds(extent, this.scene.size);
-    this.events.moved(this, false);
+    if (!this.frame || !this.isFree) return;
+    const { rings, origin } = this.frame;
+    this.followed.include((this.outlineShown === 0 ? this.track.bounds : null) ?? boundsOf(rings.points, origin));
   }
 
   private async addParticles(frame: Frame): Promise<void> {
@@ -503,71 +473,17 @@ export class Pane {
     this.dirty = true;
   }
 
-  private method(): Method | null {
-    const { method } = this.track;
-    return method && {
-      placement: nameOf(PLACEMENTS, this.settings.placement) || method.placement,
-      fill: nameOf(FILLS, this.settings.fill) || method.fill,
-    };
-  }
-
   private description(): string {
-    const settings = settingsText(this.settings);
-    const text = settings ? settings.replaceAll(';', ', ').replaceAll(':', ' ') : 'as streamed';
+    const text = settingsPhrase(this.settings);
     const isAlone = this.shown !== null && this.shown === this.variant?.result;
-    const outline = this.outlines.length > 1
-      ? `${outlineName(this.outlines[this.outlineShown])}, ` : '';
+    const outline = this.outlines.length > 1 ? `${outlineName(this.outlines[this.outlineShown])}, ` : '';
     return outline + (isAlone ? `${text} (this frame alone)` : text);
   }
 
   private resize(): void {
     this.scene.resize();
-    if (this.isFree && this.extent) {
-      this.scene.view = fitBounds(this.extent, this.scene.size);
-      this.events.moved(this, false);
-    }
+    this.followed.resize();
     this.dirty = true;
-  }
-
-  private listenForRings(): void {
-    this.canvas.addEventListener('pointermove', (event) => this.point(event.offsetX, event.offsetY));
-    this.canvas.addEventListener('pointerleave', () => {
-      this.pointer = null;
-      this.dirty = true;
-    });
-    this.canvas.addEventListener('click', (event) => {
-      this.point(event.offsetX, event.offsetY);
-      this.selectAtPointer();
-    });
-    this.canvas.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') {
-        this.measurement.clear();
-        this.select(null);
-        this.events.selected?.(this, null);
-      }
-      if (event.key !== 'Enter') return;
-      this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
-      this.selectAtPointer();
-    });
-  }
-
-  private point(x: number, y: number): void {
-    this.pointer = [x, y];
-    this.dirty = true;
-  }
-
-  private selectAtPointer(): void {
-    if (!this.pointer) return;
-    const { x, y, ring } = this.scene.pick(...this.pointer);
-    const identity = ring === null ? null : this.frame?.rings.identities[ring] ?? null;
-    const mode = select('measure').value as MeasureMode;
-    if (mode === 'off') {
-      this.select(identity);
-      this.events.selected?.(this, identity === null ? null : [x, y]);
-    } else {
-      this.measurement.add(mode, [x, y], identity);
-      this.dirty = true;
-    }
   }
 
   /** Selects the ring or the body at a world position, or none. A picture of the other kind selects nothing. */
@@ -576,87 +492,6 @@ export class Pane {
       this.space?.selectAt(point?.length === 3 ? point : null);
       return;
     }
-    const ring = point && this.scene.pick(...toCss(this.scene.view, this.scene.size, ...point)).ring;
-    this.select(ring === null ? null : this.frame?.rings.identities[ring] ?? null);
+    this.pointer.selectAt(point);
   }
-
-  private select(identity: bigint | null): void {
-    this.selected = identity || null;
-    this.scene.select(identity);
-    this.dirty = true;
-  }
-
-  private pick(): void {
-    this.picked = this.pointer && this.frame ? this.scene.pick(...this.pointer) : null;
-    this.scene.hovered = this.picked?.ring ?? null;
-  }
-
-  private updateReadout(): void {
-    const lines: string[] = [];
-    if (this.picked) {
-      const { x, y, ring } = this.picked;
-      lines.push(`x ${number(x)}, y ${number(y)}`);
-      if (ring !== null) lines.push(this.ringText(ring));
-      lines.push(...this.valueTexts(x, y));
-    }
-    if (this.selected !== null) {
-      const rings = this.scene.selectedRings;
-      lines.push(`Selected: ${rings.length === 0 ? `ring ${this.selected}, not in this frame`
-        : rings.map((ring) => this.ringText(ring)).join('\n')}`);
-    }
-    setText(this.readout, lines.join('\n'));
-    this.placeReadout();
-  }
-
-  /** Puts the readout beside the pointer, within the picture. Without a pointer it is in the corner. */
-  private placeReadout(): void {
-    const { style, classList, offsetWidth, offsetHeight } = this.readout;
-    const { width, height } = this.scene.size;
-    classList.toggle('at-pointer', this.pointer !== null);
-    if (!this.pointer) {
-      style.left = style.top = '';
-      return;
-    }
-    const [x, y] = this.pointer;
-    const beside = (at: number, length: number, room: number) =>
-      (at + POINTER_GAP + length <= room ? at + POINTER_GAP : Math.max(0, at - POINTER_GAP - length));
-    style.left = `${Math.min(beside(x, offsetWidth, width), Math.max(0, width - offsetWidth))}px`;
-    style.top = `${beside(y, offsetHeight, height)}px`;
-  }
-
-  /** Attribute values at a world position. */
-  private valueTexts(x: number, y: number): string[] {
-    const { frame } = this;
-    if (!frame) return [];
-    const names = this.scene.channels;
-    const tolerance = Math.max(frame.statistics.spacing, POINTER_GAP / this.scene.view.scale / 2);
-    return valuesAt(frame, names, x - frame.origin[0], y - frame.origin[1], tolerance)
-      .map(({ name, value }) => `${channelLabel(name, names)} ${number(value)}`);
-  }
-
-  /** Area of a measured ring in the frame shown. */
-  private areaText(identity: bigint | null): string {
-    if (identity === null) return 'no ring here';
-    if (identity === 0n) return 'ring without identity';
-    const ring = this.frame?.rings.identities.indexOf(identity) ?? -1;
-    if (!this.frame || ring < 0) return `ring ${identity} is not in this frame`;
-    const { area, perimeter } = this.frame.rings;
-    return `area ${number(Math.abs(area[ring]))}, perimeter ${number(perimeter[ring])}`;
-  }
-
-  private ringText(ring: number): string {
-    const rings = this.frame?.rings;
-    if (!rings) return '';
-    const identity = rings.identities[ring];
-    const kind = rings.area[ring] < 0 ? 'hole' : 'ring';
-    const name = identity ? `${kind} ${identity}` : `${kind} without identity`;
-    const parents = rings.parents[ring].filter((parent) => parent !== identity);
-    return `${name}: area ${number(Math.abs(rings.area[ring]))}, perimeter ` +
-      `${number(rings.perimeter[ring])}, particles ${count(rings.particles[ring])}` +
-      (parents.length > 0 ? `, from ${rings.parents[ring].join(', ')}` : '');
-  }
-}
-
-function sameBounds(a: Bounds, b: Bounds): boolean {
-  return a.left === b.left && a.bottom === b.bottom && a.right === b.right && a.top === b.top;
 }
