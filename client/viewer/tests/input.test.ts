@@ -7,7 +7,7 @@ import { parseTimes } from '../src/input/csv';
 import { inspectFiles, openDropped } from '../src/input/drop';
 import { parseLammpsFrame } from '../src/input/lammps';
 import { naturalOrder } from '../src/input/natural_order';
-import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions } from '../src/input/options';
+import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices } from '../src/input/options';
 import { RecordingSource } from '../src/input/recording';
 import { shareOf } from '../src/input/share';
 import { InputError } from '../src/input/source';
@@ -73,6 +73,21 @@ test('a plane is found among three axes; 3D is refused', async () => {
   const flat = await openDropped([file('a.csv', 'x,y,z\n0,7,1\n2,7,3\n')]);
   assert.deepEqual(doubles((await flat.frame(0)).positions), [0, 1, 2, 3]);
   await assert.rejects(openDropped([file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n')]), /Choose the plane/);
+});
+
+test('3D particles are read as surfaces, with planes as sections', async () => {
+  assert.deepEqual(parseSlices('surface'), { isSurface: true, slices: [] });
+  const both = parseSlices('z=1; surface');
+  assert.deepEqual([both.isSurface, both.slices.map(({ origin }) => origin)], [true, [[0, 0, 1]]]);
+  assert.throws(() => parseSlices('surfaces'), FieldError);
+  const ball = file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n');
+  const source = await openDropped([ball], { ...NO_OPTIONS, slice: 'surface', spacing: '1' });
+  assert.ok(source.isSurface);
+  assert.deepEqual(doubles((await source.frame(0)).positions), [0, 1, 2, 3, 4, 0]);
+  const fieldOf = (field: string) => (error: unknown) => error instanceof FieldError && error.field === field;
+  await assert.rejects(openDropped([ball], { ...NO_OPTIONS, slice: 'surface' }), fieldOf('spacing'));
+  const flat = openDropped([file('a.csv', 'x,y\n0,1\n')], { ...NO_OPTIONS, slice: 'surface', spacing: '1' });
+  await assert.rejects(flat, fieldOf('slice'));
 });
 
 test('duplicate ids are dropped, text in numbers is refused', async () => {

@@ -69,16 +69,32 @@ export function parseSpacing(text: string): number | null {
   return value;
 }
 
-/** Planes `z=0.5` or `OX,OY,OZ,NX,NY,NZ`, separated by semicolons. Throws FieldError. */
-export function parseSlices(text: string): SectionPlane[] {
-  if (text.trim() === '') return [];
-  return text.split(';').map((part) => {
-    const plane = planeOf(part.trim());
-    if (!plane) {
-      throw new FieldError('slice', 'Write a plane as x=C, y=C, z=C, or as a point and a normal OX,OY,OZ,NX,NY,NZ.');
-    }
-    return plane;
+/** Errors of the option `slice`, after the name of the file. */
+export const CHOOSE_SPACE = 'Choose the plane that cuts it, for example z=0, or open it as a surface.';
+export const NOT_IN_SPACE = 'has two coordinates. Planes and surfaces are of particles with x, y and z only.';
+
+/** The word for surfaces in the option `slice`. */
+export const SURFACE = 'surface';
+
+/** How 3D particles are reconstructed: as surfaces in space, or in the first of the planes. Each other plane is a section. */
+export interface SpaceChoice { isSurface: boolean; slices: readonly SectionPlane[] }
+
+/** Planes `z=0.5` or `OX,OY,OZ,NX,NY,NZ`, and `surface`, separated by semicolons. Throws FieldError. */
+export function parseSlices(text: string): SpaceChoice {
+  const parts = text.split(';').map((part) => part.trim()).filter(Boolean);
+  const slices = parts.filter((part) => part !== SURFACE).map((part) => {
+    const plane = planeOf(part);
+    if (plane) return plane;
+    throw new FieldError('slice', 'Write a plane as x=C, y=C, z=C, or as a point and a normal OX,OY,OZ,NX,NY,NZ; or the word surface.');
   });
+  return { isSurface: parts.includes(SURFACE), slices };
+}
+
+/** Throws FieldError if particles are reconstructed in space, or in a plane of it, without their spacing. */
+export function checkSpacing({ isSurface, slices }: SpaceChoice, spacing: number | null): void {
+  if (spacing !== null || (!isSurface && slices.length === 0)) return;
+  throw new FieldError('spacing', isSurface ? 'Surfaces need the spacing of the particles.'
+    : 'Particles in a plane of 3D need their spacing.');
 }
 
 function planeOf(text: string): SectionPlane | null {

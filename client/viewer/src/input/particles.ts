@@ -2,7 +2,7 @@ import { PositionFormat } from '@proto/v1/reconstruction_pb';
 import { bytesOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
 import type { ColumnPlan } from './columns';
-import { FieldError } from './options';
+import { CHOOSE_SPACE, FieldError, NOT_IN_SPACE } from './options';
 import type { Rows } from './rows';
 
 /** Relative extent above which an axis counts. Above the rounding of six-digit text. */
@@ -32,7 +32,7 @@ function planeOf(axes: Axes, name: string): [number, number] {
   const axis = flatAxis(axes);
   if (axis !== null) return axis === 0 ? [1, 2] : [0, axis === 1 ? 2 : 1];
   const text = axes.map((values) => extentOf(values as Float64Array).toPrecision(3)).join(' x ');
-  throw new FieldError('slice', `${name} is 3D (extents ${text}). Choose the plane that cuts it, for example z=0.`);
+  throw new FieldError('slice', `${name} is 3D (extents ${text}). ${CHOOSE_SPACE}`);
 }
 
 export function extentOf(values: Float64Array): number {
@@ -94,7 +94,7 @@ export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace = fa
   const { time, step, index, name } = table;
   const axes = positionsOf({ ...table, rows }, plan);
   if (inSpace && axes.some((axis) => axis === null)) {
-    throw new FieldError('slice', `${name} has two coordinates. A plane cuts particles with x, y and z only.`);
+    throw new FieldError('slice', `${name} ${NOT_IN_SPACE}`);
   }
   const chosen = inSpace ? [0, 1, 2] : planeOf(axes, name);
   const components = chosen.length;

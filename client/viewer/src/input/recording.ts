@@ -7,7 +7,9 @@ import { decompress } from 'fzstd';
 import { arrayOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
 import type { SectionPlane } from '../protocol/sections';
-import { FieldError, type FileFacts, type FileOptions, NO_OPTIONS, parseSlices, parseSpacing } from './options';
+import {
+  checkSpacing, CHOOSE_SPACE, FieldError, type FileFacts, type FileOptions, NO_OPTIONS, NOT_IN_SPACE, parseSlices, parseSpacing,
+} from './options';
 import { InputError, type FrameSource } from './source';
 import { axesOf, hasThreeCoordinates, middlePlane, spacingOf } from './space';
 
@@ -58,6 +60,7 @@ export class RecordingSource implements FrameSource {
 
   notice = '';
   slices: readonly SectionPlane[] = [];
+  isSurface = false;
 
   private constructor(private readonly bytes: Uint8Array, private readonly blocks: number[],
                       readonly title: string, public spacing: number | null) {}
@@ -89,22 +92,17 @@ export class RecordingSource implements FrameSource {
 
   /** The same frames with options. Throws FieldError. */
   async with(options: FileOptions = NO_OPTIONS): Promise<RecordingSource> {
-    const slices = parseSlices(options.slice);
+    const choice = parseSlices(options.slice);
+    const isOfSpace = choice.isSurface || choice.slices.length > 0;
     for (const field of ['columns', 'select'] as const) {
       if (options[field] !== '') throw new FieldError(field, 'A recording has no columns. Leave this field empty.');
     }
     const spacing = parseSpacing(options.spacing) ?? this.spacing;
     const inSpace = hasThreeCoordinates((await this.frame(0)).positionFormat);
-    if (inSpace && slices.length === 0) {
-      throw new FieldError('slice', `${this.title} is 3D. Choose the plane that cuts it, for example z=0.`);
-    }
-    if (!inSpace && slices.length > 0) {
-      throw new FieldError('slice', `${this.title} has two coordinates. A plane cuts particles with x, y and z only.`);
-    }
-    if (slices.length > 0 && spacing === null) {
-      throw new FieldError('spacing', 'Particles in a plane of 3D need their spacing.');
-    }
-    return Object.assign(Object.create(RecordingSource.prototype) as RecordingSource, this, { spacing, slices });
+    if (inSpace && !isOfSpace) throw new FieldError('slice', `${this.title} is 3D. ${CHOOSE_SPACE}`);
+    if (!inSpace && isOfSpace) throw new FieldError('slice', `${this.title} ${NOT_IN_SPACE}`);
+    checkSpacing(choice, spacing);
+    return Object.assign(Object.create(RecordingSource.prototype) as RecordingSource, this, { spacing, ...choice });
   }
 
   get count(): number { return this.locations.length; }

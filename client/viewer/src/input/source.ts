@@ -8,7 +8,9 @@ export interface FrameSource {
   readonly count: number;
   /** World units; null: to be estimated. */
   readonly spacing: number | null;
-  /** Planes that cut 3D particles: the picture, then more. Empty: the particles are 2D. */
+  /** Whether 3D particles are reconstructed as surfaces. The planes are sections then. */
+  readonly isSurface: boolean;
+  /** Planes that cut 3D particles: the picture, then more. Empty without surfaces: the particles are 2D. */
   readonly slices: readonly SectionPlane[];
   /** Names of scalars that every frame has. */
   readonly scalars: string[];

@@ -3,8 +3,8 @@ import type { Particles } from '../protocol/particles';
 import type { SectionPlane } from '../protocol/sections';
 import { type ColumnPlan, namesOfUnnamed, planColumns } from './columns';
 import {
-  ALL_COLUMNS, type ColumnRequest, FieldError, type FileFacts, type FileOptions, parseRequest, parseSlices,
-  parseSpacing,
+  ALL_COLUMNS, checkSpacing, type ColumnRequest, FieldError, type FileFacts, type FileOptions, parseRequest, parseSlices,
+  parseSpacing, type SpaceChoice,
 } from './options';
 import { isInSpace, type ParticleTable, particlesOf, positionsOf } from './particles';
 import { InputError, type FrameSource } from './source';
@@ -47,32 +47,32 @@ export class TableSource implements FrameSource {
   private constructor(
     readonly title: string, private readonly reader: TableReader, private readonly times: Map<number, number>,
     private readonly request: ColumnRequest, readonly spacing: number | null,
-    readonly slices: readonly SectionPlane[],
+    private readonly choice: SpaceChoice,
   ) {}
 
   /** Reads the first frame, whose scalars all frames have. Throws InputError, and FieldError for an option. */
   static async open(title: string, reader: TableReader, times: Map<number, number>,
                     options: FileOptions): Promise<TableSource> {
     const spacing = parseSpacing(options.spacing);
-    const slices = parseSlices(options.slice);
-    const source = new TableSource(title, reader, times, parseRequest(options), spacing, slices);
+    const choice = parseSlices(options.slice);
+    const source = new TableSource(title, reader, times, parseRequest(options), spacing, choice);
     const first = await source.frame(0);
     if (first.positions.length === 0 && source.request.conditions.length > 0) {
       throw new FieldError('select', `No particle of the first frame has ${options.select}.`);
     }
-    if (slices.length > 0 && spacing === null) {
-      throw new FieldError('spacing', 'Particles in a plane of 3D need their spacing.');
-    }
+    checkSpacing(choice, spacing);
     source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
     return source;
   }
 
   get count(): number { return this.reader.count; }
+  get isSurface(): boolean { return this.choice.isSurface; }
+  get slices(): readonly SectionPlane[] { return this.choice.slices; }
 
   async frame(index: number): Promise<Particles> {
     const table = await this.reader.table(index);
     const time = this.times.get(index) ?? table.time;
-    return particlesOf({ ...table, time }, planOf(table, this.request), this.slices.length > 0);
+    return particlesOf({ ...table, time }, planOf(table, this.request), this.isSurface || this.slices.length > 0);
   }
 }
 

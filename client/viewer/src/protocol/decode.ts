@@ -1,5 +1,5 @@
 import {
-  CoordinateFormat, type Mesh as MeshMessage, Plane, PositionFormat, type ReconstructedFrame,
+  CoordinateFormat, type Mesh as MeshMessage, Output, Plane, PositionFormat, type ReconstructedFrame,
   type Rings as RingsMessage,
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
@@ -163,4 +163,9 @@ export function decodeSpaceFrame(message: ReconstructedFrame): Frame {
     meshDigest: null,
     surface: surfaceMessageOf(message),
   };
+}
+
+/** Decodes a result of a stream with this output. `plane`: as of `decodeFrame`. */
+export function decodeResult(message: ReconstructedFrame, output: Output | undefined, plane: Plane): Frame {
+  return output === Output.SURFACE ? decodeSpaceFrame(message) : decodeFrame(message, plane);
 }

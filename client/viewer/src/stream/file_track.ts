@@ -1,4 +1,4 @@
-import type { ReconstructedFrame, ReconstructionParameters, StreamOpened }
+import { Output, type ReconstructedFrame, type ReconstructionParameters, type StreamOpened }
   from '@proto/v1/reconstruction_pb';
 import { InputError, type FrameSource } from '../input/source';
 import { shareOf } from '../input/share';
@@ -9,8 +9,8 @@ import { History, type Entry } from './history';
 import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
 import { type Outline, outlinesOf } from '../protocol/sections';
-import { methodOf, outputsFor, parametersOf, type Settings, withSlices } from './settings';
-import { decodeFrame } from '../protocol/decode';
+import { methodOf, outputsFor, parametersOf, type Settings, withSpace } from './settings';
+import { decodeResult } from '../protocol/decode';
 import { particleChannels, type Particles } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
 import { CallError, describe, mayRetry, sentence, type CallStatus } from './status';
@@ -121,8 +121,8 @@ export class FileTrack implements Track {
 
   private open(): void {
     const producer: Producer = new Producer(this.gateway, {
-      parameters: withSlices(parametersOf(this.settings, null, this.source.spacing), this.source.slices),
-      outputs: outputsFor(this.hasAttributes ? this.source.scalars : []),
+      parameters: withSpace(parametersOf(this.settings, null, this.source.spacing), this.source),
+      outputs: outputsFor(this.hasAttributes ? this.source.scalars : [], this.source.isSurface),
       labels: { from: 'viewer' },
     }, {
       opened: (opened) => this.opened(opened),
@@ -176,7 +176,7 @@ export class FileTrack implements Track {
       receivedAt: performance.now(),
       bytes: message.length,
       summary: summarise(frame, this.counts),
-      frame: () => decodeFrame(parseResult(message), 0),
+      frame: () => decodeResult(parseResult(message), this.source.isSurface ? Output.SURFACE : undefined, 0),
     }, Math.max(1, (this.player.sequence ?? 1) - KEPT_BEHIND));
     this.answered(sequence);
   }

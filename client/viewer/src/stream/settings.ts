@@ -1,9 +1,9 @@
 import { create } from '@bufbuild/protobuf';
 import {
-  CoordinateFormat, Fill, OutputsSchema, Placement, ReconstructionParametersSchema,
+  CoordinateFormat, Fill, Output, OutputsSchema, Placement, ReconstructionParametersSchema,
   SectionSchema, SlicePlaneSchema, type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
-import type { SectionPlane } from '../protocol/sections';
+import type { SpaceChoice } from '../input/options';
 import type { Method } from './track';
 
 /** Settings of a reconstruction. Null and UNSPECIFIED: the value of the stream. Lengths in spacings. */
@@ -115,14 +115,15 @@ export function methodWith(method: Method | null, { placement, fill }: Settings)
   };
 }
 
-/** Adds the planes that cut 3D particles: the stream's own, then its sections. */
-export function withSlices(parameters: ReconstructionParameters, planes: readonly SectionPlane[]) {
-  const [own, ...others] = planes.map(({ origin, normal }) => create(SlicePlaneSchema, {
+/** Chooses surfaces of 3D particles, or the plane of their outline. The other planes are sections. */
+export function withSpace(parameters: ReconstructionParameters, { isSurface, slices }: SpaceChoice) {
+  const planes = slices.map(({ origin, normal }) => create(SlicePlaneSchema, {
     originX: origin[0], originY: origin[1], originZ: origin[2],
     normalX: normal[0], normalY: normal[1], normalZ: normal[2],
   }));
-  parameters.slice = own;
-  parameters.sections.push(...others.map((slice) => create(SectionSchema, { slice })));
+  if (isSurface) parameters.output = Output.SURFACE;
+  else parameters.slice = planes.shift();
+  parameters.sections.push(...planes.map((slice) => create(SectionSchema, { slice })));
   return parameters;
 }
 
@@ -154,13 +155,15 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     sections: base?.sections,
     minComponentArea: base?.minComponentArea,
     minComponentParticles: base?.minComponentParticles,
+    output: base?.output,
+    surface: base?.surface,
   });
 }
 
-/** Outputs of everything that the page draws. */
-export function outputsFor(attributes: string[]) {
+/** Outputs of everything that the page draws. `isSurface`: of surfaces. */
+export function outputsFor(attributes: string[], isSurface = false) {
   return create(OutputsSchema, {
-    rings: true, mesh: true, normals: true, attributes,
-    coordinateFormat: CoordinateFormat.FLOAT32_RELATIVE,
+    rings: true, mesh: true, surface: isSurface, normals: true, attributes,
+    coordinateFormat: isSurface ? CoordinateFormat.COMPACT : CoordinateFormat.FLOAT32_RELATIVE,
   });
 }

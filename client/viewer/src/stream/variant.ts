@@ -1,6 +1,6 @@
-import { ReconstructFrameRequestSchema, ReconstructFrameResponseSchema } from '@proto/v1/reconstruction_pb';
+import { Output, ReconstructFrameRequestSchema, ReconstructFrameResponseSchema } from '@proto/v1/reconstruction_pb';
 import { shareOf } from '../input/share';
-import { decodeFrame } from '../protocol/decode';
+import { decodeResult } from '../protocol/decode';
 import type { Frame } from '../protocol/frame';
 import { particleChannels } from '../protocol/particles';
 import type { Gateway } from './gateway';
@@ -59,7 +59,7 @@ export class Variant {
     const response = await this.gateway.call(
       '/v1/frame', ReconstructFrameRequestSchema, ReconstructFrameResponseSchema, {
         parameters: parametersOf(settings, track.parameters, spacing),
-        outputs: outputsFor((particles.scalars ?? []).map(({ name }) => name)),
+        outputs: outputsFor((particles.scalars ?? []).map(({ name }) => name), track.parameters?.output === Output.SURFACE),
         frame: chosen,
       });
     if (!response.frame) throw new Error('The response of the server has no frame.');
@@ -68,7 +68,7 @@ export class Variant {
     frame.particleFormat = chosen.positionFormat;
     frame.particles = chosen.positions;
     return {
-      ...decodeFrame(frame, track.parameters?.plane ?? 0), particleAttributes: particleChannels(chosen),
+      ...decodeResult(frame, track.parameters?.output, track.parameters?.plane ?? 0), particleAttributes: particleChannels(chosen),
     };
   }
 }

@@ -1,5 +1,5 @@
 import {
-  Output, WatchMode, type ReconstructedFrame, type ReconstructionParameters, type WatchEnded,
+  WatchMode, type ReconstructedFrame, type ReconstructionParameters, type WatchEnded,
   type WatchOpened, type WatchedFrame,
 } from '@proto/v1/reconstruction_pb';
 import { Backoff } from './backoff';
@@ -7,7 +7,7 @@ import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { PlayoutClock } from './playout_clock';
 import { Player, type Range } from './player';
-import { decodeFrame, decodeSpaceFrame } from '../protocol/decode';
+import { decodeResult } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
 import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf } from './settings';
@@ -246,8 +246,7 @@ export class WatchTrack implements Track {
       bytes: message.length,
       summary: summarise(frame, live ? this.counts : null),
       message: parse,
-      frame: () => (this.parameters?.output === Output.SURFACE
-        ? decodeSpaceFrame(parse()) : decodeFrame(parse(), this.parameters?.plane ?? 0)),
+      frame: () => decodeResult(parse(), this.parameters?.output, this.parameters?.plane ?? 0),
     }, keepFrom);
   }
 

@@ -1,6 +1,6 @@
 import type { FileInput } from '../input/drop';
-import { FILE_FIELDS, type FieldError, type FileField, type FileOptions, NO_OPTIONS } from '../input/options';
-import { byId, input, setText } from './dom';
+import { FILE_FIELDS, type FieldError, type FileField, type FileOptions, NO_OPTIONS, SURFACE } from '../input/options';
+import { button, byId, input, setText } from './dom';
 
 const fieldOf = (field: FileField) => input(`file-${field}`);
 const errorOf = (field: FileField) => byId(`file-${field}-error`, HTMLElement);
@@ -14,8 +14,12 @@ export class FileForm {
   constructor(private readonly submitted: (file: FileInput, options: FileOptions) => void) {
     byId('file-options', HTMLFormElement).addEventListener('submit', (event) => {
       event.preventDefault();
-      this.clearErrors();
-      if (this.file) this.submitted(this.file, this.options);
+      this.submit();
+    });
+    button('file-surface').addEventListener('click', () => {
+      fieldOf('slice').value = SURFACE;
+      fieldOf('spacing').value ||= this.file?.facts.spacing ?? '';
+      this.submit();
     });
   }
 
@@ -33,6 +37,7 @@ export class FileForm {
     fieldOf('spacing').placeholder = facts.spacing || 'estimated';
     fieldOf('columns').placeholder = facts.columns || 'x,y';
     fieldOf('slice').placeholder = facts.slice || 'z=0';
+    button('file-surface').hidden = facts.slice === '';
     byId('file-filters', HTMLDataListElement).replaceChildren(...facts.filters.map((filter) => new Option(filter, filter)));
     for (const field of FILE_FIELDS) {
       fieldOf(field).value = options[field];
@@ -55,6 +60,11 @@ export class FileForm {
     errorOf(field).hidden = false;
     setText(errorOf(field), message);
     fieldOf(field).focus();
+  }
+
+  private submit(): void {
+    this.clearErrors();
+    if (this.file) this.submitted(this.file, this.options);
   }
 
   private clearErrors(): void {

@@ -61,6 +61,44 @@ test('3D particles ask for their plane, with defaults of the file', async () => 
   await first.close();
 });
 
+test('3D particles open as a surface, with sections', async () => {
+  const flags = ['--surface', '--spacing', '0.1', '--attributes', 'type'];
+  const [truth] = await world.statistics(place('ball.csv'), ...flags);
+  const [section] = await world.statistics(place('ball.csv'), '--slice', 'z=1', '--spacing', '0.1');
+  const isTrue = () => until('the numbers of the command line', async () => await viewer.value('surface-digest') === truth.surface_digest);
+  viewer = await Viewer.open(browser, world.url);
+  await viewer.drop(place('ball.csv'));
+  await until('the question', async () => /is 3D/.test(await errorOf('slice').textContent()));
+  await viewer.button('Open as a surface').click();
+  await isTrue();
+  assert.ok(await viewer.pane().locator('.space canvas').isVisible());
+  assert.equal(await errorOf('slice').isVisible(), false);
+  assert.equal((await viewer.numbers()).bodies, '1, 0');
+  await viewer.allFrames();
+  assert.deepEqual(await violations(viewer.page), []);
+  await shot('file_surface');
+  assert.match(new URL(viewer.page.url()).hash, /open=spacing:0\.1;slice:surface/);
+  await field('Plane').fill('surface; z=1');
+  await submit();
+  await viewer.page.getByLabel('Picture of').selectOption({ label: 'z = 1' });
+  await shows(section.rings_digest);
+  const { hash } = new URL(viewer.page.url());
+  await viewer.close();
+  viewer = await Viewer.open(browser, world.url, { hash: hash.replace(/,of:1/, '') });
+  await viewer.drop(place('ball.csv'));
+  await isTrue();
+});
+
+test('a surface of flat particles, or without their spacing, is refused beside its field', async () => {
+  viewer = await Viewer.open(browser, world.url);
+  await viewer.drop(place('flat.csv'));
+  await viewer.allFrames();
+  assert.ok(await viewer.button('Open as a surface').isHidden());
+  await viewer.page.evaluate(() => { location.hash = '#file=ball.csv&open=slice:surface'; });
+  await viewer.drop(place('ball.csv'));
+  await until('the error', async () => /Surfaces need the spacing/.test(await errorOf('spacing').textContent()));
+});
+
 test('a wrong option is reported beside its field', async () => {
   const [left] = await world.statistics(place('flat.csv'), '--select', 'type=1', '--spacing', '0.1');
   viewer = await Viewer.open(browser, world.url);
