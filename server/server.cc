@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/base/received_bytes.h"
 #include "server/calls/methods.h"
+#include "server/calls/surface_level.h"
 #include "server/compute/heap.h"
 #include "server/compute/worker_memory.h"
 #include "server/relay/nats_bus.h"
@@ -78,10 +79,10 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 
 // The limits that IntakeGuard enforces for the memory of the process. The process may hold its
 // memory at the start, the workers, and the budget, which includes the histories. In addition it
-// may hold frames beyond the budget, and results that watchers have not received yet, up to a
-// sixteenth of the budget.
+// may hold frames beyond the budget, and results that watchers have not received yet or levels of
+// detail of them, up to a sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
-                                    const WatchRegistry& watchers) {
+                                    const WatchRegistry& watchers, const LevelQueue& levels) {
   const std::uint64_t outside =
       ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
   const std::uint64_t room = budget.bytes(), more = room / kPartsOfBudgetBeyond;
@@ -90,7 +91,10 @@ IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBu
   return {.resident_bytes = ResidentBytes,
           .most_bytes = [outside, room, most,
                          &budget] { return outside + std::clamp(budget.planned(), room, most); },
-          .more_bytes = [more, &watchers] { return std::min(watchers.held_bytes(), more); },
+          .more_bytes =
+              [more, &watchers, &levels] {
+                return std::min(watchers.held_bytes() + levels.kept_bytes(), more);
+              },
           .give_back_freed = GiveBackFreedMemory,
           .limit_bytes = outside + most,
           .received_bytes = ReceivedBytesOfConnections};
@@ -156,8 +160,16 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
+      levels_(std::make_shared<LevelQueue>(
+          dispatcher_,
+          [this](const LevelQueue::Frame& exact, const LevelOfDetail& level,
+                 const std::atomic<bool>& cancelled) {
+            return MakeResultLevel(exact, level, cancelled, budget_);
+          },
+          LevelQueue::Limits{.kept_bytes = options.limits.LevelBytes()})),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_), &budget_.reads()),
+      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_, *levels_),
+                    &budget_.reads()),
       context_{.limits = options_.limits,
                .authentication = authentication_,
                .checkpoint_keys = checkpoint_keys_,
@@ -167,6 +179,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                .unary_calls = calls_,
                .watchers = watchers_,
                .dispatcher = dispatcher_,
+               .levels = *levels_,
                .budget = budget_,
                .pool = pool_,
                .relay = relay_.get()},
@@ -262,6 +275,15 @@ void Server::AddGauges() {
   add("partiemc_history_bytes",
       "Results that watchers can go back to, of all streams; a part of --memory-budget of its own.",
       [this] { return history_.held(); });
+  add("partiemc_level_bytes", "Levels of detail that are kept for watchers, outside of the budget.",
+      [this] { return levels_->kept_bytes(); });
+  add("partiemc_levels_waiting", "Levels of detail that wait for their thread or are computed.",
+      [this] { return levels_->waiting(); });
+  metrics_->AddCounter("partiemc_levels_computed_total", "Levels of detail that were computed.",
+                       [this] { return static_cast<double>(levels_->computed()); });
+  metrics_->AddCounter("partiemc_levels_shared_total",
+                       "Frames for which a watcher received a level that was computed for another.",
+                       [this] { return static_cast<double>(levels_->shared()); });
   if (relay_ != nullptr) AddRelayMetrics();
   AddConnectionMetrics();
   const auto count = [this](const char* name, const char* help, std::uint64_t LogLosses::*value) {
@@ -419,6 +441,7 @@ Server::~Server() {
   server_->Shutdown(std::chrono::system_clock::now());
   server_->Wait();
   acceptor_.reset();
+  levels_->Stop();  // It uses the budget.
 }
 
 // Waits until no new calls arrive. gRPC's shutdown would cut a new call without a reason. Before

@@ -28,6 +28,7 @@
 #include "server/stream/unary_registry.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
+#include "server/watch/level_queue.h"
 #include "server/watch/result_history.h"
 #include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
@@ -162,6 +163,7 @@ class Server {
   UnaryRegistry calls_;
   MemoryBudget budget_;
   ComputePool pool_;
+  std::shared_ptr<LevelQueue> levels_;
   IdleTimer idle_timer_;
   IntakeGuard intake_guard_;
   const ServerContext context_;

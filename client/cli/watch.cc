@@ -62,6 +62,11 @@ std::optional<std::uint64_t> FromSequence(std::string_view from) {
   return from == kOldest ? std::optional<std::uint64_t>(0) : ParseFrom(from);
 }
 
+std::optional<LevelOfDetail> LevelOf(const WatchFlags& flags) {
+  if (!flags.max_error && !flags.max_triangles) return std::nullopt;
+  return LevelOfDetail{.max_error = flags.max_error, .max_triangles = flags.max_triangles};
+}
+
 // Exit code and counts of a watch.
 struct Ended {
   ExitCode code = kGood;
@@ -81,7 +86,9 @@ struct Ended {
 std::string Detail(const WatchedFrame& frame, bool is_surface, std::uint64_t dropped) {
   const Result& result = frame.frame.result;
   std::string detail = Concat("t = ", frame.time, ", ", result.statistics.particles, " particles, ",
-                              is_surface ? Plural(result.statistics.triangles, "triangle")
+                              is_surface ? Plural(frame.level ? result.surface.TriangleCount()
+                                                              : result.statistics.triangles,
+                                                  "triangle")
                                          : Concat(result.rings.RingCount(), " polylines"));
   if (dropped > 0) AppendAll(detail, ", ", dropped, " dropped");
   return detail;
@@ -147,6 +154,7 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
                        {.mode = flags.mode == "every" ? WatchMode::kEvery : WatchMode::kLatest,
                         .credits = flags.credits,
                         .from_sequence = FromSequence(flags.from),
+                        .level_of_detail = LevelOf(flags),
                         .credentials = flags.server.credentials,
                         .fallback_addresses = {servers.begin() + 1, servers.end()},
                         .rejoin = {.give_up_after = ToMilliseconds(flags.give_up_after_seconds)},
@@ -222,6 +230,21 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
   verb->add_option("--frames", flags.frames, "Stop after N frames (default: when the stream ends)")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62))
       ->type_name("N");
+  auto* const max_error =
+      verb->add_option("--max-error", flags.max_error,
+                       "Receive surfaces with fewer triangles, whose root mean square error is at "
+                       "most E spacings, in (0, 1]")
+          ->check([](const std::string& text) -> std::string {
+            const auto error = ParseNumber<double>(text);
+            if (error && *error > 0 && *error <= 1) return {};
+            return "--max-error: " + text + "; must be in (0, 1], in spacings";
+          })
+          ->type_name("E");
+  verb->add_option("--max-triangles", flags.max_triangles,
+                   "Receive surfaces with at most N triangles, or with error 0.35 if more are left")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62))
+      ->excludes(max_error)
+      ->type_name("N");
   verb->add_option("--credits", flags.credits, "Number of frames in flight")
       ->check(CLI::Range(1, 64))
       ->type_name("N")
@@ -271,6 +294,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       "A watcher never slows the stream. A watcher that joins late receives the newest frame at\n"
       "once, or with --from the history of the server (its --history-bytes). After a lost\n"
       "connection, --mode every and --from continue with the next frame.\n"
+      "With --max-error or --max-triangles areas, volumes and digests are of the exact surfaces.\n"
       "Examples:\n"
       "  partiemc streams --server simulator:50051\n"
       "  partiemc watch dam-break --server simulator:50051\n"
@@ -278,6 +302,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       "  partiemc watch dam-break --from oldest --mode every --stats dam.csv\n"
       "  partiemc watch dam-break --frames 1 --quiet --output-dir now\n"
       "  partiemc watch dam-break --wait --record dam.pemc\n"
+      "  partiemc watch tank --max-triangles 20000 --output-dir out\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
   verb->parse_complete_callback([&flags, mode] { CompleteRecording(flags, mode->count() > 0); });
   return verb;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct WatchFlags {
   ServerFlags server;
   std::string mode = "latest";
   std::string from;  ///< A sequence number or "oldest"; empty: the newest frame.
+  std::optional<double> max_error;
+  std::optional<std::uint64_t> max_triangles;
   std::uint32_t credits = 2;
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/library/channel.h"
 #include "client/library/retry_policy.h"
+#include "wire/surface_level.h"
 
 namespace partiemc::client {
 namespace {
@@ -70,6 +71,10 @@ void WatchCall::Start(std::string_view stream_name, const WatcherOptions& option
   open.mutable_open()->set_mode(ToWire(options.mode));
   open.mutable_open()->set_credits(std::max<std::uint32_t>(options.credits, 1));
   if (from_sequence) open.mutable_open()->set_from_sequence(*from_sequence);
+  if (options.level_of_detail) {
+    wire::EncodeLevelOfDetail(*options.level_of_detail,
+                              *open.mutable_open()->mutable_level_of_detail());
+  }
   thread_ = std::thread([this, open = std::move(open)]() mutable { Run(std::move(open)); });
 }
 
@@ -190,6 +195,7 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.frame.rings_digest = decoded_.rings_digest;
   frame.frame.mesh_digest = decoded_.mesh_digest;
   frame.frame.surface_digest = decoded_.surface_digest;
+  frame.level = wire::LevelOf(result);
   std::swap(frame.frame.section_digests, decoded_.section_digests);
   frame.dropped = message.frame().dropped();
   frame.oldest_sequence = message.frame().oldest_sequence();

@@ -150,6 +150,31 @@ absl::Status DecodePlain(const v1::Surface& message, const PointFormat& format, 
   return absl::OkStatus();
 }
 
+// Writes offsets, points, triangles, normals and attributes, in the coordinate format and relative
+// to the origin of `message`.
+absl::Status EncodeGeometry(const Surface& surface, double spacing, bool has_normals,
+                            v1::ReconstructedFrame& message) {
+  v1::Surface& to = *message.mutable_surface();
+  AssignBytes(std::span<const std::uint32_t>(surface.point_offsets), *to.mutable_point_offsets());
+  AssignBytes(std::span<const std::uint32_t>(surface.triangle_offsets),
+              *to.mutable_triangle_offsets());
+  const Origin origin = OriginOf(message);
+  if (message.coordinate_format() == v1::COORDINATE_FORMAT_COMPACT) {
+    return EncodeCompact(surface, origin, spacing, has_normals && !surface.normals.empty(), to);
+  }
+  to.clear_step();
+  AssignBytes(std::span<const std::uint32_t>(surface.triangles), *to.mutable_triangles());
+  if (has_normals) {
+    AssignBytes(std::span<const float>(surface.normals), *to.mutable_normals());
+  } else {
+    to.clear_normals();
+  }
+  EncodeAttributes(surface.attributes, surface.PointCount(), *to.mutable_attributes());
+  return EncodePoints(surface.points,
+                      {.format = message.coordinate_format(), .origin = origin, .components = 3},
+                      spacing, "surface.points", *to.mutable_points());
+}
+
 }  // namespace
 
 absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
@@ -161,26 +186,14 @@ absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
   SetOrigin(origin, message);
   message.set_coordinate_format(ToWire(outputs.coordinates));
   v1::Surface& to = *message.mutable_surface();
-  AssignBytes(std::span<const std::uint32_t>(surface.point_offsets), *to.mutable_point_offsets());
-  AssignBytes(std::span<const std::uint32_t>(surface.triangle_offsets),
-              *to.mutable_triangle_offsets());
   AssignBytes(std::span<const std::uint32_t>(surface.outer_of), *to.mutable_outer_of());
   EncodeMeasures(surface, to);
-  const double spacing = result.statistics.spacing;
-  if (outputs.coordinates == Coordinates::kCompact) {
-    return EncodeCompact(surface, origin, spacing, outputs.normals && !surface.normals.empty(), to);
-  }
-  to.clear_step();
-  AssignBytes(std::span<const std::uint32_t>(surface.triangles), *to.mutable_triangles());
-  if (outputs.normals) {
-    AssignBytes(std::span<const float>(surface.normals), *to.mutable_normals());
-  } else {
-    to.clear_normals();
-  }
-  EncodeAttributes(surface.attributes, surface.PointCount(), *to.mutable_attributes());
-  return EncodePoints(surface.points,
-                      {.format = message.coordinate_format(), .origin = origin, .components = 3},
-                      spacing, "surface.points", *to.mutable_points());
+  return EncodeGeometry(surface, result.statistics.spacing, outputs.normals, message);
+}
+
+absl::Status ReplaceGeometry(const Surface& surface, double spacing,
+                             v1::ReconstructedFrame& message) {
+  return EncodeGeometry(surface, spacing, !surface.normals.empty(), message);
 }
 
 absl::Status DecodeSurface(const v1::ReconstructedFrame& message, Surface& surface) {

@@ -12,6 +12,12 @@ namespace partiemc::wire {
 absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message);
 
+/// Replaces points, triangles, normals and attributes of the surface in `message` by those of
+/// `surface`, which has the same shells. Keeps the coordinate format and the origin. Requires: a
+/// surface that DecodeSurface has read from `message`, with fewer points. Errors: as EncodeResult.
+absl::Status ReplaceGeometry(const Surface& surface, double spacing,
+                             v1::ReconstructedFrame& message);
+
 /// Reads the surface of `message`, except for its statistics; empties it if there is none. Checks
 /// every count and index. Errors: DATA_LOSS.
 absl::Status DecodeSurface(const v1::ReconstructedFrame& message, Surface& surface);

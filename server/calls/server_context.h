@@ -7,6 +7,7 @@ class Authentication;
 class ComputePool;
 class CurrentCheckpointKeys;
 class HistoryRoom;
+class LevelQueue;
 class MemoryBudget;
 class OpeningCalls;
 class Relay;
@@ -27,6 +28,7 @@ struct ServerContext {
   UnaryRegistry& unary_calls;
   WatchRegistry& watchers;
   WatchDispatcher& dispatcher;
+  LevelQueue& levels;
   MemoryBudget& budget;
   ComputePool& pool;
   Relay* relay = nullptr;  ///< Null: only the streams of this server.

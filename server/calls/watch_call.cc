@@ -10,6 +10,7 @@
 #include "server/watch/result_broadcaster.h"
 #include "wire/codec.h"
 #include "wire/message_bytes.h"
+#include "wire/surface_level.h"
 
 namespace partiemc::server {
 namespace {
@@ -26,6 +27,12 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
                             {std::string(wire::kReasonUnsupported), "open.mode", absl::StrCat(mode),
                              "must be WATCH_MODE_LATEST or WATCH_MODE_EVERY"});
   }
+}
+
+absl::Status NoLevel(std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(wire::kReasonUnsupported), "open.level_of_detail", "set", std::move(rule)});
 }
 
 }  // namespace
@@ -58,6 +65,17 @@ void WatchCall::OnRequest() {
 void WatchCall::OnResponseWritten(bool ok) {
   response_.Clear();
   machine_->WriteDone(ok);
+}
+
+void WatchCall::OnCancel() {
+  const auto machine = machine_;  // This call may be deleted after the first event.
+  if (context().levels.Withdraw(*this)) machine->WriteDone(false);
+  machine->Cancelled();
+}
+
+void WatchCall::Cut() {
+  channel().Cancel();
+  if (context().levels.Withdraw(*this)) machine_->WriteDone(false);
 }
 
 void WatchCall::OnDone() { context().watchers.Leave(*machine_); }
@@ -110,6 +128,7 @@ void WatchCall::StartOpen() {
 
 absl::Status WatchCall::OpenHere(const StreamSummary& stream) {
   const StreamDescription& description = stream.description;
+  if (auto status = JoinLevel(description); !status.ok()) return status;
   if (auto status = TakePlace(stream.id, description.name); !status.ok()) return status;
   v1::WatchOpened& opened = *opened_.mutable_opened();
   opened.set_lineage(stream.lineage);
@@ -119,7 +138,22 @@ absl::Status WatchCall::OpenHere(const StreamSummary& stream) {
   return absl::OkStatus();
 }
 
+absl::Status WatchCall::JoinLevel(const StreamDescription& description) {
+  if (!parsed_.open().has_level_of_detail()) return absl::OkStatus();
+  if (description.parameters.output != Output::kSurface) {
+    return NoLevel("must be absent: the stream has outlines, not surfaces");
+  }
+  auto level = wire::DecodeLevelOfDetail(parsed_.open().level_of_detail());
+  if (!level.ok()) return level.status();
+  auto seat = context().levels.Join(description.broadcaster.get(), *level);
+  if (seat.ok()) level_ = *std::move(seat);
+  return seat.status();
+}
+
 absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
+  if (parsed_.open().has_level_of_detail()) {
+    return NoLevel("must be absent for a stream of another replica: watch it there");
+  }
   const v1::StreamSummary& stream = found.stream.summary();
   if (auto status = TakePlace(stream.stream_id(), stream.stream_name()); !status.ok())
     return status;
@@ -154,8 +188,22 @@ void WatchCall::WriteOpened(const HeldFrames& held) {
 
 void WatchCall::WriteFrame(const Published& published, std::uint64_t dropped,
                            std::uint64_t oldest_sequence) {
+  if (level_) {
+    level_dropped_ = dropped;
+    level_oldest_ = oldest_sequence;
+    // The frames of the history come without gaps.
+    const bool may_skip = terms_.mode == WatchMode::kLatest && !terms_.from_sequence;
+    return context().levels.Request(level_, published.frame, may_skip, *this);
+  }
   const auto& result = static_cast<const WatchedResult&>(*published.frame);
   Write(result.bytes.ToResponse(dropped, oldest_sequence));
+}
+
+void WatchCall::LevelDone(const absl::StatusOr<LevelQueue::Frame>& level) {
+  if (!level.ok()) return machine_->WriteRefused(level.status());
+  if (*level == nullptr) return machine_->WriteSkipped();
+  const auto& result = static_cast<const WatchedResult&>(**level);
+  Write(result.bytes.ToResponse(level_dropped_, level_oldest_));
 }
 
 void WatchCall::WriteEnded(const WatchEnd& end, std::uint64_t dropped) {
@@ -176,6 +224,7 @@ void WatchCall::Finish(const absl::Status& status) {
   // Frees the watcher's slot before it sends the status, because a client that receives the status
   // may watch again at once.
   context().watchers.Close(*machine_);
+  level_ = {};
   LogEnd(status);
   End(status);
 }

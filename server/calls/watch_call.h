@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,16 +15,17 @@
 #include "server/relay/relay.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
+#include "server/watch/level_queue.h"
 #include "server/watch/watch_registry.h"
 #include "server/watch/watch_state_machine.h"
 
 namespace partiemc::server {
 
-class WatchCall final : public ByteCall, private WatchTransport {
+class WatchCall final : public ByteCall, private WatchTransport, private LevelQueue::Waiter {
  public:
   WatchCall(ArrivedCall call, const ServerContext& context);
 
-  void OnCancel() override { machine_->Cancelled(); }
+  void OnCancel() override;
   void OnDone() override;
 
  private:
@@ -37,10 +39,12 @@ class WatchCall final : public ByteCall, private WatchTransport {
   void WriteFrame(const Published& published, std::uint64_t dropped,
                   std::uint64_t oldest_sequence) override;
   void WriteEnded(const WatchEnd& end, std::uint64_t dropped) override;
-  void Cut() override { channel().Cancel(); }
+  void LevelDone(const absl::StatusOr<LevelQueue::Frame>& level) override;
+  void Cut() override;
   void Finish(const absl::Status& status) override;
 
   absl::StatusOr<WatchTerms> ReadTerms() const;
+  absl::Status JoinLevel(const StreamDescription& description);
   absl::Status OpenHere(const StreamSummary& stream);
   absl::Status OpenRemote(const Relay::Found& found);
   absl::Status TakePlace(const std::string& stream_id, const std::string& stream_name);
@@ -51,6 +55,8 @@ class WatchCall final : public ByteCall, private WatchTransport {
   v1::WatchStreamRequest parsed_;
   v1::WatchStreamResponse opened_;  // Once open.
   WatchTerms terms_;
+  LevelQueue::Seat level_;                              // Without a level: exact frames.
+  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Of the frame that waits for its level.
   std::string stream_name_;
   std::string end_reason_;
   std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();

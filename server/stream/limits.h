@@ -110,6 +110,10 @@ struct ServerLimits {
   /// the maximum number of streams.
   std::uint64_t KeptResultBytes() const { return (std::uint64_t{64} << 20) / max_streams; }
 
+  /// Maximum memory of the levels of detail that are kept for watchers of the same frame, outside
+  /// of the budget: a 32nd of the budget.
+  std::uint64_t LevelBytes() const { return memory_budget / 32; }
+
   /// Maximum number of opening calls, which have not sent their first request; for all methods
   /// together.
   std::uint32_t MaxOpeningCalls() const { return std::max(64u, max_streams + max_watchers); }

@@ -82,10 +82,36 @@ void WatchStateMachine::ReadEnded() {
 void WatchStateMachine::WriteDone(bool ok) {
   Published written;  // Freed without the lock.
   const Event event(*this);
+  written = TakeInWrite();
+  if (!ok) Abandon(WatcherGone());
+}
+
+void WatchStateMachine::WriteSkipped() {
+  Published skipped;  // Freed without the lock.
+  const Event event(*this);
+  skipped = TakeBackWrite();
+}
+
+void WatchStateMachine::WriteRefused(const absl::Status& status) {
+  Published refused;  // Freed without the lock.
+  const Event event(*this);
+  refused = TakeBackWrite();
+  End(WatchEnd::With(status));
+}
+
+Published WatchStateMachine::TakeInWrite() {
   state_.writing = Writing::kIdle;
   if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
-  written = std::exchange(in_write_, {});
-  if (!ok) Abandon(WatcherGone());
+  return std::exchange(in_write_, {});
+}
+
+// Counts the frame in write as dropped, and returns its credit.
+Published WatchStateMachine::TakeBackWrite() {
+  ++credit_;
+  --counts_.frames;
+  ++counts_.dropped;
+  next_told_ = told_before_;
+  return TakeInWrite();
 }
 
 void WatchStateMachine::Cancelled() {
@@ -325,6 +351,7 @@ void WatchStateMachine::WriteFrame() {
   in_write_ = std::move(pending_.front());
   pending_.pop_front();
   const std::uint64_t dropped = in_write_.number - next_told_;
+  told_before_ = next_told_;
   next_told_ = in_write_.number + 1;
   Write(Writing::kResult,
         [this, frame = in_write_, dropped, oldest = broadcaster_->oldest_sequence()] {

@@ -57,7 +57,8 @@ class WatchTransport {
   /// WriteOpened; completes by WatchStateMachine::Opened, during this call or later.
   virtual void StartOpen() = 0;
 
-  /// Each starts a write; completes by WatchStateMachine::WriteDone.
+  /// Each starts a write; completes by WatchStateMachine::WriteDone, WriteFrame also by
+  /// WriteSkipped or WriteRefused.
   virtual void WriteOpened(const HeldFrames& held) = 0;
   /// `oldest_sequence`: the oldest frame that a watcher can request now.
   virtual void WriteFrame(const Published& published, std::uint64_t dropped,
@@ -116,6 +117,11 @@ class WatchStateMachine final : public SerializedCall {
   /// Completes StartOpen. If `terms` is an error, the watch ends.
   void Opened(const absl::StatusOr<WatchTerms>& terms);
   void WriteDone(bool ok);
+  /// The transport has not begun to write the frame of WriteFrame, and never will: the watcher
+  /// misses it. Takes the place of WriteDone.
+  void WriteSkipped();
+  /// As WriteSkipped, and ends the watch with this error.
+  void WriteRefused(const absl::Status& status);
   /// The client has disconnected.
   void Cancelled();
 
@@ -153,6 +159,8 @@ class WatchStateMachine final : public SerializedCall {
   void DecideWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Write(Writing what, Action action) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void WriteFrame() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Published TakeInWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Published TakeBackWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void TakeRequest(const WatchRequest& request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Join(const WatchTerms& terms) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Take(const Published& published) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -179,10 +187,11 @@ class WatchStateMachine final : public SerializedCall {
   std::uint64_t credit_ ABSL_GUARDED_BY(mutex_) = 0;
   std::deque<Published> pending_ ABSL_GUARDED_BY(mutex_);
   Published in_write_ ABSL_GUARDED_BY(mutex_);
-  std::size_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;   // Of pending_ and in_write_.
-  std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;    // The last offered frame; 0: none.
-  std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;  // Next of the history; 0: live.
-  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;  // Next frame if none is dropped.
+  std::size_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;     // Of pending_ and in_write_.
+  std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;      // The last offered frame; 0: none.
+  std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;    // Next of the history; 0: live.
+  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;    // Next frame if none is dropped.
+  std::uint64_t told_before_ ABSL_GUARDED_BY(mutex_) = 0;  // next_told_ before in_write_.
   WatchCounts counts_ ABSL_GUARDED_BY(mutex_);
 };
 

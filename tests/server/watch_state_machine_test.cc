@@ -206,6 +206,33 @@ void Open(WatchStateMachine& machine, const StepTransport& transport) {
   machine.Opened(transport.terms);
 }
 
+TEST_F(WatchTest, ASkippedFrameCountsAsDroppedAndReturnsItsCredit) {
+  StepTransport transport({broadcaster_, WatchMode::kLatest, 2});
+  const auto machine = std::make_shared<WatchStateMachine>(transport, kMaxBytes);
+  machine->Start();
+  Open(*machine, transport);
+  machine->WriteDone(true);  // `opened`.
+  Publish(1);
+  dispatcher_.Flush();
+  Publish(2);
+  Publish(3);
+  dispatcher_.Flush();
+  machine->WriteSkipped();
+  machine->WriteDone(true);
+  Publish(4);
+  dispatcher_.Flush();
+  EXPECT_EQ(transport.written, (std::vector<SeenFrame>{{1, 0}, {3, 2}, {4, 0}}));
+  EXPECT_EQ(machine->counts().frames, 2u);
+  EXPECT_EQ(machine->counts().dropped, 2u);
+  machine->WriteRefused(absl::ResourceExhaustedError("memory"));
+  ASSERT_TRUE(transport.ended.has_value());
+  EXPECT_EQ(transport.ended->second, 1u);
+  EXPECT_EQ(machine->held_bytes(), 0u);
+  machine->WriteDone(true);
+  ASSERT_TRUE(transport.status.has_value());
+  EXPECT_EQ(transport.status->code(), absl::StatusCode::kResourceExhausted);
+}
+
 TEST_F(WatchTest, OfWhatIsPublishedAfterItIsInAWatcherOfEveryMissesNothing) {
   for (std::uint64_t round = 0; round < 200; ++round) {
     const auto watcher = Join(WatchMode::kEvery, 9);

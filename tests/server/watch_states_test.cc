@@ -40,11 +40,16 @@ class ScriptedWatch final : private WatchTransport {
     ok ? machine->Opened(terms_) : machine->Opened(absl::NotFoundError("no such stream"));
   }
   void EndWrite(bool ok) {
-    writing = false;
+    writing = writing_frame = false;
     machine->WriteDone(ok);
   }
+  // The frame in write has no level of detail.
+  void GiveUpWrite(bool skips) {
+    writing = writing_frame = false;
+    skips ? machine->WriteSkipped() : machine->WriteRefused(absl::ResourceExhaustedError("memory"));
+  }
 
-  bool reading = false, opening = false, writing = false;
+  bool reading = false, opening = false, writing = false, writing_frame = false;
   std::optional<absl::Status> finished;
   const std::shared_ptr<WatchStateMachine> machine =
       std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), kMaxBytes);
@@ -53,7 +58,10 @@ class ScriptedWatch final : private WatchTransport {
   void StartRead() override { Begin(reading); }
   void StartOpen() override { Begin(opening); }
   void WriteOpened(const HeldFrames&) override { Begin(writing); }
-  void WriteFrame(const Published&, std::uint64_t, std::uint64_t) override { Begin(writing); }
+  void WriteFrame(const Published&, std::uint64_t, std::uint64_t) override {
+    Begin(writing);
+    writing_frame = true;
+  }
   void WriteEnded(const WatchEnd&, std::uint64_t) override { Begin(writing); }
   void Cut() override {
     if (finished) throw std::logic_error("cut after the end");
@@ -102,7 +110,11 @@ class Order {
     } else if (dice < 9) {
       if (watch_.opening) watch_.EndOpening(random_.Chance(0.95));
     } else if (dice < 13) {
-      if (watch_.writing) watch_.EndWrite(random_.Chance(0.95));
+      if (watch_.writing_frame && random_.Chance(0.2)) {
+        watch_.GiveUpWrite(random_.Chance(0.9));
+      } else if (watch_.writing) {
+        watch_.EndWrite(random_.Chance(0.95));
+      }
     } else if (dice < 17) {
       const Published frame{
           std::make_shared<NumberedFrame>(number_ + 1, random_.Chance(0.02) ? kMaxBytes : 100),

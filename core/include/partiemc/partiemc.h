@@ -23,4 +23,5 @@
 #include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "partiemc/surface.h"
+#include "partiemc/surface_level.h"
 #include "partiemc/validate.h"

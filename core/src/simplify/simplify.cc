@@ -291,6 +291,20 @@ SimplifyReport Simplifier::Run(Surface& simplified) {
   return report;
 }
 
+// Keeps the `components` values of each remaining point. `values` may be empty.
+void KeepValues(std::span<const std::uint32_t> new_index, std::size_t components,
+                std::vector<float>& values) {
+  if (values.empty()) return;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < new_index.size(); ++k) {
+    if (new_index[k] == kNoIndex) continue;
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(components * k), components,
+                values.begin() + static_cast<std::ptrdiff_t>(components * new_index[k]));
+    ++kept;
+  }
+  values.resize(components * kept);
+}
+
 }  // namespace
 
 SimplifyReport Simplify(const SimplifyLimits& limits, Surface& surface) {
@@ -299,12 +313,10 @@ SimplifyReport Simplify(const SimplifyLimits& limits, Surface& surface) {
   Simplifier simplifier(limits, surface);
   const SimplifyReport report = simplifier.Run(simplified);
   const std::span<const std::uint32_t> new_index = simplifier.NewIndices();
-  for (std::size_t k = 0; k < new_index.size(); ++k) {
-    if (new_index[k] == kNoIndex) continue;
-    std::copy_n(surface.normals.begin() + 3 * k, 3,
-                surface.normals.begin() + 3 * std::size_t{new_index[k]});
+  KeepValues(new_index, 3, surface.normals);
+  for (AttributeValues& attribute : surface.attributes) {
+    KeepValues(new_index, static_cast<std::size_t>(attribute.components), attribute.values);
   }
-  surface.normals.resize(simplified.points.size());
   surface.points.assign(simplified.points.begin(), simplified.points.end());
   surface.triangles.assign(simplified.triangles.begin(), simplified.triangles.end());
   surface.point_offsets.assign(simplified.point_offsets.begin(), simplified.point_offsets.end());

@@ -21,6 +21,7 @@
 #include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/client/stream.h"
+#include "partiemc/surface_level.h"
 
 namespace partiemc::client {
 
@@ -39,6 +40,9 @@ struct WatcherOptions {
   /// follow. If all held frames are older, only live frames are received. Absent: starts with the
   /// newest frame.
   std::optional<std::uint64_t> from_sequence = {};
+  /// For streams of surfaces: receive simplified surfaces. Absent: exact ones. Servers without the
+  /// capability "surface-levels" send exact ones, too.
+  std::optional<LevelOfDetail> level_of_detail = {};
   Credentials credentials = {};
   /// Servers where the stream may be, in addition to the address of Open.
   std::vector<std::string> fallback_addresses = {};
@@ -76,6 +80,9 @@ struct WatchedFrame {
   std::uint64_t sequence = 0;  ///< Number of the producer's frame.
   double time = 0;
   FrameResult frame;
+  /// Set if the surface is a level of detail. Statistics, digests, measures and identities are
+  /// those of the exact surface.
+  std::optional<SurfaceLevel> level;
   /// x0, y0, x1, y1, ... in the stream's plane, or x0, y0, z0, ... if the stream has surfaces;
   /// empty unless the producer echoes its particles.
   std::vector<double> particles;
@@ -109,7 +116,8 @@ class Watcher {
   /// `stream_name` is a name from ListStreams; `address` is HOST:PORT, [IPV6]:PORT or unix:PATH.
   /// Errors: INVALID_ARGUMENT (address, credentials), UNAVAILABLE (no server, or TLS verification
   /// failed), UNAUTHENTICATED (token), NOT_FOUND (no such stream at any address),
-  /// RESOURCE_EXHAUSTED (too many watchers), DEADLINE_EXCEEDED. Each message is one line.
+  /// RESOURCE_EXHAUSTED (too many watchers or levels of detail), DEADLINE_EXCEEDED. Each message is
+  /// one line.
   static absl::StatusOr<std::unique_ptr<Watcher>> Open(std::string_view address,
                                                        std::string_view stream_name,
                                                        const WatcherOptions& options);

@@ -1,0 +1,56 @@
+// Levels of detail: finished surfaces with fewer triangles, for viewers (core/SURFACES.md,
+// "Simplification").
+#pragma once
+
+#include <atomic>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "partiemc/surface.h"
+
+namespace partiemc {
+
+/// The requested level of detail. Exactly one member is set.
+struct LevelOfDetail {
+  /// Limit of the root mean square distance to the exact surface, in spacings, in (0, 1]. No
+  /// removed point is farther than twice this from the level.
+  std::optional<double> max_error;
+  /// The smallest error of a fixed list up to 0.35 with which the surface has at most this many
+  /// triangles; at least 1. If no error of the list suffices, the level has error 0.35 and more
+  /// triangles.
+  std::optional<std::uint64_t> max_triangles;
+
+  friend auto operator<=>(const LevelOfDetail&, const LevelOfDetail&) = default;
+};
+
+/// Errors: INVALID_ARGUMENT (OUT_OF_RANGE) with the field `level_of_detail`, or its member.
+absl::Status Validate(const LevelOfDetail& level);
+
+/// Marks a surface as a level of detail.
+struct SurfaceLevel {
+  double error = 0;          ///< In spacings; 0: no point was removed.
+  std::uint64_t digest = 0;  ///< DigestSurface of the level.
+
+  friend bool operator==(const SurfaceLevel&, const SurfaceLevel&) = default;
+};
+
+/// Upper bound of the memory that MakeLevel allocates for a surface of this size, including the
+/// surface. `attribute_values`: values of all attributes for each point.
+std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
+                         std::uint64_t attribute_values);
+
+/// Simplifies `surface` to a level, and returns its error. The remaining points keep their bits,
+/// normals and attributes; measures stay those of the exact surface. S1, S2 and S4 hold, and S3
+/// between all triangles that the simplification has changed.
+/// Requires: a valid level; S1 to S4, `spacing` > 0; normals may be absent. Rounded coordinates may
+/// break S3; such triangles stay.
+/// Runs in the caller's Arena. Deterministic for any number of threads. Errors: CANCELLED after
+/// `cancelled` was set; then `surface` is unspecified. May throw std::bad_alloc.
+absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
+                                 const std::atomic<bool>* cancelled, Surface& surface);
+
+}  // namespace partiemc

@@ -1,0 +1,103 @@
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "base/cancellation.h"
+#include "partiemc/status.h"
+#include "partiemc/surface_level.h"
+#include "simplify/simplify.h"
+#include "space/surface_bytes.h"
+
+namespace partiemc {
+namespace {
+
+// The errors from which a number of triangles selects, in spacings. The number of triangles falls
+// about as the error grows, so steps of about 1.4 leave at most a third of the limit unused. With
+// larger errors more shells break a guarantee and keep their triangles.
+constexpr std::array kErrors = {.015, .02, .03, .04, .06, .08, .12, .17, .25, .35};
+
+// Of a point: coordinates, normal, indices; of a triangle: its indices. MakeLevel holds the exact
+// surface, the best level so far and the level in work, of which simplification copies the
+// triangles.
+constexpr std::uint64_t kBytesPerPoint = 3 * (24 + 12) + 8, kBytesPerTriangle = 5 * 12 + 16;
+
+absl::Status OutOfRange(std::string field, std::string value, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
+}
+
+// Keeps the measures of the exact surface.
+void SimplifyBy(double error, double spacing, Surface& surface) {
+  std::vector<ShellMeasures> exact = surface.measures;
+  simplify::Simplify({.error = error * spacing, .spacing = spacing}, surface);
+  surface.measures = std::move(exact);
+}
+
+// Finds the smallest error of kErrors that suffices, by bisection. Returns the error.
+double SimplifyToCount(std::uint64_t max_triangles, double spacing, Surface& surface) {
+  std::size_t first = 0, last = kErrors.size() - 1;
+  Surface best = surface;
+  SimplifyBy(kErrors[last], spacing, best);
+  while (first < last && best.TriangleCount() <= max_triangles) {
+    const std::size_t middle = first + (last - first) / 2;
+    Surface level = surface;
+    SimplifyBy(kErrors[middle], spacing, level);
+    if (level.TriangleCount() <= max_triangles) {
+      best = std::move(level);
+      last = middle;
+    } else {
+      first = middle + 1;
+    }
+  }
+  surface = std::move(best);
+  return kErrors[last];
+}
+
+}  // namespace
+
+absl::Status Validate(const LevelOfDetail& level) {
+  if (level.max_error.has_value() == level.max_triangles.has_value()) {
+    return OutOfRange("level_of_detail", level.max_error ? "two limits" : "no limit",
+                      "must have either max_error or max_triangles");
+  }
+  // This form of the comparison refuses NaN, too.
+  if (level.max_error && !(*level.max_error > 0 && *level.max_error <= 1)) {
+    return OutOfRange("level_of_detail.max_error", ShortestNumber(*level.max_error),
+                      "must be in (0, 1], in spacings");
+  }
+  if (level.max_triangles == 0u) {
+    return OutOfRange("level_of_detail.max_triangles", "0", "must be at least 1");
+  }
+  return absl::OkStatus();
+}
+
+std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
+                         std::uint64_t attribute_values) {
+  return space::kBytesAtLeast + kBytesPerTriangle * triangles +
+         (kBytesPerPoint + space::kBytesPerSimplifiedPoint + 3 * sizeof(float) * attribute_values) *
+             points;
+}
+
+absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
+                                 const std::atomic<bool>* cancelled, Surface& surface) {
+  const CancellationScope scope(cancelled);
+  const std::size_t exact = surface.TriangleCount();
+  double error = 0;
+  try {
+    if (level.max_error) {
+      error = *level.max_error;
+      SimplifyBy(error, spacing, surface);
+    } else if (exact > level.max_triangles.value_or(exact)) {
+      error = SimplifyToCount(*level.max_triangles, spacing, surface);
+    }
+  } catch (const Cancelled&) {
+    return absl::CancelledError("the level of detail was cancelled");
+  }
+  return surface.TriangleCount() < exact ? error : 0;
+}
+
+}  // namespace partiemc

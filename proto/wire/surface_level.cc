@@ -1,0 +1,80 @@
+#include "wire/surface_level.h"
+
+#include <cstring>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/result.h"
+#include "partiemc/status.h"
+#include "wire/surface_codec.h"
+
+namespace partiemc::wire {
+namespace {
+
+// The last entry of an array of offsets: the number of points or triangles.
+std::uint64_t LastOf(const std::string& offsets) {
+  std::uint32_t last = 0;
+  if (offsets.size() >= sizeof last) {
+    std::memcpy(&last, offsets.data() + offsets.size() - sizeof last, sizeof last);
+  }
+  return last;
+}
+
+std::uint64_t BytesOfLevel(const v1::Surface& surface) {
+  std::uint64_t values = 0;
+  for (const v1::NamedAttribute& attribute : surface.attributes()) values += attribute.components();
+  return LevelBytes(LastOf(surface.point_offsets()), LastOf(surface.triangle_offsets()), values);
+}
+
+}  // namespace
+
+absl::StatusOr<LevelOfDetail> DecodeLevelOfDetail(const v1::LevelOfDetail& message) {
+  LevelOfDetail level;
+  if (message.has_max_error()) level.max_error = message.max_error();
+  if (message.has_max_triangles()) level.max_triangles = message.max_triangles();
+  const absl::Status status = Validate(level);
+  if (status.ok()) return level;
+  auto violation = *FindViolation(status);
+  violation.field = absl::StrCat("open.", violation.field);
+  return ViolationError(status.code(), violation);
+}
+
+void EncodeLevelOfDetail(const LevelOfDetail& level, v1::LevelOfDetail& message) {
+  message.Clear();
+  if (level.max_error) message.set_max_error(*level.max_error);
+  if (level.max_triangles) message.set_max_triangles(*level.max_triangles);
+}
+
+std::optional<SurfaceLevel> LevelOf(const v1::ReconstructedFrame& message) {
+  if (!message.surface().has_level()) return std::nullopt;
+  const v1::SurfaceLevel& level = message.surface().level();
+  return SurfaceLevel{.error = level.error(), .digest = level.digest()};
+}
+
+absl::Status ReplaceByLevel(const LevelOfDetail& level,
+                            absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve,
+                            const std::atomic<bool>* cancelled, v1::ReconstructedFrame& message) {
+  if (!message.has_surface()) return absl::OkStatus();
+  v1::Surface& surface = *message.mutable_surface();
+  absl::Status status = reserve(BytesOfLevel(surface));
+  Surface decoded;
+  if (status.ok()) status = DecodeSurface(message, decoded);
+  if (!status.ok()) return status;
+  const double spacing = message.statistics().spacing();
+  double error = 0;
+  if (decoded.ShellCount() > 0) {
+    const auto made = MakeLevel(level, spacing, cancelled, decoded);
+    if (!made.ok()) return made.status();
+    error = *made;
+  }
+  // Measures and identities stay in the message.
+  if (error > 0) status = ReplaceGeometry(decoded, spacing, message);
+  // A compact surface has another order of points and triangles in the message.
+  if (status.ok() && error > 0) status = DecodeSurface(message, decoded);
+  if (!status.ok()) return status;
+  surface.mutable_level()->set_error(error);
+  surface.mutable_level()->set_digest(DigestSurface(decoded));
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc::wire

@@ -1,0 +1,84 @@
+#include "server/calls/surface_level.h"
+
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "partiemc/v1/reconstruction.pb.h"
+#include "server/compute/memory_budget.h"
+#include "server/relay/watched_result.h"
+#include "wire/surface_level.h"
+
+namespace partiemc::server {
+namespace {
+
+constexpr char kField[] = "open.level_of_detail";
+
+// The bytes of a result, the message in it, and the bytes of the level.
+constexpr std::uint64_t kCopies = 3;
+
+// Bytes of the budget, until the end of the scope.
+class Reservation {
+ public:
+  explicit Reservation(MemoryBudget& budget) : budget_(budget) {}
+  ~Reservation() {
+    if (bytes_ > 0) budget_.GiveBack(bytes_);
+  }
+  Reservation(const Reservation&) = delete;
+  Reservation& operator=(const Reservation&) = delete;
+
+  absl::Status Take(std::uint64_t bytes) {
+    may_fit_later_ = bytes_ + bytes <= budget_.bytes();
+    if (!may_fit_later_ || budget_.TryTake(bytes) != FairShare::Fit::kYes) {
+      return NoRoomInBudget(kField, bytes_ + bytes, budget_.bytes());
+    }
+    bytes_ += bytes;
+    return absl::OkStatus();
+  }
+  bool may_fit_later() const { return may_fit_later_; }
+
+ private:
+  MemoryBudget& budget_;
+  std::uint64_t bytes_ = 0;
+  bool may_fit_later_ = true;
+};
+
+absl::StatusOr<LevelQueue::Frame> MakeOrThrow(const LevelQueue::Frame& exact,
+                                              const LevelOfDetail& level,
+                                              const std::atomic<bool>& cancelled,
+                                              Reservation& reservation) {
+  const auto& result = static_cast<const WatchedResult&>(*exact);
+  absl::Status status = reservation.Take(kCopies * result.bytes.size());
+  if (!status.ok()) return status;
+  v1::ReconstructedFrame frame;
+  if (!frame.ParseFromString(result.bytes.ToString())) {
+    return absl::InternalError("a result for watchers cannot be parsed");
+  }
+  if (!frame.has_surface()) return exact;
+  status = wire::ReplaceByLevel(
+      level, [&](std::uint64_t bytes) { return reservation.Take(bytes); }, &cancelled, frame);
+  if (absl::IsDataLoss(status)) return absl::InternalError(status.message());
+  if (!status.ok()) return status;
+  return std::make_shared<WatchedResult>(wire::WatchedBytes(frame.SerializeAsString()));
+}
+
+}  // namespace
+
+LevelQueue::Made MakeResultLevel(const LevelQueue::Frame& exact, const LevelOfDetail& level,
+                                 const std::atomic<bool>& cancelled, MemoryBudget& budget) {
+  Reservation reservation(budget);
+  LevelQueue::Made made;
+  try {
+    made.level = MakeOrThrow(exact, level, cancelled, reservation);
+  } catch (const std::bad_alloc&) {
+    made.level = NoRoomInBudget(kField, exact->bytes(), budget.bytes());
+  }
+  made.may_succeed_later =
+      absl::IsResourceExhausted(made.level.status()) && reservation.may_fit_later();
+  return made;
+}
+
+}  // namespace partiemc::server
