@@ -24,7 +24,7 @@ std::optional<SurfaceLevel> LevelOf(const v1::ReconstructedFrame& message);
 /// Replaces the surface of `message` by a level in the same coordinate format, with the same origin
 /// and step. All other fields, measures and identities stay. A message without a surface stays as
 /// it is.
-/// `reserve` is called once, with an upper bound of the memory; its error is returned.
+/// `reserve` is called once, with an estimate of the memory; its error is returned.
 /// Runs in the caller's Arena. Errors: DATA_LOSS for a malformed surface; CANCELLED. After an error
 /// `message` is unspecified. May throw std::bad_alloc.
 absl::Status ReplaceByLevel(const LevelOfDetail& level,

@@ -1,10 +1,6 @@
 // The server seen from outside: Prometheus metrics, log, and `info`.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -30,26 +26,6 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using Json = nlohmann::json;
-
-// The response to GET, header and body.
-std::string Get(const Address& address, const std::string& path) {
-  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in name{};
-  name.sin_family = AF_INET;
-  name.sin_port = htons(address.port);
-  inet_pton(AF_INET, address.host.c_str(), &name.sin_addr);
-  EXPECT_EQ(connect(descriptor, reinterpret_cast<const sockaddr*>(&name), sizeof(name)), 0);
-  const std::string request = "GET " + path + " HTTP/1.0\r\n\r\n";
-  EXPECT_EQ(send(descriptor, request.data(), request.size(), 0),
-            static_cast<ssize_t>(request.size()));
-  std::string answer;
-  std::vector<char> buffer(1 << 16);
-  for (ssize_t n = 0; (n = recv(descriptor, buffer.data(), buffer.size(), 0)) > 0;) {
-    answer.append(buffer.data(), static_cast<std::size_t>(n));
-  }
-  close(descriptor);
-  return answer;
-}
 
 // A scrape, checked against the text format: each sample has a family with a type before it, and no
 // sample occurs twice.

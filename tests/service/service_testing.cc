@@ -1,12 +1,17 @@
 #include "service/service_testing.h"
 
+#include <arpa/inet.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "partiemc/reconstructor.h"
 #include "server/moving_blob.h"
@@ -54,6 +59,25 @@ bool Eventually(const std::function<bool()>& holds) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return true;
+}
+
+std::string Get(const Address& address, const std::string& path) {
+  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in name{};
+  name.sin_family = AF_INET;
+  name.sin_port = htons(address.port);
+  inet_pton(AF_INET, address.host.c_str(), &name.sin_addr);
+  EXPECT_EQ(connect(descriptor, reinterpret_cast<const sockaddr*>(&name), sizeof(name)), 0);
+  const std::string request = "GET " + path + " HTTP/1.0\r\n\r\n";
+  EXPECT_EQ(send(descriptor, request.data(), request.size(), 0),
+            static_cast<ssize_t>(request.size()));
+  std::string answer;
+  std::vector<char> buffer(1 << 16);
+  for (ssize_t n = 0; (n = recv(descriptor, buffer.data(), buffer.size(), 0)) > 0;) {
+    answer.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+  close(descriptor);
+  return answer;
 }
 
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport) {

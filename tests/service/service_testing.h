@@ -30,6 +30,9 @@ std::unique_ptr<Server> StartServer(const ServerOptions& options);
 /// server sees end. False after two minutes.
 bool Eventually(const std::function<bool()>& holds);
 
+/// The response to an HTTP GET, header and body.
+std::string Get(const Address& address, const std::string& path);
+
 std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport);
 
 /// Sets a deadline, so that a hanging call fails its test.

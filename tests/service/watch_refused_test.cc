@@ -3,10 +3,15 @@
 // a test.
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include "server/merging_balls.h"
 #include "service/error_testing.h"
 #include "support/temporary_folder.h"
+#include "wire/codec.h"
 
 namespace partiemc::server {
 namespace {
@@ -24,6 +29,28 @@ class WatchRefused : public ErrorTable {
     Serve();
     producer_ = std::make_unique<StreamClient>(channel_);
     ASSERT_TRUE(producer_->SendAndReceive(OpenRequest("tank")).has_opened());
+  }
+  // Serves a stream of surfaces named "tank".
+  void OpenProducerOfSurfaces() {
+    Serve();
+    v1::ReconstructRequest open = OpenRequest("tank");
+    wire::EncodeParameters(MergingBallsParameters(), *open.mutable_open()->mutable_parameters());
+    producer_ = std::make_unique<StreamClient>(channel_);
+    ASSERT_TRUE(producer_->SendAndReceive(open).has_opened());
+  }
+  static v1::WatchStreamRequest RequestOf(const v1::LevelOfDetail& level) {
+    v1::WatchStreamRequest request;
+    request.mutable_open()->set_stream_name("tank");
+    request.mutable_open()->set_mode(v1::WATCH_MODE_EVERY);
+    request.mutable_open()->set_credits(9);
+    *request.mutable_open()->mutable_level_of_detail() = level;
+    return request;
+  }
+  // Expects this end of a watch with this level.
+  void ExpectOfLevel(const v1::LevelOfDetail& level, StatusCode code, const std::string& reason) {
+    WatchClient watcher(channel_);
+    watcher.Send(RequestOf(level));
+    Expect(watcher, code, reason);
   }
   void Expect(WatchClient& watcher, StatusCode code, const std::string& reason) {
     const auto status = watcher.Finish();
@@ -73,11 +100,57 @@ TEST_F(WatchRefused, IDLE) {
 
 TEST_F(WatchRefused, OUT_OF_RANGE) {
   ExpectOfOpen("tank", v1::WATCH_MODE_LATEST, 0, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
+  producer_.reset();
+  OpenProducerOfSurfaces();
+  v1::LevelOfDetail level;
+  ExpectOfLevel(level, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
+  for (const double error : {0.0, -1.0, 1.5, std::numeric_limits<double>::quiet_NaN()}) {
+    level.set_max_error(error);
+    ExpectOfLevel(level, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
+  }
+  level.set_max_triangles(0);
+  ExpectOfLevel(level, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
 }
 
 TEST_F(WatchRefused, UNSUPPORTED) {
   ExpectOfOpen("tank", static_cast<v1::WatchMode>(9), 1, StatusCode::INVALID_ARGUMENT,
                "UNSUPPORTED");
+  v1::LevelOfDetail level;
+  level.set_max_error(.1);
+  ExpectOfLevel(level, StatusCode::INVALID_ARGUMENT, "UNSUPPORTED");  // A stream of outlines.
+}
+
+TEST_F(WatchRefused, TOO_MANY_LEVELS) {
+  options_.limits.max_watchers = 20;
+  OpenProducerOfSurfaces();
+  std::vector<std::unique_ptr<WatchClient>> watchers;
+  v1::LevelOfDetail level;
+  for (int k = 1; k <= 8; ++k) {
+    level.set_max_triangles(100 * k);
+    watchers.push_back(std::make_unique<WatchClient>(channel_));
+    watchers.back()->Send(RequestOf(level));
+    ASSERT_TRUE(watchers.back()->Receive().has_opened());
+  }
+  WatchClient shares(channel_);
+  shares.Send(RequestOf(level));
+  EXPECT_TRUE(shares.Receive().has_opened());
+  level.set_max_error(.1);
+  ExpectOfLevel(level, StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_LEVELS");
+}
+
+TEST_F(WatchRefused, MEMORY_BUDGET) {
+  options_.limits.memory_budget = 1 << 20;
+  OpenProducerOfSurfaces();
+  v1::LevelOfDetail level;
+  level.set_max_error(.1);
+  WatchClient watcher(channel_);
+  watcher.Send(RequestOf(level));
+  ASSERT_TRUE(watcher.Receive().has_opened());
+  v1::ReconstructRequest request;
+  wire::EncodeFrame(MergingBalls(0).AsFrame(0), *request.mutable_frame());
+  request.mutable_frame()->set_sequence(1);
+  ASSERT_TRUE(producer_->SendAndReceive(request).has_frame());
+  Expect(watcher, StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET");
 }
 
 TEST_F(WatchRefused, NO_SUCH_STREAM) {

@@ -38,7 +38,7 @@ struct SurfaceLevel {
   friend bool operator==(const SurfaceLevel&, const SurfaceLevel&) = default;
 };
 
-/// Upper bound of the memory that MakeLevel allocates for a surface of this size, including the
+/// Estimate of the memory that MakeLevel allocates for a surface of this size, including the
 /// surface. `attribute_values`: values of all attributes for each point.
 std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
                          std::uint64_t attribute_values);

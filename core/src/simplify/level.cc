@@ -19,9 +19,8 @@ namespace {
 // larger errors more shells break a guarantee and keep their triangles.
 constexpr std::array kErrors = {.015, .02, .03, .04, .06, .08, .12, .17, .25, .35};
 
-// Of a point: coordinates, normal, indices; of a triangle: its indices. MakeLevel holds the exact
-// surface, the best level so far and the level in work, of which simplification copies the
-// triangles.
+// Bytes of the exact surface, the best level so far and the next level. A point has coordinates, a
+// normal and new indices. Simplification copies the triangles of its surface.
 constexpr std::uint64_t kBytesPerPoint = 3 * (24 + 12) + 8, kBytesPerTriangle = 5 * 12 + 16;
 
 absl::Status OutOfRange(std::string field, std::string value, std::string rule) {
