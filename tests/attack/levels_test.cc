@@ -91,7 +91,7 @@ TEST_F(ManyLevels, AreRefusedBeyondTheLimitWithBoundedMemory) {
     std::vector<std::unique_ptr<server::WatchClient>> watchers;
     int taken = 0;
     for (int k = 1; k <= kWatchers; ++k) {
-      auto watcher = Watch(channel, .001 * (k + kWatchers * round));
+      auto watcher = Watch(channel, .02 + .001 * (k + kWatchers * round));
       if (watcher->Receive().has_opened()) {
         ++taken;
         watchers.push_back(std::move(watcher));

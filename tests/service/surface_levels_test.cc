@@ -1,13 +1,9 @@
 // Watchers of levels of detail through a server: a level is computed once for all that share it, is
 // closed, and disturbs neither the producer nor exact watchers.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,7 +14,6 @@
 #include "server/merging_balls.h"
 #include "service/service_testing.h"
 #include "support/shell_measures.h"
-#include "wire/codec.h"
 
 namespace partiemc::server {
 namespace {
@@ -27,7 +22,6 @@ using client::Coordinates;
 using client::Event;
 using client::Received;
 using client::WatchMode;
-using ::testing::HasSubstr;
 
 constexpr std::uint64_t kFrames = 14;
 
@@ -82,7 +76,7 @@ class SurfaceLevels : public ::testing::Test {
     EXPECT_EQ(frame.frame.result.statistics, exact.result.statistics);
     EXPECT_EQ(surface.measures, exact.result.surface.measures);
     EXPECT_EQ(surface.parents, exact.result.surface.parents);
-    EXPECT_LT(2 * surface.TriangleCount(), exact.result.surface.TriangleCount());
+    EXPECT_LT(3 * surface.TriangleCount(), 2 * exact.result.surface.TriangleCount());
     EXPECT_EQ(surface.normals.size(), 3 * surface.PointCount());
     EXPECT_EQ(frame.particles, MergingBalls(frame.sequence - 1).positions);
     support::MeasureShells(surface);
@@ -174,7 +168,7 @@ TEST_F(SurfaceLevels, OfWatchersOfLatestMissNoFrameUncounted) {
 
 TEST_F(SurfaceLevels, EndWithTheirWatchersAtAnyTime) {
   Produce();
-  for (int round = 0; round < 30; ++round) {
+  for (int round = 0; round < 10; ++round) {
     const auto leaves = WatchLevel(MaxError(.01 * (1 + round % 3)));
     const auto stays = WatchLevel(MaxError(.01 * (1 + round % 2)));
     Step();
@@ -210,7 +204,9 @@ TEST_F(SurfaceLevels, WithoutMemoryEndAWatchOfEveryFrame) {
 
 TEST_F(SurfaceLevels, DoNotDelayADrain) {
   Produce();
-  const auto watcher = WatchLevel(MaxTriangles(1));
+  const auto watcher = Watch({.mode = WatchMode::kEvery,
+                              .level_of_detail = MaxTriangles(1),
+                              .rejoin = {.give_up_after = std::chrono::milliseconds(0)}});
   for (int k = 0; k < 8; ++k) Step();
   server_->Drain(std::chrono::seconds(10));
   client::WatchedFrame frame;
