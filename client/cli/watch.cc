@@ -237,7 +237,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
           ->check([](const std::string& text) -> std::string {
             const auto error = ParseNumber<double>(text);
             if (error && *error > 0 && *error <= 1) return {};
-            return "--max-error: " + text + "; must be in (0, 1], in spacings";
+            return text + "; must be in (0, 1], in spacings";
           })
           ->type_name("E");
   verb->add_option("--max-triangles", flags.max_triangles,

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
 #include "server/calls/methods.h"
+#include "server/calls/surface_level.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
 #include "server/security/authentication.h"
@@ -25,6 +27,7 @@
 #include "server/stream/stream_registry.h"
 #include "server/stream/unary_registry.h"
 #include "server/telemetry/metrics.h"
+#include "server/watch/level_queue.h"
 #include "server/watch/result_history.h"
 #include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
@@ -69,6 +72,13 @@ class Served {
   server::WatchDispatcher dispatcher_;
   server::MemoryBudget budget_{std::uint64_t{64} << 20};
   server::ComputePool pool_{1};
+  const std::shared_ptr<server::LevelQueue> levels_ = std::make_shared<server::LevelQueue>(
+      dispatcher_,
+      [this](const server::LevelQueue::Frame& exact, const LevelOfDetail& level,
+             const std::atomic<bool>& cancelled) {
+        return server::MakeResultLevel(exact, level, cancelled, budget_);
+      },
+      server::LevelQueue::Limits{});
   const server::ServerContext context_{.limits = limits_,
                                        .authentication = authentication_,
                                        .checkpoint_keys = keys_,
@@ -78,6 +88,7 @@ class Served {
                                        .unary_calls = unary_calls_,
                                        .watchers = watchers_,
                                        .dispatcher = dispatcher_,
+                                       .levels = *levels_,
                                        .budget = budget_,
                                        .pool = pool_};
   const server::Methods methods_{context_, metrics_};

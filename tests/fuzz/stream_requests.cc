@@ -2,6 +2,7 @@
 // reuse.
 #include <spdlog/spdlog.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -13,6 +14,7 @@
 #include "server/calls/reconstruct_call.h"
 #include "server/stream/opening_calls.h"
 #include "server/stream/unary_registry.h"
+#include "server/watch/level_queue.h"
 #include "server/watch/result_history.h"
 #include "server/watch/watch_dispatcher.h"
 #include "server/watch/watch_registry.h"
@@ -60,6 +62,12 @@ struct Shared {
   server::ComputePool pool{1};
   server::MemoryBudget budget{1 << 30};
   server::WatchDispatcher dispatcher;
+  const std::shared_ptr<server::LevelQueue> levels = std::make_shared<server::LevelQueue>(
+      dispatcher,
+      [](const server::LevelQueue::Frame& exact, const LevelOfDetail&, const std::atomic<bool>&) {
+        return server::LevelQueue::Made{.level = exact};
+      },
+      server::LevelQueue::Limits{});
   server::Worker worker;
 };
 
@@ -134,6 +142,7 @@ class Stream {
                                        .unary_calls = unary_calls_,
                                        .watchers = watchers_,
                                        .dispatcher = shared_.dispatcher,
+                                       .levels = *shared_.levels,
                                        .budget = shared_.budget,
                                        .pool = shared_.pool};
   NoChannel channel_;
