@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "partiemc/client/stream.h"
 #include "partiemc/client/watcher.h"
 #include "partiemc/status.h"
+#include "relay/nats_process.h"
 #include "server/merging_balls.h"
 #include "service/service_testing.h"
 #include "support/shell_measures.h"
@@ -200,6 +202,24 @@ TEST_F(SurfaceLevels, WithoutMemoryEndAWatchOfEveryFrame) {
   const auto received = (*watcher)->Receive(frame);
   EXPECT_EQ(received.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ((*watcher)->end().reason, "MEMORY_BUDGET");
+}
+
+TEST_F(SurfaceLevels, OfAStreamOfAnotherReplicaAreRefused) {
+  const NatsProcess nats;
+  ServerOptions options = Options();
+  options.nats = nats.url();
+  const auto has = StartServer(options), shows = StartServer(options);
+  const auto producer = client::Stream::Open(
+      has->address().ToString(), {.name = "balls", .parameters = MergingBallsParameters()});
+  ASSERT_TRUE(producer.ok()) << producer.status();
+  const auto watch = [&](const Server& server, const std::optional<LevelOfDetail>& level) {
+    return client::Watcher::Open(server.address().ToString(), "balls", {.level_of_detail = level})
+        .status();
+  };
+  EXPECT_TRUE(Eventually([&] { return watch(*shows, std::nullopt).ok(); }));
+  const absl::Status refused = watch(*shows, MaxError(.1));
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_TRUE(watch(*has, MaxError(.1)).ok());
 }
 
 TEST_F(SurfaceLevels, DoNotDelayADrain) {
