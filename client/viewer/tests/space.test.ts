@@ -173,7 +173,7 @@ test('the shell at a place is the smallest one around it', () => {
   assert.equal(shellAt(shells, [1.001, 0, 0], 1e-3), 0, 'within the rounding');
 });
 
-test('a spray of new bodies is searched for the selected one in a moment', () => {
+test('a spray is searched for the selected body in a moment', () => {
   const spray = (firstIdentity: number) => cubesAt(Array.from({ length: 20_000 }, (_, k): Vector => [4 * k, 0, 0]), firstIdentity);
   const begin = performance.now();
   assert.deepEqual(shellsByPlace(spray(1), [7], spray(1e6)), [7]);
@@ -183,7 +183,7 @@ test('a spray of new bodies is searched for the selected one in a moment', () =>
 
 const hiddenCanvas = { clientWidth: 0, clientHeight: 0 } as HTMLCanvasElement;
 
-test('a frame that is refused keeps the box of the frames before it', () => {
+test('a refused frame keeps the box of the frames before it', () => {
   const scene = new SpaceScene(hiddenCanvas);
   scene.show(spaceFrameOf(frame(1), surfaceAt([0, 0, 0])), []);
   const { extent } = scene;
@@ -212,7 +212,7 @@ test('particles are coloured only by numbers of each of them', () => {
   }
 });
 
-test('a section with other points than its rings is refused by name', () => {
+test('a section with other points than its rings is refused', () => {
   const points = Float32Array.of(0, 0, 1, 0, 0, 2);
   for (const [offsets, isRight] of [[[0, 3], true], [[0, 4_000_000_000], false], [[0, 2], false], [[1, 3], false], [[0, 3, 2, 3], false]] as const) {
     const sections = [{ rings: { points, offsets: Uint32Array.from(offsets) }, origin: [0, 0] }];

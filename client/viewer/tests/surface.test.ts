@@ -112,7 +112,7 @@ test('a frame without bodies is empty', () => {
   assert.equal(decodeSurface(message, MeshoptDecoder).positions.length, 0);
 });
 
-test('particles without any body are relative to the origin of the frame', () => {
+test('particles without a body are relative to the origin', () => {
   const particles = bytesOf(Float32Array.of(11, 22, 33));
   const none: SurfaceMessage = {
     ...plainMessage([]), origin: [1, 2, 3], attributes: [], particles, particleFormat: PositionFormat.FLOAT32_3,

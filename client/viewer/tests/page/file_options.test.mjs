@@ -1,6 +1,6 @@
 // Options of files, truncated recordings and closed files. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { readFileSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { before, test } from 'node:test';
 import { cleansUp, launch, recording, screenshots, until, Viewer, violations, withoutTooltip, World } from './support.mjs';
@@ -89,7 +89,32 @@ test('3D particles open as a surface, with sections', async () => {
   await isTrue();
 });
 
-test('a surface of flat particles, or without their spacing, is refused beside its field', async () => {
+test('a surface that the stream lacks is requested alone', async () => {
+  mkdirSync(place('balls'));
+  const rows = readFileSync(place('ball.csv'), 'utf8').split('\n');
+  for (const share of [1, 2]) {
+    writeFileSync(place(`balls/b_${share}.csv`), rows.filter((row, k) => k === 0 || share === 2 || row.split(',')[1] === '1').join('\n'));
+  }
+  const truth = await world.statistics(place('balls'), '--surface', '--spacing', '0.1');
+  viewer = await Viewer.open(browser, world.url);
+  await viewer.page.routeWebSocket(/v1\/reconstruct/, (socket) => {
+    let frames = 0;
+    socket.connectToServer().onMessage((message) => {
+      if (message.length < 5000 || ++frames === 1) socket.send(message);
+    });
+  });
+  await viewer.page.reload();
+  await viewer.drop(place('balls'));
+  await until('the question', async () => /is 3D/.test(await errorOf('slice').textContent()));
+  await viewer.button('Open as a surface').click();
+  // The file plays to its last frame.
+  const volume = Number(truth[1].volume.toPrecision(7));
+  await until('the last frame', async () => await viewer.value('frame') === '1' && Number(await viewer.value('volume')) === volume);
+  assert.match(await viewer.pane().locator('header').textContent(), /this frame alone/);
+  assert.ok(await viewer.pane().locator('.space canvas').isVisible());
+});
+
+test('a surface needs three coordinates and a spacing', async () => {
   viewer = await Viewer.open(browser, world.url);
   await viewer.drop(place('flat.csv'));
   await viewer.allFrames();
