@@ -1,6 +1,7 @@
 #include "partiemc/reconstructor.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -11,8 +12,10 @@
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
 #include "bins/cell_mask.h"
+#include "bins/resolution.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
+#include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
@@ -86,6 +89,19 @@ class FrameMemory final : public MemoryGuard {
   }
   void Done() { done_ += last_; }
 
+  // Returns RESOURCE_EXHAUSTED if the guard refuses the memory to lift particles.
+  absl::Status ReserveLift(std::size_t particles) {
+    if (Reserve(kBytesPerLiftedParticle * particles)) {
+      Done();
+      return absl::OkStatus();
+    }
+    return ViolationError(absl::StatusCode::kResourceExhausted,
+                          {std::string(kReasonOutOfMemory), "positions",
+                           absl::StrCat(particles, " particles in a periodic box"),
+                           absl::StrCat("must fit into the memory budget, but need ",
+                                        (last_ >> 20) + 1, " MiB: try again later")});
+  }
+
  private:
   MemoryGuard* const guard_;
   std::uint64_t done_ = 0, last_ = 0;
@@ -135,6 +151,12 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
+// What is known about a lifted frame before its outlines.
+struct Lifted {
+  std::optional<Lengths> lengths;
+  Doubts doubts;
+};
+
 // The input of one outline of a frame.
 struct OutlineTask {
   const ReconstructionParameters& parameters;
@@ -143,21 +165,28 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;  // The first outline checks the frame.
+  bool is_first;         // The first outline checks the frame.
+  const Lifted* lifted;  // Null without a periodic box; else the frame has been lifted.
 };
 
 // Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
 // use: the frame, or the slab around a slice. `lengths` stays empty if the particles give no
 // estimate of the spacing. Errors: see Reconstruct.
-absl::Status SortParticles(const ReconstructionParameters& parameters, const FrameLimits& limits,
-                           const Frame& frame, const State& state, Workspace::Buffers& b,
-                           Frame& seen, std::optional<Lengths>& lengths, Scale& scale,
+absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame& seen,
+                           std::optional<Lengths>& lengths, Scale& scale,
                            FrameStatistics& statistics) {
+  const ReconstructionParameters& parameters = task.parameters;
+  const Frame& frame = task.frame;
   seen = frame;
   statistics.particles = frame.ParticleCount();
-  auto decided = DecideLengths(parameters, frame, state, b.spacing);
-  if (!decided.ok()) return decided.status();
-  lengths = *decided;
+  if (task.lifted != nullptr) {
+    lengths = task.lifted->lengths;
+    statistics.doubts = task.lifted->doubts;
+  } else {
+    auto decided = DecideLengths(parameters, frame, task.previous, b.spacing);
+    if (!decided.ok()) return decided.status();
+    lengths = *decided;
+  }
   if (!lengths) {
     if (frame.ParticleCount() > 0) statistics.doubts.Add(Doubt::kSpacingProvisional);
     return absl::OkStatus();
@@ -173,7 +202,7 @@ absl::Status SortParticles(const ReconstructionParameters& parameters, const Fra
     b.slab.Take(frame, *parameters.slice, parameters.kernel_radius * spacing);
     seen = b.slab.AsFrame();
   }
-  absl::Status status = BinParticles(seen, parameters.plane, scale, limits, b.bins);
+  absl::Status status = BinParticles(seen, parameters.plane, scale, task.limits, b.bins);
   if (!status.ok()) return status;
   if (parameters.slice) SetHeights(b.slab.heights(), scale, b.bins);
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
@@ -193,6 +222,46 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
+// The periods of the lattice; without a box, none.
+LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
+                         double cell_size) {
+  LatticePeriods periods;
+  if (!parameters.box) return periods;
+  const Axes axes = AxesOf(frame, parameters.plane);
+  const std::array<int, 2> in_plane{axes.first, axes.second};
+  for (std::size_t k = 0; k < in_plane.size(); ++k) {
+    const auto& axis = parameters.box->axes[static_cast<std::size_t>(in_plane[k])];
+    if (axis) periods.cells[k] = axis->length / cell_size;
+  }
+  return periods;
+}
+
+// Checks a frame in a periodic box, decides its lengths and lifts its particles
+// (periodic/lift.h). Errors: see Reconstruct.
+absl::Status LiftOutline(const ReconstructionParameters& parameters, const FrameLimits& limits,
+                         const Frame& given, const State& state, FrameMemory& memory,
+                         Workspace::Buffers& b, Frame& frame, Lifted& lifted) {
+  absl::Status status = CheckFrame(given, parameters, limits, b.distinct_ids);
+  if (!status.ok()) return status;
+  const auto decided = DecideLengths(parameters, given, state, b.spacing);
+  if (!decided.ok()) return decided.status();
+  lifted.lengths = *decided;
+  if (!lifted.lengths) return absl::OkStatus();
+  const double spacing = lifted.lengths->spacing;
+  status = CheckStep(given, parameters.plane, spacing, lifted.doubts);
+  if (!status.ok() && !lifted.lengths->is_provisional) return status;
+  status = Validate(*parameters.box, parameters.kernel_radius, spacing);
+  if (status.ok()) status = memory.ReserveLift(given.ParticleCount());
+  if (!status.ok()) return status;
+  const Axes axes = AxesOf(given, parameters.plane);
+  const std::array<int, 2> in_plane{axes.first, axes.second};
+  return Lift({.frame = given,
+               .box = *parameters.box,
+               .axes = in_plane,
+               .range = 2 * parameters.kernel_radius * spacing},
+              b.lift, frame);
+}
+
 // Runs the stages from normals to mesh. Errors: INTERNAL if RepairRings or BuildMesh fails, which
 // is a bug; their comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
@@ -204,7 +273,10 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     const PlacementTraits& traits = TraitsOf(parameters.placement);
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
                     traits.takes_particles);
-    EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, previous.normals,
+    // In a periodic box, a body may have changed its image since the last frame.
+    const auto known = task.lifted == nullptr ? std::span<const CellNormal>(previous.normals)
+                                              : std::span<const CellNormal>();
+    EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
                     b.normal_scratch, b.planes, b.next_normals);
   });
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
@@ -216,9 +288,9 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
   result.statistics.self_intersections = b.placed.self_intersections;
   InStage(observer, Stage::kIdentities, [&] {
-    ContinueRings(
-        {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size},
-        previous.history, b.identity_scratch, b.next_history, result.rings);
+    ContinueRings({frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed,
+                   scale.cell_size, PeriodsOf(parameters, frame, scale.cell_size)},
+                  previous.history, b.identity_scratch, b.next_history, result.rings);
   });
   b.attribute_scratch.sorted.clear();
   const auto at_points = [&](std::span<const double> points) -> std::span<const AttributeValues> {
@@ -252,9 +324,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
     absl::Status checked = task.is_first
                                ? CheckFrame(task.frame, parameters, task.limits, b.distinct_ids)
                                : absl::OkStatus();
-    return checked.ok() ? SortParticles(parameters, task.limits, task.frame, task.previous, b, seen,
-                                        lengths, scale, result.statistics)
-                        : checked;
+    return checked.ok() ? SortParticles(task, b, seen, lengths, scale, result.statistics) : checked;
   });
   if (!status.ok() || !lengths) return status;
   status = memory.ReserveOutline({.particles = seen.ParticleCount(),
@@ -321,6 +391,7 @@ SurfaceParameters SurfaceParametersOf(const ReconstructionParameters& parameters
   surface.simplify = parameters.surface.simplify;
   surface.min_component_volume = parameters.surface.min_component_volume;
   surface.min_component_particles = parameters.min_component_particles;
+  surface.box = parameters.box;
   return surface;
 }
 
@@ -409,21 +480,30 @@ absl::Status Reconstructor::Reconstruct(const Frame& frame, State& state, Worksp
   return status;
 }
 
-absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
+absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
                                                Workspace::Buffers& b, Result& result,
                                                const FrameControl& control) const {
   absl::Status status = CheckOutput(state, parameters_.output);
   if (!status.ok()) return status;
   const bool is_surface = surface_ != nullptr;
+  const bool is_lifted = parameters_.box && !is_surface;  // A surface lifts its frame itself.
   b.next_states.resize(std::max(b.next_states.size(), 1 + sections_.size()));
   FrameMemory memory(control.memory);
   const State unseen;
+  Frame frame = given;
+  Lifted lifted;
+  if (is_lifted) {
+    status = InStage(control.observer, Stage::kBins, [&] {
+      return LiftOutline(parameters_, limits_, given, state, memory, b, frame, lifted);
+    });
+    if (!status.ok()) return status;
+  }
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {
-    const bool is_first = outline == (is_surface ? 1 : 0);
+    const bool is_first = outline == (is_surface ? 1 : 0) && !is_lifted;
     absl::Status outlined =
         ReconstructOutline({parameters, VariantFor(parameters, *variant_), limits_, frame, previous,
-                            control.observer, is_first},
+                            control.observer, is_first, is_lifted ? &lifted : nullptr},
                            memory, b, b.next_states[outline], into);
     memory.Done();
     return outlined;
@@ -438,10 +518,10 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& frame, State& state,
   if (is_surface) {
     // The last step that can fail, because it commits its state.
     status = surface_->Reconstruct(
-        frame, state.surface, b.surface, result.surface,
+        given, state.surface, b.surface, result.surface,
         {.observer = control.observer, .memory = &memory, .cancelled = control.cancelled});
     if (!status.ok()) return status;
-    SummariseSurface(parameters_, frame, result);
+    SummariseSurface(parameters_, given, result);
   } else {
     CommitState(b.next_states[0], state);
   }

@@ -2,6 +2,7 @@
 #include "partiemc/surface_reconstructor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +23,7 @@
 #include "frame/scale.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
+#include "periodic/lift.h"
 #include "simplify/simplify.h"
 #include "space/bins.h"
 #include "space/bodies.h"
@@ -48,6 +50,7 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceCrossings crossings;
   space::Bodies bodies;
   space::CleaningScratch cleaning;
+  LiftScratch lift;  // Empty without a periodic box.
   std::vector<Vec3> anchors, positions, normals;
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
@@ -237,6 +240,17 @@ void MakeEmpty(Surface& surface) {
   surface.attributes.clear();
 }
 
+/// The periods of the lattice; without a box, none.
+LatticePeriods PeriodsOf(const SurfaceParameters& parameters, double cell_size) {
+  LatticePeriods periods;
+  if (!parameters.box) return periods;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& axis = parameters.box->axes[k];
+    if (axis) periods.cells[k] = axis->length / cell_size;
+  }
+  return periods;
+}
+
 /// The history after a frame without particles: no shell, no identity given.
 void EndIdentities(const Frame& frame, const ShellHistory& previous, ShellHistory& next) {
   next.identities_given = previous.identities_given;
@@ -261,6 +275,10 @@ SurfaceReconstructor::SurfaceReconstructor(const SurfaceParameters& parameters,
 absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
+  if (parameters.box) {
+    absl::Status status = Validate(*parameters.box, parameters.kernel_radius, parameters.spacing);
+    if (!status.ok()) return status;
+  }
   if (absl::Status status = Validate(limits); !status.ok()) return status;
   return SurfaceReconstructor(parameters, limits);
 }
@@ -306,25 +324,39 @@ absl::Status SurfaceReconstructor::ReconstructFrame(const Frame& frame, SurfaceS
   return status;
 }
 
-absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const SurfaceState* state,
+absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const SurfaceState* state,
                                                       SurfaceWorkspace::Buffers& b,
                                                       Surface& surface,
                                                       const FrameControl& control) const {
   const double h = parameters_.spacing, cell_size = parameters_.cell_size * h;
   const SurfacePlacement placement = parameters_.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
+  Frame frame = given;
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
-                          .is_simplified = parameters_.simplify > 0};
+                          .is_simplified = parameters_.simplify > 0,
+                          .is_lifted = parameters_.box.has_value()};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
   Scale scale;
   absl::Status status = in_stage(Stage::kBins, [&] {
-    absl::Status checked = CheckFrame(frame, in_space_, limits_, b.distinct_ids);
+    absl::Status checked = CheckFrame(given, in_space_, limits_, b.distinct_ids);
     if (checked.ok() && state != nullptr) checked = CheckCellSize(*state, cell_size);
     if (!checked.ok() || frame.ParticleCount() == 0) return checked;
+    if (parameters_.box) {
+      constexpr std::array kAxes = {0, 1, 2};
+      checked = Reserve(size, control.memory);
+      if (checked.ok()) {
+        checked = Lift({.frame = given,
+                        .box = *parameters_.box,
+                        .axes = kAxes,
+                        .range = 2 * parameters_.kernel_radius * h},
+                       b.lift, frame);
+      }
+      if (!checked.ok()) return checked;
+    }
     scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, h));
     checked = space::FindBricks(frame, scale, limits_, b.bins);
     size.bricks = bricks.size();
@@ -377,7 +409,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& frame, const 
   if (state != nullptr) {
     in_stage(Stage::kIdentities, [&] {
       space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
-                             b.mesh.shell_of, cell_size},
+                             b.mesh.shell_of, cell_size, PeriodsOf(parameters_, cell_size)},
                             state->history, b.identities, b.next_history, surface);
     });
   }

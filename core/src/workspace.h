@@ -18,6 +18,7 @@
 #include "partiemc/reconstructor.h"
 #include "partiemc/state.h"
 #include "partiemc/surface_reconstructor.h"
+#include "periodic/lift.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
@@ -33,6 +34,7 @@ struct NextState {
 struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
+  LiftScratch lift;  // Empty without a periodic box.
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;

@@ -180,9 +180,10 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
   static const std::array<House, 4> kHouses = {
       {{"core/src/",
         "core/src/",
-        {"base", "frame", "state", "bins", "field", "crossings", "rings", "sampler", "normals",
-         "vertices", "identities", "mesh", "attributes", "gauges", "space", "space_vertices",
-         "space_identities", "check", "simplify"},
+        {"base",      "frame",      "state",   "periodic", "bins",           "field",
+         "crossings", "rings",      "sampler", "normals",  "vertices",       "identities",
+         "mesh",      "attributes", "gauges",  "space",    "space_vertices", "space_identities",
+         "check",     "simplify"},
         {"frame_lengths", "reconstructor", "surface_reconstructor", "workspace",
          "workspace_bytes"}},
        {"server/",

@@ -73,6 +73,23 @@ struct Section {
   friend bool operator==(const Section&, const Section&) = default;
 };
 
+/// A periodic axis: a particle at `x` is also at `x` plus any whole number of lengths.
+struct PeriodicAxis {
+  double origin = 0;  ///< Lower end of the box, world units.
+  double length = 0;  ///< World units.
+
+  friend bool operator==(const PeriodicAxis&, const PeriodicAxis&) = default;
+};
+
+/// A rectangular box with periodic axes: x, y, z. An absent axis is not periodic and has no ends.
+struct PeriodicBox {
+  std::array<std::optional<PeriodicAxis>, 3> axes{};
+
+  static constexpr double kMostSpacings = 1e8;  ///< Limit of a length, in spacings.
+
+  friend bool operator==(const PeriodicBox&, const PeriodicBox&) = default;
+};
+
 /// Used only by Output::kSurface.
 struct SurfaceOptions {
   /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
@@ -180,12 +197,23 @@ struct ReconstructionParameters {
 
   SurfaceOptions surface = {};
 
+  /// If present, a body that crosses a face of the box is one body (core/METHOD.md, "Periodic
+  /// boxes"). Particles may lie in the box or beside it. Results are unwrapped: each body is whole,
+  /// and the centre of its bounding box lies in the box. A frame with a body that reaches its own
+  /// image is refused with the reason PERCOLATES. A length must be at least four kernel radii and
+  /// at most kMostSpacings spacings. For outlines, the axes are those of the plane of the
+  /// particles. Excludes slices.
+  std::optional<PeriodicBox> box = std::nullopt;
+
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;
 };
 
 /// Checks every field. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status Validate(const ReconstructionParameters& parameters);
+
+/// Checks a box. `spacing`: 0 if it is not known yet. Errors: as above.
+absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spacing);
 
 /// Fills in `reference_radius` and `clean` if they are absent.
 /// Requires: Validate(parameters).ok().

@@ -31,6 +31,7 @@ inline constexpr std::string_view kReasonTooManyTiles = "TOO_MANY_TILES";
 inline constexpr std::string_view kReasonOutOfMemory = "OUT_OF_MEMORY";
 inline constexpr std::string_view kReasonNotPlanar = "NOT_PLANAR";
 inline constexpr std::string_view kReasonResolution = "RESOLUTION";
+inline constexpr std::string_view kReasonPercolates = "PERCOLATES";
 inline constexpr std::string_view kReasonCorruptState = "CORRUPT_STATE";
 
 /// Makes a status with the message "field: value; rule" and `violation` as payload, so that no

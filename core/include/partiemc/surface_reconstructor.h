@@ -57,6 +57,9 @@ struct SurfaceParameters {
   double min_component_volume = 0;
   std::uint64_t min_component_particles = 0;
 
+  /// As ReconstructionParameters::box: shells are unwrapped.
+  std::optional<PeriodicBox> box = std::nullopt;
+
   friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
 };
 

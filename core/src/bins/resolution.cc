@@ -51,6 +51,11 @@ absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirector
                              double cell_size, double spacing, Doubts& doubts) {
   if (std::holds_alternative<std::span<const double>>(frame.positions)) return absl::OkStatus();
   if (StepAt(BoundOf(tiles, cell_size)) <= kDoubtfulStep * spacing) return absl::OkStatus();
+  return CheckStep(frame, plane, spacing, doubts);
+}
+
+absl::Status CheckStep(const Frame& frame, Plane plane, double spacing, Doubts& doubts) {
+  if (std::holds_alternative<std::span<const double>>(frame.positions)) return absl::OkStatus();
   const double largest = LargestCoordinate(frame, plane);
   const double step = StepAt(largest);
   if (step <= kDoubtfulStep * spacing) return absl::OkStatus();

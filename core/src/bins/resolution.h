@@ -16,4 +16,7 @@ namespace partiemc {
 absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirectory& tiles,
                              double cell_size, double spacing, Doubts& doubts);
 
+/// As CheckResolution, without tiles. Cost: linear in particles.
+absl::Status CheckStep(const Frame& frame, Plane plane, double spacing, Doubts& doubts);
+
 }  // namespace partiemc

@@ -125,6 +125,26 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
+// Lengths of boxes, in kernel radii. Particles of one body are at most two kernel radii apart; a
+// box of four has one nearest image of each particle.
+constexpr double kMinBoxLength = 4;
+
+// Checks the box, and that nothing excludes it.
+absl::Status CheckBox(const ReconstructionParameters& p) {
+  if (!p.box) return absl::OkStatus();
+  if (auto status = Validate(*p.box, p.kernel_radius, p.spacing.value_or(0)); !status.ok()) {
+    return status;
+  }
+  constexpr std::string_view kRule =
+      "must be absent with a periodic box: a plane cuts only one image of a body";
+  if (p.slice) return Refused("slice", "present", std::string(kRule));
+  for (std::size_t k = 0; k < p.sections.size(); ++k) {
+    if (!p.sections[k].slice) continue;
+    return Refused(absl::StrCat("sections[", k, "].slice"), "present", std::string(kRule));
+  }
+  return absl::OkStatus();
+}
+
 // Checks what only surfaces require.
 absl::Status CheckSurface(const ReconstructionParameters& p) {
   const auto check = [](const char* field, double value, const char* rule) {
@@ -189,7 +209,37 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
                       "must be 0 or more squared spacings, and finite");
   }
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
+  if (absl::Status status = CheckBox(p); !status.ok()) return status;
   return CheckOutlines(p);
+}
+
+absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spacing) {
+  constexpr std::string_view kAxes = "xyz";
+  bool any = false;
+  for (std::size_t k = 0; k < box.axes.size(); ++k) {
+    if (!box.axes[k]) continue;
+    any = true;
+    const auto [origin, length] = *box.axes[k];
+    const std::string field = absl::StrCat("box.", std::string(1, kAxes[k]), ".");
+    if (!(std::abs(origin) <= kMaxCoordinate)) {
+      return OutOfRange(field + "origin", origin, "must be finite and at most 1e69 in magnitude");
+    }
+    if (!(length > 0 && length <= kMaxCoordinate)) {
+      return OutOfRange(field + "length", length, "must be above 0 and at most 1e69");
+    }
+    if (spacing == 0) continue;
+    const double least = kMinBoxLength * kernel_radius * spacing;
+    if (length < least) {
+      return OutOfRange(
+          field + "length", length,
+          absl::StrCat("must be at least four kernel radii, ", ShortestNumber(least)));
+    }
+    if (length > box.kMostSpacings * spacing) {
+      return OutOfRange(field + "length", length, "must be at most 1e8 spacings");
+    }
+  }
+  if (!any) return Refused("box", "no axis", "must have one of the axes x, y, z");
+  return absl::OkStatus();
 }
 
 ReconstructionParameters Resolve(ReconstructionParameters parameters) {

@@ -131,7 +131,8 @@ void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                .found = scratch.tracks.by_id.found,
                .has_ids = !input.frame.ids.empty(),
                .time = input.frame.time,
-               .cell_size = input.cell_size},
+               .cell_size = input.cell_size,
+               .periods = input.periods},
               scratch.relation_scratch, scratch.relations);
   AssignIdentities(previous, scratch, next);
   WriteResult(previous, input.placed.kept_as, scratch, rings);

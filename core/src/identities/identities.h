@@ -46,6 +46,7 @@ struct IdentityInput {
   const RingTopology& topology;
   const PlacedVertices& placed;
   double cell_size;
+  LatticePeriods periods = {};
 };
 
 /// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the

@@ -69,19 +69,38 @@ bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_
   return previous.rings[before].is_hole == now.rings[number].is_hole;
 }
 
+// Moves runs, and wraps them if the box is periodic.
+std::span<const NodeRun> Moved(std::span<const NodeRun> runs, std::span<const CellShift> shifts,
+                               const LatticePeriods& periods, RelationScratch& s) {
+  MoveRuns(runs, shifts, s.moved);
+  if (!periods.Any()) return s.moved;
+  WrapRuns(s.moved, periods, s.wrapped);
+  return s.wrapped;
+}
+
+// The runs of both frames, comparable.
+struct ComparedRuns {
+  std::span<const NodeRun> before, now;
+};
+ComparedRuns RunsToCompare(const RingHistory& previous, const RingsNow& now, RelationScratch& s) {
+  if (!now.periods.Any()) return {previous.runs, now.runs};
+  WrapRuns(previous.runs, now.periods, s.wrapped_before);
+  WrapRuns(now.runs, now.periods, s.wrapped_now);
+  return {s.wrapped_before, s.wrapped_now};
+}
+
 // Relates rings by the nodes that they share after moving the last frame's rings forward, or this
 // frame's rings backward.
-void RelateByNodes(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                   std::vector<Relation>& relations) {
+void RelateByNodes(const RingHistory& previous, const RingsNow& now, const ComparedRuns& runs,
+                   RelationScratch& s, std::vector<Relation>& relations) {
   const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
     if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
   };
-  MoveRuns(previous.runs, s.shift_before, s.moved);
-  FindSharedNodes(s.moved, now.runs, s.newest, s.shared);
+  FindSharedNodes(Moved(previous.runs, s.shift_before, now.periods, s), runs.now, s.newest,
+                  s.shared);
   for (const SharedNodes& pair : s.shared) add(pair.a, pair.b, pair.nodes);
   if (AnyMoves(s.shift_now)) {
-    MoveRuns(now.runs, s.shift_now, s.moved);
-    FindSharedNodes(s.moved, previous.runs, s.newest, s.shared);
+    FindSharedNodes(Moved(now.runs, s.shift_now, now.periods, s), runs.before, s.newest, s.shared);
     for (const SharedNodes& pair : s.shared) add(pair.b, pair.a, pair.nodes);
   }
   Unite(relations);
@@ -95,10 +114,10 @@ void CountSamples(const RingHistory& previous, Evidence& evidence) {
 // Relates two rings by their nodes at the original positions, if moving found no relation for
 // either ring: a hole may not follow the body around it, and velocities may be wrong. Skips outer
 // rings with samples.
-void AddUnmoved(const RingHistory& previous, const RingsNow& now, RelationScratch& s,
-                std::vector<Relation>& relations) {
+void AddUnmoved(const RingHistory& previous, const RingsNow& now, const ComparedRuns& runs,
+                RelationScratch& s, std::vector<Relation>& relations) {
   const Evidence& e = s.evidence;
-  FindSharedNodes(previous.runs, now.runs, s.newest, s.shared);
+  FindSharedNodes(runs.before, runs.now, s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) {
     if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
     if (e.linked_before[pair.a] || e.linked_now[pair.b]) continue;
@@ -125,7 +144,8 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
   MoveHolesAlong(previous.rings, s.shift_before);
   MoveHolesAlong(now.rings, s.shift_now);
 
-  RelateByNodes(previous, now, s, relations);
+  const ComparedRuns runs = RunsToCompare(previous, now, s);
+  RelateByNodes(previous, now, runs, s, relations);
   if (by_samples) {
     CountSamples(previous, e);
     AddFoundSamples(now.found, relations);
@@ -135,7 +155,7 @@ void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScrat
   e.linked_now.assign(now.rings.size(), 0);
   MarkCounting(e, relations);
   if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
-    AddUnmoved(previous, now, s, relations);
+    AddUnmoved(previous, now, runs, s, relations);
     MarkCounting(e, relations);
   }
   DropNeighbours(e, relations);

@@ -20,13 +20,15 @@ struct RingsNow {
   bool has_ids = false;
   double time = 0;
   double cell_size = 1;  ///< World units.
+  LatticePeriods periods = {};
 };
 
 /// Warm buffers of RelateRings.
 struct RelationScratch {
   std::vector<CellShift> shift_before, shift_now;
   std::vector<std::int64_t> displacements;
-  std::vector<NodeRun> moved;
+  std::vector<NodeRun> moved, wrapped;
+  std::vector<NodeRun> wrapped_before, wrapped_now;  // Used only with a periodic box.
   std::vector<SharedNodes> shared;
   std::vector<std::uint32_t> newest;  // For FindSharedNodes.
   Evidence evidence;
@@ -34,7 +36,8 @@ struct RelationScratch {
 
 /// Finds the related rings (core/IDENTITIES.md). Rings move by the displacement of their samples,
 /// else by their velocities, else not at all; then the nodes that they share are counted. If
-/// samples contradict the nodes, the samples decide. `relations` has each pair once, in no
+/// samples contradict the nodes, the samples decide. In a periodic box, nodes are compared after
+/// wrapping, because a ring may change its image. `relations` has each pair once, in no
 /// particular order.
 /// Cost: n log n in runs, rings and samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,

@@ -35,6 +35,19 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
   std::sort(moved.begin(), moved.end(), ComesBefore);
 }
 
+void WrapRuns(std::span<const NodeRun> runs, const LatticePeriods& periods,
+              std::vector<NodeRun>& wrapped) {
+  wrapped.clear();
+  for (const NodeRun& run : runs) {
+    const auto row = static_cast<std::int32_t>(run.row - WrapOf(periods.cells[1], run.row));
+    ForEachWrapped(periods.cells[0], run.first, run.last,
+                   [&](std::int32_t first, std::int32_t last) {
+                     wrapped.push_back({row, first, last, run.ring});
+                   });
+  }
+  std::sort(wrapped.begin(), wrapped.end(), ComesBefore);
+}
+
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared) {
   SweepSharedNodes<NodeRun>(a_runs, b_runs, newest, shared);

@@ -7,6 +7,7 @@
 
 #include "identities/shared_nodes.h"
 #include "partiemc/state.h"
+#include "periodic/run_periods.h"
 
 namespace partiemc {
 
@@ -24,12 +25,18 @@ inline std::uint32_t PieceOf(const NodeRun& run) { return run.ring; }
 void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of_ring,
               std::vector<NodeRun>& moved);
 
+/// Writes `runs`, wrapped into the periodic box, to `wrapped`, sorted by row, then column. Runs are
+/// split at faces. Runs of holes may then overlap other runs.
+void WrapRuns(std::span<const NodeRun> runs, const LatticePeriods& periods,
+              std::vector<NodeRun>& wrapped);
+
 /// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b. `newest`
 /// is scratch: by ring of `a_runs`, the index in `shared` of the ring's newest pair.
-/// Requires: both sets of runs sorted by row, then column, and `b_runs` disjoint.
-/// After MoveRuns, rings may lie on each other, and the number of overlaps of their runs has no
-/// limit. If there are more than 16 overlaps for each run of both sets, `shared` is left empty.
-/// Cost: linear in runs, rings and overlaps, n log n in pairs of rings.
+/// Requires: both sets of runs sorted by row, then column. `b_runs` should be disjoint: each
+/// overlap among them costs a comparison. After MoveRuns, rings may lie on each other, and the
+/// number of overlaps of their runs has no limit. If there are more than 16 overlaps for each run
+/// of both sets, `shared` is left empty. Cost: linear in runs, rings and overlaps, n log n in pairs
+/// of rings.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);
 

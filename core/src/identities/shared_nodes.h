@@ -68,6 +68,7 @@ void SweepSharedNodes(std::span<const Run> a_runs, std::span<const Run> b_runs,
         return;
       }
       const Run& b = b_runs[k];
+      if (b.last < a.first) continue;  // Behind a longer run: wrapped runs may overlap.
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
       // Usually a ring overlaps the same ring as in the previous row, so only its newest pair is
       // tried. Pairs that are added repeatedly are summed at the end.

@@ -73,7 +73,8 @@ void ContinueShells(const ShellInput& input, const ShellHistory& previous,
                 .found = scratch.tracks.found,
                 .has_ids = !input.frame.ids.empty(),
                 .time = input.frame.time,
-                .cell_size = input.cell_size},
+                .cell_size = input.cell_size,
+                .periods = input.periods},
                scratch.relation_scratch, scratch.relations);
   AssignShellIdentities(previous, scratch, next);
   WriteIdentities(previous, scratch, surface);

@@ -95,6 +95,42 @@ void MoveRuns(std::span<const ShellRun> runs, std::span<const NodeShift> shift_o
   std::sort(moved.begin(), moved.end(), ComesBefore);
 }
 
+/// Writes `runs`, wrapped into the periodic box, to `wrapped`, sorted by row, then node.
+void WrapRuns(std::span<const ShellRun> runs, const LatticePeriods& periods,
+              std::vector<ShellRun>& wrapped) {
+  wrapped.clear();
+  for (const ShellRun& run : runs) {
+    const auto layer = static_cast<std::int32_t>(run.layer - WrapOf(periods.cells[2], run.layer));
+    const auto row = static_cast<std::int32_t>(run.row - WrapOf(periods.cells[1], run.row));
+    ForEachWrapped(periods.cells[0], run.first, run.last,
+                   [&](std::int32_t first, std::int32_t last) {
+                     wrapped.push_back({layer, row, first, last, run.shell});
+                   });
+  }
+  std::sort(wrapped.begin(), wrapped.end(), ComesBefore);
+}
+
+/// Moves runs, and wraps them if the box is periodic.
+std::span<const ShellRun> Moved(std::span<const ShellRun> runs, std::span<const NodeShift> shifts,
+                                const LatticePeriods& periods, ShellRelationScratch& s) {
+  MoveRuns(runs, shifts, s.moved);
+  if (!periods.Any()) return s.moved;
+  WrapRuns(s.moved, periods, s.wrapped);
+  return s.wrapped;
+}
+
+/// The runs of both frames, comparable.
+struct ComparedRuns {
+  std::span<const ShellRun> before, now;
+};
+ComparedRuns RunsToCompare(const ShellHistory& previous, const ShellsNow& now,
+                           ShellRelationScratch& s) {
+  if (!now.periods.Any()) return {previous.runs, now.runs};
+  WrapRuns(previous.runs, now.periods, s.wrapped_before);
+  WrapRuns(now.runs, now.periods, s.wrapped_now);
+  return {s.wrapped_before, s.wrapped_now};
+}
+
 bool AreOfOneKind(const ShellHistory& previous, const ShellsNow& now, std::uint32_t before,
                   std::uint32_t number) {
   return previous.shells[before].is_cavity == now.shells[number].is_cavity;
@@ -102,17 +138,17 @@ bool AreOfOneKind(const ShellHistory& previous, const ShellsNow& now, std::uint3
 
 /// Relates shells by the nodes that they share after moving the last frame's shells forward, or
 /// this frame's shells backward.
-void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
-                   std::vector<Relation>& relations) {
+void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, const ComparedRuns& runs,
+                   ShellRelationScratch& s, std::vector<Relation>& relations) {
   const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
     if (AreOfOneKind(previous, now, before, number)) relations.push_back({before, number, nodes});
   };
-  MoveRuns(previous.runs, s.shift_before, s.moved);
-  SweepSharedNodes<ShellRun>(s.moved, now.runs, s.newest, s.shared);
+  SweepSharedNodes<ShellRun>(Moved(previous.runs, s.shift_before, now.periods, s), runs.now,
+                             s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) add(pair.a, pair.b, pair.nodes);
   if (AnyMoves(s.shift_now)) {
-    MoveRuns(now.runs, s.shift_now, s.moved);
-    SweepSharedNodes<ShellRun>(s.moved, previous.runs, s.newest, s.shared);
+    SweepSharedNodes<ShellRun>(Moved(now.runs, s.shift_now, now.periods, s), runs.before, s.newest,
+                               s.shared);
     for (const SharedNodes& pair : s.shared) add(pair.b, pair.a, pair.nodes);
   }
   Unite(relations);
@@ -121,10 +157,10 @@ void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, ShellRela
 /// Relates two shells by their nodes at the original positions, if moving found no relation for
 /// either: a cavity may not follow the body around it, and velocities may be wrong. Skips bodies
 /// with samples.
-void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
-                std::vector<Relation>& relations) {
+void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, const ComparedRuns& runs,
+                ShellRelationScratch& s, std::vector<Relation>& relations) {
   const Evidence& e = s.evidence;
-  SweepSharedNodes<ShellRun>(previous.runs, now.runs, s.newest, s.shared);
+  SweepSharedNodes<ShellRun>(runs.before, runs.now, s.newest, s.shared);
   for (const SharedNodes& pair : s.shared) {
     if (!AreOfOneKind(previous, now, pair.a, pair.b)) continue;
     if (e.linked_before[pair.a] || e.linked_now[pair.b]) continue;
@@ -151,7 +187,8 @@ void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelat
   MoveCavitiesAlong(previous.shells, s.shift_before);
   MoveCavitiesAlong(now.shells, s.shift_now);
 
-  RelateByNodes(previous, now, s, relations);
+  const ComparedRuns runs = RunsToCompare(previous, now, s);
+  RelateByNodes(previous, now, runs, s, relations);
   if (by_samples) {
     e.sample_count.assign(previous.shells.size(), 0);
     for (const ShellSample& sample : previous.samples) ++e.sample_count[sample.shell];
@@ -162,7 +199,7 @@ void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelat
   e.linked_now.assign(now.shells.size(), 0);
   MarkCounting(e, relations);
   if (AnyMoves(s.shift_before) || AnyMoves(s.shift_now)) {
-    AddUnmoved(previous, now, s, relations);
+    AddUnmoved(previous, now, runs, s, relations);
     MarkCounting(e, relations);
   }
   DropNeighbours(e, relations);

@@ -8,6 +8,7 @@
 #include "identities/relations.h"
 #include "identities/shared_nodes.h"
 #include "partiemc/surface_state.h"
+#include "periodic/run_periods.h"
 #include "space_identities/shell_tracks.h"
 
 namespace partiemc::space {
@@ -20,13 +21,15 @@ struct ShellsNow {
   bool has_ids = false;
   double time = 0;
   double cell_size = 1;  ///< World units.
+  LatticePeriods periods = {};
 };
 
 /// Warm buffers of RelateShells.
 struct ShellRelationScratch {
   std::vector<NodeShift> shift_before, shift_now;
   std::vector<std::int64_t> displacements;
-  std::vector<ShellRun> moved;
+  std::vector<ShellRun> moved, wrapped;
+  std::vector<ShellRun> wrapped_before, wrapped_now;  // Used only with a periodic box.
   std::vector<SharedNodes> shared;
   std::vector<std::uint32_t> newest;  // For SweepSharedNodes.
   Evidence evidence;

@@ -9,6 +9,7 @@
 #include "identities/shared_nodes.h"
 #include "partiemc/frame.h"
 #include "partiemc/surface.h"
+#include "periodic/run_periods.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/crossings.h"
@@ -37,6 +38,7 @@ struct ShellInput {
   std::span<const ThinQuad> thin;           ///< As for AssembleSurface.
   std::span<const std::uint32_t> shell_of;  ///< By vertex, also of drops (MeshScratch).
   double cell_size;                         ///< World units.
+  LatticePeriods periods = {};
 };
 
 /// The shells of a frame, numbered from 0 in the order of their first runs: by layer, row, node.

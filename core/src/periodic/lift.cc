@@ -1,0 +1,341 @@
+#include "periodic/lift.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "base/parallel.h"
+#include "frame/frame_view.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
+
+// Two cells with more pairs of particles than this are joined if their bounding boxes are within
+// the range.
+constexpr std::uint64_t kMostPairs = 1 << 14;
+
+// Limit of grid coordinates on axes that are not periodic. Farther particles share the outermost
+// cells; their frame needs too many tiles anyway.
+constexpr double kMostCells = 1 << 30;
+
+// Particles farther from the box than this number of its lengths are refused: the rounding of their
+// coordinates would be visible.
+constexpr double kMostLengths = 1e6;
+
+constexpr std::uint32_t kNoCell = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t kGrain = 1 << 12;
+
+// The grid of cells. The diagonal of a cell is at most the range, so the particles of a cell are in
+// one cluster.
+struct Grid {
+  std::array<bool, 3> counts{};         // The coordinate counts.
+  std::array<double, 3> origin{};       // Of the box; 0 without a period.
+  std::array<double, 3> length{};       // Period; 0: none.
+  std::array<double, 3> side{1, 1, 1};  // Of a cell.
+  std::array<std::int32_t, 3> cells{};  // Along a period.
+  std::array<std::int32_t, 3> reach{};  // Cells within the range.
+  double range_square = 0;
+};
+
+Grid MakeGrid(const LiftInput& input) {
+  Grid grid;
+  grid.range_square = input.range * input.range;
+  const double longest = input.range / std::sqrt(static_cast<double>(input.axes.size()));
+  for (const int axis : input.axes) {
+    const auto k = static_cast<std::size_t>(axis);
+    grid.counts[k] = true;
+    grid.side[k] = longest;
+    if (const auto& periodic = input.box.axes[k]) {
+      grid.origin[k] = periodic->origin;
+      grid.length[k] = periodic->length;
+      grid.cells[k] = static_cast<std::int32_t>(std::ceil(periodic->length / longest));
+      grid.side[k] = periodic->length / grid.cells[k];
+    }
+    grid.reach[k] = static_cast<std::int32_t>(std::ceil(input.range / grid.side[k]));
+  }
+  return grid;
+}
+
+// The image of the box in which a coordinate lies.
+double ImageOf(const Grid& grid, std::size_t axis, double coordinate) {
+  return grid.length[axis] > 0 ? std::floor((coordinate - grid.origin[axis]) / grid.length[axis])
+                               : 0;
+}
+
+// Reads the coordinates of particles. Those that do not count are 0.
+template <typename Real>
+std::array<double, 3> CoordinatesOf(const Grid& grid, std::span<const Real> positions,
+                                    std::size_t components, std::size_t particle) {
+  std::array<double, 3> at{};
+  for (std::size_t k = 0; k < components; ++k) {
+    if (grid.counts[k]) at[k] = static_cast<double>(positions[particle * components + k]);
+  }
+  return at;
+}
+
+std::array<double, 3> Wrapped(const Grid& grid, std::array<double, 3> at) {
+  for (std::size_t k = 0; k < 3; ++k) at[k] -= ImageOf(grid, k, at[k]) * grid.length[k];
+  return at;
+}
+
+std::array<std::int32_t, 3> CellOf(const Grid& grid, const std::array<double, 3>& wrapped) {
+  std::array<std::int32_t, 3> cell{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!grid.counts[k]) continue;
+    const double at = std::floor((wrapped[k] - grid.origin[k]) / grid.side[k]);
+    // Rounding may put a wrapped coordinate onto the upper face of the box.
+    cell[k] = static_cast<std::int32_t>(
+        grid.length[k] > 0 ? std::clamp(at, 0.0, static_cast<double>(grid.cells[k] - 1))
+                           : std::clamp(at, -kMostCells, kMostCells));
+  }
+  return cell;
+}
+
+// Sorts the particles by cell.
+template <typename Real>
+void SortByCell(const Grid& grid, std::span<const Real> positions, std::size_t components,
+                LiftScratch& s) {
+  const std::size_t count = positions.size() / components;
+  s.entries.resize(count);
+  s.wrapped.resize(count);
+  ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const auto at = Wrapped(grid, CoordinatesOf(grid, positions, components, k));
+      s.entries[k] = {CellOf(grid, at), static_cast<std::uint32_t>(k)};
+    }
+  });
+  ParallelSort(std::span(s.entries), [](const LiftScratch::Entry& a, const LiftScratch::Entry& b) {
+    return a.cell != b.cell ? a.cell < b.cell : a.particle < b.particle;
+  });
+  ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const auto at =
+          Wrapped(grid, CoordinatesOf(grid, positions, components, s.entries[k].particle));
+      s.wrapped[k] = {at[0], at[1], at[2]};
+    }
+  });
+}
+
+Vec3 Lower(const Vec3& a, const Vec3& b) {
+  return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
+}
+Vec3 Upper(const Vec3& a, const Vec3& b) {
+  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
+}
+
+void ListCells(LiftScratch& s) {
+  s.cells.clear();
+  for (std::uint32_t k = 0; k < s.entries.size(); ++k) {
+    const Vec3& at = s.wrapped[k];
+    if (s.cells.empty() || s.cells.back().at != s.entries[k].cell) {
+      s.cells.push_back({.at = s.entries[k].cell, .first = k, .low = at, .high = at});
+    }
+    LiftCell& cell = s.cells.back();
+    cell.last = k + 1;
+    cell.low = Lower(cell.low, at);
+    cell.high = Upper(cell.high, at);
+  }
+}
+
+std::size_t SlotOf(const std::array<std::int32_t, 3>& cell, std::size_t slots) {
+  std::uint64_t hash = 0;
+  for (const std::int32_t at : cell) {
+    hash = (hash ^ static_cast<std::uint32_t>(at)) * 0x9e3779b97f4a7c15u;
+    hash ^= hash >> 32;
+  }
+  return hash & (slots - 1);
+}
+
+// Fills the hash table, at most half full.
+void IndexCells(LiftScratch& s) {
+  s.slots.assign(std::bit_ceil(2 * s.cells.size() + 1), kNoCell);
+  for (std::uint32_t k = 0; k < s.cells.size(); ++k) {
+    std::size_t slot = SlotOf(s.cells[k].at, s.slots.size());
+    while (s.slots[slot] != kNoCell) slot = (slot + 1) & (s.slots.size() - 1);
+    s.slots[slot] = k;
+  }
+}
+
+std::uint32_t FindCell(const LiftScratch& s, const std::array<std::int32_t, 3>& at) {
+  std::size_t slot = SlotOf(at, s.slots.size());
+  while (s.slots[slot] != kNoCell && s.cells[s.slots[slot]].at != at) {
+    slot = (slot + 1) & (s.slots.size() - 1);
+  }
+  return s.slots[slot];
+}
+
+Vec3 ShiftOf(const Grid& grid, const Image& image) {
+  return {static_cast<double>(image[0]) * grid.length[0],
+          static_cast<double>(image[1]) * grid.length[1],
+          static_cast<double>(image[2]) * grid.length[2]};
+}
+
+// Whether two cells have particles within the range, if `b` is moved by `shift`.
+bool AreNear(const Grid& grid, const LiftScratch& s, const LiftCell& a, const LiftCell& b,
+             const Vec3& shift) {
+  const Vec3 low = b.low + shift, high = b.high + shift;
+  const Vec3 gap = Upper(Upper(a.low - high, low - a.high), Vec3{});
+  if (Dot(gap, gap) > grid.range_square) return false;
+  const Vec3 span = Upper(a.high, high) - Lower(a.low, low);
+  if (Dot(span, span) <= grid.range_square) return true;
+  if (std::uint64_t{a.last - a.first} * (b.last - b.first) > kMostPairs) return true;
+  for (std::uint32_t i = a.first; i < a.last; ++i) {
+    for (std::uint32_t j = b.first; j < b.last; ++j) {
+      const Vec3 apart = s.wrapped[j] + shift - s.wrapped[i];
+      if (Dot(apart, apart) <= grid.range_square) return true;
+    }
+  }
+  return false;
+}
+
+// Joins the cells that are within the range of each other. Returns in which axes a cluster reaches
+// its own image.
+std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
+  std::array<bool, 3> winds{};
+  s.sets.Reset(s.cells.size());
+  const auto visit = [&](std::uint32_t a, const std::array<std::int32_t, 3>& step) {
+    std::array<std::int32_t, 3> at{};
+    Image image{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      at[k] = s.cells[a].at[k] + step[k];
+      if (grid.cells[k] == 0) continue;
+      image[k] = at[k] < 0 ? -1 : at[k] >= grid.cells[k] ? 1 : 0;
+      at[k] -= static_cast<std::int32_t>(image[k]) * grid.cells[k];
+    }
+    const std::uint32_t b = FindCell(s, at);
+    if (b == kNoCell) return;
+    const ImageSets::Found from = s.sets.Find(a), to = s.sets.Find(b);
+    const Image beyond = to.image - from.image;
+    if (from.root == to.root && beyond == image) return;
+    if (!AreNear(grid, s, s.cells[a], s.cells[b], ShiftOf(grid, image))) return;
+    if (from.root != to.root) {
+      s.sets.Join(from, to, image);
+      return;
+    }
+    for (std::size_t k = 0; k < 3; ++k) winds[k] = winds[k] || beyond[k] != image[k];
+  };
+  const auto [most_x, most_y, most_z] = grid.reach;
+  for (std::uint32_t cell = 0; cell < s.cells.size(); ++cell) {
+    if (cell % kGrain == 0) ThrowIfCancelled();
+    // Half of the neighbours; the cell is a neighbour of the others.
+    for (std::int32_t x = 0; x <= most_x; ++x) {
+      for (std::int32_t y = x == 0 ? 0 : -most_y; y <= most_y; ++y) {
+        for (std::int32_t z = x == 0 && y == 0 ? 1 : -most_z; z <= most_z; ++z) {
+          visit(cell, {x, y, z});
+        }
+      }
+    }
+  }
+  return winds;
+}
+
+// Finds the bounding box of each cluster, and the image of each cell that moves the centre of this
+// box into the periodic box.
+void ChooseImages(const Grid& grid, LiftScratch& s) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  s.low.assign(s.cells.size(), {kFar, kFar, kFar});
+  s.high.assign(s.cells.size(), {-kFar, -kFar, -kFar});
+  for (std::uint32_t k = 0; k < s.cells.size(); ++k) {
+    const auto [root, image] = s.sets.Find(k);
+    const Vec3 shift = ShiftOf(grid, image);
+    s.low[root] = Lower(s.low[root], s.cells[k].low + shift);
+    s.high[root] = Upper(s.high[root], s.cells[k].high + shift);
+  }
+  for (std::uint32_t k = 0; k < s.cells.size(); ++k) {
+    const auto [root, image] = s.sets.Find(k);
+    const Vec3 centre = .5 * (s.low[root] + s.high[root]);
+    const Image of_centre{static_cast<std::int64_t>(ImageOf(grid, 0, centre.x)),
+                          static_cast<std::int64_t>(ImageOf(grid, 1, centre.y)),
+                          static_cast<std::int64_t>(ImageOf(grid, 2, centre.z))};
+    s.cells[k].image = image - of_centre;
+  }
+}
+
+template <typename Real>
+void WritePositions(const Grid& grid, std::span<const Real> given, std::size_t components,
+                    LiftScratch& s) {
+  s.positions.resize(given.size());
+  ParallelFor(s.cells.size(), [&](std::size_t k) {
+    const LiftCell& cell = s.cells[k];
+    for (std::uint32_t i = cell.first; i < cell.last; ++i) {
+      const std::size_t first = s.entries[i].particle * components;
+      for (std::size_t axis = 0; axis < components; ++axis) {
+        const auto at = static_cast<double>(given[first + axis]);
+        const double lengths = static_cast<double>(cell.image[axis]) - ImageOf(grid, axis, at);
+        s.positions[first + axis] = lengths == 0 ? at : at + lengths * grid.length[axis];
+      }
+    }
+  });
+}
+
+// Checks that no particle is too far away to be wrapped.
+template <typename Real>
+absl::Status CheckDistances(const Grid& grid, std::span<const Real> positions,
+                            std::size_t components) {
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const std::size_t axis = k % components;
+    const auto at = static_cast<double>(positions[k]);
+    if (std::abs(at - grid.origin[axis]) <= kMostLengths * grid.length[axis]) continue;
+    if (grid.length[axis] == 0) continue;
+    return InvalidFrame(kReasonOutOfRange,
+                        CoordinateField("positions", k / components, static_cast<int>(axis)),
+                        ShortestNumber(at), "must be at most 1e6 lengths away from the box");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckAxes(const LiftInput& input) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!input.box.axes[k] || std::ranges::count(input.axes, static_cast<int>(k)) > 0) continue;
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonOutOfRange), absl::StrCat("parameters.box.", kAxisNames[k]), "present",
+         "must be absent: it is no axis of the plane of the particles"});
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Percolates(const std::array<bool, 3>& winds) {
+  std::string axes;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (winds[k]) absl::StrAppend(&axes, axes.empty() ? "" : " and ", kAxisNames[k]);
+  }
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonPercolates), "positions", absl::StrCat("a body percolates along ", axes),
+       "must end more than two kernel radii before its own image; leave out this periodic axis to "
+       "have the body end at the box"});
+}
+
+}  // namespace
+
+absl::Status Lift(const LiftInput& input, LiftScratch& s, Frame& lifted) {
+  lifted = input.frame;
+  if (absl::Status status = CheckAxes(input); !status.ok()) return status;
+  const Grid grid = MakeGrid(input);
+  const auto components = static_cast<std::size_t>(input.frame.components);
+  absl::Status checked =
+      std::visit([&](auto positions) { return CheckDistances(grid, positions, components); },
+                 input.frame.positions);
+  if (!checked.ok()) return checked;
+  std::visit([&](auto positions) { SortByCell(grid, positions, components, s); },
+             input.frame.positions);
+  ListCells(s);
+  IndexCells(s);
+  const std::array<bool, 3> winds = JoinCells(grid, s);
+  if (winds != std::array<bool, 3>{}) return Percolates(winds);
+  ChooseImages(grid, s);
+  std::visit([&](auto positions) { WritePositions(grid, positions, components, s); },
+             input.frame.positions);
+  lifted.positions = std::span<const double>(s.positions);
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

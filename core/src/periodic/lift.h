@@ -1,0 +1,68 @@
+// Lifts the particles of a periodic box to open space, so that no body is cut by a face of the box.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "base/vec3.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "periodic/image_sets.h"
+
+namespace partiemc {
+
+/// The particles of one cell of the grid in which Lift searches neighbours.
+struct LiftCell {
+  std::array<std::int32_t, 3> at{};
+  std::uint32_t first = 0, last = 0;  ///< Its particles, [first, last) in the order of the cells.
+  Vec3 low, high;                     ///< Bounding box of its particles, wrapped into the box.
+  Image image{};                      ///< Image into which its particles are lifted.
+};
+
+/// Warm buffers of Lift.
+struct LiftScratch {
+  struct Entry {
+    std::array<std::int32_t, 3> cell;
+    std::uint32_t particle;
+  };
+  std::vector<Entry> entries;        // By cell.
+  std::vector<Vec3> wrapped;         // In the order of `entries`.
+  std::vector<LiftCell> cells;       // By coordinates of the grid.
+  std::vector<std::uint32_t> slots;  // Hash table of the cells.
+  ImageSets sets;                    // Of cells.
+  std::vector<Vec3> low, high;       // By root: bounding box of the lifted cluster.
+  std::vector<double> positions;     // The result.
+};
+
+/// Bytes of a LiftScratch per particle, at most. A cell has at least one particle.
+inline constexpr std::uint64_t kBytesPerLiftedParticle = 300;
+
+struct LiftInput {
+  const Frame& frame;
+  const PeriodicBox& box;
+  /// The coordinates that count: two for outlines, three for surfaces. The others stay as they are.
+  std::span<const int> axes;
+  /// Particles at most this far apart are in one cluster. World units.
+  double range;
+};
+
+/// Moves each particle by whole lengths of the box, so that clusters are contiguous and the centre
+/// of the bounding box of each lies in the box. A cluster is a set of particles that are connected
+/// by distances of at most `range` in the periodic box. Sets `lifted` to the frame with the new
+/// positions, a view of `scratch`. A particle that does not move keeps the bits of its position.
+///
+/// Two cells of the grid with very many particles may be joined although their particles are up to
+/// two ranges apart, so that the cost is bounded (kMostPairs in lift.cc).
+/// Requires: CheckFrame has passed the frame; Validate has passed the box for `range` = two kernel
+/// radii.
+/// Errors: INVALID_ARGUMENT: OUT_OF_RANGE if a periodic axis is not one of `axes`, or a particle is
+/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image.
+/// The result depends neither on the order of the particles nor on the number of threads.
+/// Cost: n log n in particles.
+absl::Status Lift(const LiftInput& input, LiftScratch& scratch, Frame& lifted);
+
+}  // namespace partiemc

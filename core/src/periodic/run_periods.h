@@ -1,0 +1,49 @@
+// Wraps runs of lattice nodes into a periodic box.
+//
+// A period need not be a whole number of cells, so a node moves by the nearest whole number. Bodies
+// are farther apart than a cell, so this never moves a node into another body.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// Lengths of a periodic box along x, y, z, in cells; 0: not periodic. In a plane, x and y are its
+/// axes.
+struct LatticePeriods {
+  std::array<double, 3> cells{};
+
+  bool Any() const { return cells != std::array<double, 3>{}; }
+};
+
+/// The number of cells by which the node at coordinate `at` moves back into its box.
+inline std::int64_t WrapOf(double period, std::int64_t at) {
+  if (period == 0) return 0;
+  const double image = std::floor(static_cast<double>(at) / period);
+  return static_cast<std::int64_t>(std::floor(image * period + 0.5));
+}
+
+/// Calls visit(first, last) for the parts of the run [first, last] in each box, wrapped.
+template <typename Visit>
+void ForEachWrapped(double period, std::int64_t first, std::int64_t last, const Visit& visit) {
+  if (period == 0) {
+    visit(static_cast<std::int32_t>(first), static_cast<std::int32_t>(last));
+    return;
+  }
+  while (first <= last) {
+    const double image = std::floor(static_cast<double>(first) / period);
+    // The last node below the upper face of this box.
+    const auto face = static_cast<std::int64_t>(std::ceil((image + 1) * period)) - 1;
+    const std::int64_t end = std::clamp(face, first, last);
+    const std::int64_t wrap = WrapOf(period, first);
+    visit(static_cast<std::int32_t>(first - wrap), static_cast<std::int32_t>(end - wrap));
+    first = end + 1;
+  }
+}
+
+}  // namespace partiemc

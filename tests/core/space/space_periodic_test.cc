@@ -1,0 +1,185 @@
+// Periodic boxes in space: surfaces are those of the same bodies in the middle of the box.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "partiemc/arena.h"
+#include "partiemc/partiemc.h"
+#include "partiemc/status.h"
+#include "space/surface_stream.h"
+
+namespace partiemc {
+namespace {
+
+using support::Known;
+using support::Random;
+using testing::SpaceParticles;
+using testing::SurfaceStream;
+using testing::TrackedParticles;
+
+constexpr PeriodicBox Cube(double length) {
+  const PeriodicAxis axis{0, length};
+  return {.axes = {axis, axis, axis}};
+}
+
+SurfaceParameters In(const PeriodicBox& box, SurfacePlacement placement) {
+  return {.placement = placement, .box = box};
+}
+
+// Moves coordinates into the box, as simulators do.
+void Wrap(std::vector<double>& xyz, const PeriodicBox& box) {
+  for (std::size_t k = 0; k < xyz.size(); ++k) {
+    const auto& axis = box.axes[k % 3];
+    if (axis) xyz[k] -= axis->length * std::floor((xyz[k] - axis->origin) / axis->length);
+  }
+}
+
+SpaceParticles BallAt(const Vec3& centre, double radius) {
+  Random random(1);
+  return testing::Ball(centre, radius, .2, random);
+}
+
+Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
+  SurfaceWorkspace workspace;
+  Surface surface;
+  const absl::Status status = SurfaceReconstructor::Create(parameters)
+                                  ->Reconstruct(particles.AsFrame(), workspace, surface);
+  EXPECT_TRUE(status.ok()) << status;
+  return surface;
+}
+
+class PeriodicSurface : public ::testing::TestWithParam<SurfacePlacement> {};
+INSTANTIATE_TEST_SUITE_P(Placements, PeriodicSurface,
+                         ::testing::Values(SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                                           SurfacePlacement::kVirtualPlane));
+
+TEST_P(PeriodicSurface, BallAcrossFaceEdgeAndCornerIsTheBallInTheMiddle) {
+  const PeriodicBox box = Cube(32);
+  const Surface middle = SurfaceOf({.placement = GetParam()}, BallAt({16, 16, 16}, 6));
+  ASSERT_EQ(middle.ShellCount(), 1u);
+  for (const Vec3& centre : {Vec3{0, 16, 16}, {16, 0, 0}, {0, 0, 0}, {31, 31, 2}}) {
+    SpaceParticles ball = BallAt({16, 16, 16}, 6);
+    for (std::size_t k = 0; k < ball.xyz.size(); ++k) {
+      ball.xyz[k] += std::array{centre.x, centre.y, centre.z}[k % 3] - 16;
+    }
+    Wrap(ball.xyz, box);
+    const Surface across = SurfaceOf(In(box, GetParam()), ball);
+    ASSERT_EQ(across.ShellCount(), 1u);
+    EXPECT_TRUE(Validate(across).ok()) << Validate(across);
+    const ShellMeasures &is = across.measures[0], &wanted = middle.measures[0];
+    EXPECT_NEAR(is.volume, wanted.volume, 1e-6 * wanted.volume);
+    EXPECT_NEAR(is.area, wanted.area, 1e-6 * wanted.area);
+    EXPECT_EQ(is.particles, wanted.particles);
+    // Cut by the faces, it has more shells.
+    EXPECT_GT(SurfaceOf({.placement = GetParam()}, ball).ShellCount(), 1u);
+  }
+}
+
+TEST(PeriodicSpace, ThreadsAndOrderChangeNoBit) {
+  const PeriodicBox box = Cube(48.5);
+  Random random(4);
+  SpaceParticles all = BallAt({1, 2, 3}, 6);
+  all.Add(BallAt({24, 1, 24}, 4));
+  all.Add(BallAt({20, 24, 47}, 5));
+  Wrap(all.xyz, box);
+  const SurfaceParameters parameters = In(box, SurfacePlacement::kVirtualPlane);
+  const Surface first = SurfaceOf(parameters, all);
+  ASSERT_EQ(first.ShellCount(), 3u);
+  EXPECT_EQ(SurfaceOf(parameters, testing::Shuffled(all, random)), first);
+  Arena arena(2);
+  arena.Execute([&] { EXPECT_EQ(SurfaceOf(parameters, all), first); });
+}
+
+// A hollow ball and a ball that cross the faces.
+TrackedParticles Crossing(Known known, int frame) {
+  TrackedParticles all{.known = known, .time = 1.0 * frame};
+  const SpaceParticles full = BallAt({0, 0, 0}, 8);
+  SpaceParticles hollow;
+  for (std::size_t k = 0; k < full.size(); ++k) {
+    if (Length(full.At(k)) > 4) hollow.Add(full.At(k));
+  }
+  const Vec3 a{.9, -.8, .7}, b{-.6, -.8, .7};
+  all.Add(hollow, 0, a, Vec3{20, 20, 20} + (1.0 * frame) * a);
+  all.Add(BallAt({0, 0, 0}, 3), 5000, b, Vec3{20, 45, 45} + (1.0 * frame) * b);
+  return all;
+}
+
+class CrossingShells : public ::testing::TestWithParam<Known> {};
+INSTANTIATE_TEST_SUITE_P(With, CrossingShells,
+                         ::testing::Values(support::kNothing, support::kIds, support::kVelocities,
+                                           support::kBoth),
+                         ::testing::PrintToStringParamName());
+
+TEST_P(CrossingShells, KeepTheirIdentitiesForHundredFrames) {
+  const PeriodicBox box{
+      .axes = {PeriodicAxis{-5, 50.3}, PeriodicAxis{4, 52.7}, PeriodicAxis{0, 51}}};
+  SurfaceStream stream(In(box, SurfacePlacement::kMarchingCubes));
+  std::vector<std::uint64_t> first;
+  for (int frame = 0; frame < 100; ++frame) {
+    SCOPED_TRACE(frame);
+    TrackedParticles particles = Crossing(GetParam(), frame);
+    Wrap(particles.xyz, box);
+    const Surface& surface = stream.Next(particles);
+    ASSERT_EQ(surface.ShellCount(), 3u);
+    std::vector<std::uint64_t> identities;
+    for (const ShellMeasures& shell : surface.measures) identities.push_back(shell.identity);
+    std::ranges::sort(identities);
+    if (frame == 0) first = identities;
+    EXPECT_EQ(identities, first);
+  }
+}
+
+TEST(PeriodicSpace, BodyThatReachesItsOwnImageIsRefused) {
+  Random random(2);
+  const auto refusal = [&](const Vec3& low, const Vec3& high) {
+    SurfaceStream stream(In(Cube(30), SurfacePlacement::kMarchingCubes));
+    const SpaceParticles body = testing::Box(low, high, 0, random);
+    const auto violation = FindViolation(stream.Try(body.AsFrame()));
+    EXPECT_EQ(stream.state() == SurfaceState(), violation.has_value());
+    return violation ? violation->reason + ": " + violation->value : "none";
+  };
+  EXPECT_EQ(refusal({0, 0, 10}, {29, 29, 14}), "PERCOLATES: a body percolates along x and y");
+  EXPECT_EQ(refusal({10, 10, 0}, {14, 14, 29}), "PERCOLATES: a body percolates along z");
+  EXPECT_EQ(refusal({10, 10, 0}, {14, 14, 22}), "none");
+}
+
+TEST(PeriodicSpace, WrongBoxesAreRefused) {
+  const auto field_of = [](const PeriodicBox& box) {
+    const auto status = SurfaceReconstructor::Create(In(box, SurfacePlacement::kQef)).status();
+    const auto violation = FindViolation(status);
+    return violation ? violation->field : status.ToString();
+  };
+  for (const double length : {0.0, -1.0, 11.99, 1.1e8, std::nan("")}) {
+    EXPECT_EQ(field_of(Cube(length)), "parameters.box.x.length");
+  }
+  EXPECT_EQ(field_of({}), "parameters.box");
+  EXPECT_EQ(field_of(Cube(12)), "OK");
+}
+
+// Through Reconstructor, as streams do.
+TEST(PeriodicSpace, StreamOfSurfacesHasTheBox) {
+  const PeriodicBox box = Cube(32);
+  ReconstructionParameters parameters{.output = Output::kSurface, .spacing = 1.0, .box = box};
+  SpaceParticles ball = BallAt({0, 0, 0}, 6);
+  Wrap(ball.xyz, box);
+  State state;
+  Workspace workspace;
+  Result result;
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+  ASSERT_TRUE(reconstructor->Reconstruct(ball.AsFrame(), state, workspace, result).ok());
+  EXPECT_EQ(result.surface.ShellCount(), 1u);
+  // A section cuts only one image.
+  parameters.sections.push_back({.slice = SlicePlane{}});
+  EXPECT_EQ(FindViolation(Validate(parameters))->field, "parameters.sections[0].slice");
+}
+
+}  // namespace
+}  // namespace partiemc
