@@ -187,6 +187,16 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("S|RULE")
       ->group(kGroup);
   AddSurfaceFlags(app, flags, kGroup);
+  CLI::Option* const periodic =
+      app.add_option("--periodic", flags.periodic,
+                     "Periodic axes of the results: a body that crosses the box is one body. The "
+                     "box is that of the LAMMPS dump, or --box")
+          ->type_name("x,y,z")
+          ->group(kGroup);
+  app.add_option("--box", flags.box, "Bounds of the periodic box in world units")
+      ->type_name("X0,X1,Y0,Y1[,Z0,Z1]")
+      ->needs(periodic)
+      ->group(kGroup);
   app.add_option(
          "--slice", flags.slices,
          "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "

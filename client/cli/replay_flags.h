@@ -38,6 +38,8 @@ struct ReplayFlags {
   /// "z=0.5" or six numbers. The first is the outline, unless the stream has a surface.
   std::vector<std::string> slices;
   std::vector<double> isolines;  ///< Isovalues of the density, drawn on each slice.
+  std::string periodic;          ///< Axes: "x,y"; empty: none.
+  std::string box;               ///< "X0,X1,Y0,Y1[,Z0,Z1]"; empty: the box of the input.
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   double kernel_radius = 3;
   double cell_size = 1;

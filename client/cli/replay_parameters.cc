@@ -30,17 +30,57 @@ std::optional<double> Number(std::string_view text) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
-// Six numbers, separated by commas.
-std::optional<std::array<double, 6>> SixNumbers(std::string_view text) {
-  const std::vector<std::string_view> parts = Split(text, ',', /*blanks=*/"");
-  std::array<double, 6> numbers{};
-  if (parts.size() != numbers.size()) return std::nullopt;
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const auto number = Number(parts[k]);
-    if (!number) return std::nullopt;
-    numbers[k] = *number;
+// Numbers, separated by commas. Empty if one is wrong.
+std::vector<double> Numbers(std::string_view text) {
+  std::vector<double> numbers;
+  for (const std::string_view part : Split(text, ',', /*blanks=*/"")) {
+    const auto number = Number(part);
+    if (!number) return {};
+    numbers.push_back(*number);
   }
   return numbers;
+}
+
+// Parses --box. Empty if the text does not have four or six numbers.
+std::optional<RecordedBox> BoxOf(std::string_view text) {
+  const std::vector<double> bounds = Numbers(text);
+  if (bounds.size() != 4 && bounds.size() != 6) return std::nullopt;
+  RecordedBox box;
+  for (std::size_t k = 0; 2 * k < bounds.size(); ++k) {
+    box.low[k] = bounds[2 * k];
+    box.high[k] = bounds[2 * k + 1];
+    box.is_periodic[k] = true;
+  }
+  return box;
+}
+
+// Sets the periodic box. Without --box and a box of the input, checks --periodic only.
+absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& recorded,
+                    ReconstructionParameters& parameters) {
+  if (flags.periodic.empty()) return absl::OkStatus();
+  std::optional<RecordedBox> bounds = recorded;
+  if (!flags.box.empty()) {
+    bounds = BoxOf(flags.box);
+    if (!bounds) return WrongFlag("--box", flags.box, "X0,X1,Y0,Y1 or X0,X1,Y0,Y1,Z0,Z1");
+  }
+  PeriodicBox box;
+  for (const std::string_view name : Split(flags.periodic, ',', /*blanks=*/"")) {
+    const bool is_axis = name == "x" || name == "y" || (name == "z" && flags.surface);
+    if (!is_axis) {
+      return WrongFlag("--periodic", flags.periodic,
+                       flags.surface ? "axes of x,y,z" : "axes of x,y: z requires --surface");
+    }
+    const auto axis = static_cast<std::size_t>(name[0] - 'x');
+    if (!bounds) continue;
+    if (!bounds->is_periodic[axis]) {
+      return WrongFlag("--periodic", flags.periodic,
+                       Concat("axes of the box with periodic boundaries (pp); ", name,
+                              " is none. --box gives other bounds"));
+    }
+    box.axes[axis] = PeriodicAxis{bounds->low[axis], bounds->high[axis] - bounds->low[axis]};
+  }
+  if (bounds) parameters.box = box;
+  return absl::OkStatus();
 }
 
 // Parses --slice. Empty if the text is neither x=C, y=C or z=C nor six numbers.
@@ -55,11 +95,11 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
     slice.normal[axis] = axis == 1 ? -1 : 1;
     return slice;
   }
-  const auto numbers = SixNumbers(text);
-  if (!numbers) return std::nullopt;
+  const std::vector<double> numbers = Numbers(text);
+  if (numbers.size() != 6) return std::nullopt;
   SlicePlane slice;
-  std::copy_n(numbers->begin(), 3, slice.origin.begin());
-  std::copy_n(numbers->begin() + 3, 3, slice.normal.begin());
+  std::copy_n(numbers.begin(), 3, slice.origin.begin());
+  std::copy_n(numbers.begin() + 3, 3, slice.normal.begin());
   return slice;
 }
 
@@ -99,7 +139,8 @@ bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded
 }
 
 absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
-                                                      std::optional<double> spacing) {
+                                                      std::optional<double> spacing,
+                                                      const std::optional<RecordedBox>& box) {
   ReconstructionParameters parameters{.output = flags.surface ? Output::kSurface : Output::kOutline,
                                       .spacing = spacing,
                                       .kernel_radius = flags.kernel_radius,
@@ -130,6 +171,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
     }
   }
   if (auto status = AddSections(flags, parameters); !status.ok()) return status;
+  if (auto status = SetBox(flags, box, parameters); !status.ok()) return status;
   if (flags.clean == "on" || flags.clean == "off") {
     parameters.clean = flags.clean == "on";
   } else if (flags.clean != "auto") {

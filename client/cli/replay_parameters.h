@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "client/cli/replay_flags.h"
+#include "client/input/base/recorded_box.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {
@@ -13,10 +14,12 @@ namespace partiemc::client {
 /// Whether the spacing is estimated before the stream opens: surfaces and slices require one.
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing);
 
-/// Uses `spacing` if the flags give none: that of the recording, or the estimate.
+/// Uses `spacing` if the flags give none: that of the recording, or the estimate. Uses
+/// `recorded_box` for --periodic without --box. If both boxes are absent, the parameters have none.
 /// Errors: INVALID_ARGUMENT, one line that names the flag.
-absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
-                                                      std::optional<double> spacing);
+absl::StatusOr<ReconstructionParameters> ParametersOf(
+    const ReplayFlags& flags, std::optional<double> spacing,
+    const std::optional<RecordedBox>& recorded_box = std::nullopt);
 
 /// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
 absl::StatusOr<std::optional<double>> RateOf(std::string_view text);

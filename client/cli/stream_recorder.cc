@@ -69,6 +69,18 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   AddFlag(flags, "--min-area", parameters.min_component_area, defaults.min_component_area);
   AddFlag(flags, "--min-particles", parameters.min_component_particles,
           defaults.min_component_particles);
+  if (parameters.box) {
+    std::string axes, bounds;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& axis = parameters.box->axes[k];
+      if (axis) AppendAll(axes, axes.empty() ? "" : ",", std::string(1, "xyz"[k]));
+      if (k == 2 && !axis) break;
+      const auto [origin, length] = axis.value_or(PeriodicAxis{});
+      AppendAll(bounds, bounds.empty() ? "" : ",", ShortestNumber(origin), ",",
+                ShortestNumber(origin + length));
+    }
+    AppendAll(flags, " --periodic ", axes, " --box ", bounds);
+  }
   std::string isovalues;
   for (const Section& section : parameters.sections) {
     // Every slice has the same isolines.

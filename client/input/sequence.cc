@@ -39,8 +39,10 @@ struct Recording {
 
 class FileSequence final : public Sequence {
  public:
-  FileSequence(Recording recording, bool in_space)
-      : recording_(std::move(recording)), projection_(in_space) {}
+  FileSequence(Recording recording, const SequenceOptions& options)
+      : recording_(std::move(recording)),
+        projection_(options.in_space),
+        requires_one_box_(options.requires_one_box) {}
 
   // Opens the first file, so that its errors are reported at once. Required before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
@@ -106,6 +108,7 @@ class FileSequence final : public Sequence {
           !status.ok()) {
         return status;
       }
+      if (absl::Status status = CheckBox(frame); !status.ok()) return status;
       selected_ += rows_.count;
       unselected_ += rows_.unselected;
       if (absl::Status status = TakeTime(frame); !status.ok()) return status;
@@ -115,6 +118,22 @@ class FileSequence final : public Sequence {
       return true;
     }
     return false;
+  }
+
+  absl::Status CheckBox(const RecordedFrame& frame) {
+    if (!requires_one_box_) return absl::OkStatus();
+    const auto refuse = [&](std::string_view fault) {
+      return absl::FailedPreconditionError(Concat(frame.source, ": ", fault));
+    };
+    if (!frame.box) return refuse("has no box for --periodic; give --box");
+    if (frame.box->is_tilted) {
+      return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
+    }
+    if (!first_box_) first_box_ = frame.box;
+    if (*first_box_ == *frame.box) return absl::OkStatus();
+    return refuse(
+        "its box differs from the box of the first frame; --periodic requires one box for all "
+        "frames");
   }
 
   absl::Status SelectsNothing() const {
@@ -187,6 +206,8 @@ class FileSequence final : public Sequence {
   std::size_t index_ = 0;  // Index of the next frame.
   ParticleRows rows_;
   PlaneProjection projection_;
+  bool requires_one_box_;
+  std::optional<RecordedBox> first_box_;
   absl::Status failure_;
   std::uint64_t selected_ = 0;    // Particles of all frames.
   std::uint64_t unselected_ = 0;  // Particles that --select left out.
@@ -318,7 +339,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   if (!format.ok()) return format.status();
   recording.format = *format;
   if (absl::Status status = TakeTimes(directory, recording); !status.ok()) return status;
-  auto sequence = std::make_unique<FileSequence>(std::move(recording), options.in_space);
+  auto sequence = std::make_unique<FileSequence>(std::move(recording), options);
   if (absl::Status status = sequence->OpenFirstFile(); !status.ok()) return status;
   return sequence;
 }

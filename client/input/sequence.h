@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "client/input/base/byte_source.h"
 #include "client/input/base/particle_attribute.h"
+#include "client/input/base/recorded_box.h"
 
 namespace partiemc::client {
 
@@ -25,6 +26,8 @@ struct RecordedFrame {
   /// cannot be used.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
+  /// The box of the simulation, along the axes of `positions`; of LAMMPS dumps.
+  std::optional<RecordedBox> box;
   int components = 2;  ///< 3 with SequenceOptions::in_space.
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
   std::vector<double> positions;
@@ -65,6 +68,9 @@ struct SequenceOptions {
 
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
   bool in_space = false;
+
+  /// Refuse a frame whose box differs from the box of the first frame, is absent or is tilted.
+  bool requires_one_box = false;
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present. A

@@ -17,12 +17,17 @@ namespace {
 // Limits the client's memory: a server may announce a window of any size.
 constexpr std::size_t kMaxFramesInFlight = 64;
 
-absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened, Output output) {
+absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
+                                      const ReconstructionParameters& requested) {
   auto parameters = wire::DecodeParameters(opened.parameters());
   if (!parameters.ok()) return parameters.status();
   // Servers of before there were surfaces ignore the output.
-  if (output == Output::kSurface && parameters->output != output) {
+  if (requested.output == Output::kSurface && parameters->output != requested.output) {
     return absl::UnimplementedError("the server does not support surfaces: use a newer one");
+  }
+  // Servers of before there were periodic boxes ignore the box.
+  if (parameters->box != requested.box) {
+    return absl::UnimplementedError("the server does not support periodic boxes: use a newer one");
   }
   return StreamInfo{
       .stream_id = opened.stream_id(),
@@ -109,7 +114,7 @@ absl::Status ResumingStream::OpenFirst() {
   AssertShared();
   auto opened = connector_.OpenNew();
   if (!opened.ok()) return opened.status();
-  auto info = ReadOpened(opened->message, options_.parameters.output);
+  auto info = ReadOpened(opened->message, options_.parameters);
   if (!info.ok()) {
     connector_.Drop(std::move(opened->call));
     return info.status();
@@ -389,7 +394,7 @@ absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
   auto opened = connector_.OpenAgain(until);
   if (!opened.ok()) return opened.status();
   if (!*opened) return false;
-  const auto info = ReadOpened((*opened)->message, options_.parameters.output);
+  const auto info = ReadOpened((*opened)->message, options_.parameters);
   if (auto suits = info.ok() ? CheckReplica(**opened, *info) : info.status(); !suits.ok()) {
     LoseCall(std::move((*opened)->call), {.status = suits, .why = "does not suit"});
     return true;

@@ -101,6 +101,42 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   }
 }
 
+// Removes the argument `box`: a dict of axes with their lower and upper bounds, such as
+// {"x": (0, 10), "y": (0, 10)}.
+void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
+  const auto given = Take<py::dict>(arguments, "box");
+  if (!given) return;
+  box.emplace();
+  for (const auto& [key, value] : *given) {
+    std::size_t axis = std::string_view::npos;
+    std::pair<double, double> bounds;
+    try {
+      const auto name = key.cast<std::string>();
+      if (name.size() == 1) axis = std::string_view("xyz").find(name);
+      bounds = value.cast<std::pair<double, double>>();
+    } catch (const py::cast_error&) {
+      axis = std::string_view::npos;
+    }
+    if (axis == std::string_view::npos) {
+      Raise(Invalid("UNSUPPORTED", "box", py::repr(*given).cast<std::string>(),
+                    "must be a dict of periodic axes with their bounds, {\"x\": (0, 10)} say"));
+    }
+    box->axes[axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
+  }
+}
+
+py::object ToPython(const std::optional<PeriodicBox>& box) {
+  if (!box) return py::none();
+  py::dict dict;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& axis = box->axes[k];
+    if (!axis) continue;
+    dict[py::str(std::string(1, "xyz"[k]))] =
+        py::make_tuple(axis->origin, axis->origin + axis->length);
+  }
+  return dict;
+}
+
 // Reads dicts of the values that differ.
 void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   const auto given = Take<std::vector<py::dict>>(arguments, "sections");
@@ -147,6 +183,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeSlice(arguments, parameters.slice);
   TakeInto(arguments, "isovalue", parameters.isovalue);
   TakeSections(arguments, parameters.sections);
+  TakeBox(arguments, parameters.box);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
@@ -241,7 +278,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "min_component_area"_a = parameters.min_component_area,
                 "min_component_particles"_a = parameters.min_component_particles,
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
-                "sections"_a = sections);
+                "sections"_a = sections, "box"_a = ToPython(parameters.box));
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

@@ -259,6 +259,29 @@ absl::Status CheckNames(const v1::Outputs& message) {
                  absl::StrCat(message.attributes_size(), " names"), "must all be different");
 }
 
+PeriodicBox FromWire(const v1::PeriodicBox& message) {
+  PeriodicBox box;
+  const auto axis = [](const v1::PeriodicAxis& from) {
+    return PeriodicAxis{from.origin(), from.length()};
+  };
+  if (message.has_x()) box.axes[0] = axis(message.x());
+  if (message.has_y()) box.axes[1] = axis(message.y());
+  if (message.has_z()) box.axes[2] = axis(message.z());
+  return box;
+}
+
+v1::PeriodicBox ToWire(const PeriodicBox& box) {
+  v1::PeriodicBox message;
+  const auto set = [](const PeriodicAxis& from, v1::PeriodicAxis& axis) {
+    axis.set_origin(from.origin);
+    axis.set_length(from.length);
+  };
+  if (box.axes[0]) set(*box.axes[0], *message.mutable_x());
+  if (box.axes[1]) set(*box.axes[1], *message.mutable_y());
+  if (box.axes[2]) set(*box.axes[2], *message.mutable_z());
+  return message;
+}
+
 SurfaceOptions FromWire(const v1::SurfaceOptions& message) {
   SurfaceOptions options;
   if (message.has_thinning_distance()) options.thinning_distance = message.thinning_distance();
@@ -370,6 +393,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
     if (from.has_isovalue()) section.isovalue = from.isovalue();
   }
   if (message.has_surface()) parameters.surface = FromWire(message.surface());
+  if (message.has_box()) parameters.box = FromWire(message.box());
   return parameters;
 }
 
@@ -401,6 +425,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
     if (from.slice) *section.mutable_slice() = ToWire(*from.slice);
     if (from.isovalue) section.set_isovalue(*from.isovalue);
   }
+  if (parameters.box) *message.mutable_box() = ToWire(*parameters.box);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

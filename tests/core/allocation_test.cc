@@ -176,6 +176,41 @@ TEST(WarmSlice, AllocatesNothing) {
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
 
+// Bodies that cross the faces of a periodic box.
+TEST(WarmPeriodicFrame, AllocatesNothing) {
+  const ReconstructionParameters parameters{
+      .spacing = 1.0, .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}}};
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<Particles> frames;
+  for (int k = 0; k < 4; ++k) {
+    Particles frame = support::Disc(12, 20.0 * k, 9.0 * k);
+    frame.Add(support::Disc(8, 45 - 20.0 * k, 40 + 5.0 * k));
+    for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
+    frames.push_back(frame);
+  }
+  State state;
+  Workspace workspace;
+  Result result;
+  std::size_t before = 0;
+  tbb::task_arena arena(1);
+  for (int round = 0; round < 12; ++round) {
+    before = allocations;
+    for (const Particles& frame : frames) {
+      arena.execute([&] {
+        const absl::Status status =
+            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
+        ASSERT_TRUE(status.ok()) << status;
+      });
+    }
+    if (round == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  EXPECT_EQ(result.rings.RingCount(), 2u);
+}
+
 // Frames in space with ids, velocities and an attribute.
 class TrackedFrames {
  public:
@@ -339,6 +374,12 @@ std::vector<MemoryCase> MemoryCases() {
   add("drops of a fine lattice", spread(60, 20), {.kernel_radius = 8, .cell_size = .25});
   add("drops of a coarse lattice", spread(150, 5), {.kernel_radius = 1.5, .cell_size = 2});
   add("noise", support::Noise(random, 30'000, 300));
+  const auto boxed = [](double length) {
+    return PeriodicBox{
+        .axes = {PeriodicAxis{-length / 2, length}, PeriodicAxis{-length / 2, length}}};
+  };
+  add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
+  add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
   return cases;
 }
 

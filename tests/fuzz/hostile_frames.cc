@@ -152,6 +152,15 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     parameters.reference_radius = HostileRatio(choices, 0.01, 1, 7.9);
   }
   if (choices.Below(4) == 1) parameters.surface_offset = HostileRatio(choices, -1, 0, 1);
+  if (choices.Below(4) == 1) {
+    const double unit = parameters.spacing.value_or(1);
+    parameters.box.emplace();
+    for (auto& axis : parameters.box->axes) {
+      const auto size = choices.Take<std::uint8_t>();
+      if (size > 0) axis = PeriodicAxis{unit * static_cast<double>(choices.Below(9)), unit * size};
+    }
+    if (choices.Below(4) != 1) parameters.box->axes[2].reset();
+  }
   return parameters;
 }
 

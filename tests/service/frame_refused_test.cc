@@ -168,6 +168,18 @@ TEST_F(FrameRefused, NOT_PLANAR) {
   Expect(request, "NOT_PLANAR");
 }
 
+TEST_F(FrameRefused, PERCOLATES) {
+  auto open = OpenRequest();
+  auto& parameters = *open.mutable_open()->mutable_parameters();
+  parameters.set_spacing(kBlobSpacing);
+  parameters.mutable_box()->mutable_x()->set_length(400 * kBlobSpacing);
+  auto request = BlobRequest(1, 1, 0);
+  std::vector<double> layer;
+  for (int k = 0; k < 400; ++k) layer.insert(layer.end(), {k * kBlobSpacing, 0.0});
+  request.mutable_frame()->set_positions(layer.data(), layer.size() * sizeof(double));
+  Expect(request, "PERCOLATES", 2, open);
+}
+
 // float32 positions so far from the origin that a step is many spacings.
 v1::ReconstructRequest CoarseRequest() {
   std::vector<float> far;

@@ -244,9 +244,26 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   return code;
 }
 
+// The box of the first frame, if --periodic requires the box of the input.
+absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) {
+  if (flags.periodic.empty() || !flags.box.empty()) return std::nullopt;
+  auto input = OpenInput(flags.input, flags.sequence);
+  if (!input.ok()) return input.status();
+  RecordedFrame first;
+  const auto found = input->frames->Next(first);
+  if (!found.ok()) return found.status();
+  if (!*found || !first.box) {
+    return absl::FailedPreconditionError(
+        Concat(flags.input, ": has no box for --periodic; give --box"));
+  }
+  return first.box;
+}
+
 }  // namespace
 
-int Replay(const ReplayFlags& flags) {
+int Replay(const ReplayFlags& given) {
+  ReplayFlags flags = given;
+  flags.sequence.requires_one_box = !flags.periodic.empty() && flags.box.empty();
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
   // Checks the flags before the input is opened. Slices and surfaces require a spacing, which the
@@ -268,7 +285,9 @@ int Replay(const ReplayFlags& flags) {
                Concat("spacing ", *spacing, " estimated from the first frame; --spacing sets it"));
     }
   }
-  const auto parameters = ParametersOf(flags, input->spacing);
+  const auto box = BoxOfInput(flags);
+  if (!box.ok()) return Complain(kInput, box.status());
+  const auto parameters = ParametersOf(flags, input->spacing, *box);
   if (!parameters.ok()) return Complain(kUsage, parameters.status());
   if (flags.loop) {
     input->frames = std::make_unique<LoopedInput>(*std::move(input), flags.input, flags.sequence);

@@ -100,6 +100,7 @@ void ParticleRows::Begin(const ColumnPlan& plan) {
   float32 = false;
   time.reset();
   step.reset();
+  box.reset();
   source.clear();
   count = 0;
   unselected = 0;

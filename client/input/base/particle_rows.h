@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "client/input/base/columns.h"
 #include "client/input/base/particle_attribute.h"
+#include "client/input/base/recorded_box.h"
 
 namespace partiemc::client::input {
 
@@ -29,6 +30,7 @@ struct ParticleRows {
   bool float32 = false;
   std::optional<double> time;
   std::optional<double> step;  ///< Number of the time step.
+  std::optional<RecordedBox> box;
   std::string source;
   std::size_t count = 0;
   std::size_t unselected = 0;  ///< Rows that do not fulfil the conditions.

@@ -19,7 +19,22 @@ using Vector3 = std::array<double, 3>;
 struct Box {
   Vector3 origin = {0, 0, 0};
   std::array<Vector3, 3> edges = {};
+  std::array<bool, 3> is_periodic = {};
+
+  bool IsTilted() const {
+    return edges[0][1] != 0 || edges[0][2] != 0 || edges[1][0] != 0 || edges[1][2] != 0 ||
+           edges[2][0] != 0 || edges[2][1] != 0;
+  }
 };
+
+RecordedBox AsRecorded(const Box& box) {
+  RecordedBox recorded{.is_periodic = box.is_periodic, .is_tilted = box.IsTilted()};
+  for (std::size_t k = 0; k < 3; ++k) {
+    recorded.low[k] = box.origin[k];
+    recorded.high[k] = box.origin[k] + box.edges[k][k];
+  }
+  return recorded;
+}
 
 // Makes a box from its lower and upper bounds and, for a triclinic box, the tilts xy, xz and yz.
 // For a triclinic box, LAMMPS writes the bounds of its bounding box, which is wider.
@@ -123,7 +138,11 @@ class LammpsDumpReader final : public FrameReader {
   absl::Status ReadItem(std::string_view item) {
     head_.begun = true;
     std::string value;
-    if (item.starts_with("BOX BOUNDS")) return ReadBox(Contains(item, "abc"));
+    if (item.starts_with("BOX BOUNDS")) {
+      // The item is a view of a line that ReadBox replaces.
+      const std::string flags(item.substr(std::string_view("BOX BOUNDS").size()));
+      return ReadBox(flags, Contains(flags, "abc"));
+    }
     if (item.starts_with("UNITS")) return ReadValue("UNITS", value);
     if (item.starts_with("TIMESTEP")) return ReadValue("TIMESTEP", head_.step);
     if (item.starts_with("TIME")) {
@@ -141,7 +160,8 @@ class LammpsDumpReader final : public FrameReader {
     return Error("unknown ITEM; only text dumps of the styles atom and custom are read");
   }
 
-  absl::Status ReadBox(bool as_edges) {
+  // `flags`: the rest of the line: "pp pp ff", "xy xz yz pp pp pp", or nothing.
+  absl::Status ReadBox(const std::string& flags, bool as_edges) {
     std::array<std::vector<double>, 3> lines;
     for (std::vector<double>& numbers : lines) {
       std::string_view line;
@@ -160,6 +180,14 @@ class LammpsDumpReader final : public FrameReader {
       }
     }
     head_.box = as_edges ? BoxOfEdges(lines) : BoxOfBounds(lines);
+    SplitAtBlanks(flags, cells_);
+    for (std::size_t k = 0, axis = 0; k < cells_.size() && axis < 3; ++k) {
+      // Other words name tilts. A boundary has two letters of p, f, s, m.
+      if (cells_[k].size() != 2 || cells_[k].find_first_not_of("pfsm") != std::string_view::npos) {
+        continue;
+      }
+      head_.box->is_periodic[axis++] = cells_[k] == "pp";
+    }
     return absl::OkStatus();
   }
 
@@ -196,6 +224,7 @@ class LammpsDumpReader final : public FrameReader {
       rows->Begin(*plan_);
       rows->time = head_.time;
       rows->step = ParseNumber(head_.step);
+      if (head_.box) rows->box = AsRecorded(*head_.box);
       rows->source = Concat(stream_->path(), ", ", FrameName());
     }
     std::string_view line;

@@ -32,7 +32,7 @@ class ImageSets {
 
   struct Found {
     std::uint32_t root;
-    Image image;  ///< Of the node, if the root is in image 0.
+    Image image;  ///< The image of the node if the root is in image 0.
   };
 
   /// Halves the path to the root. Cost: almost constant on average.

@@ -19,7 +19,7 @@ constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
 
 // Two cells with more pairs of particles than this are joined if their bounding boxes are within
 // the range.
-constexpr std::uint64_t kMostPairs = 1 << 14;
+constexpr std::uint64_t kMostPairs = 1 << 12;
 
 // Limit of grid coordinates on axes that are not periodic. Farther particles share the outermost
 // cells; their frame needs too many tiles anyway.
@@ -36,9 +36,9 @@ constexpr std::size_t kGrain = 1 << 12;
 // one cluster.
 struct Grid {
   std::array<bool, 3> counts{};         // The coordinate counts.
-  std::array<double, 3> origin{};       // Of the box; 0 without a period.
+  std::array<double, 3> origin{};       // Lower end of the box; 0 without a period.
   std::array<double, 3> length{};       // Period; 0: none.
-  std::array<double, 3> side{1, 1, 1};  // Of a cell.
+  std::array<double, 3> side{1, 1, 1};  // Length of a cell.
   std::array<std::int32_t, 3> cells{};  // Along a period.
   std::array<std::int32_t, 3> reach{};  // Cells within the range.
   double range_square = 0;
@@ -69,7 +69,7 @@ double ImageOf(const Grid& grid, std::size_t axis, double coordinate) {
                                : 0;
 }
 
-// Reads the coordinates of particles. Those that do not count are 0.
+// Reads the coordinates of particles. The other coordinates are 0.
 template <typename Real>
 std::array<double, 3> CoordinatesOf(const Grid& grid, std::span<const Real> positions,
                                     std::size_t components, std::size_t particle) {
@@ -131,7 +131,12 @@ Vec3 Upper(const Vec3& a, const Vec3& b) {
 }
 
 void ListCells(LiftScratch& s) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < s.entries.size(); ++k) {
+    count += k == 0 || s.entries[k].cell != s.entries[k - 1].cell ? 1 : 0;
+  }
   s.cells.clear();
+  s.cells.reserve(count);  // kBytesPerLiftedParticle has no margin for growth by doubling.
   for (std::uint32_t k = 0; k < s.entries.size(); ++k) {
     const Vec3& at = s.wrapped[k];
     if (s.cells.empty() || s.cells.back().at != s.entries[k].cell) {

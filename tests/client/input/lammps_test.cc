@@ -95,6 +95,43 @@ TEST(LammpsDump, ImageFlagsNeedABoxAndWholeNumbers) {
       absl::StatusCode::kDataLoss, {"without BOX BOUNDS"});
 }
 
+TEST(LammpsDump, BoxHasBoundsAndBoundaries) {
+  const std::string mixed = "ITEM: BOX BOUNDS pp ff ps\n0 10\n-5 15\n-0.5 0.5\n";
+  const ReadSequence read =
+      Read(Frame("0", "1", "x y\n1 2\n", mixed) + Frame("1", "1", "x y\n1 2\n") +
+           Frame("2", "1", "x y\n1 2\n", "ITEM: BOX BOUNDS\n0 10\n-5 15\n-0.5 0.5\n"));
+  ASSERT_EQ(read.frames.size(), 3u) << read.status;
+  ASSERT_TRUE(read.frames[0].box.has_value());
+  EXPECT_THAT(read.frames[0].box->low, ElementsAre(0, -5, 0));
+  EXPECT_THAT(read.frames[0].box->high, ElementsAre(10, 15, 0));
+  EXPECT_THAT(read.frames[0].box->is_periodic, ElementsAre(true, false, false));
+  EXPECT_THAT(read.frames[1].box->is_periodic, ElementsAre(true, true, false));
+  EXPECT_THAT(read.frames[2].box->is_periodic, ElementsAre(false, false, false));
+  EXPECT_FALSE(read.frames[0].box->is_tilted);
+}
+
+// The particles lie in the plane y = 2, so z becomes the second axis.
+TEST(LammpsDump, BoxHasTheAxesOfThePositions) {
+  const ReadSequence read = Read(Frame("0", "2", "x y z\n1 2 0.1\n3 2 0.2\n"));
+  ASSERT_EQ(read.frames.size(), 1u) << read.status;
+  EXPECT_THAT(read.frames[0].box->low, ElementsAre(0, -.5, 0));
+  EXPECT_THAT(read.frames[0].box->high, ElementsAre(10, .5, 0));
+}
+
+TEST(LammpsDump, PeriodicRequiresOneOrthogonalBox) {
+  const SequenceOptions one_box{.requires_one_box = true};
+  const std::string atoms = "x y\n1 2\n";
+  EXPECT_TRUE(Read(Frame("0", "1", atoms) + Frame("1", "1", atoms), one_box).status.ok());
+  const std::string wider = "ITEM: BOX BOUNDS pp pp pp\n0 10.5\n-5 15\n-0.5 0.5\n";
+  ExpectRefused(Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, wider), one_box).status,
+                absl::StatusCode::kFailedPrecondition, {"frame 1", "differs"});
+  const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
+  ExpectRefused(Read(Frame("0", "1", atoms, tilted), one_box).status,
+                absl::StatusCode::kFailedPrecondition, {"frame 0", "triclinic", "orthogonal"});
+  ExpectRefused(Read(Frame("0", "1", atoms, ""), one_box).status,
+                absl::StatusCode::kFailedPrecondition, {"no box", "--box"});
+}
+
 TEST(LammpsDump, ASelectionThatHoldsForNoParticleIsRefused) {
   const std::string dump =
       Frame("0", "1", "type x y\n1 1 2\n") + Frame("1", "2", "type x y\n1 1 2\n2 3 4\n");

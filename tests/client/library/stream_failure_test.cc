@@ -253,5 +253,23 @@ TEST(StreamFailure, ServerWithoutSurfacesIsRefused) {
   ExpectOneLine(stream.status());
 }
 
+TEST(StreamFailure, ServerWithoutPeriodicBoxesIsRefused) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    v1::ReconstructRequest request;
+    rpc.Read(&request);
+    v1::ReconstructResponse response;
+    *response.mutable_opened()->mutable_parameters() = request.open().parameters();
+    response.mutable_opened()->mutable_parameters()->clear_box();
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  ReconstructionParameters parameters{.spacing = 1};
+  parameters.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+  const auto stream = Stream::Open(server.address(), {.parameters = parameters});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("periodic boxes"));
+  ExpectOneLine(stream.status());
+}
+
 }  // namespace
 }  // namespace partiemc::client

@@ -1,0 +1,108 @@
+// `partiemc replay --periodic` as a program, with boxes of LAMMPS dumps.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A disc of radius 6 that moves through the corner of a box of 30 x 20, wrapped by image flags.
+void WriteDump(const std::string& path,
+               const std::string& bounds = "pp pp pp\n-10 20\n5 25\n-1 1\n") {
+  std::ofstream file(path);
+  for (int frame = 0; frame < 3; ++frame) {
+    std::string atoms;
+    int count = 0;
+    for (int i = -6; i <= 6; ++i) {
+      for (int j = -6; j <= 6; ++j) {
+        if (i * i + j * j > 36) continue;
+        const int x = 18 + i + 2 * frame, y = 24 + j + 2 * frame;
+        const int image_x = x >= 20 ? 1 : 0, image_y = y >= 25 ? 1 : 0;
+        atoms += std::to_string(++count) + " " + std::to_string(x - 30 * image_x) + " " +
+                 std::to_string(y - 20 * image_y) + " " + std::to_string(image_x) + " " +
+                 std::to_string(image_y) + "\n";
+      }
+    }
+    file << "ITEM: TIMESTEP\n"
+         << frame << "\nITEM: NUMBER OF ATOMS\n"
+         << count << "\nITEM: BOX BOUNDS " << bounds << "ITEM: ATOMS id x y ix iy\n"
+         << atoms;
+  }
+}
+
+struct Columns {
+  std::vector<std::string> rings, area, digest;
+};
+
+Columns Replayed(const std::string& dump, std::vector<std::string> more) {
+  const support::TemporaryFolder output;
+  more.insert(more.begin(), {"replay", dump, "--spacing", "1", "--stats", output.Path("s.csv")});
+  const Ran ran = RunPartiemc(more);
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  const std::string stats = Content(output.Path("s.csv"));
+  return {Column(stats, "polylines"), Column(stats, "area"), Column(stats, "rings_digest")};
+}
+
+TEST(PeriodicReplay, DiscAcrossCornerIsOneBody) {
+  const support::TemporaryFolder input;
+  const std::string dump = input.Path("disc.lammpstrj");
+  WriteDump(dump);
+  // By the names of the columns, positions stay wrapped: the faces cut the disc.
+  const std::vector<std::string> wrapped = {"--local", "--columns", "x,y"};
+  EXPECT_THAT(Replayed(dump, wrapped).rings, ElementsAre("4", "4", "4"));
+  std::vector<std::string> periodic = wrapped;
+  periodic.insert(periodic.end(), {"--periodic", "x,y", "--check"});
+  const Columns whole = Replayed(dump, periodic);
+  EXPECT_THAT(whole.rings, ElementsAre("1", "1", "1"));
+  const Columns open = Replayed(dump, {"--local"});  // Unwrapped by its image flags.
+  ASSERT_EQ(open.area.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(std::stod(whole.area.at(k)), std::stod(open.area[k]),
+                1e-6 * std::stod(open.area[k]));
+  }
+  // --box replaces the box of the dump; the unwrapped particles are wrapped again.
+  const Columns same =
+      Replayed(dump, {"--local", "--periodic", "x,y", "--box", "-10,20,5,25", "--fill", "greedy"});
+  EXPECT_EQ(same.rings, whole.rings);
+  // A server gives the same bits.
+  ServerProgram server;
+  EXPECT_EQ(Replayed(dump, {"--server", server.address(), "--columns", "x,y", "--periodic", "x,y"})
+                .digest,
+            whole.digest);
+}
+
+TEST(PeriodicReplay, WrongBoxesAreRefused) {
+  const support::TemporaryFolder input;
+  const auto refusal = [&](const std::string& bounds, const std::vector<std::string>& flags,
+                           int exit_code) {
+    const std::string dump = input.Path("disc.lammpstrj");
+    WriteDump(dump, bounds);
+    std::vector<std::string> all = {"replay", dump, "--local", "--spacing", "1"};
+    all.insert(all.end(), flags.begin(), flags.end());
+    const Ran ran = RunPartiemc(all);
+    EXPECT_EQ(ran.exit_code, exit_code) << ran.error;
+    return ran.error;
+  };
+  const std::string plain = "pp pp pp\n-10 20\n5 25\n-1 1\n";
+  EXPECT_THAT(refusal("pp ff pp\n-10 20\n5 25\n-1 1\n", {"--periodic", "x,y"}, 2),
+              HasSubstr("y is none"));
+  EXPECT_THAT(refusal("xy xz yz pp pp pp\n-10 20 1\n5 25 0\n-1 1 0\n", {"--periodic", "x"}, 3),
+              HasSubstr("triclinic"));
+  EXPECT_THAT(refusal(plain, {"--periodic", "z"}, 2), HasSubstr("--surface"));
+  EXPECT_THAT(refusal(plain, {"--periodic", "x", "--box", "0,9"}, 2), HasSubstr("X0,X1,Y0,Y1"));
+  EXPECT_THAT(refusal(plain, {"--periodic", "x", "--box", "0,9,0,9"}, 2),
+              HasSubstr("four kernel radii"));
+  EXPECT_THAT(refusal(plain, {"--box", "0,30,0,30"}, 2), HasSubstr("--periodic"));
+}
+
+}  // namespace
+}  // namespace partiemc::client
