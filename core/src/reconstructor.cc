@@ -90,16 +90,13 @@ class FrameMemory final : public MemoryGuard {
   void Done() { done_ += last_; }
 
   // Returns RESOURCE_EXHAUSTED if the guard refuses the memory to lift particles.
-  absl::Status ReserveLift(std::size_t particles) {
-    if (Reserve(kBytesPerLiftedParticle * particles)) {
-      Done();
-      return absl::OkStatus();
-    }
-    return ViolationError(absl::StatusCode::kResourceExhausted,
-                          {std::string(kReasonOutOfMemory), "positions",
-                           absl::StrCat(particles, " particles in a periodic box"),
-                           absl::StrCat("must fit into the memory budget, but need ",
-                                        (last_ >> 20) + 1, " MiB: try again later")});
+  absl::Status ReserveLift(std::uint64_t bytes) {
+    if (Reserve(bytes)) return absl::OkStatus();
+    return ViolationError(
+        absl::StatusCode::kResourceExhausted,
+        {std::string(kReasonOutOfMemory), "positions", "particles in a periodic box",
+         absl::StrCat("must fit into the memory budget, but need ", (bytes >> 20) + 1,
+                      " MiB: try again later")});
   }
 
  private:
@@ -251,15 +248,17 @@ absl::Status LiftOutline(const ReconstructionParameters& parameters, const Frame
   status = CheckStep(given, parameters.plane, spacing, lifted.doubts);
   if (!status.ok() && !lifted.lengths->is_provisional) return status;
   status = Validate(*parameters.box, parameters.kernel_radius, spacing);
-  if (status.ok()) status = memory.ReserveLift(given.ParticleCount());
   if (!status.ok()) return status;
   const Axes axes = AxesOf(given, parameters.plane);
   const std::array<int, 2> in_plane{axes.first, axes.second};
-  return Lift({.frame = given,
-               .box = *parameters.box,
-               .axes = in_plane,
-               .range = 2 * parameters.kernel_radius * spacing},
-              b.lift, frame);
+  status = Lift({.frame = given,
+                 .box = *parameters.box,
+                 .axes = in_plane,
+                 .range = 2 * parameters.kernel_radius * spacing,
+                 .reserve = [&](std::uint64_t bytes) { return memory.ReserveLift(bytes); }},
+                b.lift, frame);
+  memory.Done();
+  return status;
 }
 
 // Runs the stages from normals to mesh. Errors: INTERNAL if RepairRings or BuildMesh fails, which

@@ -335,8 +335,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
-                          .is_simplified = parameters_.simplify > 0,
-                          .is_lifted = parameters_.box.has_value()};
+                          .is_simplified = parameters_.simplify > 0};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
@@ -347,14 +346,16 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (!checked.ok() || frame.ParticleCount() == 0) return checked;
     if (parameters_.box) {
       constexpr std::array kAxes = {0, 1, 2};
-      checked = Reserve(size, control.memory);
-      if (checked.ok()) {
-        checked = Lift({.frame = given,
-                        .box = *parameters_.box,
-                        .axes = kAxes,
-                        .range = 2 * parameters_.kernel_radius * h},
-                       b.lift, frame);
-      }
+      checked = Lift({.frame = given,
+                      .box = *parameters_.box,
+                      .axes = kAxes,
+                      .range = 2 * parameters_.kernel_radius * h,
+                      .reserve =
+                          [&](std::uint64_t bytes) {
+                            size.lift_bytes = bytes;
+                            return Reserve(size, control.memory);
+                          }},
+                     b.lift, frame);
       if (!checked.ok()) return checked;
     }
     scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, h));

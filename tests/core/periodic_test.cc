@@ -178,8 +178,13 @@ TEST(Periodic, OrderOfParticlesChangesNoLiftedPosition) {
       const Frame frame = given.AsFrame();
       LiftScratch scratch;
       Frame lifted;
-      EXPECT_TRUE(
-          Lift({.frame = frame, .box = box, .axes = kAxes, .range = 6}, scratch, lifted).ok());
+      const absl::Status status = Lift({.frame = frame,
+                                        .box = box,
+                                        .axes = kAxes,
+                                        .range = 6,
+                                        .reserve = [](std::uint64_t) { return absl::OkStatus(); }},
+                                       scratch, lifted);
+      EXPECT_TRUE(status.ok()) << status;
       std::vector<std::array<double, 4>> rows;  // Given and lifted positions.
       for (std::size_t k = 0; k < given.size(); ++k) {
         rows.push_back(

@@ -130,13 +130,17 @@ Vec3 Upper(const Vec3& a, const Vec3& b) {
   return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
 }
 
-void ListCells(LiftScratch& s) {
+std::size_t CountCells(const LiftScratch& s) {
   std::size_t count = 0;
   for (std::size_t k = 0; k < s.entries.size(); ++k) {
     count += k == 0 || s.entries[k].cell != s.entries[k - 1].cell ? 1 : 0;
   }
+  return count;
+}
+
+void ListCells(std::size_t count, LiftScratch& s) {
   s.cells.clear();
-  s.cells.reserve(count);  // kBytesPerLiftedParticle has no margin for growth by doubling.
+  s.cells.reserve(count);
   for (std::uint32_t k = 0; k < s.entries.size(); ++k) {
     const Vec3& at = s.wrapped[k];
     if (s.cells.empty() || s.cells.back().at != s.entries[k].cell) {
@@ -329,10 +333,15 @@ absl::Status Lift(const LiftInput& input, LiftScratch& s, Frame& lifted) {
   absl::Status checked =
       std::visit([&](auto positions) { return CheckDistances(grid, positions, components); },
                  input.frame.positions);
+  const std::uint64_t bytes = kBytesPerLiftedParticle * input.frame.ParticleCount();
+  if (checked.ok()) checked = input.reserve(bytes);
   if (!checked.ok()) return checked;
   std::visit([&](auto positions) { SortByCell(grid, positions, components, s); },
              input.frame.positions);
-  ListCells(s);
+  const std::size_t cells = CountCells(s);
+  checked = input.reserve(bytes + kBytesPerLiftCell * cells);
+  if (!checked.ok()) return checked;
+  ListCells(cells, s);
   IndexCells(s);
   const std::array<bool, 3> winds = JoinCells(grid, s);
   if (winds != std::array<bool, 3>{}) return Percolates(winds);

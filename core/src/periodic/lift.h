@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "base/vec3.h"
 #include "partiemc/frame.h"
@@ -38,8 +39,9 @@ struct LiftScratch {
   std::vector<double> positions;     // The result.
 };
 
-/// Bytes of a LiftScratch per particle, at most. A cell has at least one particle.
-inline constexpr std::uint64_t kBytesPerLiftedParticle = 300;
+/// Bytes of a LiftScratch, at most.
+inline constexpr std::uint64_t kBytesPerLiftedParticle = 72;
+inline constexpr std::uint64_t kBytesPerLiftCell = 192;
 
 struct LiftInput {
   const Frame& frame;
@@ -48,6 +50,9 @@ struct LiftInput {
   std::span<const int> axes;
   /// Particles at most this far apart are in one cluster. World units.
   double range;
+  /// Called twice with the bytes that the scratch requires, before they are allocated: a lower
+  /// bound by particles, then the sum. Its error ends Lift.
+  absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
 };
 
 /// Moves each particle by whole lengths of the box, so that clusters are contiguous and the centre
@@ -60,9 +65,9 @@ struct LiftInput {
 /// Requires: CheckFrame has passed the frame; Validate has passed the box for `range` = two kernel
 /// radii.
 /// Errors: INVALID_ARGUMENT: OUT_OF_RANGE if a periodic axis is not one of `axes`, or a particle is
-/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image.
-/// The result depends neither on the order of the particles nor on the number of threads.
-/// Cost: n log n in particles.
+/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image; those of
+/// `reserve`. The result depends neither on the order of the particles nor on the number of
+/// threads. Cost: n log n in particles.
 absl::Status Lift(const LiftInput& input, LiftScratch& scratch, Frame& lifted);
 
 }  // namespace partiemc

@@ -3,8 +3,6 @@
 
 #include <cstdint>
 
-#include "periodic/lift.h"
-
 namespace partiemc::space {
 
 /// The counts that determine the memory of a surface.
@@ -18,8 +16,8 @@ struct SurfaceSize {
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
   bool has_state = false;              ///< Of a stream.
   bool is_simplified = false;
-  bool is_lifted = false;     ///< Has a periodic box.
-  std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
+  std::uint64_t lift_bytes = 0;  ///< Of a periodic box (periodic/lift.h).
+  std::uint64_t samples = 0;     ///< Particles that a state may store; 0 without ids.
 };
 
 /// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
@@ -55,7 +53,7 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerBrick * size.bricks + kBytesPerEdge * size.edges +
                         per_loop * size.loops;
-  if (size.is_lifted) bytes += kBytesPerLiftedParticle * size.particles;
+  bytes += size.lift_bytes;
   const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
   const std::uint64_t points = size.edges + size.loops + drop_points;
   bytes += kBytesPerValue * size.attribute_values * points;
