@@ -197,8 +197,8 @@ struct ReconstructionParameters {
 
   SurfaceOptions surface = {};
 
-  /// If present, a body that crosses a face of the box is one body (core/METHOD.md, "Periodic
-  /// boxes"). Particles may lie in the box or beside it. Results are unwrapped: each body is whole,
+  /// If present, a body that crosses a face of the box is one body (core/PERIODIC.md).
+  /// Particles may lie in the box or beside it. Results are unwrapped: each body is whole,
   /// and the centre of its bounding box lies in the box. A frame with a body that reaches its own
   /// image is refused with the reason PERCOLATES. A length must be at least four kernel radii and
   /// at most kMostSpacings spacings. For outlines, the axes are those of the plane of the
