@@ -306,7 +306,10 @@ void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
                           std::span<const BodyStep> steps, Certificate& certificate) {
   const std::size_t vertices = certificate.setbacks.size();
   const auto save_or_return = [&](BodyStep step, std::uint8_t& setbacks, std::uint8_t& saved) {
-    if (step == BodyStep::kIsSaved) saved = setbacks;
+    if (step == BodyStep::kIsSaved) {
+      saved = setbacks;
+      setbacks = 0;
+    }
     if (step == BodyStep::kReturns) setbacks = saved;
   };
   ParallelFor(static_cast<std::uint32_t>(vertices), [&](std::uint32_t v) {

@@ -60,9 +60,9 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
 
-/// Certifies again after vertices have moved from their certified positions. The setbacks of
-/// vertices and nodes count on. Cost: linear in vertices and bricks, and in the faces of cells in
-/// which something has moved.
+/// Certifies again after vertices have moved from their certified positions. The setbacks that
+/// vertices and nodes have count on. Cost: linear in vertices and bricks, and in the faces of cells
+/// in which something has moved.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
@@ -74,9 +74,10 @@ enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
 void FindBodyOfNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                      std::span<const std::uint32_t> body_of_vertex, Certificate& certificate);
 
-/// Stores the setbacks of the bodies that are saved, and takes back those of the bodies that
-/// return, all of whose vertices then count as moved. Positions that were certified with these
-/// setbacks are certified again. Requires: FindBodyOfNodes.
+/// Stores the setbacks of the bodies that are saved, which then have none, so that the next
+/// certification has all its means. Takes back those of the bodies that return, all of whose
+/// vertices then count as moved: positions that were certified with these setbacks are certified
+/// again. Requires: FindBodyOfNodes.
 void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
                           std::span<const BodyStep> steps, Certificate& certificate);
 
