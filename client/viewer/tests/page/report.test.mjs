@@ -136,7 +136,7 @@ test('without WebGL the picture is SVG', async () => {
   const bare = await launch(['--no-sandbox', '--disable-gpu', '--disable-3d-apis', '--disable-software-rasterizer']);
   try {
     await inReport('discs.html', { browser: bare, width: 390 }, async (report) => {
-      assert.ok(await report.page.locator('.picture svg path').count() > 20);
+      await until('paths are shown', async () => await report.page.locator('.picture svg path').count() > 20);
       assert.deepEqual(await violations(report.page), []);
       assert.equal(await report.page.evaluate(() => document.documentElement.scrollWidth), 390);
     });
