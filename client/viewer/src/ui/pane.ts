@@ -92,6 +92,8 @@ export class Pane {
               private readonly pictureOfSpace: ((events: SpaceEvents) => SpacePicture) | null = null) {
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
+    // Without WebGL, the scene puts its picture after the canvas, which must have a parent.
+    const picture = make('div', { class: 'picture' }, this.canvas);
     this.scene = new Scene(this.canvas);
     this.followed = new FollowedView(this.scene, () => events.moved(this, false));
     this.detach = attachNavigation(this.canvas, this.scene, () => {
@@ -103,10 +105,9 @@ export class Pane {
       changed: () => { this.dirty = true; },
       selected: (point) => this.events.selected?.(this, point),
     });
+    picture.append(this.overlay.element, this.scaleBar.element, this.pointer.readout, this.notice.element);
     this.element = make('section', { class: 'pane' },
-      make('header', {}, this.badge, this.name, this.subtitle, this.closeButton),
-      make('div', { class: 'picture' }, this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout, this.notice.element),
-      this.numbers.element);
+      make('header', {}, this.badge, this.name, this.subtitle, this.closeButton), picture, this.numbers.element);
     this.element.addEventListener('pointerdown', () => events.chosen(this));
     this.element.addEventListener('focusin', () => events.chosen(this));
     this.observer = new ResizeObserver(() => this.resize());
