@@ -1,4 +1,4 @@
-// Computes levels of detail for watchers, on a thread of its own with low priority. Independent of
+// Computes levels of detail for watchers, on a separate thread with low priority. Independent of
 // messages.
 #pragma once
 

@@ -201,7 +201,7 @@ struct ReconstructionParameters {
   /// Particles may lie in the box or beside it. Results are unwrapped: each body is whole,
   /// and the centre of its bounding box lies in the box. A frame with a body that reaches its own
   /// image is refused with the reason PERCOLATES. A length must be at least four kernel radii and
-  /// at most kMostSpacings spacings. For outlines, the axes are those of the plane of the
+  /// at most kMostSpacings spacings. For outlines, the box may have the axes of the plane of the
   /// particles. Excludes slices.
   std::optional<PeriodicBox> box = std::nullopt;
 

@@ -65,8 +65,8 @@ struct LiftInput {
 /// Requires: CheckFrame has passed the frame; Validate has passed the box for `range` = two kernel
 /// radii.
 /// Errors: INVALID_ARGUMENT: OUT_OF_RANGE if a periodic axis is not one of `axes`, or a particle is
-/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image; those of
-/// `reserve`. The result depends neither on the order of the particles nor on the number of
+/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image; errors
+/// of `reserve`. The result depends neither on the order of the particles nor on the number of
 /// threads. Cost: n log n in particles.
 absl::Status Lift(const LiftInput& input, LiftScratch& scratch, Frame& lifted);
 

@@ -167,7 +167,7 @@ TEST(SurfaceReplay, IsTheSameThroughAServer) {
   ASSERT_EQ(watch.Wait(), 0) << watch.Error();
   EXPECT_THAT(watch.Out(), AllOf(HasSubstr("triangles"), HasSubstr("--surface --simplify 0.05")));
 
-  // Attributes are not recorded, but the outlines and surfaces are those of the stream.
+  // Attributes are not recorded, but the recording gives the outlines and surfaces of the stream.
   const Ran again = RunPartiemc(with({"replay", output.Path("balls.pemc"), "--local"},
                                      {"--surface", "--simplify", "0.05", "--slice", "0,0,0,0,0,1",
                                       "--stats", output.Path("again.csv")}));
