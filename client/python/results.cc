@@ -168,6 +168,11 @@ void DefineRings(py::module_& module) {
           [](R r) { return Column<std::uint64_t>(r, &RingMeasures::particle_count); },
           "(R,) uint64: particles of the ring's component, 0 for holes.")
       .def_property_readonly(
+          "cuts", [](R r) { return View<std::uint32_t>(r.part.cuts, 1, r.owner); },
+          "(C,) uint32, ascending: points whose segment to the next point of the ring lies on a "
+          "face "
+          "of the periodic box, where a body was cut. `perimeter` does not count these segments.")
+      .def_property_readonly(
           "identities", [](R r) { return Column<std::uint64_t>(r, &RingMeasures::identity); },
           "(R,) uint64: constant from frame to frame; 0: not tracked.")
       .def_property_readonly(

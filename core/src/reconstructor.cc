@@ -1,7 +1,6 @@
 #include "partiemc/reconstructor.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,7 +11,6 @@
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
 #include "bins/cell_mask.h"
-#include "bins/resolution.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
 #include "frame/frame_view.h"
@@ -21,6 +19,7 @@
 #include "frame_lengths.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
+#include "periodic_outline.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 
@@ -148,12 +147,6 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   return size;
 }
 
-// What is known about a lifted frame before its outlines.
-struct Lifted {
-  std::optional<Lengths> lengths;
-  Doubts doubts;
-};
-
 // The input of one outline of a frame.
 struct OutlineTask {
   const ReconstructionParameters& parameters;
@@ -162,8 +155,8 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;         // The first outline checks the frame.
-  const Lifted* lifted;  // Null without a periodic box; else the frame has been lifted.
+  bool is_first;                  // The first outline checks the frame.
+  const PeriodicFrame* periodic;  // Null without a periodic box; else the frame has been lifted.
 };
 
 // Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
@@ -176,9 +169,10 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   const Frame& frame = task.frame;
   seen = frame;
   statistics.particles = frame.ParticleCount();
-  if (task.lifted != nullptr) {
-    lengths = task.lifted->lengths;
-    statistics.doubts = task.lifted->doubts;
+  if (task.periodic != nullptr) {
+    lengths = task.periodic->lengths;
+    statistics.doubts = task.periodic->doubts;
+    statistics.particles = task.periodic->lifted.particles;
   } else {
     auto decided = DecideLengths(parameters, frame, task.previous, b.spacing);
     if (!decided.ok()) return decided.status();
@@ -219,48 +213,6 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   });
 }
 
-// The periods of the lattice; without a box, none.
-LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
-                         double cell_size) {
-  LatticePeriods periods;
-  if (!parameters.box) return periods;
-  const Axes axes = AxesOf(frame, parameters.plane);
-  const std::array<int, 2> in_plane{axes.first, axes.second};
-  for (std::size_t k = 0; k < in_plane.size(); ++k) {
-    const auto& axis = parameters.box->axes[static_cast<std::size_t>(in_plane[k])];
-    if (axis) periods.cells[k] = axis->length / cell_size;
-  }
-  return periods;
-}
-
-// Checks a frame in a periodic box, decides its lengths and lifts its particles
-// (periodic/lift.h). Errors: see Reconstruct.
-absl::Status LiftOutline(const ReconstructionParameters& parameters, const FrameLimits& limits,
-                         const Frame& given, const State& state, FrameMemory& memory,
-                         Workspace::Buffers& b, Frame& frame, Lifted& lifted) {
-  absl::Status status = CheckFrame(given, parameters, limits, b.distinct_ids);
-  if (!status.ok()) return status;
-  const auto decided = DecideLengths(parameters, given, state, b.spacing);
-  if (!decided.ok()) return decided.status();
-  lifted.lengths = *decided;
-  if (!lifted.lengths) return absl::OkStatus();
-  const double spacing = lifted.lengths->spacing;
-  status = CheckStep(given, parameters.plane, spacing, lifted.doubts);
-  if (!status.ok() && !lifted.lengths->is_provisional) return status;
-  status = Validate(*parameters.box, parameters.kernel_radius, spacing);
-  if (!status.ok()) return status;
-  const Axes axes = AxesOf(given, parameters.plane);
-  const std::array<int, 2> in_plane{axes.first, axes.second};
-  status = Lift({.frame = given,
-                 .box = *parameters.box,
-                 .axes = in_plane,
-                 .range = 2 * parameters.kernel_radius * spacing,
-                 .reserve = [&](std::uint64_t bytes) { return memory.ReserveLift(bytes); }},
-                b.lift, frame);
-  memory.Done();
-  return status;
-}
-
 // Runs the stages from normals to mesh. Errors: INTERNAL if RepairRings or BuildMesh fails, which
 // is a bug; their comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
@@ -273,24 +225,48 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
                     traits.takes_particles);
     // In a periodic box, a body may have changed its image since the last frame.
-    const auto known = task.lifted == nullptr ? std::span<const CellNormal>(previous.normals)
-                                              : std::span<const CellNormal>();
+    const auto known = task.periodic == nullptr ? std::span<const CellNormal>(previous.normals)
+                                                : std::span<const CellNormal>();
     EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
                     b.normal_scratch, b.planes, b.next_normals);
   });
+  const bool percolates = task.periodic != nullptr && task.periodic->HasCopies();
+  Percolation percolation;
+  if (percolates) {
+    const PeriodicFrame& periodic = *task.periodic;
+    ChooseBodies({.lifted = periodic.lifted,
+                  .window = periodic.window,
+                  .reach = periodic.reach,
+                  .cell_size = scale.cell_size,
+                  .bins = b.bins,
+                  .crossings = b.crossings},
+                 b.choice, b.topology);
+    percolation = {periodic.window, static_cast<std::uint32_t>(periodic.lifted.particles),
+                   b.choice.fates};
+    result.statistics.cut_bodies = b.choice.cut_bodies;
+  }
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
     return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
-                          parameters, task.variant, scale},
+                          parameters, task.variant, scale, percolates ? &percolation : nullptr},
                          b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
   result.statistics.self_intersections = b.placed.self_intersections;
+  if (percolates) RemoveGoneRings(percolation, b.topology, b.placed, result.rings);
   InStage(observer, Stage::kIdentities, [&] {
-    ContinueRings({frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed,
-                   scale.cell_size, PeriodsOf(parameters, frame, scale.cell_size)},
-                  previous.history, b.identity_scratch, b.next_history, result.rings);
+    ContinueRings(
+        {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size,
+         PeriodsOf(parameters, frame, scale.cell_size), percolates ? &percolation : nullptr},
+        previous.history, b.identity_scratch, b.next_history, result.rings);
   });
+  if (percolates) {
+    const double spacing = scale.spacing * scale.cell_size;
+    if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings)) {
+      return absl::InternalError("rings cannot be cut at the faces of the box");
+    }
+    ClearOutside(percolation, b.bins.tiles, b.topology.components, scale.cell_size, b.crossings);
+  }
   b.attribute_scratch.sorted.clear();
   const auto at_points = [&](std::span<const double> points) -> std::span<const AttributeValues> {
     InterpolateAttributes(frame, b.bins, scale, points, b.attribute_scratch, b.node_attributes);
@@ -489,20 +465,29 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   b.next_states.resize(std::max(b.next_states.size(), 1 + sections_.size()));
   FrameMemory memory(control.memory);
   const State unseen;
-  Frame frame = given;
-  Lifted lifted;
+  PeriodicFrame periodic;
   if (is_lifted) {
     status = InStage(control.observer, Stage::kBins, [&] {
-      return LiftOutline(parameters_, limits_, given, state, memory, b, frame, lifted);
+      absl::Status checked = CheckFrame(given, parameters_, limits_, b.distinct_ids);
+      if (!checked.ok()) return checked;
+      const auto lengths = DecideLengths(parameters_, given, state, b.spacing);
+      if (!lengths.ok()) return lengths.status();
+      periodic.lengths = *lengths;
+      checked = LiftOutline(
+          parameters_, given, [&](std::uint64_t bytes) { return memory.ReserveLift(bytes); },
+          b.lift, periodic);
+      memory.Done();
+      return checked;
     });
     if (!status.ok()) return status;
   }
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {
     const bool is_first = outline == (is_surface ? 1 : 0) && !is_lifted;
+    const Frame& frame = is_lifted ? periodic.lifted.frame : given;
     absl::Status outlined =
         ReconstructOutline({parameters, VariantFor(parameters, *variant_), limits_, frame, previous,
-                            control.observer, is_first, is_lifted ? &lifted : nullptr},
+                            control.observer, is_first, is_lifted ? &periodic : nullptr},
                            memory, b, b.next_states[outline], into);
     memory.Done();
     return outlined;

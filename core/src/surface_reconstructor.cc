@@ -331,7 +331,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   const double h = parameters_.spacing, cell_size = parameters_.cell_size * h;
   const SurfacePlacement placement = parameters_.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
-  Frame frame = given;
+  LiftedFrame lifted{.frame = given};
+  const Frame& frame = lifted.frame;
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
@@ -350,12 +351,13 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                       .box = *parameters_.box,
                       .axes = kAxes,
                       .range = 2 * parameters_.kernel_radius * h,
+                      .margin = 0,
                       .reserve =
                           [&](std::uint64_t bytes) {
                             size.lift_bytes = bytes;
                             return Reserve(size, control.memory);
                           }},
-                     b.lift, frame);
+                     b.lift, lifted);
       if (!checked.ok()) return checked;
     }
     scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, h));

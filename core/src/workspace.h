@@ -8,6 +8,7 @@
 #include "attributes/attributes.h"
 #include "bins/bins.h"
 #include "crossings/crossings.h"
+#include "cut/ring_cut.h"
 #include "field/field.h"
 #include "frame/distinct_ids.h"
 #include "frame/slab.h"
@@ -19,6 +20,7 @@
 #include "partiemc/state.h"
 #include "partiemc/surface_reconstructor.h"
 #include "periodic/lift.h"
+#include "rings/body_choice.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
@@ -35,6 +37,8 @@ struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
   LiftScratch lift;  // Empty without a periodic box.
+  BodyChoice choice;
+  RingCutScratch ring_cut;  // Empty unless bodies percolate.
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;

@@ -41,6 +41,7 @@ absl::Status EncodeRings(const Result& result, bool with_normals, v1::Reconstruc
   v1::Rings& rings = *message.mutable_rings();
   AssignBytes(std::span<const std::uint32_t>(result.rings.offsets), *rings.mutable_offsets());
   AssignBytes(std::span<const std::uint32_t>(result.rings.outer_of), *rings.mutable_outer_of());
+  AssignBytes(std::span<const std::uint32_t>(result.rings.cuts), *rings.mutable_cuts());
   EncodeMeasures(result.rings, rings);
   if (with_normals) {
     AssignBytes(std::span<const float>(result.rings.normals), *rings.mutable_normals());
@@ -69,6 +70,7 @@ void EncodeStatistics(const FrameStatistics& statistics, v1::FrameStatistics& me
   message.set_dropped_holes(statistics.dropped_holes);
   message.set_dropped_components(statistics.dropped_components);
   message.set_dropped_spray(statistics.dropped_spray);
+  message.set_cut_bodies(statistics.cut_bodies);
   message.set_triangles(statistics.triangles);
   message.set_triangles_grid(statistics.triangles_grid);
   message.set_self_intersections(statistics.self_intersections);
@@ -123,6 +125,14 @@ absl::Status CheckNesting(std::span<const std::uint32_t> outer_of) {
   return absl::OkStatus();
 }
 
+absl::Status CheckCuts(std::span<const std::uint32_t> cuts, std::size_t points) {
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    if (cuts[k] < points && (k == 0 || cuts[k - 1] < cuts[k])) continue;
+    return Lost("rings.cuts", absl::StrCat("must be ascending numbers of the ", points, " points"));
+  }
+  return absl::OkStatus();
+}
+
 // Checks the number of elements of every array against the numbers of rings and points.
 absl::Status CheckRingCounts(const v1::Rings& message, std::size_t points) {
   if (message.offsets().size() % sizeof(std::uint32_t) != 0) {
@@ -147,6 +157,9 @@ absl::Status CheckRingCounts(const v1::Rings& message, std::size_t points) {
     return Lost("rings.normals",
                 absl::StrCat("must have two floats for each of the ", points, " points"));
   }
+  if (message.cuts().size() % sizeof(std::uint32_t) != 0) {
+    return Lost("rings.cuts", "is no array of uint32");
+  }
   return absl::OkStatus();
 }
 
@@ -163,6 +176,8 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
   CopyBytes(from.outer_of(), rings.outer_of);
   if (auto status = CheckNesting(rings.outer_of); !status.ok()) return status;
   CopyBytes(from.normals(), rings.normals);
+  CopyBytes(from.cuts(), rings.cuts);
+  if (auto status = CheckCuts(rings.cuts, rings.PointCount()); !status.ok()) return status;
 
   const auto identities = ViewBytes<std::uint64_t>(from.identities());
   rings.measures.resize(rings.RingCount());
@@ -217,6 +232,7 @@ void DecodeStatistics(const v1::FrameStatistics& message, FrameStatistics& stati
                 .dropped_holes = message.dropped_holes(),
                 .dropped_components = message.dropped_components(),
                 .dropped_spray = message.dropped_spray(),
+                .cut_bodies = message.cut_bodies(),
                 .triangles = message.triangles(),
                 .triangles_grid = message.triangles_grid(),
                 .self_intersections = message.self_intersections(),

@@ -177,11 +177,12 @@ TEST(Periodic, OrderOfParticlesChangesNoLiftedPosition) {
       constexpr std::array kAxes = {0, 1};
       const Frame frame = given.AsFrame();
       LiftScratch scratch;
-      Frame lifted;
+      LiftedFrame lifted;
       const absl::Status status = Lift({.frame = frame,
                                         .box = box,
                                         .axes = kAxes,
                                         .range = 6,
+                                        .margin = 0,
                                         .reserve = [](std::uint64_t) { return absl::OkStatus(); }},
                                        scratch, lifted);
       EXPECT_TRUE(status.ok()) << status;
@@ -312,30 +313,41 @@ TEST(Periodic, MergeAndSplitAcrossFaceHaveTheirParents) {
   }
 }
 
-TEST(Periodic, BodyThatReachesItsOwnImageIsRefused) {
+// Rings of this placement may cross, so they cannot be cut at the faces.
+ReconstructionParameters Uncut(const PeriodicBox& box) {
+  ReconstructionParameters parameters = In(box);
+  parameters.placement = Placement::kFarthestParticle;
+  return parameters;
+}
+
+TEST(Periodic, BodyThatReachesItsOwnImageIsRefusedIfItCannotBeCut) {
   const PeriodicBox box = BoxOf(40, 60);
-  const auto layer = RefusalOf(In(box), support::Lattice(40, 8, 0, 20));
+  const auto layer = RefusalOf(Uncut(box), support::Lattice(40, 8, 0, 20));
   ASSERT_TRUE(layer.has_value());
   EXPECT_EQ(layer->reason, kReasonPercolates);
   EXPECT_EQ(layer->field, "positions");
   EXPECT_EQ(layer->value, "a body percolates along x");
-  const auto column = RefusalOf(In(box), support::Lattice(8, 60, 20, 0));
+  const auto column = RefusalOf(Uncut(box), support::Lattice(8, 60, 20, 0));
   EXPECT_EQ(column->value, "a body percolates along y");
-  const auto filled = RefusalOf(In(box), support::Lattice(40, 60));
+  const auto filled = RefusalOf(Uncut(box), support::Lattice(40, 60));
   EXPECT_EQ(filled->value, "a body percolates along x and y");
   // A diagonal band winds around both axes at once.
   Particles band;
   for (int k = 0; k < 120; ++k) band.Add(k / 3., k / 2.);
-  EXPECT_EQ(RefusalOf(In(box), Wrapped(band, box))->value, "a body percolates along x and y");
+  EXPECT_EQ(RefusalOf(Uncut(box), Wrapped(band, box))->value, "a body percolates along x and y");
 }
 
 TEST(Periodic, RangeIsTwoKernelRadii) {
   const PeriodicBox box = BoxOf(40, 40);
   // The gap to the own image is 40 - 33 = 7, then 6.
-  RingStream stream(In(box));
+  RingStream stream(Uncut(box));
   stream.Next(support::Lattice(34, 3, 5, 20));
   EXPECT_EQ(stream.rings().RingCount(), 1u);
-  EXPECT_EQ(RefusalOf(In(box), support::Lattice(35, 3, 5, 20))->reason, kReasonPercolates);
+  EXPECT_EQ(RefusalOf(Uncut(box), support::Lattice(35, 3, 5, 20))->reason, kReasonPercolates);
+  // The bar does not touch its image, so it is whole if it may be cut.
+  const Result bar = ReconstructOnce(In(box), support::Lattice(35, 3, 5, 20));
+  EXPECT_EQ(bar.rings.RingCount(), 1u);
+  EXPECT_EQ(bar.statistics.cut_bodies, 0u);
 }
 
 // A bar that is longer than the box does not wind around it if it is not closed.
@@ -356,7 +368,9 @@ TEST(Periodic, RefusedFrameChangesNothing) {
   RingStream stream(In(box));
   stream.Next(support::Disc(6, 0, 0));
   const State before = stream.state();
-  EXPECT_FALSE(stream.Try(support::Lattice(40, 8, 0, 20)).ok());
+  Particles far = support::Disc(6, 0, 0);
+  far.Add(20, 4.1e7);
+  EXPECT_FALSE(stream.Try(far).ok());
   EXPECT_EQ(stream.state(), before);
   const std::uint64_t identity = before.history.rings[0].identity;
   EXPECT_EQ(stream.Next(support::Disc(6, 39, 39)).measures[0].identity, identity);

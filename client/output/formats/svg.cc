@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/output/color_map.h"
 #include "client/output/formats/formats.h"
+#include "client/output/formats/stretches.h"
 #include "client/output/html.h"
 #include "client/output/text.h"
 
@@ -97,6 +98,19 @@ std::string RingPath(const Rings& rings, const Picture& picture) {
     }
     path += 'Z';
   }
+  return path;
+}
+
+/// Returns the path of the rings without their cuts.
+std::string OutlinePath(const Rings& rings, const Picture& picture) {
+  std::string path;
+  ForEachStretch(rings, [&](std::size_t, std::span<const std::uint32_t> points, bool is_closed) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      path += k == 0 ? 'M' : 'L';
+      picture.AppendPoint(path, &rings.points[2 * std::size_t{points[k]}]);
+    }
+    if (is_closed) path += 'Z';
+  });
   return path;
 }
 
@@ -257,8 +271,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   AppendAll(out, "\">\n<title>Frame ", frame.index, ", time ");
   AppendNumber(out, frame.time);
   AppendAll(out, "</title>\n", kStyle, "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n");
-  const std::string rings = RingPath(frame.result.rings, picture);
-  AppendAll(out, R"(<path class="inside" d=")", rings, "\"/>\n");
+  AppendAll(out, R"(<path class="inside" d=")", RingPath(frame.result.rings, picture), "\"/>\n");
   const Mesh& mesh = frame.result.mesh;
   const std::vector<double> values =
       attribute != nullptr ? MagnitudesOf(*attribute) : std::vector<double>();
@@ -276,14 +289,15 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
     AppendNumber(out, std::round(dot * kSteps) / kSteps);
     AppendAll(out, R"(" d=")", DotPath(frame.particles, picture), "\"/>\n");
   }
-  AppendAll(out, R"(<path class="outline" d=")", rings, "\"/>\n");
+  AppendAll(out, R"(<path class="outline" d=")", OutlinePath(frame.result.rings, picture),
+            "\"/>\n");
   if (attribute != nullptr && !inside) {
     AppendBands(out, "lines", RingsByBand(frame.result.rings, values, range, picture));
   }
   for (const std::size_t k : frame.sections_in_plane) {
     if (k >= frame.result.sections.size()) continue;
     AppendAll(out, R"(<path class="isoline" d=")",
-              RingPath(frame.result.sections[k].rings, picture), "\"/>\n");
+              OutlinePath(frame.result.sections[k].rings, picture), "\"/>\n");
   }
   if (attribute != nullptr) AppendLegend(out, attribute->name, range, picture.height());
   out += "</svg>\n";

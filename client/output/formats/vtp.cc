@@ -15,6 +15,7 @@
 
 #include "client/output/formats/file_mesh.h"
 #include "client/output/formats/formats.h"
+#include "client/output/formats/stretches.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {
@@ -71,7 +72,7 @@ void AddPolygons(const FileMesh& mesh, vtkPolyData* data) {
   data->SetPolys(polygons);
 }
 
-// Adds the rings as lines, and the cell data of an outline.
+// Adds the rings as lines, without cuts, and the cell data of an outline.
 void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) {
   // VTK numbers the lines of polygonal data before its polygons, so the values for rings come
   // first.
@@ -82,14 +83,13 @@ void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) 
   vtkNew<vtkCellArray> lines;
   const Rings& rings = mesh.rings();
   const vtkIdType first = mesh.first_of_rings();
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-    const std::uint32_t begin = rings.offsets[ring], end = rings.offsets[ring + 1];
-    lines->InsertNextCell(static_cast<int>(end - begin) + 1);
-    for (std::uint32_t k = begin; k < end; ++k) lines->InsertCellPoint(first + k);
-    lines->InsertCellPoint(first + begin);
+  ForEachStretch(rings, [&](std::size_t ring, std::span<const std::uint32_t> points, bool closed) {
+    lines->InsertNextCell(static_cast<int>(points.size()) + (closed ? 1 : 0));
+    for (const std::uint32_t point : points) lines->InsertCellPoint(first + point);
+    if (closed) lines->InsertCellPoint(first + points[0]);
     classes->InsertNextValue(rings.outer_of[ring] == kNoRing ? kOuterRingClass : kHoleClass);
     ring_of->InsertNextValue(static_cast<int>(ring));
-  }
+  });
   for (std::size_t k = 0; k < triangles.TriangleCount(); ++k) {
     classes->InsertNextValue(static_cast<unsigned char>(triangles.classes[k]));
     ring_of->InsertNextValue(-1);

@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kNoRing = 0xffffffff;
 
 struct RingMeasures {
   double area = 0;       ///< World units squared; positive for outer rings, negative for holes.
-  double perimeter = 0;  ///< World units.
+  double perimeter = 0;  ///< World units, without segments in Rings::cuts.
   double centroid_x = 0, centroid_y = 0;  ///< Centroid of the enclosed area, world units.
   std::uint64_t particle_count = 0;       ///< Particles of the component; 0 for holes.
   /// The ring that continues this ring in the next frame has the same identity. Distinct within a
@@ -45,6 +45,9 @@ struct Rings {
   /// merge has several. After a split, several rings have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< Like `offsets`; {0} without identities.
+  /// Points, ascending, whose segment to the next point of the ring lies on a face of the periodic
+  /// box, where a body was cut (ReconstructionParameters::box).
+  std::vector<std::uint32_t> cuts;
 
   std::size_t RingCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 2; }
@@ -90,6 +93,9 @@ struct FrameStatistics {
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Components below the minimum size in the parameters.
+  /// Bodies that were cut at faces of the periodic box, because they percolate or because they are
+  /// long and near a body that does (core/PERIODIC.md).
+  std::uint64_t cut_bodies = 0;
   std::uint64_t triangles = 0;           ///< Triangles of the mesh or of the surface.
   std::uint64_t triangles_grid = 0;      ///< Triangles of a mesh by Fill::kGrid of the same rings.
   std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.

@@ -10,6 +10,7 @@ void Rings::Clear() {
   normals.clear();
   parents.clear();
   parent_offsets.assign(1, 0);
+  cuts.clear();
 }
 
 void Mesh::Clear() {

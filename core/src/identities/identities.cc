@@ -1,6 +1,7 @@
 #include "identities/identities.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -19,10 +20,40 @@ std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   return s.number[ring];
 }
 
+// The nodes of a window.
+struct NodeWindow {
+  std::array<std::int64_t, 2> first{}, last{};
+
+  // Shortens a run to the window. Returns false if nothing is left.
+  bool Clip(NodeRun& run) const {
+    if (run.row < first[1] || run.row > last[1]) return false;
+    if (run.last < first[0] || run.first > last[0]) return false;
+    run.first = static_cast<std::int32_t>(std::max<std::int64_t>(run.first, first[0]));
+    run.last = static_cast<std::int32_t>(std::min<std::int64_t>(run.last, last[0]));
+    return true;
+  }
+};
+
+NodeWindow NodesOf(const Window& window, double cell_size) {
+  constexpr std::int64_t kFar = std::int64_t{1} << 40;
+  NodeWindow nodes{{-kFar, -kFar}, {kFar, kFar}};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (!window.axes[k]) continue;
+    const auto [origin, length] = *window.axes[k];
+    nodes.first[k] = static_cast<std::int64_t>(std::ceil(origin / cell_size));
+    nodes.last[k] = static_cast<std::int64_t>(std::ceil((origin + length) / cell_size)) - 1;
+  }
+  return nodes;
+}
+
 // Collects the runs of this frame and numbers the rings. Each run lies between two crossed edges of
-// a row. Every ring has a run: it encloses a node, so it crosses the row of that node.
+// a row. Every ring has a run: it encloses a node, so it crosses the row of that node. Of a body
+// that will be cut, only the nodes in the window count; its rings without such nodes get no number.
 void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;
+  const NodeWindow window = input.percolation != nullptr
+                                ? NodesOf(input.percolation->window, input.cell_size)
+                                : NodeWindow{};
   runs.clear();
   s.number.assign(topology.RingCount(), kNoRing);
   s.topology_ring.clear();
@@ -40,7 +71,13 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
       if (topology.outer_of[ring] == kNoRing) return;
     }
     if (input.placed.kept_as[ring] == kNoRing) return;
-    runs.push_back({edge.row, from.column + 1, edge.column, NumberOf(ring, s)});
+    NodeRun run{edge.row, from.column + 1, edge.column, 0};
+    if (input.percolation != nullptr && input.percolation->IsCut(topology, ring)) {
+      if (!window.Clip(run)) return;
+      if (topology.outer_of[ring] != kNoRing) NumberOf(topology.outer_of[ring], s);
+    }
+    run.ring = NumberOf(ring, s);
+    runs.push_back(run);
   });
 }
 
@@ -79,7 +116,7 @@ void WriteResult(const RingHistory& previous, std::span<const std::uint32_t> kep
   for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {
     if (kept_as[ring] == kNoRing) continue;
     const std::uint32_t number = s.number[ring];
-    rings.measures[kept_as[ring]].identity = s.rings[number].identity;
+    if (number != kNoRing) rings.measures[kept_as[ring]].identity = s.rings[number].identity;
     auto relation = std::ranges::lower_bound(s.relations, number, {}, &Relation::now);
     for (; relation != s.relations.end() && relation->now == number; ++relation) {
       rings.parents.push_back(previous.rings[relation->before].identity);
@@ -123,7 +160,8 @@ void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                                  .crossings = input.crossings,
                                  .components = input.topology.components,
                                  .ring_of_component = scratch.ring_of_component,
-                                 .particle_count = scratch.particle_count}},
+                                 .particle_count = scratch.particle_count,
+                                 .percolation = input.percolation}},
                   previous, scratch.rings, scratch.tracks);
   RelateRings(previous,
               {.runs = next.runs,

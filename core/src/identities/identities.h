@@ -14,6 +14,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/state.h"
+#include "rings/percolation.h"
 #include "rings/rings.h"
 #include "vertices/vertices.h"
 
@@ -47,6 +48,7 @@ struct IdentityInput {
   const PlacedVertices& placed;
   double cell_size;
   LatticePeriods periods = {};
+  const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
 };
 
 /// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the

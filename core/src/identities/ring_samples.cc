@@ -98,7 +98,7 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
       const float y = scratch.positions[2 * std::size_t{particle} + 1];
       const std::uint32_t component =
           input.components.ComponentOf(input.bins.tiles, input.crossings, tile, x, y);
-      if (component == kNoComponent) continue;
+      if (component == kNoComponent || !input.Counts(particle, component)) continue;
       const std::uint32_t ring = input.ring_of_component[component];
       if (ring == kNoRing) continue;
       visit(SampleAt(input.bins.tiles[tile], x, y, input.ids[particle], ring));
@@ -128,6 +128,7 @@ void FillShortRings(const SampleInput& input, RingSamples& s) {
           const std::uint32_t ring = input.ring_of_component[component];
           if (ring == kNoRing || s.ring_limit[ring] == 0) return;
           const BinnedParticle& at = input.bins.particles[particle];
+          if (!input.Counts(at.source, component)) return;
           TakeSample(SampleAt(input.bins.tiles[tile], at.x, at.y, input.ids[at.source], ring), s);
         });
   }

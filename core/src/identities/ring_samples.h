@@ -10,6 +10,7 @@
 #include "identities/run_overlaps.h"
 #include "partiemc/state.h"
 #include "rings/components.h"
+#include "rings/percolation.h"
 
 namespace partiemc {
 
@@ -43,6 +44,13 @@ struct SampleInput {
   const Components& components;
   std::span<const std::uint32_t> ring_of_component;  ///< By component: its outer ring, or kNoRing.
   std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
+  const Percolation* percolation = nullptr;          ///< Null unless bodies will be cut.
+
+  /// Whether a particle counts: copies of particles of bodies that will be cut do not. `source`:
+  /// its index in the frame.
+  bool Counts(std::uint32_t source, std::uint32_t component) const {
+    return percolation == nullptr || percolation->Counts(source, component);
+  }
 };
 
 /// Selects the samples of each outer ring, and finds the samples of the last frame.

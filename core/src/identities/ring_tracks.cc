@@ -16,9 +16,9 @@ void FollowParticles(const TrackInput& input, const RingHistory& previous,
   const VelocityUnits units(frame);
   const auto add = [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
     const std::uint32_t ring = in.ring_of_component[component];
-    if (ring == kNoRing) return;
-    const PlaneVelocity velocity =
-        VelocityOf(frame, input.plane, in.bins.particles[particle].source);
+    const std::uint32_t source = in.bins.particles[particle].source;
+    if (ring == kNoRing || !in.Counts(source, component)) return;
+    const PlaneVelocity velocity = VelocityOf(frame, input.plane, source);
     t.sum_x[ring] += units.Of(velocity.x);
     t.sum_y[ring] += units.Of(velocity.y);
   };

@@ -207,8 +207,13 @@ void PutNodesInPlace(Work& w) {
 void AddRingLoops(Work& w) {
   const std::vector<std::uint32_t>& offsets =
       w.MovesVertices() ? w.input.topology.offsets : w.input.rings.offsets;
+  const std::vector<std::uint32_t>& groups = w.input.placed.group_of_ring;
   for (std::uint32_t ring = 0; ring + 1 < offsets.size(); ++ring) {
     w.scratch.loops.AddPoints(offsets[ring], offsets[ring + 1]);
+    if (!groups.empty()) {
+      w.scratch.loops.EndLoop(groups[ring]);
+      continue;
+    }
     const std::uint32_t outer = w.input.topology.outer_of[ring];
     w.scratch.loops.EndLoop(outer == kNoRing ? ring : outer);
   }
@@ -313,7 +318,7 @@ void MoveVertices(Work& w) {
 std::uint64_t ExpectedBandTriangles(const Work& w) {
   const Staircases& staircases = w.scratch.staircases;
   std::int64_t rings = 0;
-  for (const std::uint32_t outer : w.input.topology.outer_of) rings += outer == kNoRing ? 1 : -1;
+  for (const std::uint32_t outer : w.input.rings.outer_of) rings += outer == kNoRing ? 1 : -1;
   const std::size_t points = w.input.rings.PointCount() + staircases.corners.size();
   return static_cast<std::uint64_t>(
       static_cast<std::int64_t>(points) -

@@ -32,6 +32,8 @@ constexpr double kMostLengths = 1e6;
 constexpr std::uint32_t kNoCell = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kGrain = 1 << 12;
 
+std::uint8_t AxisBit(std::size_t axis) { return static_cast<std::uint8_t>(1u << axis); }
+
 // The grid of cells. The diagonal of a cell is at most the range, so the particles of a cell are in
 // one cluster.
 struct Grid {
@@ -204,10 +206,9 @@ bool AreNear(const Grid& grid, const LiftScratch& s, const LiftCell& a, const Li
   return false;
 }
 
-// Joins the cells that are within the range of each other. Returns in which axes a cluster reaches
-// its own image.
+// Joins the cells that are within the range of each other, and marks the clusters that percolate.
+// Returns the axes along which any cluster percolates.
 std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
-  std::array<bool, 3> winds{};
   s.sets.Reset(s.cells.size());
   const auto visit = [&](std::uint32_t a, const std::array<std::int32_t, 3>& step) {
     std::array<std::int32_t, 3> at{};
@@ -228,7 +229,10 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
       s.sets.Join(from, to, image);
       return;
     }
-    for (std::size_t k = 0; k < 3; ++k) winds[k] = winds[k] || beyond[k] != image[k];
+    // The cluster reaches its own image.
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (beyond[k] != image[k]) s.cells[a].percolates |= AxisBit(k);
+    }
   };
   const auto [most_x, most_y, most_z] = grid.reach;
   for (std::uint32_t cell = 0; cell < s.cells.size(); ++cell) {
@@ -242,11 +246,17 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
       }
     }
   }
-  return winds;
+  std::uint8_t all = 0;
+  for (std::uint32_t cell = 0; cell < s.cells.size(); ++cell) {
+    const std::uint8_t axes = s.cells[cell].percolates;
+    s.cells[s.sets.Find(cell).root].percolates |= axes;
+    all |= axes;
+  }
+  return {(all & AxisBit(0)) != 0, (all & AxisBit(1)) != 0, (all & AxisBit(2)) != 0};
 }
 
 // Finds the bounding box of each cluster, and the image of each cell that moves the centre of this
-// box into the periodic box.
+// box into the periodic box. Along axes along which the cluster percolates, cells stay in the box.
 void ChooseImages(const Grid& grid, LiftScratch& s) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   s.low.assign(s.cells.size(), {kFar, kFar, kFar});
@@ -264,6 +274,9 @@ void ChooseImages(const Grid& grid, LiftScratch& s) {
                           static_cast<std::int64_t>(ImageOf(grid, 1, centre.y)),
                           static_cast<std::int64_t>(ImageOf(grid, 2, centre.z))};
     s.cells[k].image = image - of_centre;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((s.cells[root].percolates & AxisBit(axis)) != 0) s.cells[k].image[axis] = 0;
+    }
   }
 }
 
@@ -311,45 +324,142 @@ absl::Status CheckAxes(const LiftInput& input) {
   return absl::OkStatus();
 }
 
-absl::Status Percolates(const std::array<bool, 3>& winds) {
-  std::string axes;
+absl::Status Percolates(const std::array<bool, 3>& axes) {
+  std::string names;
   for (std::size_t k = 0; k < 3; ++k) {
-    if (winds[k]) absl::StrAppend(&axes, axes.empty() ? "" : " and ", kAxisNames[k]);
+    if (axes[k]) absl::StrAppend(&names, names.empty() ? "" : " and ", kAxisNames[k]);
   }
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonPercolates), "positions", absl::StrCat("a body percolates along ", axes),
+      {std::string(kReasonPercolates), "positions", absl::StrCat("a body percolates along ", names),
        "must end more than two kernel radii before its own image; leave out this periodic axis to "
        "have the body end at the box"});
 }
 
+// Calls visit(particle, lengths) for each copy: the index of its particle, and by how many lengths
+// along each axis the copy lies beyond it.
+template <typename Visit>
+void ForEachCopy(const Grid& grid, LiftScratch& s, std::size_t components, double margin,
+                 const Visit& visit) {
+  for (std::uint32_t k = 0; k < s.cells.size(); ++k) {
+    const std::uint8_t axes = s.cells[s.sets.Find(k).root].percolates;
+    if (axes == 0) continue;
+    for (std::uint32_t i = s.cells[k].first; i < s.cells[k].last; ++i) {
+      const std::uint32_t particle = s.entries[i].particle;
+      Image least{}, most{};
+      for (std::size_t axis = 0; axis < components; ++axis) {
+        if ((axes & AxisBit(axis)) == 0) continue;
+        const double above = s.positions[particle * components + axis] - grid.origin[axis];
+        most[axis] = above <= margin ? 1 : 0;
+        least[axis] = grid.length[axis] - above <= margin ? -1 : 0;
+      }
+      for (std::int64_t x = least[0]; x <= most[0]; ++x) {
+        for (std::int64_t y = least[1]; y <= most[1]; ++y) {
+          for (std::int64_t z = least[2]; z <= most[2]; ++z) {
+            if (x != 0 || y != 0 || z != 0) visit(particle, Image{x, y, z});
+          }
+        }
+      }
+    }
+  }
+}
+
+// Appends to `values` those of the copies. `given`: `components` per particle.
+template <typename Value>
+std::span<const Value> WithCopies(std::span<const Value> given, std::size_t components,
+                                  std::span<const std::uint32_t> originals,
+                                  std::vector<Value>& values) {
+  if (given.empty()) return given;
+  values.reserve(given.size() + components * originals.size());
+  values.assign(given.begin(), given.end());
+  for (const std::uint32_t particle : originals) {
+    const auto first = given.begin() + static_cast<std::ptrdiff_t>(particle * components);
+    values.insert(values.end(), first, first + static_cast<std::ptrdiff_t>(components));
+  }
+  return values;
+}
+
+// Bytes of a particle with everything that a copy repeats.
+std::uint64_t BytesOfCopy(const Frame& frame) {
+  std::uint64_t bytes = sizeof(std::uint32_t) + sizeof(float) + sizeof(std::uint64_t) +
+                        frame.components * (sizeof(double) + sizeof(float));
+  for (const Attribute& attribute : frame.attributes) bytes += 4 * attribute.components;
+  return bytes;
+}
+
+// Appends copies of the particles of percolating clusters. `bytes`: what has been reserved.
+absl::Status AddCopies(const LiftInput& input, const Grid& grid, std::uint64_t bytes,
+                       LiftScratch& s, LiftedFrame& lifted) {
+  const Frame& given = input.frame;
+  const auto components = static_cast<std::size_t>(given.components);
+  std::uint64_t copies = 0;
+  ForEachCopy(grid, s, components, input.margin, [&](std::uint32_t, const Image&) { ++copies; });
+  const std::uint64_t all = given.ParticleCount() + copies;
+  if (all > FrameLimits::kMostParticles) {
+    return InvalidFrame(kReasonTooManyParticles, "positions", absl::StrCat(all),
+                        absl::StrCat("must be at most ", FrameLimits::kMostParticles,
+                                     " with the copies beyond the faces of the box"));
+  }
+  // All arrays are copied, so the given particles count, too.
+  if (absl::Status status = input.reserve(bytes + all * BytesOfCopy(given)); !status.ok()) {
+    return status;
+  }
+  s.originals.clear();
+  s.originals.reserve(copies);
+  s.positions.reserve(components * all);
+  ForEachCopy(grid, s, components, input.margin, [&](std::uint32_t particle, const Image& lengths) {
+    for (std::size_t axis = 0; axis < components; ++axis) {
+      s.positions.push_back(s.positions[particle * components + axis] +
+                            static_cast<double>(lengths[axis]) * grid.length[axis]);
+    }
+    s.originals.push_back(particle);
+  });
+  lifted.originals = s.originals;
+  Frame& frame = lifted.frame;
+  frame.volumes = WithCopies(given.volumes, 1, s.originals, s.volumes);
+  frame.ids = WithCopies(given.ids, 1, s.originals, s.ids);
+  frame.velocities = WithCopies(given.velocities, components, s.originals, s.velocities);
+  s.attributes.assign(given.attributes.begin(), given.attributes.end());
+  s.values.resize(std::max(s.values.size(), s.attributes.size()));
+  for (std::size_t k = 0; k < s.attributes.size(); ++k) {
+    Attribute& attribute = s.attributes[k];
+    attribute.values = WithCopies(attribute.values, static_cast<std::size_t>(attribute.components),
+                                  s.originals, s.values[k]);
+  }
+  frame.attributes = s.attributes;
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::Status Lift(const LiftInput& input, LiftScratch& s, Frame& lifted) {
-  lifted = input.frame;
+absl::Status Lift(const LiftInput& input, LiftScratch& s, LiftedFrame& lifted) {
+  lifted = {.frame = input.frame, .particles = input.frame.ParticleCount()};
   if (absl::Status status = CheckAxes(input); !status.ok()) return status;
   const Grid grid = MakeGrid(input);
   const auto components = static_cast<std::size_t>(input.frame.components);
   absl::Status checked =
       std::visit([&](auto positions) { return CheckDistances(grid, positions, components); },
                  input.frame.positions);
-  const std::uint64_t bytes = kBytesPerLiftedParticle * input.frame.ParticleCount();
+  std::uint64_t bytes = kBytesPerLiftedParticle * input.frame.ParticleCount();
   if (checked.ok()) checked = input.reserve(bytes);
   if (!checked.ok()) return checked;
   std::visit([&](auto positions) { SortByCell(grid, positions, components, s); },
              input.frame.positions);
   const std::size_t cells = CountCells(s);
-  checked = input.reserve(bytes + kBytesPerLiftCell * cells);
+  bytes += kBytesPerLiftCell * cells;
+  checked = input.reserve(bytes);
   if (!checked.ok()) return checked;
   ListCells(cells, s);
   IndexCells(s);
-  const std::array<bool, 3> winds = JoinCells(grid, s);
-  if (winds != std::array<bool, 3>{}) return Percolates(winds);
+  lifted.percolates = JoinCells(grid, s);
+  const bool has_copies = lifted.percolates != std::array<bool, 3>{};
+  if (has_copies && input.margin == 0) return Percolates(lifted.percolates);
   ChooseImages(grid, s);
   std::visit([&](auto positions) { WritePositions(grid, positions, components, s); },
              input.frame.positions);
-  lifted.positions = std::span<const double>(s.positions);
-  return absl::OkStatus();
+  if (has_copies) checked = AddCopies(input, grid, bytes, s, lifted);
+  lifted.frame.positions = std::span<const double>(s.positions);
+  return checked;
 }
 
 }  // namespace partiemc

@@ -1,4 +1,5 @@
 // Lifts the particles of a periodic box to open space, so that no body is cut by a face of the box.
+// Bodies that reach their own image cannot be lifted. Their particles get copies beyond the faces.
 #pragma once
 
 #include <array>
@@ -22,6 +23,8 @@ struct LiftCell {
   std::uint32_t first = 0, last = 0;  ///< Its particles, [first, last) in the order of the cells.
   Vec3 low, high;                     ///< Bounding box of its particles, wrapped into the box.
   Image image{};                      ///< Image into which its particles are lifted.
+  /// Of the first cell of a cluster: the axes along which the cluster percolates, a bit each.
+  std::uint8_t percolates = 0;
 };
 
 /// Warm buffers of Lift.
@@ -36,7 +39,13 @@ struct LiftScratch {
   std::vector<std::uint32_t> slots;  // Hash table of the cells.
   ImageSets sets;                    // Of cells.
   std::vector<Vec3> low, high;       // By root: bounding box of the lifted cluster.
-  std::vector<double> positions;     // The result.
+  // The result: the particles of the frame, then the copies.
+  std::vector<double> positions;
+  std::vector<std::uint32_t> originals;  // By copy: the particle.
+  std::vector<float> volumes, velocities;
+  std::vector<std::uint64_t> ids;
+  std::vector<std::vector<float>> values;  // By attribute.
+  std::vector<Attribute> attributes;
 };
 
 /// Bytes of a LiftScratch, at most.
@@ -50,9 +59,20 @@ struct LiftInput {
   std::span<const int> axes;
   /// Particles at most this far apart are in one cluster. World units.
   double range;
+  /// Copies of percolating clusters reach this far beyond the faces, at most one length. World
+  /// units. 0: such clusters are refused.
+  double margin;
   /// Called twice with the bytes that the scratch requires, before they are allocated: a lower
   /// bound by particles, then the sum. Its error ends Lift.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
+};
+
+/// A frame in open space.
+struct LiftedFrame {
+  Frame frame;                ///< The given particles in their order, then the copies.
+  std::size_t particles = 0;  ///< Number of given particles.
+  std::span<const std::uint32_t> originals;  ///< By copy: the index of the given particle.
+  std::array<bool, 3> percolates{};          ///< Axes along which a cluster percolates.
 };
 
 /// Moves each particle by whole lengths of the box, so that clusters are contiguous and the centre
@@ -60,14 +80,19 @@ struct LiftInput {
 /// by distances of at most `range` in the periodic box. Sets `lifted` to the frame with the new
 /// positions, a view of `scratch`. A particle that does not move keeps the bits of its position.
 ///
+/// A cluster percolates along an axis if it reaches its own image along this axis. Along such axes,
+/// its particles are wrapped into the box, and those within `margin` of a face get copies beyond
+/// the opposite face. A copy has the id, volume, velocity and attributes of its particle.
+///
 /// Two cells of the grid with very many particles may be joined although their particles are up to
 /// two ranges apart, so that the cost is bounded (kMostPairs in lift.cc).
 /// Requires: CheckFrame has passed the frame; Validate has passed the box for `range` = two kernel
 /// radii.
 /// Errors: INVALID_ARGUMENT: OUT_OF_RANGE if a periodic axis is not one of `axes`, or a particle is
-/// more than 1e6 lengths away from the box; PERCOLATES if a cluster reaches its own image; errors
-/// of `reserve`. The result depends neither on the order of the particles nor on the number of
+/// more than 1e6 lengths away from the box; PERCOLATES if a cluster percolates and `margin` is 0;
+/// TOO_MANY_PARTICLES if there are more than FrameLimits::kMostParticles with the copies; errors of
+/// `reserve`. The result depends neither on the order of the particles nor on the number of
 /// threads. Cost: n log n in particles.
-absl::Status Lift(const LiftInput& input, LiftScratch& scratch, Frame& lifted);
+absl::Status Lift(const LiftInput& input, LiftScratch& scratch, LiftedFrame& lifted);
 
 }  // namespace partiemc

@@ -1,7 +1,10 @@
 #include "vertices/measure.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "base/parallel.h"
 #include "base/point.h"
@@ -30,6 +33,50 @@ RingMeasures MeasureRing(std::span<const double> points) {
   const bool flat = twice_area == 0;
   measures.centroid_x = x0 + (flat ? 0 : moment_x / (3 * twice_area));
   measures.centroid_y = y0 + (flat ? 0 : moment_y / (3 * twice_area));
+  return measures;
+}
+
+WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, 2> low{-kInfinity, -kInfinity}, high{kInfinity, kInfinity};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (!window.axes[k]) continue;
+    low[k] = window.axes[k]->origin;
+    high[k] = low[k] + window.axes[k]->length;
+  }
+  // The area is the integral of y dx over the ring after each point has moved to the nearest point
+  // of the window. Points beyond a side move along it. A segment consists of pieces that are each
+  // on one side of all sides' lines.
+  WindowMeasures measures;
+  const std::size_t count = points.size() / 2;
+  const double base = std::clamp(points[1], low[1], high[1]);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Point a = PointAt(points, k), b = PointAt(points, k + 1 < count ? k + 1 : 0);
+    const double dx = b.x - a.x, dy = b.y - a.y;
+    std::array<double, 6> at{0, 1, 1, 1, 1, 1};
+    std::size_t pieces = 1;
+    const auto split = [&](double from, double step, double line) {
+      const double t = (line - from) / step;
+      if (t > 0 && t < 1) at[pieces++] = t;
+    };
+    for (const double line : {low[0], high[0]}) split(a.x, dx, line);
+    for (const double line : {low[1], high[1]}) split(a.y, dy, line);
+    std::sort(at.begin() + 1, at.begin() + pieces);
+    at[pieces] = 1;
+    const auto clamped = [&](double t) {
+      return Point{std::clamp(a.x + t * dx, low[0], high[0]),
+                   std::clamp(a.y + t * dy, low[1], high[1])};
+    };
+    for (std::size_t piece = 0; piece < pieces; ++piece) {
+      const Point from = clamped(at[piece]), to = clamped(at[piece + 1]);
+      measures.area -= (to.x - from.x) * ((from.y + to.y) / 2 - base);
+      const double middle = (at[piece] + at[piece + 1]) / 2;
+      const double x = a.x + middle * dx, y = a.y + middle * dy;
+      if (x <= low[0] || x >= high[0] || y <= low[1] || y >= high[1]) continue;
+      const double length = at[piece + 1] - at[piece];
+      measures.perimeter += length * std::sqrt(dx * dx + dy * dy);
+    }
+  }
   return measures;
 }
 

@@ -174,6 +174,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
   const RingTopology& topology = input.topology;
   const PlacementTraits& traits = TraitsOf(input.parameters.placement);
   const int per_segment = traits.on_edges + traits.in_cells;
+  placed.roots.clear();
   scratch.points.resize(2 * per_segment * topology.segments.size());
   ParallelFor(topology.segments.size(), [&](std::size_t k) {
     PlaceSegment(input, k, scratch.points.data() + 2 * per_segment * k);
@@ -203,6 +204,7 @@ bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
   const RingTopology& topology = input.topology;
   rings.Clear();
   placed.self_intersections = 0;
+  placed.group_of_ring.clear();
   placed.point_of_segment.resize(topology.segments.size());
   placed.kept_as.resize(topology.RingCount());
   if (TraitsOf(input.parameters.placement).refines) {

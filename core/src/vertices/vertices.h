@@ -9,6 +9,7 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
+#include "rings/percolation.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/periodic_ring.h"
@@ -30,6 +31,9 @@ struct PlacedVertices {
   /// `virtual-plane` only: the anchor of each point, to which the repair may move it; interleaved,
   /// in world units.
   std::vector<double> roots;
+  /// By ring of Rings: the outer ring of its component in the topology. Empty unless bodies were
+  /// cut (cut/ring_cut.h); rings are then those of the topology.
+  std::vector<std::uint32_t> group_of_ring;
   std::uint64_t self_intersections = 0;  ///< 0 for placements that guarantee simple rings.
 };
 
@@ -76,6 +80,7 @@ struct VertexInput {
   const ReconstructionParameters& parameters;
   const VirtualPlaneVariant& variant;
   const Scale& scale;
+  const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
 };
 
 /// Places the vertices of every ring and measures the rings.

@@ -23,6 +23,25 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
+// The part of a ring that counts.
+struct RingPart {
+  bool counts;
+  double area, perimeter;
+};
+
+// Of a body that will be cut, only the part in the window counts, because the ends of its copies
+// are no part of the body.
+RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) {
+  const RingMeasures& whole = rings.measures[ring];
+  if (input.percolation == nullptr || !input.percolation->IsCut(input.topology, ring)) {
+    const bool is_gone =
+        input.percolation != nullptr && input.percolation->IsGone(input.topology, ring);
+    return {!is_gone, whole.area, whole.perimeter};
+  }
+  const WindowMeasures part = MeasureInWindow(rings.RingPoints(ring), input.percolation->window);
+  return {true, part.area, part.perimeter};
+}
+
 // The target of the offset for this frame, in spacings; empty if no component is long enough.
 std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.variant.constants;
@@ -33,9 +52,11 @@ std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& 
     const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
     // Spray does not count: its area depends on how it broke off.
     if (rings.measures[outer].perimeter < constants.ShortestRing() * spacing) continue;
+    const auto [counts, ring_area, ring_perimeter] = PartOf(input, rings, ring);
+    if (!counts) continue;
     if (is_outer) volume += VolumeOf(input, ring);
-    area += rings.measures[ring].area;
-    perimeter += rings.measures[ring].perimeter;
+    area += ring_area;
+    perimeter += ring_perimeter;
   }
   if (perimeter <= 0) return std::nullopt;
   volume *= input.scale.cell_size * input.scale.cell_size;

@@ -1,0 +1,290 @@
+#include "cut/ring_cut.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "vertices/measure.h"
+
+namespace partiemc {
+namespace {
+
+// Sides move by at most this number of steps.
+constexpr int kMostShifts = 16;
+// A step, in spacings and in last bits of the coordinate.
+constexpr double kShiftSpacings = 1e-9, kShiftBits = 8;
+
+bool IsCut(const RingCutInput& input, const RingCutScratch& s, std::size_t ring) {
+  return input.percolation.IsCut(input.topology, s.topology_ring[ring]);
+}
+
+// Collects the rings to be cut.
+void CollectLoops(const RingCutInput& input, const Rings& rings, const PlacedVertices& placed,
+                  RingCutScratch& s) {
+  s.loops.Clear();
+  for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
+    if (!IsCut(input, s, ring)) continue;
+    const auto first = static_cast<std::uint32_t>(s.loops.points.size());
+    for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+      const Point at = PointAt(rings.points, k);
+      s.loops.points.push_back({.at = at,
+                                .root = placed.roots.empty() ? at : PointAt(placed.roots, k),
+                                .normal_x = rings.normals[2 * k],
+                                .normal_y = rings.normals[2 * k + 1]});
+    }
+    const std::uint32_t outer = rings.outer_of[ring];
+    s.loops.loops.push_back({.first = first,
+                             .last = static_cast<std::uint32_t>(s.loops.points.size()),
+                             .ring = ring,
+                             .outer = outer == kNoRing ? ring : outer});
+  }
+}
+
+// Cuts the loops at all sides of the window, moved by `steps`.
+bool CutAtSides(const RingCutInput& input, int steps, RingCutScratch& s) {
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto& ends = input.percolation.window.axes[static_cast<std::size_t>(axis)];
+    if (!ends) continue;
+    const double farthest = std::abs(ends->origin) + ends->length;
+    const double step = kShiftSpacings * input.spacing +
+                        kShiftBits * std::numeric_limits<double>::epsilon() * farthest;
+    for (const bool is_lower : {true, false}) {
+      const double side = ends->origin + (is_lower ? 0 : ends->length);
+      s.kept.Clear();
+      if (!CutAtLine({.axis = axis, .at = side + steps * step, .keeps_above = is_lower}, s.loops,
+                     s.line, s.kept)) {
+        return false;
+      }
+      std::swap(s.loops, s.kept);
+    }
+  }
+  return true;
+}
+
+// Writes the new rings: rings that are not cut, and in the place of each outer ring that is cut its
+// loops. Requires: the loops of a component follow each other.
+class Assembly {
+ public:
+  Assembly(const RingCutInput& input, const Rings& from, const PlacedVertices& placed,
+           RingCutScratch& s)
+      : input_(input), from_(from), placed_(placed), s_(s), to_(s.rings) {
+    to_.Clear();
+    s_.roots.clear();
+    s_.group.clear();
+    s_.hole_of.clear();
+  }
+
+  // Returns false if a loop is too thin to have a direction.
+  bool Run() {
+    std::ranges::stable_sort(s_.loops.loops, {}, &Loops::Loop::outer);
+    std::size_t loop = 0;
+    for (std::uint32_t ring = 0; ring < from_.RingCount(); ++ring) {
+      if (!IsCut(input_, s_, ring)) {
+        AddRing(ring);
+        continue;
+      }
+      const std::size_t first = loop;
+      while (loop < s_.loops.loops.size() && s_.loops.loops[loop].outer == ring) {
+        if (!AddLoop(s_.loops.loops[loop++])) return false;
+      }
+      if (loop > first) GiveToLargest(ring, loop - first);
+    }
+    return true;
+  }
+
+ private:
+  void EndRing(std::uint32_t group, bool is_hole) {
+    to_.offsets.push_back(static_cast<std::uint32_t>(to_.PointCount()));
+    s_.group.push_back(group);
+    s_.hole_of.push_back(is_hole ? 0 : kNoRing);
+  }
+
+  std::uint32_t GroupOf(std::uint32_t ring) const {
+    const std::uint32_t outer = from_.outer_of[ring];
+    return s_.topology_ring[outer == kNoRing ? ring : outer];
+  }
+
+  void AddParents(std::uint32_t ring) {
+    if (from_.parent_offsets.size() < 2) return;
+    if (ring != kNoRing) {
+      const auto parents = from_.ParentsOf(ring);
+      to_.parents.insert(to_.parents.end(), parents.begin(), parents.end());
+    }
+    to_.parent_offsets.push_back(static_cast<std::uint32_t>(to_.parents.size()));
+  }
+
+  void AddRing(std::uint32_t ring) {
+    const auto append = [&](const auto& source, auto& target) {
+      if (source.empty()) return;
+      target.insert(target.end(), source.begin() + 2 * from_.offsets[ring],
+                    source.begin() + 2 * from_.offsets[ring + 1]);
+    };
+    append(from_.points, to_.points);
+    append(from_.normals, to_.normals);
+    append(placed_.roots, s_.roots);
+    to_.measures.push_back(from_.measures[ring]);
+    AddParents(ring);
+    EndRing(GroupOf(ring), from_.outer_of[ring] != kNoRing);
+  }
+
+  bool AddLoop(const Loops::Loop& loop) {
+    const auto points = std::span(s_.loops.points).subspan(loop.first, loop.last - loop.first);
+    double cut = 0;
+    const auto first = static_cast<std::uint32_t>(to_.PointCount());
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const LoopPoint& point = points[k];
+      to_.points.insert(to_.points.end(), {point.at.x, point.at.y});
+      to_.normals.insert(to_.normals.end(), {point.normal_x, point.normal_y});
+      s_.roots.insert(s_.roots.end(), {point.root.x, point.root.y});
+      if (!point.is_cut) continue;
+      to_.cuts.push_back(first + static_cast<std::uint32_t>(k));
+      const Point& next = points[(k + 1) % points.size()].at;
+      cut += std::abs(next.x - point.at.x) + std::abs(next.y - point.at.y);
+    }
+    const bool is_hole = loop.ring != kNoSource && from_.outer_of[loop.ring] != kNoRing;
+    EndRing(GroupOf(loop.outer), is_hole);
+    RingMeasures measures = MeasureRing(to_.RingPoints(to_.offsets.size() - 2));
+    if ((measures.area > 0) == is_hole || measures.area == 0) return false;
+    measures.perimeter = std::max(0.0, measures.perimeter - cut);
+    if (is_hole) measures.identity = from_.measures[loop.ring].identity;
+    to_.measures.push_back(measures);
+    AddParents(is_hole ? loop.ring : kNoRing);
+    return true;
+  }
+
+  // Gives the identity, parents and number of particles of a ring to the largest of its pieces, the
+  // last `count` loops.
+  void GiveToLargest(std::uint32_t ring, std::size_t count) {
+    const auto last = to_.measures.end();
+    const auto largest = std::ranges::max_element(last - static_cast<std::ptrdiff_t>(count), last,
+                                                  {}, &RingMeasures::area);
+    if (largest->area < 0) return;  // Holes alone: the outer ring encloses the window.
+    largest->identity = from_.measures[ring].identity;
+    largest->particle_count = from_.measures[ring].particle_count;
+    if (from_.parent_offsets.size() < 2) return;
+    const auto parents = from_.ParentsOf(ring);
+    const auto index = static_cast<std::size_t>(largest - to_.measures.begin());
+    to_.parents.insert(to_.parents.begin() + to_.parent_offsets[index], parents.begin(),
+                       parents.end());
+    for (std::size_t k = index + 1; k < to_.parent_offsets.size(); ++k) {
+      to_.parent_offsets[k] += static_cast<std::uint32_t>(parents.size());
+    }
+  }
+
+  const RingCutInput& input_;
+  const Rings& from_;
+  const PlacedVertices& placed_;
+  RingCutScratch& s_;
+  Rings& to_;
+};
+
+// Assigns holes to outer rings. Returns false if rings touch or are nested wrongly.
+bool NestRings(RingCutScratch& s) {
+  Rings& rings = s.rings;
+  if (CountTouchingPairs(rings.points, rings.offsets, s.pairs) > 0) return false;
+  s.depths.Find(rings.points, rings.offsets);
+  const std::size_t count = rings.offsets.size() - 1;
+  rings.outer_of.assign(count, kNoRing);
+  for (std::size_t ring = 0; ring < count; ++ring) {
+    const std::uint32_t around = s.depths.AroundOf(ring);
+    const bool is_hole = s.hole_of[ring] != kNoRing;
+    if (is_hole) rings.outer_of[ring] = around;
+    const bool is_in_hole = around != kNoRing && s.hole_of[around] != kNoRing;
+    if (is_hole ? around == kNoRing || is_in_hole : around != kNoRing && !is_in_hole) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void RemoveGoneRings(const Percolation& percolation, const RingTopology& topology,
+                     PlacedVertices& placed, Rings& rings) {
+  std::uint32_t kept = 0, end = 0;
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    const std::uint32_t old = placed.kept_as[ring];
+    if (old == kNoRing) continue;
+    if (percolation.IsGone(topology, ring)) {
+      placed.kept_as[ring] = kNoRing;
+      continue;
+    }
+    const std::uint32_t first = rings.offsets[old], last = rings.offsets[old + 1];
+    const auto move = [&](auto& values) {
+      if (values.empty()) return;
+      std::copy(values.begin() + 2 * first, values.begin() + 2 * last, values.begin() + 2 * end);
+    };
+    move(rings.points);
+    move(rings.normals);
+    move(placed.roots);
+    rings.measures[kept] = rings.measures[old];
+    rings.outer_of[kept] = topology.outer_of[ring];  // Of the topology, until all are moved.
+    end += last - first;
+    rings.offsets[kept] = end - (last - first);
+    placed.kept_as[ring] = kept++;
+  }
+  rings.offsets.resize(kept + 1);
+  rings.offsets[kept] = end;
+  rings.points.resize(2 * std::size_t{end});
+  rings.normals.resize(2 * std::size_t{end});
+  if (!placed.roots.empty()) placed.roots.resize(2 * std::size_t{end});
+  rings.measures.resize(kept);
+  rings.outer_of.resize(kept);
+  for (std::uint32_t& outer : rings.outer_of) {
+    if (outer != kNoRing) outer = placed.kept_as[outer];
+  }
+}
+
+bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& placed, Rings& rings) {
+  s.topology_ring.resize(rings.RingCount());
+  for (std::uint32_t ring = 0; ring < placed.kept_as.size(); ++ring) {
+    if (placed.kept_as[ring] != kNoRing) s.topology_ring[placed.kept_as[ring]] = ring;
+  }
+  for (int steps = 0; steps < kMostShifts; ++steps) {
+    CollectLoops(input, rings, placed, s);
+    if (!CutAtSides(input, steps, s)) continue;
+    if (!Assembly(input, rings, placed, s).Run() || !NestRings(s)) continue;
+    std::swap(rings, s.rings);
+    std::swap(placed.roots, s.roots);
+    std::swap(placed.group_of_ring, s.group);
+    return true;
+  }
+  return false;
+}
+
+void ClearOutside(const Percolation& percolation, const TileDirectory& directory,
+                  const Components& components, double cell_size, Crossings& crossings) {
+  // The cells along each axis that are strictly inside.
+  std::array<std::int64_t, 2> first, last;
+  for (std::size_t k = 0; k < 2; ++k) {
+    constexpr std::int64_t kFar = std::int64_t{1} << 40;
+    first[k] = -kFar;
+    last[k] = kFar;
+    if (!percolation.window.axes[k]) continue;
+    const double lower = percolation.window.axes[k]->origin / cell_size;
+    const double upper =
+        (percolation.window.axes[k]->origin + percolation.window.axes[k]->length) / cell_size;
+    // The sides may move a little, so a cell at a side does not count.
+    first[k] = static_cast<std::int64_t>(std::floor(lower + .01)) + 1;
+    last[k] = static_cast<std::int64_t>(std::ceil(upper - .01)) - 2;
+  }
+  for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
+    const std::int64_t left = std::int64_t{directory[tile].x} << kTileShift;
+    const std::int64_t bottom = std::int64_t{directory[tile].y} << kTileShift;
+    for (int j = 0; j < kTileSize; ++j) {
+      std::uint32_t& row = crossings.interior[tile][j];
+      for (std::uint32_t bits = row; bits != 0; bits &= bits - 1) {
+        const int i = std::countr_zero(bits);
+        const Fate fate = percolation.fates[components.At(crossings, {tile, i, j})];
+        const std::int64_t x = left + i, y = bottom + j;
+        const bool is_inside = x >= first[0] && x <= last[0] && y >= first[1] && y <= last[1];
+        if (fate == Fate::kGone || (fate == Fate::kCut && !is_inside)) {
+          row &= ~(std::uint32_t{1} << i);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,56 @@
+// Cuts the rings of percolating bodies at the faces of a periodic box.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cut/line_cut.h"
+#include "rings/percolation.h"
+#include "rings/rings.h"
+#include "vertices/intersections.h"
+#include "vertices/ring_depths.h"
+#include "vertices/vertices.h"
+
+namespace partiemc {
+
+/// Warm buffers of CutRings.
+struct RingCutScratch {
+  Loops loops, kept;
+  LineCutScratch line;
+  std::vector<std::uint32_t> topology_ring;  // By ring: its ring of the topology.
+  std::vector<std::uint32_t> group;          // By new ring.
+  std::vector<double> roots;
+  std::vector<std::uint32_t> hole_of;  // By new ring: kNoRing, or any value for a hole.
+  Rings rings;
+  TouchingPairsBuffers pairs;
+  RingDepths depths;
+};
+
+struct RingCutInput {
+  const Percolation& percolation;
+  const RingTopology& topology;
+  double spacing;  ///< World units.
+};
+
+/// Removes the rings of components with Fate::kGone. In `placed.kept_as`, they become kNoRing.
+void RemoveGoneRings(const Percolation& percolation, const RingTopology& topology,
+                     PlacedVertices& placed, Rings& rings);
+
+/// Replaces the rings of components with Fate::kCut by their parts in the window. `rings.cuts`
+/// lists the segments on its sides; perimeters do not count them. The largest piece of a ring has
+/// its identity, parents and number of particles; the other pieces have none. Sets
+/// `placed.group_of_ring`, and keeps `placed.roots` parallel to the points.
+///
+/// Where a ring has a vertex on a side, or pieces would touch, both opposite sides move by up to
+/// some billionths of the spacing (kMostShifts in ring_cut.cc). Returns false if this does not
+/// help, which is a bug.
+/// Cost: as CutAtLine, CountTouchingPairs and RingDepths.
+[[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
+                            PlacedVertices& placed, Rings& rings);
+
+/// Clears the interior cells of components that are gone, and those of cut components that are not
+/// strictly inside the window. Cost: linear in tiles.
+void ClearOutside(const Percolation& percolation, const TileDirectory& directory,
+                  const Components& components, double cell_size, Crossings& crossings);
+
+}  // namespace partiemc

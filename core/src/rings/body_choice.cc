@@ -1,0 +1,101 @@
+#include "rings/body_choice.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace partiemc {
+namespace {
+
+std::uint32_t RootOf(std::uint32_t component, std::vector<std::uint32_t>& set) {
+  while (set[component] != component) component = set[component] = set[set[component]];
+  return component;
+}
+
+// Joins the components that share a particle.
+void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
+  const std::uint32_t components = topology.components.size();
+  const std::size_t given = input.lifted.particles;
+  c.component_of.assign(given + input.lifted.originals.size(), kNoComponent);
+  c.given_count.assign(components, 0);
+  c.given_weight.assign(components, 0);
+  c.has_copies.assign(components, 0);
+  c.set.resize(components);
+  std::iota(c.set.begin(), c.set.end(), 0u);
+  topology.components.ForEachParticle(
+      input.bins, input.crossings,
+      [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
+        const std::uint32_t source = input.bins.particles[particle].source;
+        c.component_of[source] = component;
+        if (source >= given) return;
+        ++c.given_count[component];
+        if (!input.bins.weight.empty()) c.given_weight[component] += input.bins.weight[particle];
+      });
+  for (std::size_t copy = 0; copy < input.lifted.originals.size(); ++copy) {
+    const std::uint32_t of_copy = c.component_of[given + copy];
+    if (of_copy == kNoComponent) continue;
+    c.has_copies[of_copy] = 1;
+    const std::uint32_t of_given = c.component_of[input.lifted.originals[copy]];
+    if (of_given == kNoComponent) continue;
+    const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
+    c.set[std::max(a, b)] = std::min(a, b);
+  }
+  for (std::uint32_t component = 0; component < components; ++component) {
+    c.has_copies[RootOf(component, c.set)] |= c.has_copies[component];
+  }
+}
+
+// Whether a ring of the topology lies in the window and its margin.
+bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::uint32_t ring) {
+  for (std::uint32_t k = topology.offsets[ring]; k < topology.offsets[ring + 1]; ++k) {
+    const Point& point = topology.entry_points[k];
+    const std::array<double, 2> at{point.x * input.cell_size, point.y * input.cell_size};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto& ends = input.window.axes[axis];
+      if (!ends) continue;
+      const double above = at[axis] - ends->origin;
+      if (above < -input.reach || above > ends->length + input.reach) return false;
+    }
+  }
+  return true;
+}
+
+void DecideFates(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
+  const std::uint32_t components = topology.components.size();
+  c.best.assign(components, kNoComponent);
+  const auto has_copies = [&](std::uint32_t component) {
+    return c.has_copies[RootOf(component, c.set)] != 0;
+  };
+  for (std::uint32_t component = 0; component < components; ++component) {
+    const std::uint32_t outer = topology.outer_ring[component];
+    if (outer == kNoRing || !has_copies(component) || !IsWhole(input, topology, outer)) continue;
+    std::uint32_t& best = c.best[RootOf(component, c.set)];
+    if (best == kNoComponent || c.given_count[component] > c.given_count[best]) best = component;
+  }
+  c.fates.resize(components);
+  for (std::uint32_t component = 0; component < components; ++component) {
+    const std::uint32_t best = c.best[RootOf(component, c.set)];
+    c.fates[component] = !has_copies(component) || best == component ? Fate::kWhole
+                         : best == kNoComponent                      ? Fate::kCut
+                                                                     : Fate::kGone;
+  }
+  c.cut_bodies = 0;
+  for (std::uint32_t component = 0; component < components; ++component) {
+    c.cut_bodies += c.fates[component] == Fate::kCut && c.set[component] == component ? 1 : 0;
+  }
+}
+
+}  // namespace
+
+void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology) {
+  JoinImages(input, topology, choice);
+  DecideFates(input, topology, choice);
+  for (std::uint32_t component = 0; component < choice.fates.size(); ++component) {
+    const std::uint32_t outer = topology.outer_ring[component];
+    if (choice.fates[component] != Fate::kCut || outer == kNoRing) continue;
+    topology.particle_count[outer] = choice.given_count[component];
+    topology.particle_weight[outer] = choice.given_weight[component];
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,45 @@
+// Bodies that percolate through a periodic box: what the stages after the rings need to know.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "partiemc/parameters.h"
+#include "rings/rings.h"
+
+namespace partiemc {
+
+/// What happens to a component of inside nodes (rings/components.h).
+enum class Fate : std::uint8_t {
+  kWhole,  ///< It remains as it is.
+  kCut,    ///< Its part in the box remains.
+  kGone,   ///< Another copy of the body remains.
+};
+
+/// The part of the plane in which percolating bodies remain.
+struct Window {
+  std::array<std::optional<PeriodicAxis>, 2> axes;  ///< Absent: without ends.
+};
+
+/// A frame with copies of particles (periodic/lift.h).
+struct Percolation {
+  Window window;
+  std::uint32_t particles;      ///< Given particles; copies follow.
+  std::span<const Fate> fates;  ///< By component.
+
+  bool IsCut(const RingTopology& topology, std::size_t ring) const {
+    return fates[topology.component_of_ring[ring]] == Fate::kCut;
+  }
+  bool IsGone(const RingTopology& topology, std::size_t ring) const {
+    return fates[topology.component_of_ring[ring]] == Fate::kGone;
+  }
+  /// False for copies of particles of a body that is cut.
+  bool Counts(std::uint32_t source, std::uint32_t component) const {
+    return source < particles || fates[component] != Fate::kCut;
+  }
+};
+
+}  // namespace partiemc

@@ -1,0 +1,447 @@
+// Bodies that reach their own image in a periodic box are cut at its faces.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cut/line_cut.h"
+#include "partiemc/arena.h"
+#include "partiemc/partiemc.h"
+#include "partiemc/status.h"
+#include "partiemc/validate.h"
+#include "support/reconstruct.h"
+#include "support/ring_stream.h"
+#include "support/tracked_scene.h"
+#include "support/tries.h"
+#include "vertices/measure.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+using support::Random;
+using support::ReconstructOnce;
+using support::RingStream;
+using testing::ElementsAre;
+
+constexpr double kWidth = 60, kHeight = 50;
+
+PeriodicBox BoxOf(double length_x, double length_y, double x = 0, double y = 0) {
+  return {.axes = {PeriodicAxis{x, length_x}, PeriodicAxis{y, length_y}, std::nullopt}};
+}
+
+ReconstructionParameters In(const PeriodicBox& box, Fill fill = Fill::kGreedy,
+                            Placement placement = Placement::kVirtualPlane) {
+  return {.placement = placement, .fill = fill, .spacing = 1.0, .box = box};
+}
+
+Particles Wrapped(Particles particles, const PeriodicBox& box) {
+  for (std::size_t k = 0; k < particles.xy.size(); ++k) {
+    const auto& axis = box.axes[k % 2];
+    double& at = particles.xy[k];
+    at -= axis->length * std::floor((at - axis->origin) / axis->length);
+  }
+  return particles;
+}
+
+// The particles of a lattice below a wave that repeats after kWidth, above a flat bottom.
+Particles Wave(double phase, double amplitude = 4, double noise = 0, std::uint64_t seed = 1) {
+  Random random(seed);
+  Particles wave;
+  for (int i = 0; i < kWidth; ++i) {
+    const double top = 20 + amplitude * std::sin(2 * M_PI * (i + phase) / kWidth);
+    for (int j = 0; j < top; ++j) {
+      wave.Add(i + .5 + random.Uniform(-noise, noise), j + 10 + random.Uniform(-noise, noise));
+    }
+  }
+  return wave;
+}
+
+double CutLength(const Rings& rings) {
+  double length = 0;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    for (std::uint32_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+      if (!std::ranges::binary_search(rings.cuts, k)) continue;
+      const std::uint32_t next = k + 1 < rings.offsets[ring + 1] ? k + 1 : rings.offsets[ring];
+      length += std::hypot(rings.points[2 * next] - rings.points[2 * k],
+                           rings.points[2 * next + 1] - rings.points[2 * k + 1]);
+    }
+  }
+  return length;
+}
+
+void ExpectValid(const Result& result, Fill fill) {
+  const absl::Status valid = Validate(result, fill);
+  EXPECT_TRUE(valid.ok()) << valid;
+  EXPECT_TRUE(std::ranges::is_sorted(result.rings.cuts));
+  for (std::size_t ring = 0; ring < result.rings.RingCount(); ++ring) {
+    const auto points = result.rings.RingPoints(ring);
+    EXPECT_LE(result.rings.measures[ring].perimeter, MeasureRing(points).perimeter + 1e-9);
+  }
+}
+
+TEST(Percolation, FlatLayerIsCutAtTheFaces) {
+  const PeriodicBox box = BoxOf(40, 60);
+  for (const Placement placement : AllPlacements()) {
+    if (!KeepsGuarantees(placement)) continue;
+    for (const Fill fill : AllFills()) {
+      SCOPED_TRACE(std::string(Name(placement)) + " " + std::string(Name(fill)));
+      const Result result =
+          ReconstructOnce(In(box, fill, placement), support::Lattice(40, 8, 0, 20));
+      ASSERT_EQ(result.rings.RingCount(), 1u);
+      ExpectValid(result, fill);
+      const RingMeasures& layer = result.rings.measures[0];
+      EXPECT_NEAR(layer.area, 320, placement == Placement::kVirtualPlane ? .1 : 6);
+      EXPECT_NEAR(layer.perimeter, 80, 1e-3);
+      EXPECT_NEAR(layer.centroid_x, 20, 1e-3);
+      EXPECT_NEAR(layer.centroid_y, 23.5, 1e-3);
+      EXPECT_EQ(layer.particle_count, 320u);
+      EXPECT_EQ(layer.identity, 1u);
+      EXPECT_NEAR(CutLength(result.rings), 16, .3);
+      EXPECT_EQ(result.statistics.cut_bodies, 1u);
+      EXPECT_EQ(result.statistics.particles, 320u);
+      for (std::size_t k = 0; k < result.rings.PointCount(); ++k) {
+        // Lattice nodes lie on the faces, so the faces move a little.
+        EXPECT_GE(result.rings.points[2 * k], 0);
+        EXPECT_LE(result.rings.points[2 * k], 40 + 1e-8);
+      }
+    }
+  }
+}
+
+TEST(Percolation, FullBoxHasNoPerimeter) {
+  const Result full = ReconstructOnce(In(BoxOf(40, 30, 3, 4)), support::Lattice(40, 30, 3.5, 4.5));
+  ASSERT_EQ(full.rings.RingCount(), 1u);
+  ExpectValid(full, Fill::kGreedy);
+  EXPECT_EQ(full.rings.PointCount(), 4u);
+  EXPECT_THAT(full.rings.cuts, ElementsAre(0, 1, 2, 3));
+  EXPECT_NEAR(full.rings.measures[0].area, 1200, 1e-9);
+  EXPECT_EQ(full.rings.measures[0].perimeter, 0);
+  EXPECT_EQ(full.rings.measures[0].particle_count, 1200u);
+}
+
+// Where the face lies does not matter: area and perimeter of a body stay.
+TEST(Percolation, FaceMayLieAnywhere) {
+  const Particles wave = Wave(0, 4, .2);
+  const Result first = ReconstructOnce(In(BoxOf(kWidth, kHeight)), wave);
+  ASSERT_EQ(first.rings.RingCount(), 1u);
+  EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()), .002 * wave.size());
+  for (const double x : {7.0, 20.0, 31.0, 59.0, -12.0}) {
+    SCOPED_TRACE(x);
+    const PeriodicBox box = BoxOf(kWidth, kHeight, x, 0);
+    const Result moved = ReconstructOnce(In(box), Wrapped(wave, box));
+    ExpectValid(moved, Fill::kGreedy);
+    ASSERT_EQ(moved.rings.RingCount(), 1u);
+    EXPECT_NEAR(moved.statistics.area, first.statistics.area, 1e-3 * first.statistics.area);
+    EXPECT_NEAR(moved.statistics.perimeter, first.statistics.perimeter,
+                1e-3 * first.statistics.perimeter);
+  }
+}
+
+// Both faces cut the outline at the same height.
+TEST(Percolation, OutlineContinuesAtTheOppositeFace) {
+  const Result result = ReconstructOnce(In(BoxOf(kWidth, kHeight)), Wave(11, 4, .2));
+  std::vector<double> left, right;
+  for (std::size_t k = 0; k < result.rings.PointCount(); ++k) {
+    const double x = result.rings.points[2 * k], y = result.rings.points[2 * k + 1];
+    if (x == 0) left.push_back(y);
+    if (x == kWidth) right.push_back(y);
+  }
+  std::ranges::sort(left);
+  std::ranges::sort(right);
+  ASSERT_EQ(left.size(), 2u);
+  ASSERT_EQ(right.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(left[k], right[k], .02);
+}
+
+// Bodies near a percolating one, in one cluster with it.
+TEST(Percolation, DropAcrossTheFaceIsWhole) {
+  const PeriodicBox box = BoxOf(kWidth, 80);
+  const auto count = support::Disc(5, 20, 42).size();
+  std::optional<double> area;
+  for (const double x : {0.0, 2.0, 58.0, 30.0}) {
+    SCOPED_TRACE(x);
+    Particles scene = Wave(0);
+    scene.Add(support::Disc(5, x, 42));  // Five spacings above the wave.
+    const Result result = ReconstructOnce(In(box), Wrapped(scene, box));
+    ExpectValid(result, Fill::kGreedy);
+    ASSERT_EQ(result.rings.RingCount(), 2u);
+    EXPECT_EQ(result.statistics.cut_bodies, 1u);
+    const bool first_is_drop = result.rings.measures[0].area < 200;
+    const RingMeasures& drop = result.rings.measures[first_is_drop ? 0 : 1];
+    if (!area) area = drop.area;
+    EXPECT_NEAR(drop.area, *area, 1e-5 * *area);
+    EXPECT_NEAR(drop.area, static_cast<double>(count), .03 * *area);
+    EXPECT_EQ(drop.particle_count, count);
+    EXPECT_NEAR(drop.centroid_x, x, .01);
+    EXPECT_EQ(result.rings.measures[first_is_drop ? 1 : 0].particle_count, Wave(0).size());
+  }
+}
+
+// A void at a face becomes a notch at both faces; inside, it is a hole.
+TEST(Percolation, VoidAcrossTheFaceBecomesTwoNotches) {
+  for (const double x : {30.0, 0.0}) {
+    SCOPED_TRACE(x);
+    const PeriodicBox box = BoxOf(60, 60);
+    Particles scene;
+    for (int i = 0; i < 60; ++i) {
+      for (int j = 0; j < 30; ++j) {
+        const double dx = std::remainder(i + .5 - x, 60), dy = j + .5 - 15;
+        if (std::hypot(dx, dy) > 7) scene.Add(i + .5, j + 10.5);
+      }
+    }
+    Particles drop = support::Disc(2, x, 25);  // In the void.
+    scene.Add(drop);
+    const Result result = ReconstructOnce(In(box), Wrapped(scene, box));
+    ExpectValid(result, Fill::kGreedy);
+    const std::size_t holes = std::ranges::count_if(
+        result.rings.outer_of, [](std::uint32_t outer) { return outer != kNoRing; });
+    EXPECT_EQ(holes, x == 30 ? 1u : 0u);
+    EXPECT_EQ(result.rings.RingCount(), x == 30 ? 3u : 2u);
+    EXPECT_NEAR(result.statistics.area, static_cast<double>(scene.size()), .01 * scene.size());
+  }
+}
+
+Particles WithEverything(Particles particles) {
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    particles.ids.push_back(3 * k + 7);
+    particles.volumes.push_back(1);
+    particles.velocities.insert(particles.velocities.end(), {1, 0});
+  }
+  return particles;
+}
+
+class DriftingBodies : public testing::TestWithParam<support::Known> {};
+INSTANTIATE_TEST_SUITE_P(With, DriftingBodies,
+                         testing::Values(support::kNothing, support::kIds, support::kVelocities,
+                                         support::kBoth),
+                         testing::PrintToStringParamName());
+
+TEST_P(DriftingBodies, KeepTheirIdentities) {
+  const PeriodicBox box = BoxOf(kWidth, 80);
+  RingStream stream(In(box));
+  for (int frame = 0; frame < 100; ++frame) {
+    SCOPED_TRACE(frame);
+    Particles scene = Wave(0);
+    for (double& at : scene.xy) at += &at - scene.xy.data() & 1 ? 0 : .9 * frame;
+    scene.Add(support::Disc(4, 5 + .9 * frame, 42));
+    scene = Wrapped(WithEverything(scene), box);
+    scene.volumes.clear();
+    if (!GetParam().ids) scene.ids.clear();
+    if (!GetParam().velocities) scene.velocities.clear();
+    for (std::size_t k = 0; k < scene.velocities.size(); k += 2) scene.velocities[k] = .9f;
+    scene.time = frame;
+    const Rings& rings = stream.Next(scene);
+    ASSERT_EQ(rings.RingCount(), 2u);
+    EXPECT_THAT((std::vector{rings.measures[0].identity, rings.measures[1].identity}),
+                testing::UnorderedElementsAre(1, 2));
+    const std::size_t layer = rings.measures[0].area > rings.measures[1].area ? 0 : 1;
+    EXPECT_EQ(rings.measures[layer].identity, 1u);
+    if (frame == 0) continue;
+    EXPECT_THAT(stream.rings().ParentsOf(layer), ElementsAre(1));
+    EXPECT_THAT(stream.rings().ParentsOf(1 - layer), ElementsAre(2));
+  }
+}
+
+// Dense random frames: every result keeps its guarantees.
+TEST(Percolation, RandomFramesKeepTheGuarantees) {
+  std::uint64_t cut = 0;
+  for (std::uint64_t seed = 1; seed <= support::Tries(400u); ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    const PeriodicBox box = BoxOf(random.Uniform(12, 50), random.Uniform(12, 50),
+                                  random.Uniform(-20, 20), random.Uniform(-20, 20));
+    const double density = random.Uniform(.02, 1.2);
+    Particles scene;
+    const auto count =
+        static_cast<std::size_t>(density * box.axes[0]->length * box.axes[1]->length);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double x = random.Uniform(0, 1), y = random.Uniform(0, 1);
+      scene.Add(box.axes[0]->origin + x * box.axes[0]->length,
+                box.axes[1]->origin + y * box.axes[1]->length);
+    }
+    if (seed % 3 == 0) {
+      scene = WithEverything(scene);
+    }
+    const Fill fill = AllFills()[seed % AllFills().size()];
+    ReconstructionParameters parameters = In(box, fill);
+    if (seed % 5 == 0) parameters.placement = Placement::kMarchingSquares;
+    if (seed % 7 == 0) parameters.placement = Placement::kQef;
+    if (seed % 11 == 0) parameters.isovalue = .6;
+    const Result result = ReconstructOnce(parameters, scene);
+    ExpectValid(result, fill);
+    cut += result.statistics.cut_bodies;
+  }
+  EXPECT_GT(cut, 100u);
+}
+
+TEST(Percolation, ThreadsAndOrderChangeNoBit) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 5);
+  const PeriodicBox box = BoxOf(kWidth, kHeight);
+  const Particles wave = Wave(3, 4, .25);
+  Arena one(1);
+  Result first;
+  one.Execute([&] { first = ReconstructOnce(In(box), wave); });
+  for (const unsigned threads : {2u, 5u}) {
+    Arena arena(threads);
+    arena.Execute([&] { EXPECT_EQ(ReconstructOnce(In(box), wave), first); });
+  }
+}
+
+TEST(Percolation, FarthestParticleIsRefused) {
+  RingStream stream(In(BoxOf(40, 60), Fill::kGreedy, Placement::kFarthestParticle));
+  const auto violation = FindViolation(stream.Try(support::Lattice(40, 8, 0, 20)));
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->reason, kReasonPercolates);
+}
+
+TEST(Percolation, AttributesContinueAcrossTheFace) {
+  const PeriodicBox box = BoxOf(40, 60);
+  const Particles layer = support::Lattice(40, 8, .5, 20);
+  std::vector<float> values;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    values.push_back(static_cast<float>(std::cos(2 * M_PI * layer.x(k) / 40)));
+  }
+  Frame frame = layer.AsFrame();
+  const Attribute attribute{.name = "wave", .components = 1, .values = values};
+  frame.attributes = std::span(&attribute, 1);
+  const Result result = ReconstructOnce(In(box), frame);
+  ExpectValid(result, Fill::kGreedy);
+  ASSERT_EQ(result.attributes.size(), 1u);
+  ASSERT_EQ(result.attributes[0].values.size(), result.mesh.PointCount());
+  for (std::size_t k = 0; k < result.mesh.PointCount(); ++k) {
+    const double expected = std::cos(2 * M_PI * result.mesh.points[2 * k] / 40);
+    EXPECT_NEAR(result.attributes[0].values[k], expected, .06);
+  }
+}
+
+// --- CutAtLine
+// ------------------------------------------------------------------------------------
+
+// A star around a point, with a hole.
+Loops Star(Random& random) {
+  Loops loops;
+  const double x = random.Uniform(-3, 3), y = random.Uniform(-3, 3);
+  const int count = 5 + static_cast<int>(random.Below(40));
+  const auto add = [&](double inner, double outer, bool is_hole) {
+    const auto first = static_cast<std::uint32_t>(loops.points.size());
+    for (int k = 0; k < count; ++k) {
+      const double turn = 2 * M_PI * (is_hole ? count - k : k) / count;
+      const double radius = random.Uniform(inner, outer);
+      loops.points.push_back({.at = {x + radius * std::cos(turn), y + radius * std::sin(turn)}});
+    }
+    loops.loops.push_back({.first = first,
+                           .last = static_cast<std::uint32_t>(loops.points.size()),
+                           .ring = is_hole ? 1u : 0u,
+                           .outer = 0});
+  };
+  add(4, 9, false);
+  add(1, 2, true);
+  return loops;
+}
+
+double AreaOf(const Loops& loops) {
+  double area = 0;
+  for (const Loops::Loop& loop : loops.loops) {
+    std::vector<double> points;
+    for (std::uint32_t k = loop.first; k < loop.last; ++k) {
+      points.insert(points.end(), {loops.points[k].at.x, loops.points[k].at.y});
+    }
+    area += MeasureRing(points).area;
+  }
+  return area;
+}
+
+TEST(CutAtLine, BothSidesMakeTheWhole) {
+  LineCutScratch scratch;
+  for (std::uint64_t seed = 1; seed <= support::Tries(2000u); ++seed) {
+    Random random(seed);
+    const Loops star = Star(random);
+    AxisLine line{.axis = static_cast<int>(random.Below(2)), .at = random.Uniform(-10, 10)};
+    Loops above, below;
+    ASSERT_TRUE(CutAtLine(line, star, scratch, above));
+    line.keeps_above = false;
+    ASSERT_TRUE(CutAtLine(line, star, scratch, below));
+    EXPECT_NEAR(AreaOf(above) + AreaOf(below), AreaOf(star), 1e-11) << seed;
+    for (const Loops* part : {&above, &below}) {
+      for (const Loops::Loop& loop : part->loops) {
+        std::size_t cuts = 0;
+        for (std::uint32_t k = loop.first; k < loop.last; ++k) {
+          const Point& at = part->points[k].at;
+          const double across = line.axis == 0 ? at.x : at.y;
+          EXPECT_TRUE(part == &above ? across >= line.at : across <= line.at);
+          cuts += part->points[k].is_cut ? 1 : 0;
+        }
+        EXPECT_EQ(cuts > 0, loop.ring == kNoSource);
+      }
+    }
+  }
+}
+
+TEST(CutAtLine, PartInTheWindowHasItsMeasures) {
+  LineCutScratch scratch;
+  for (std::uint64_t seed = 1; seed <= support::Tries(1000u); ++seed) {
+    Random random(seed);
+    Loops loops = Star(random);
+    Window window;
+    if (random.Below(4) > 0) window.axes[0] = PeriodicAxis{random.Uniform(-8, 0), 5};
+    if (random.Below(4) > 0) window.axes[1] = PeriodicAxis{random.Uniform(-8, 0), 7};
+    double area = 0, perimeter = 0;
+    for (const Loops::Loop& loop : loops.loops) {
+      std::vector<double> points;
+      for (std::uint32_t k = loop.first; k < loop.last; ++k) {
+        points.insert(points.end(), {loops.points[k].at.x, loops.points[k].at.y});
+      }
+      const WindowMeasures part = MeasureInWindow(points, window);
+      area += part.area;
+      perimeter += part.perimeter;
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      const auto& ends = window.axes[static_cast<std::size_t>(axis)];
+      if (!ends) continue;
+      for (const bool above : {true, false}) {
+        Loops kept;
+        ASSERT_TRUE(CutAtLine({axis, ends->origin + (above ? 0 : ends->length), above}, loops,
+                              scratch, kept));
+        loops = kept;
+      }
+    }
+    EXPECT_NEAR(area, AreaOf(loops), 1e-11) << seed;
+    double length = 0;
+    for (const Loops::Loop& loop : loops.loops) {
+      for (std::uint32_t k = loop.first; k < loop.last; ++k) {
+        if (loops.points[k].is_cut) continue;
+        const Point& from = loops.points[k].at;
+        const Point& to = loops.points[k + 1 < loop.last ? k + 1 : loop.first].at;
+        length += std::hypot(to.x - from.x, to.y - from.y);
+      }
+    }
+    EXPECT_NEAR(perimeter, length, 1e-10) << seed;
+  }
+}
+
+TEST(CutAtLine, PointOnTheLineIsReported) {
+  Loops square;
+  for (const auto& [x, y] : {std::pair(0., 0.), {2., 0.}, {2., 2.}, {0., 2.}}) {
+    square.points.push_back({.at = {x, y}});
+  }
+  square.loops.push_back({.first = 0, .last = 4, .ring = 0, .outer = 0});
+  LineCutScratch scratch;
+  Loops kept;
+  EXPECT_FALSE(CutAtLine({.axis = 0, .at = 2}, square, scratch, kept));
+  kept.Clear();
+  EXPECT_TRUE(CutAtLine({.axis = 0, .at = 1}, square, scratch, kept));
+  EXPECT_EQ(AreaOf(kept), 2);
+}
+
+}  // namespace
+}  // namespace partiemc
