@@ -176,8 +176,12 @@ TEST(WarmSlice, AllocatesNothing) {
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
 
-// Bodies that cross the faces of a periodic box.
-TEST(WarmPeriodicFrame, AllocatesNothing) {
+// Bodies that cross the faces of a periodic box, without and with a layer that percolates.
+class WarmPeriodicFrame : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Percolates, WarmPeriodicFrame, testing::Bool(),
+                         testing::PrintToStringParamName());
+
+TEST_P(WarmPeriodicFrame, AllocatesNothing) {
   const ReconstructionParameters parameters{
       .spacing = 1.0, .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}}};
   const auto reconstructor = Reconstructor::Create(parameters);
@@ -186,6 +190,7 @@ TEST(WarmPeriodicFrame, AllocatesNothing) {
   for (int k = 0; k < 4; ++k) {
     Particles frame = support::Disc(12, 20.0 * k, 9.0 * k);
     frame.Add(support::Disc(8, 45 - 20.0 * k, 40 + 5.0 * k));
+    if (GetParam()) frame.Add(support::Lattice(90, 12 + k, .3, 60));
     for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
     frames.push_back(frame);
   }
@@ -208,7 +213,10 @@ TEST(WarmPeriodicFrame, AllocatesNothing) {
     }
   }
   EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
-  EXPECT_EQ(result.rings.RingCount(), 2u);
+  if (!GetParam()) {
+    EXPECT_EQ(result.rings.RingCount(), 2u);
+  }
+  EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
 }
 
 // Frames in space with ids, velocities and an attribute.
@@ -380,6 +388,9 @@ std::vector<MemoryCase> MemoryCases() {
   };
   add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
   add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
+  add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});
+  add("full periodic box", support::Lattice(150, 150, -74.7, -74.7), {.box = boxed(150)});
+  add("percolating noise", support::Noise(random, 30'000, 300), {.box = boxed(600)});
   return cases;
 }
 

@@ -100,8 +100,8 @@ TEST(Percolation, FlatLayerIsCutAtTheFaces) {
       ASSERT_EQ(result.rings.RingCount(), 1u);
       ExpectValid(result, fill);
       const RingMeasures& layer = result.rings.measures[0];
-      EXPECT_NEAR(layer.area, 320, placement == Placement::kVirtualPlane ? .1 : 6);
-      EXPECT_NEAR(layer.perimeter, 80, 1e-3);
+      EXPECT_NEAR(layer.area, 320, placement == Placement::kVirtualPlane ? 1e-8 : 6);
+      EXPECT_NEAR(layer.perimeter, 80, 1e-9);
       EXPECT_NEAR(layer.centroid_x, 20, 1e-3);
       EXPECT_NEAR(layer.centroid_y, 23.5, 1e-3);
       EXPECT_EQ(layer.particle_count, 320u);
@@ -134,14 +134,14 @@ TEST(Percolation, FaceMayLieAnywhere) {
   const Particles wave = Wave(0, 4, .2);
   const Result first = ReconstructOnce(In(BoxOf(kWidth, kHeight)), wave);
   ASSERT_EQ(first.rings.RingCount(), 1u);
-  EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()), .002 * wave.size());
+  EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()), 1e-6 * wave.size());
   for (const double x : {7.0, 20.0, 31.0, 59.0, -12.0}) {
     SCOPED_TRACE(x);
     const PeriodicBox box = BoxOf(kWidth, kHeight, x, 0);
     const Result moved = ReconstructOnce(In(box), Wrapped(wave, box));
     ExpectValid(moved, Fill::kGreedy);
     ASSERT_EQ(moved.rings.RingCount(), 1u);
-    EXPECT_NEAR(moved.statistics.area, first.statistics.area, 1e-3 * first.statistics.area);
+    EXPECT_NEAR(moved.statistics.area, first.statistics.area, 1e-8 * first.statistics.area);
     EXPECT_NEAR(moved.statistics.perimeter, first.statistics.perimeter,
                 1e-3 * first.statistics.perimeter);
   }
@@ -160,7 +160,7 @@ TEST(Percolation, OutlineContinuesAtTheOppositeFace) {
   std::ranges::sort(right);
   ASSERT_EQ(left.size(), 2u);
   ASSERT_EQ(right.size(), 2u);
-  for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(left[k], right[k], .02);
+  for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(left[k], right[k], 1e-5);
 }
 
 // Bodies near a percolating one, in one cluster with it.

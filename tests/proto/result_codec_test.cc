@@ -34,6 +34,7 @@ Result SquareWithHole() {
   result.rings.parents = {2, 5};
   result.rings.parent_offsets = {0, 2, 2};
   for (int i = 0; i < 8; ++i) result.rings.normals.insert(result.rings.normals.end(), {0.6f, 0.8f});
+  result.rings.cuts = {1, 3};
   result.mesh.points = result.rings.points;
   result.mesh.points.insert(result.mesh.points.end(), {0.5, 0.5});
   result.mesh.triangles = {0, 1, 8, 0, 8, 3};
@@ -44,6 +45,7 @@ Result SquareWithHole() {
                        .dropped_holes = 2,
                        .dropped_components = 3,
                        .dropped_spray = 7,
+                       .cut_bodies = 1,
                        .triangles = 2,
                        .triangles_grid = 9,
                        .self_intersections = 4,
@@ -265,6 +267,9 @@ std::vector<Hostile> HostileChanges() {
       {"rings.outer_of", [](M& m) { m.mutable_rings()->mutable_outer_of()->append("1234"); }},
       {"rings.outer_of", [](M& m) { Put(*m.mutable_rings()->mutable_outer_of(), 1, 2u); }},
       {"rings.outer_of", [](M& m) { Put(*m.mutable_rings()->mutable_outer_of(), 1, 1u); }},
+      {"rings.cuts", [](M& m) { m.mutable_rings()->mutable_cuts()->append("12"); }},
+      {"rings.cuts", [](M& m) { Put(*m.mutable_rings()->mutable_cuts(), 1, 8u); }},
+      {"rings.cuts", [](M& m) { Put(*m.mutable_rings()->mutable_cuts(), 1, 1u); }},
       {"rings.identities", [](M& m) { m.mutable_rings()->mutable_identities()->resize(8); }},
       {"rings.measures", [](M& m) { m.mutable_rings()->mutable_measures()->RemoveLast(); }},
       {"rings.measures", [](M& m) { m.mutable_rings()->add_measures(); }},

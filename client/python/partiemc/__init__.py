@@ -69,7 +69,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     min_component_volume: for output "surface": drops bodies with less particle volume, in cubed
         spacings. 0 by default.
     box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses the box is
-        one body, and results are unwrapped.
+        one body, and results are unwrapped. An outline that reaches its own image is cut at the
+        faces (`rings.cuts`).
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

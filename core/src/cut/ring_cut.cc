@@ -79,7 +79,9 @@ class Assembly {
 
   // Returns false if a loop is too thin to have a direction.
   bool Run() {
-    std::ranges::stable_sort(s_.loops.loops, {}, &Loops::Loop::outer);
+    std::ranges::sort(s_.loops.loops, [](const Loops::Loop& a, const Loops::Loop& b) {
+      return a.outer != b.outer ? a.outer < b.outer : a.first < b.first;
+    });
     std::size_t loop = 0;
     for (std::uint32_t ring = 0; ring < from_.RingCount(); ++ring) {
       if (!IsCut(input_, s_, ring)) {

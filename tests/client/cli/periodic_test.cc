@@ -80,6 +80,27 @@ TEST(PeriodicReplay, DiscAcrossCornerIsOneBody) {
             whole.digest);
 }
 
+// A layer of 30 x 6 particles across the periodic faces.
+TEST(PeriodicReplay, LayerIsCutAtTheFaces) {
+  const support::TemporaryFolder folder;
+  const std::string csv = folder.Path("layer.csv");
+  std::ofstream file(csv);
+  file << "x,y\n";
+  for (int k = 0; k < 180; ++k) file << k % 30 + .5 << "," << k / 30 << "\n";
+  file.close();
+  const std::vector<std::string> flags = {"--periodic", "x", "--box", "0,30,0,30"};
+  std::vector<std::string> local = {"--local", "--check", "--format",
+                                    "svg",     "--out",   folder.Path("out")};
+  local.insert(local.end(), flags.begin(), flags.end());
+  const Columns cut = Replayed(csv, local);
+  ASSERT_THAT(cut.rings, ElementsAre("1"));
+  EXPECT_NEAR(std::stod(cut.area[0]), 180, 1e-6);
+  ServerProgram server;
+  std::vector<std::string> remote = {"--server", server.address()};
+  remote.insert(remote.end(), flags.begin(), flags.end());
+  EXPECT_EQ(Replayed(csv, remote).digest, cut.digest);
+}
+
 TEST(PeriodicReplay, WrongBoxesAreRefused) {
   const support::TemporaryFolder input;
   const auto refusal = [&](const std::string& bounds, const std::vector<std::string>& flags,

@@ -11,6 +11,7 @@
 
 #include "client/output/color_map.h"
 #include "client/output/fixtures.h"
+#include "client/output/formats/stretches.h"
 #include "client/output/read_files.h"
 #include "client/output/text.h"
 #include "gmock/gmock.h"
@@ -187,6 +188,22 @@ TEST(Svg, UsesTheBoxOfTheSequence) {
   // The longer side, 2, and two margins of 0.04 have 1000 units: 480.769 per unit of length.
   EXPECT_THAT(svg, HasSubstr("viewBox=\"0 0 1000 519.231\""));
   EXPECT_THAT(svg, HasSubstr("d=\"M19.231 500L500 500L19.231 19.231Z\""));
+}
+
+TEST(Stretches, EndAtCuts) {
+  Result result;
+  result.rings.points.resize(2 * 11);
+  result.rings.offsets = {0, 3, 7, 11};
+  result.rings.outer_of = {kNoRing, kNoRing, kNoRing};
+  result.rings.cuts = {4, 5, 7, 8, 9, 10};
+  std::vector<std::string> stretches;
+  ForEachStretch(result.rings,
+                 [&](std::size_t ring, std::span<const std::uint32_t> points, bool is_closed) {
+                   std::string text = std::to_string(ring) + ":";
+                   for (const std::uint32_t point : points) text += " " + std::to_string(point);
+                   stretches.push_back(text + (is_closed ? " closed" : ""));
+                 });
+  EXPECT_THAT(stretches, ElementsAre("0: 0 1 2 closed", "1: 6 3 4"));
 }
 
 TEST(Svg, EveryMeshEdgeIsDrawnOnce) {
