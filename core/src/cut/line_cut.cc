@@ -71,8 +71,8 @@ bool LinkChains(const AxisLine& line, LineCutScratch& s) {
   std::ranges::sort(s.crossings, [](const auto& a, const auto& b) {
     return a.along != b.along ? a.along < b.along : a.chain < b.chain;
   });
-  // A chain that leaves the kept side has the inside on its left: for x > at, it runs towards -x,
-  // so the inside is below it, and the stretch inside begins with an entry.
+  // The inside is on the left of a chain. If the side x > at is kept, a chain leaves it towards -x,
+  // so the inside is below. The stretch inside then begins with an entry.
   const bool begins_with_entry = (line.axis == 0) == line.keeps_above;
   for (std::size_t k = 0; k + 1 < s.crossings.size(); ++k) {
     if (s.crossings[k].along == s.crossings[k + 1].along) return false;

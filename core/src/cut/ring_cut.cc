@@ -221,7 +221,7 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
     move(rings.normals);
     move(placed.roots);
     rings.measures[kept] = rings.measures[old];
-    rings.outer_of[kept] = topology.outer_of[ring];  // Of the topology, until all are moved.
+    rings.outer_of[kept] = topology.outer_of[ring];  // Renumbered below.
     end += last - first;
     rings.offsets[kept] = end - (last - first);
     placed.kept_as[ring] = kept++;

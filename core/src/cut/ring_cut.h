@@ -48,8 +48,8 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
 [[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
                             PlacedVertices& placed, Rings& rings);
 
-/// Clears the interior cells of components that are gone, and those of cut components that are not
-/// strictly inside the window. Cost: linear in tiles.
+/// Clears interior cells: all cells of components that are gone, and the cells of cut components
+/// that are not strictly inside the window. Cost: linear in tiles.
 void ClearOutside(const Percolation& percolation, const TileDirectory& directory,
                   const Components& components, double cell_size, Crossings& crossings);
 
