@@ -10,10 +10,19 @@ from pathlib import Path
 import run
 
 
+ROWS = [{"metric": "slow", "value": 2, "better": "lower", "margin": 1.7},
+        {"metric": "fast", "value": 80, "better": "higher", "margin": 1.7}]
+
+
 def worse(slow, fast):
-    rows = [{"metric": "slow", "value": 2, "better": "lower", "margin": 1.7},
-            {"metric": "fast", "value": 80, "better": "higher", "margin": 1.7}]
-    return run.failures(rows, {"slow": slow, "fast": fast})
+    return run.failures(ROWS, {"slow": slow, "fast": fast})
+
+
+def worse_twice(first, second):
+    """Names of the metrics that fail twice. `first`, `second`: values of slow and fast."""
+    measured = [dict(zip(("slow", "fast"), values)) for values in (first, second)]
+    with contextlib.redirect_stderr(io.StringIO()):
+        return list(run.failures_twice(ROWS, measured[0], lambda: measured[1]))
 
 
 def file_with(text):
@@ -25,12 +34,12 @@ def file_with(text):
 
 class Failures(unittest.TestCase):
     def test_noise_and_improvements_pass(self):
-        self.assertEqual(worse(2 * 1.5, 80 / 1.5), [])
-        self.assertEqual(worse(0.1, 1000), [])
+        self.assertEqual(worse(2 * 1.5, 80 / 1.5), {})
+        self.assertEqual(worse(0.1, 1000), {})
 
     def test_twice_as_slow_fails(self):
-        self.assertRegex(worse(4, 80)[0], "^slow is 4, recorded 2")
-        self.assertRegex(worse(2, 40)[0], "^fast is 40, recorded 80")
+        self.assertRegex(worse(4, 80)["slow"], "^slow is 4, recorded 2")
+        self.assertRegex(worse(2, 40)["fast"], "^fast is 40, recorded 80")
         self.assertEqual(len(worse(math.nan, math.nan)), 2)
 
     def test_zero_stays_zero(self):
@@ -40,6 +49,18 @@ class Failures(unittest.TestCase):
     def test_unmeasured_metric_fails(self):
         row = {"metric": "gone", "value": 1, "better": "lower", "margin": 2}
         self.assertEqual(len(run.failures([row], {})), 1)
+
+    def test_same_metric_fails_twice(self):
+        self.assertEqual(worse_twice((4, 80), (4, 80)), ["slow"])
+        self.assertEqual(worse_twice((4, 40), (2, 40)), ["fast"])
+        self.assertEqual(worse_twice((4, 40), (4, 40)), ["slow", "fast"])
+
+    def test_other_metric_of_second_measurement_passes(self):
+        self.assertEqual(worse_twice((4, 80), (2, 80)), [])
+        self.assertEqual(worse_twice((4, 80), (2, 40)), [])
+
+    def test_second_measurement_follows_a_failure_only(self):
+        self.assertEqual(run.failures_twice(ROWS, {"slow": 2, "fast": 80}, self.fail), {})
 
 
 class Expectations(unittest.TestCase):
