@@ -58,7 +58,7 @@ export class SpaceViewer extends Viewer {
   space(k = 0) { return this.pane(k).locator('.space canvas'); }
 
   /** Whether the picture has more than its background. */
-  async isDrawn(k = 0) { return (await this.space(k).screenshot()).length > 6000; }
+  async isDrawn(k = 0) { return (await this.pixelsOf(this.space(k))).length > 6000; }
 
   /** Pauses at the first frame of the recording that the server holds. */
   async pauseAtFirst() {

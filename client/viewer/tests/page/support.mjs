@@ -222,9 +222,18 @@ export class Viewer {
   }
 
   /** Pixels of a picture, as a string. */
-  async picture(k = 0) {
-    const image = await this.pane(k).locator('.picture').screenshot();
-    return image.toString('base64');
+  async picture(k = 0) { return (await this.pixelsOf(this.pane(k).locator('.picture'))).toString('base64'); }
+
+  /** An element's pixels as PNG, at once. `Locator.screenshot` first waits for two refreshes of the screen
+   * between which the element does not move; a page that draws frames by software on a busy machine may
+   * have none within a minute. */
+  async pixelsOf(element) {
+    const clip = await element.evaluate((shown) => {
+      shown.scrollIntoView({ behavior: 'instant', block: 'nearest', inline: 'nearest' });
+      const { x, y, width, height } = shown.getBoundingClientRect();
+      return { x, y, width, height };
+    });
+    return this.page.screenshot({ clip });
   }
 
   /** Waits until the page has drawn all changes so far. */
