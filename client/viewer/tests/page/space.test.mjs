@@ -2,20 +2,14 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import path from 'node:path';
-import { before, test } from 'node:test';
-import { ballsOf, FRAMES, SpaceViewer, streamBalls, SURFACE } from './space_support.mjs';
-import { cleansUp, launch, screenshots, until, violations, withoutTooltip, World } from './support.mjs';
+import { test } from 'node:test';
+import { ballsOf, FRAMES, servesBalls, SpaceViewer, streamBalls, SURFACE } from './space_support.mjs';
+import { screenshots, until, violations, withoutTooltip } from './support.mjs';
 
-let world, browser, viewer;
+let viewer;
+const balls = servesBalls(() => viewer);
 
-before(async () => {
-  world = await World.start();
-  streamBalls(world);
-  browser = await launch();
-});
-cleansUp(() => ({ world, browser, viewer }));
-
-const open = async (options = {}) => { viewer = await SpaceViewer.ofBalls(browser, world.url, options); };
+const open = async (options = {}) => { viewer = await SpaceViewer.ofBalls(balls.browser, balls.world.url, options); };
 const changes = (what, act) => viewer.changes(what, act);
 const shot = (name) => viewer.page.screenshot({ path: path.join(screenshots, `space_${name}.png`) });
 
@@ -28,7 +22,7 @@ test('a live surface is drawn and moves, in every format', async () => {
   await until('the stream is live', async () => await viewer.status() === 'Live');
   for (const format of ['float64', 'float32']) {
     const name = `balls_${format}`;
-    const producer = streamBalls(world, name, format);
+    const producer = streamBalls(balls.world, name, format);
     await viewer.button(`Watch ${name}`).click();
     await until(`${name} is shown`, async () => await viewer.pane().locator('.name').textContent() === name);
     await viewer.shows();
@@ -40,7 +34,7 @@ test('a live surface is drawn and moves, in every format', async () => {
 test('numbers and curves are those of surfaces', async () => {
   await open();
   const at = await viewer.pauseAtFirst();
-  const truth = (await world.statistics(ballsOf(world), ...SURFACE))[(at - 1) % FRAMES];
+  const truth = (await balls.world.statistics(ballsOf(balls.world), ...SURFACE))[(at - 1) % FRAMES];
   const numbers = await viewer.numbers();
   assert.equal(numbers.bodies, '2, 1');
   assert.equal(numbers['surface-digest'], truth.surface_digest);
@@ -84,7 +78,7 @@ test('every control changes the picture', async () => {
   assert.match(decodeURIComponent(address), /space=flat,translucent,parallel,clip:x:0.3:flipped/);
   const frame = await viewer.frame();
   await page.goto('about:blank');
-  await page.goto(world.url + address);
+  await page.goto(balls.world.url + address);
   await until('the link shows the frame', async () => await viewer.frame() === frame && await viewer.isDrawn());
   assert.equal(new URL(page.url()).hash, address);
   assert.equal(await page.getByLabel('Clip plane').inputValue(), 'x');
@@ -216,9 +210,9 @@ test('a pane says why it shows no surface', async () => {
   ];
   for (const [file, reason] of cases) {
     await viewer?.close();
-    viewer = await SpaceViewer.open(browser, world.url);
+    viewer = await SpaceViewer.open(balls.browser, balls.world.url);
     await viewer.page.route(`**/${file}`, (route) => route.abort());
-    await viewer.page.goto(`${world.url}#stream=balls`);
+    await viewer.page.goto(`${balls.world.url}#stream=balls`);
     await viewer.page.reload();
     const notice = viewer.pane().locator('.notice');
     await until(`the notice without ${file}`, async () => reason.test(await notice.textContent()) && await notice.isVisible());
@@ -245,13 +239,13 @@ function damaged(message) {
 }
 
 test('a damaged frame is refused by name, and the next one is shown', async () => {
-  viewer = await SpaceViewer.open(browser, world.url);
+  viewer = await SpaceViewer.open(balls.browser, balls.world.url);
   let isDamaging = true;
   await viewer.page.routeWebSocket(/v1\/watch/, (socket) => {
     const server = socket.connectToServer();
     server.onMessage((message) => socket.send(isDamaging && message.length > 2000 ? damaged(message) : message));
   });
-  await viewer.page.goto(`${world.url}#stream=balls`);
+  await viewer.page.goto(`${balls.world.url}#stream=balls`);
   await viewer.page.reload();
   const notice = viewer.pane().locator('.notice');
   await until('the notice', async () => /Frame \d+ cannot be shown: surface\.triangles does not decompress/.test(await notice.textContent()));

@@ -1,17 +1,11 @@
 // Tests what pictures of surfaces hold of the graphics card: nothing accumulates, and a lost context returns.
 import assert from 'node:assert/strict';
-import { before, test } from 'node:test';
-import { SpaceViewer, streamBalls } from './space_support.mjs';
-import { cleansUp, launch, until, World } from './support.mjs';
+import { test } from 'node:test';
+import { servesBalls, SpaceViewer } from './space_support.mjs';
+import { until } from './support.mjs';
 
-let world, browser, viewer;
-
-before(async () => {
-  world = await World.start();
-  streamBalls(world);
-  browser = await launch();
-});
-cleansUp(() => ({ world, browser, viewer }));
+let viewer;
+const balls = servesBalls(() => viewer);
 
 /** Counts what the page creates and deletes by WebGL. Runs in the page before its scripts. */
 function countCalls() {
@@ -42,9 +36,9 @@ function countCalls() {
 
 /** Opens the page with counters. */
 async function open() {
-  viewer = await SpaceViewer.open(browser, 'about:blank');
+  viewer = await SpaceViewer.open(balls.browser, 'about:blank');
   await viewer.page.addInitScript(countCalls);
-  await viewer.page.goto(`${world.url}#stream=balls`);
+  await viewer.page.goto(`${balls.world.url}#stream=balls`);
   await viewer.drawsSurface();
 }
 

@@ -1,7 +1,8 @@
 // A stream of surfaces for the page's tests, and the page that shows it.
 import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { moduleOf, until, Viewer } from './support.mjs';
+import { before } from 'node:test';
+import { cleansUp, launch, moduleOf, until, Viewer, World } from './support.mjs';
 
 const { parseSpaceView, project } = await moduleOf('src/space/camera.ts');
 
@@ -39,6 +40,19 @@ export function ballsOf(world) {
 export function streamBalls(world, name = 'balls', format = 'compact') {
   return world.replayOf(ballsOf(world), name, ...SURFACE, '--echo-particles', '--slice', 'z=0', '--slice', 'y=2',
     '--loop', '--rate', '5', '--coordinates', format);
+}
+
+/** Starts a server with the stream `balls`, and Chromium, before all tests, and closes them after all.
+ * Returns both as { world, browser }, which are set then. `viewer`: returns the page that is open. */
+export function servesBalls(viewer) {
+  const opened = {};
+  before(async () => {
+    opened.world = await World.start();
+    streamBalls(opened.world);
+    opened.browser = await launch();
+  });
+  cleansUp(() => ({ ...opened, viewer: viewer() }));
+  return opened;
 }
 
 /** The page with pictures of surfaces. */
