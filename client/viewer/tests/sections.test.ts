@@ -53,7 +53,7 @@ test('parallel planes are shifted onto each other, others are not drawn together
 function message(...corners: number[][]) {
   const rings = (points: number[]) => ({
     points: bytesOf(Float64Array.from(points)), offsets: bytesOf(Uint32Array.of(0, points.length / 2)),
-    outerOf: bytesOf(Uint32Array.of(0xffffffff)),
+    outerOf: bytesOf(Uint32Array.of(0xffffffff)), measures: [{}],
   });
   const [own, ...sections] = corners;
   return create(ReconstructedFrameSchema, {

@@ -4,7 +4,8 @@ import {
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
 import { AttributeChannels, type Channels } from './channels';
-import type { Frame, Mesh, Rings, Statistics } from './frame';
+import { checkNesting, countCheck, lost, offsetsOf } from './checks';
+import { bareRings, type Frame, type Mesh, type Rings, type Statistics } from './frame';
 import { relativePositions } from './positions';
 import { surfaceMessageOf } from './surface';
 
@@ -75,20 +76,48 @@ class MessageMesh implements Mesh {
   }
 }
 
-function decodeRings(message: RingsMessage | undefined, points: Float32Array): Rings {
-  const measures = message?.measures ?? [];
+const NO_RINGS = bareRings(new Float32Array(0), new Uint32Array(1));
+/** A ring has at least three points. */
+const FEWEST_OF_RING = 3;
+
+/** Decodes rings, and checks all arrays against the numbers of rings and points. */
+function decodeRings(message: RingsMessage, relative: Relative): Rings {
+  const { measures, identities, normals } = message;
+  if (message.points.length % (relative.isRelative() ? 8 : 16) !== 0) throw lost('rings.points', 'is no array of points');
+  const points = relative.points(message.points);
+  const count = points.length / 2;
+  // A frame without rings may have no offsets.
+  const offsets = message.offsets.length === 0 && count === 0
+    ? new Uint32Array(1) : offsetsOf(message.offsets, 'rings.offsets', 'ring', FEWEST_OF_RING);
+  const rings = offsets.length - 1;
+  if (offsets[rings] !== count) throw lost('rings.offsets', `must end with the ${count} points`);
+  const check = countCheck('ring', rings);
+  check(message.outerOf.length === 4 * rings, 'rings.outer_of', 'a uint32');
+  check([0, 8 * rings].includes(identities.length), 'rings.identities', 'a uint64');
+  check(measures.length === rings, 'rings.measures', 'an entry');
+  if (![0, 8 * count].includes(normals.length)) throw lost('rings.normals', `must have two floats for each of the ${count} points`);
+  const outerOf = arrayOf(Uint32Array, message.outerOf);
+  checkNesting(outerOf, 'rings.outer_of', 'ring');
   return {
-    points,
-    offsets: message ? arrayOf(Uint32Array, message.offsets) : new Uint32Array(1),
-    outerOf: arrayOf(Uint32Array, message?.outerOf ?? EMPTY),
-    identities: arrayOf(BigUint64Array, message?.identities ?? EMPTY),
+    points, offsets, outerOf,
+    identities: identities.length > 0 ? arrayOf(BigUint64Array, identities) : new BigUint64Array(rings),
     area: Float64Array.from(measures, ({ area }) => area),
     perimeter: Float64Array.from(measures, ({ perimeter }) => perimeter),
     particles: Float64Array.from(measures, ({ particleCount }) => Number(particleCount)),
     parents: measures.map((measure) => measure.parentIdentities),
-    normals: message && message.normals.length > 0 ? arrayOf(Float32Array, message.normals) : null,
-    attributes: new AttributeChannels(message?.attributes ?? []),
+    normals: normals.length > 0 ? arrayOf(Float32Array, normals) : null,
+    attributes: new AttributeChannels(message.attributes),
   };
+}
+
+/** The outline and its mesh. A message that contradicts itself has none, and a sentence with the reason. */
+function decodeOutline(message: ReconstructedFrame, relative: Relative): Pick<Frame, 'rings' | 'mesh' | 'problem'> {
+  try {
+    const rings = message.rings ? decodeRings(message.rings, relative) : NO_RINGS;
+    return { rings, mesh: message.mesh ? new MessageMesh(message.mesh, relative) : null };
+  } catch (error) {
+    return { rings: NO_RINGS, mesh: null, problem: `The frame is damaged: ${(error as Error).message}` };
+  }
 }
 
 function decodeStatistics(message: ReconstructedFrame): Statistics {
@@ -132,10 +161,9 @@ export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
     sequence: message.sequence,
     time: message.time,
     origin: relative.origin,
-    rings: decodeRings(message.rings, relative.points(message.rings?.points ?? EMPTY)),
+    ...decodeOutline(message, relative),
     sections: message.sections.map((section) => decodeSection(section, message)),
     isolines: [],
-    mesh: message.mesh ? new MessageMesh(message.mesh, relative) : null,
     particles: message.particles.length > 0
       ? relativePositions(message.particleFormat, message.particles, plane, relative.origin)
       : null,
@@ -152,7 +180,7 @@ export function decodeSpaceFrame(message: ReconstructedFrame): Frame {
   return {
     sequence, time, surfaceDigest,
     origin: [originX, originY],
-    rings: decodeRings(undefined, new Float32Array(0)),
+    rings: NO_RINGS,
     sections: sections.map((section) => decodeSection(section, message)),
     isolines: [],
     mesh: null,

@@ -1,4 +1,5 @@
 import { AttributeChannels, type Channels } from './channels';
+import { NO_OUTER } from './checks';
 import type { SurfaceMessage } from './surface';
 
 /** Class of a mesh triangle. */
@@ -77,6 +78,8 @@ export interface Frame {
   /** Surfaces in space, not decoded yet. The outlines of such a frame are its sections. */
   surface?: SurfaceMessage;
   surfaceDigest?: bigint;
+  /** Why the frame has neither rings nor mesh: the contradiction in its message. Absent for an intact one. */
+  problem?: string;
 }
 
 /** Another outline of the frame, drawn as lines. */
@@ -89,7 +92,7 @@ export interface Isoline {
 }
 
 /** In Rings.outerOf: an outer ring. */
-export const NO_RING = 0xffffffff;
+export const NO_RING = NO_OUTER;
 
 /** Rings without measures, identities and attributes: lines to draw. */
 export function bareRings(points: Float32Array, offsets: Uint32Array): Rings {

@@ -1,12 +1,13 @@
 import { CoordinateFormat, type ReconstructedFrame } from '@proto/v1/reconstruction_pb';
 import { arrayOf } from './arrays';
 import type { NamedValues } from './channels';
+import { checkNesting, countCheck, lost as lostField, NO_OUTER, offsetsOf } from './checks';
 import { positionsInSpace } from './positions';
 
 // The steps and limits of proto/wire/surface_codec.cc and compact_surface.cc.
 
 /** In Surface.outerOf: an outer shell. */
-export const NO_SHELL = 0xffffffff;
+export const NO_SHELL = NO_OUTER;
 /** A shell has at least four triangles, a tetrahedron. */
 const FEWEST_OF_SHELL = 4;
 const MOST_STEPS = 2 ** 30;
@@ -83,7 +84,7 @@ export interface Surface {
 
 /** The message contradicts itself. */
 function lost(field: string, rule: string): Error {
-  return new Error(`surface.${field} ${rule}.`);
+  return lostField(`surface.${field}`, rule);
 }
 
 /** The bytes of a frame: views into its message. */
@@ -124,15 +125,7 @@ function copyOf<T extends Uint32Array | Float32Array | BigUint64Array>(
 }
 
 function decodeOffsets(bytes: Uint8Array, field: string): Uint32Array {
-  if (bytes.length % 4 !== 0) throw lost(field, 'is no array of uint32');
-  const offsets = copyOf(Uint32Array, bytes);
-  if (offsets.length === 0 || offsets[0] !== 0) throw lost(field, 'must begin with 0');
-  for (let k = 0; k + 1 < offsets.length; ++k) {
-    if (offsets[k + 1] < offsets[k] + FEWEST_OF_SHELL) {
-      throw lost(field, `gives shell ${k} fewer than ${FEWEST_OF_SHELL}`);
-    }
-  }
-  return offsets;
+  return offsetsOf(bytes.slice(), `surface.${field}`, 'shell', FEWEST_OF_SHELL);
 }
 
 type Shells = Pick<Surface, 'pointOffsets' | 'triangleOffsets' | 'outerOf' | 'identities'>;
@@ -142,18 +135,13 @@ function decodeShells(message: SurfaceMessage): Shells {
   const pointOffsets = decodeOffsets(message.pointOffsets, 'point_offsets');
   const triangleOffsets = decodeOffsets(message.triangleOffsets, 'triangle_offsets');
   const shells = pointOffsets.length - 1;
-  const check = (isRight: boolean, field: string, unit: string) => {
-    if (!isRight) throw lost(field, `must have ${unit} for each of the ${shells} shells`);
-  };
-  check(triangleOffsets.length === shells + 1, 'triangle_offsets', 'an entry');
-  check(message.outerOf.length === 4 * shells, 'outer_of', 'a uint32');
-  check([0, 8 * shells].includes(message.identities.length), 'identities', 'a uint64');
-  check(message.measures.area.length === shells, 'measures', 'an entry');
+  const check = countCheck('shell', shells);
+  check(triangleOffsets.length === shells + 1, 'surface.triangle_offsets', 'an entry');
+  check(message.outerOf.length === 4 * shells, 'surface.outer_of', 'a uint32');
+  check([0, 8 * shells].includes(message.identities.length), 'surface.identities', 'a uint64');
+  check(message.measures.area.length === shells, 'surface.measures', 'an entry');
   const outerOf = copyOf(Uint32Array, message.outerOf);
-  outerOf.forEach((outer, k) => {
-    if (outer === NO_SHELL || (outer < shells && outerOf[outer] === NO_SHELL)) return;
-    throw lost('outer_of', `names shell ${outer} for shell ${k}, which is no outer shell`);
-  });
+  checkNesting(outerOf, 'surface.outer_of', 'shell');
   const identities = message.identities.length > 0
     ? copyOf(BigUint64Array, message.identities) : new BigUint64Array(shells);
   return { pointOffsets, triangleOffsets, outerOf, identities };

@@ -273,7 +273,7 @@ export class Pane {
 
   get state(): PaneState {
     const doubts = this.frame?.statistics.doubts ?? [];
-    const problem = this.isSpace ? this.space?.problem ?? '' : '';
+    const problem = (this.isSpace ? this.space : this.frame)?.problem ?? '';
     return paneState(this.track, this.refusal || problem, doubts.map((doubt) => this.track.doubtText(doubt)).join(' '),
       this.frame !== null && !this.isPending);
   }

@@ -1,0 +1,40 @@
+// Checks of messages, as in proto/wire/result_codec.cc and surface_codec.cc. A message that contradicts
+// itself is refused with a sentence that names the field.
+import { arrayOf } from './arrays';
+
+/** What closed curves and surfaces are called in sentences. */
+export type Owner = 'ring' | 'shell';
+
+/** In an array of outer rings or shells: the ring or shell is an outer one itself. */
+export const NO_OUTER = 0xffffffff;
+
+/** The message contradicts itself. */
+export function lost(field: string, rule: string): Error {
+  return new Error(`${field} ${rule}.`);
+}
+
+/** Reads offsets, and checks that each ring or shell has at least `fewest` elements. A view of `bytes` if they are aligned. */
+export function offsetsOf(bytes: Uint8Array, field: string, owner: Owner, fewest: number): Uint32Array {
+  if (bytes.length % 4 !== 0) throw lost(field, 'is no array of uint32');
+  const offsets = arrayOf(Uint32Array, bytes);
+  if (offsets.length === 0 || offsets[0] !== 0) throw lost(field, 'must begin with 0');
+  for (let k = 0; k + 1 < offsets.length; ++k) {
+    if (offsets[k + 1] < offsets[k] + fewest) throw lost(field, `gives ${owner} ${k} fewer than ${fewest}`);
+  }
+  return offsets;
+}
+
+/** Returns a check of the number of entries of a field: `isRight`, or the field must have `unit` for each ring or shell. */
+export function countCheck(owner: Owner, count: number): (isRight: boolean, field: string, unit: string) => void {
+  return (isRight, field, unit) => {
+    if (!isRight) throw lost(field, `must have ${unit} for each of the ${count} ${owner}s`);
+  };
+}
+
+/** Checks that holes and cavities are in outer rings and shells. */
+export function checkNesting(outerOf: Uint32Array, field: string, owner: Owner): void {
+  outerOf.forEach((outer, k) => {
+    if (outer === NO_OUTER || (outer < outerOf.length && outerOf[outer] === NO_OUTER)) return;
+    throw lost(field, `names ${owner} ${outer} for ${owner} ${k}, which is no outer ${owner}`);
+  });
+}
