@@ -116,7 +116,7 @@ function decodeOutline(message: ReconstructedFrame, relative: Relative): Pick<Fr
     const rings = message.rings ? decodeRings(message.rings, relative) : NO_RINGS;
     return { rings, mesh: message.mesh ? new MessageMesh(message.mesh, relative) : null };
   } catch (error) {
-    return { rings: NO_RINGS, mesh: null, problem: `The frame is damaged: ${(error as Error).message}` };
+    return { rings: NO_RINGS, mesh: null, problem: `Frame ${message.sequence} cannot be shown: ${(error as Error).message}` };
   }
 }
 
@@ -142,7 +142,7 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
 
 /** A section sets neither sequence nor time. */
 function decodeSection(section: ReconstructedFrame, { sequence, time }: ReconstructedFrame): Frame {
-  return { ...decodeFrame(section, Plane.UNSPECIFIED), sequence, time };
+  return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }
 
 /** The server echoes velocities, and no other attributes of the particles. */

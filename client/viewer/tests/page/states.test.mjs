@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { before, test } from 'node:test';
-import { cleansUp, launch, screenshots, until, Viewer, violations, World } from './support.mjs';
+import { fromBinary, toBinary } from '@bufbuild/protobuf';
+import { cleansUp, launch, moduleOf, screenshots, until, Viewer, violations, World } from './support.mjs';
 
 let browser, world, viewer;
 before(async () => {
@@ -87,6 +88,32 @@ test('a lost server is named until it is back', async () => {
   } finally {
     await own.close();
   }
+});
+
+test('a damaged frame is refused by name, and the next one is shown', async () => {
+  const stream = world.loop('plain');
+  const { WatchStreamResponseSchema } = await moduleOf('build/generated/partiemc/v1/reconstruction_pb.ts');
+  const damaged = (bytes) => {
+    const message = fromBinary(WatchStreamResponseSchema, bytes);
+    const frame = message.response.case === 'frame' ? message.response.value.frame : null;
+    frame?.rings?.offsets.set([1]);
+    return Buffer.from(toBinary(WatchStreamResponseSchema, message));
+  };
+  viewer = await Viewer.open(browser, world.url);
+  let isDamaging = true;
+  await viewer.page.routeWebSocket(/v1\/watch/, (socket) => {
+    const server = socket.connectToServer();
+    server.onMessage((message) => socket.send(isDamaging ? damaged(message) : message));
+  });
+  await viewer.page.goto(`${world.url}#stream=plain`);
+  await viewer.page.reload();
+  await becomes('Refused');
+  assert.match(await notice().textContent(), /^Frame \d+ cannot be shown: rings\.offsets must begin with 0\./);
+  isDamaging = false;
+  await becomes('Live');
+  assert.ok(await notice().isHidden());
+  assert.deepEqual(viewer.errors, []);
+  await stream.stop();
 });
 
 test('refused settings show no picture of the former ones', async () => {
