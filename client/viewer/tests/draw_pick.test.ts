@@ -25,6 +25,7 @@ function ringsOf(corners: number[][], outerOf: number[]): Rings {
     perimeter: new Float64Array(corners.length),
     particles: new Float64Array(corners.length),
     parents: corners.map(() => []),
+    cuts: new Uint32Array(0),
     normals: null,
     attributes: new Map(),
   };

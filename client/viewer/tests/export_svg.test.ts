@@ -41,6 +41,14 @@ test('the outline has every vertex at its screen position', () => {
   assert.ok(text.includes(`M${x} ${y}L`));
 });
 
+test('the outline ends at cuts', () => {
+  const cuts = Uint32Array.of(1, 2);  // In the first ring.
+  const text = draw({ outline: true }, { ...FRAME, rings: { ...FRAME.rings, cuts } });
+  assert.equal(count(text, /Z/g), FRAME.rings.outerOf.length - 1);
+  const segments = FRAME.rings.offsets[1] - cuts.length;
+  assert.equal(count(text, /M/g), segments + FRAME.rings.outerOf.length - 1);
+});
+
 test('parts outside the picture are left out', () => {
   const drop = { x: 14.6, y: 3.1, scale: 250 };
   assert.equal(count(draw({ outline: true }, FRAME, drop), /Z/g), 1);

@@ -35,6 +35,11 @@ test('intact rings are decoded', () => {
   assert.equal(mesh?.triangles.length, 3);
 });
 
+test('cuts are decoded', () => {
+  assert.deepEqual([...frameOf({}).rings.cuts], []);
+  assert.deepEqual([...frameOf({ cuts: words(1, 3) }).rings.cuts], [1, 3]);
+});
+
 test('rings without identities have the identity 0', () => {
   assert.deepEqual([...frameOf({ identities: new Uint8Array(0) }).rings.identities], [0n, 0n]);
 });
@@ -52,6 +57,9 @@ test('a frame without rings is intact', () => {
 
 test('a damaged message has no outline and names the field', () => {
   const cases: [Fields, RegExp][] = [
+    [{ cuts: words(3, 7) }, /rings\.cuts must be ascending numbers of the 7 points\./],
+    [{ cuts: words(3, 3) }, /rings\.cuts must be ascending/],
+    [{ cuts: new Uint8Array(6) }, /rings\.cuts must be ascending/],
     [{ offsets: words(0, 4, 8) }, /rings\.offsets must end with the 7 points\./],
     [{ offsets: words(0, 4, 6) }, /rings\.offsets gives ring 1 fewer than 3\./],
     [{ offsets: words(0, 5, 3) }, /rings\.offsets gives ring 1 fewer than 3\./],

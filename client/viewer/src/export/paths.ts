@@ -55,6 +55,25 @@ export function ringPath(rings: Rings, which: Iterable<number>, at: Projection):
   return path;
 }
 
+/** Path of the rings without their cuts. Rings outside the picture are left out. */
+export function outlinePath(rings: Rings, which: Iterable<number>, at: Projection): string {
+  const cuts = new Set(rings.cuts);
+  let path = '';
+  for (const ring of which) {
+    const vertices = [...range(rings.offsets[ring], rings.offsets[ring + 1])];
+    if (!vertices.some((k) => cuts.has(k))) {
+      path += ringPath(rings, [ring], at);
+      continue;
+    }
+    if (!at.sees(rings.points, vertices)) continue;
+    vertices.forEach((k, place) => {
+      const next = vertices[(place + 1) % vertices.length];
+      if (!cuts.has(k)) path += `M${at.text(rings.points, k)}L${at.text(rings.points, next)}`;
+    });
+  }
+  return path;
+}
+
 /** Paths of triangles, grouped by `keyOf`. A null key leaves a triangle out. */
 export function trianglePaths<Key>(
   mesh: Mesh, keyOf: (triangle: number) => Key | null, at: Projection,

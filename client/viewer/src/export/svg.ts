@@ -11,7 +11,7 @@ import {
 import type { Size, View } from '../draw/view';
 import { type Frame, type Mesh, NO_RING, type Rings, TRIANGLE_CLASS } from '../protocol/frame';
 import {
-  bandPaths, dotPath, edgePaths, normalPath, Projection, ringPath, segmentPaths, short, trianglePaths,
+  bandPaths, dotPath, edgePaths, normalPath, outlinePath, Projection, ringPath, segmentPaths, short, trianglePaths,
 } from './paths';
 
 /** Colours of an attribute. */
@@ -50,10 +50,10 @@ export function svg(
   }
   if (look.outline) parts.push(...outline(rings, look, ringColour, range, at));
   for (const isoline of shownIsolines(frame, look)) {
-    const path = ringPath(isoline.rings, isoline.rings.outerOf.keys(), new Projection(view, size, isoline.origin));
+    const path = outlinePath(isoline.rings, isoline.rings.outerOf.keys(), new Projection(view, size, isoline.origin));
     parts.push(line(path, isolineColour(isoline.index, look.dark), ISOLINE_WIDTH));
   }
-  parts.push(line(ringPath(rings, selected, at), colours.accent, Math.max(look.lineWidth, 1) + 0.5));
+  parts.push(line(outlinePath(rings, selected, at), colours.accent, Math.max(look.lineWidth, 1) + 0.5));
   const drawn = parts.filter((part) => part !== '');
   return [...drawn, '</g>', ...marksSvg(marks), '</svg>', ''].join('\n');
 }
@@ -124,7 +124,7 @@ function outline(
   const values = name === null ? undefined : rings.attributes.get(name);
   if (!values) {
     return Array.from(grouped(rings, ringColour), ([colour, group]) =>
-      line(ringPath(rings, group, at), unpacked(colour), look.lineWidth));
+      line(outlinePath(rings, group, at), unpacked(colour), look.lineWidth));
   }
   const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
   const colourOf = (point: number, next: number): string =>

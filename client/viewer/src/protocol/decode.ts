@@ -98,6 +98,10 @@ function decodeRings(message: RingsMessage, relative: Relative): Rings {
   if (![0, 8 * count].includes(normals.length)) throw lost('rings.normals', `must have two floats for each of the ${count} points`);
   const outerOf = arrayOf(Uint32Array, message.outerOf);
   checkNesting(outerOf, 'rings.outer_of', 'ring');
+  const cuts = arrayOf(Uint32Array, message.cuts);
+  if (message.cuts.length % 4 !== 0 || !cuts.every((cut, k) => cut < count && (k === 0 || cuts[k - 1] < cut))) {
+    throw lost('rings.cuts', `must be ascending numbers of the ${count} points`);
+  }
   return {
     points, offsets, outerOf,
     identities: identities.length > 0 ? arrayOf(BigUint64Array, identities) : new BigUint64Array(rings),
@@ -105,6 +109,7 @@ function decodeRings(message: RingsMessage, relative: Relative): Rings {
     perimeter: Float64Array.from(measures, ({ perimeter }) => perimeter),
     particles: Float64Array.from(measures, ({ particleCount }) => Number(particleCount)),
     parents: measures.map((measure) => measure.parentIdentities),
+    cuts,
     normals: normals.length > 0 ? arrayOf(Float32Array, normals) : null,
     attributes: new AttributeChannels(message.attributes),
   };

@@ -18,6 +18,8 @@ export interface Rings {
   particles: Float64Array;
   /** Identities, in the previous frame, of the rings that each ring continues. */
   parents: bigint[][];
+  /** Vertices, ascending, whose segment to the next one lies on a face of the periodic box. */
+  cuts: Uint32Array;
   normals: Float32Array | null;
   /** Numbers per vertex. */
   attributes: Channels;
@@ -106,6 +108,7 @@ export function bareRings(points: Float32Array, offsets: Uint32Array): Rings {
     perimeter: new Float64Array(count),
     particles: new Float64Array(count),
     parents: Array.from({ length: count }, () => []),
+    cuts: new Uint32Array(0),
     normals: null,
     attributes: new AttributeChannels([]),
   };

@@ -32,7 +32,12 @@ vec2 direction(vec2 vector, vec2 otherwise) {
 void main() {
   int index = gl_VertexID / 6;
   int corner = gl_VertexID - 6 * index;
-  uvec4 ring = texelFetch(rings, at(int(texelFetch(ringOf, at(index), 0).r)), 0);
+  uint word = texelFetch(ringOf, at(index), 0).r;
+  if (isCut(word)) {
+    gl_Position = vec4(2.0, 2.0, 0.0, 1.0);  // Beside the picture.
+    return;
+  }
+  uvec4 ring = texelFetch(rings, at(ringAt(word)), 0);
   int first = int(ring.x);
   int last = int(ring.y) - 1;
   int next = index == last ? first : index + 1;

@@ -22,6 +22,10 @@ vec2 pixel(vec2 point) { return (point - centre) * scale; }
 
 vec4 position(vec2 pixels) { return vec4(2.0 * pixels / size, 0.0, 1.0); }
 
+// The ring of a vertex, and whether its segment is not drawn (ring_table.ts).
+int ringAt(uint word) { return int(word & 0x7fffffffu); }
+bool isCut(uint word) { return word >> 31 == 1u; }
+
 vec4 unpacked(uint colour) {
   return vec4(uvec4(colour, colour >> 8, colour >> 16, colour >> 24) & 255u) / 255.0;
 }

@@ -10,7 +10,7 @@ uniform usampler2D rings;
 void main() {
   int index = gl_VertexID / 3;
   int corner = gl_VertexID - 3 * index;
-  uvec4 ring = texelFetch(rings, at(int(texelFetch(ringOf, at(index), 0).r)), 0);
+  uvec4 ring = texelFetch(rings, at(ringAt(texelFetch(ringOf, at(index), 0).r)), 0);
   int next = index + 1 == int(ring.y) ? int(ring.x) : index + 1;
   int point = corner == 0 ? int(ring.x) : corner == 1 ? index : next;
   gl_Position = position(pixel(texelFetch(points, at(point), 0).rg));

@@ -2,6 +2,9 @@ import type { Rings } from '../../protocol/frame';
 import type { Look } from '../look';
 import { ringColours } from '../look_colours';
 
+/** Marks a vertex whose segment to the next one is not drawn (program.ts, ringAt). */
+const CUT = 0x80000000;
+
 /** Numbers per ring: first vertex, end vertex, colour, unused. */
 const ROW = 4;
 
@@ -10,7 +13,7 @@ export class RingTable {
   private ringOfPoint = new Uint32Array(0);
   private rows = new Uint32Array(0);
 
-  /** The ring of every vertex. Valid until the next call. */
+  /** The ring of every vertex, and whether its segment is CUT. Valid until the next call. */
   ringOf(rings: Rings): Uint32Array {
     const count = rings.points.length / 2;
     if (this.ringOfPoint.length < count) this.ringOfPoint = new Uint32Array(2 * count);
@@ -18,6 +21,7 @@ export class RingTable {
     for (let ring = 0; ring + 1 < offsets.length; ++ring) {
       this.ringOfPoint.fill(ring, offsets[ring], offsets[ring + 1]);
     }
+    for (const point of rings.cuts) this.ringOfPoint[point] |= CUT;
     return this.ringOfPoint.subarray(0, count);
   }
 
