@@ -1,61 +1,28 @@
-// Counts every operator new of the program: a frame like one before must need none. oneTBB's own
-// task pool takes memory by other means and is not counted.
+// Allocations and memory of outlines: a frame like one before must allocate nothing.
 #include <gtest/gtest.h>
-#include <malloc.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <array>
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <ostream>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/heap_counts.h"
+#include "core/recording_guard.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
-#include "partiemc/surface_reconstructor.h"
 #include "support/particles.h"
-
-namespace {
-
-std::atomic<std::size_t> allocations = 0;
-std::atomic<std::size_t> live_bytes = 0, peak_bytes = 0;
-
-void* Allocate(std::size_t bytes, std::size_t alignment) {
-  ++allocations;
-  void* memory = nullptr;
-  if (posix_memalign(&memory, alignment, bytes) != 0) throw std::bad_alloc();
-  const std::size_t live = live_bytes += malloc_usable_size(memory);
-  std::size_t peak = peak_bytes;
-  while (peak < live && !peak_bytes.compare_exchange_weak(peak, live)) continue;
-  return memory;
-}
-
-void Free(void* memory) {
-  live_bytes -= malloc_usable_size(memory);
-  std::free(memory);
-}
-
-}  // namespace
-
-void* operator new(std::size_t bytes) { return Allocate(bytes, alignof(std::max_align_t)); }
-void* operator new(std::size_t bytes, std::align_val_t alignment) {
-  return Allocate(bytes, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept { Free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { Free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { Free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { Free(memory); }
 
 namespace partiemc {
 namespace {
 
+using support::allocations;
+using support::live_bytes;
 using support::Particles;
+using support::RecordingGuard;
 
 // Values of an attribute, for which the mesh of `greedy` has the smallest blocks.
 std::vector<float> NoisyValues(std::size_t count) {
@@ -218,95 +185,6 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
   }
   EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
 }
-
-// Frames in space with ids, velocities and an attribute.
-class TrackedFrames {
- public:
-  explicit TrackedFrames(const std::vector<std::vector<double>>& frames) : frames_(frames) {
-    for (const std::vector<double>& xyz : frames) {
-      velocities_.emplace_back(xyz.size(), 1.0f);
-      ids_.emplace_back();
-      for (std::size_t k = 0; k < xyz.size() / 3; ++k) ids_.back().push_back(k);
-    }
-    for (const std::vector<float>& velocities : velocities_) {
-      attributes_.push_back({"velocity", 3, velocities});
-    }
-  }
-
-  // Frame k; with positions only unless it is tracked.
-  Frame At(std::size_t k, bool is_tracked = true) const {
-    Frame frame{.positions = std::span<const double>(frames_[k]), .components = 3};
-    if (!is_tracked) return frame;
-    frame.ids = ids_[k];
-    frame.velocities = velocities_[k];
-    frame.attributes = std::span(&attributes_[k], 1);
-    frame.time = static_cast<double>(k);
-    return frame;
-  }
-
- private:
-  const std::vector<std::vector<double>>& frames_;
-  std::vector<std::vector<float>> velocities_;
-  std::vector<std::vector<std::uint64_t>> ids_;
-  std::vector<Attribute> attributes_;
-};
-
-class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int, bool>> {};
-
-TEST_P(WarmSurface, AllocatesNothing) {
-  const auto placement = std::get<SurfacePlacement>(GetParam());
-  const int threads = std::get<int>(GetParam());
-  const bool is_tracked = std::get<bool>(GetParam());
-  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-  tbb::task_arena arena(threads);
-  const auto reconstructor = SurfaceReconstructor::Create(
-      {.placement = placement, .clean = true, .min_component_particles = 2});
-  ASSERT_TRUE(reconstructor.ok());
-  // Balls that meet, with spray; then a few particles, then none.
-  std::vector<std::vector<double>> frames;
-  support::Random random(1);
-  for (int k = 0; k < 3; ++k) {
-    std::vector<double>& xyz = frames.emplace_back();
-    for (int p = 0; p < 24 * 12 * 12; ++p) {
-      const double x = p % 24 - 6, y = p / 24 % 12 - 6, z = p / 288 - 6;
-      const double shifted = x - 9 - k;
-      if (x * x + y * y + z * z > 25 && shifted * shifted + y * y + z * z > 20) continue;
-      xyz.insert(xyz.end(), {x + random.Uniform(0, .2), y, z});
-    }
-    for (int p = 0; p < 90; ++p) xyz.push_back(random.Uniform(-20, 20));
-  }
-  frames.push_back({0, 0, 0, 1, 0, 0});
-  frames.emplace_back();
-  const TrackedFrames tracked(frames);
-  SurfaceWorkspace workspace;
-  Surface surface;
-  SurfaceState state;
-  std::size_t before = 0;
-  for (int round = 0; round < 3; ++round) {
-    before = allocations;
-    for (std::size_t k = 0; k < frames.size(); ++k) {
-      arena.execute([&] {
-        const Frame frame = tracked.At(k, is_tracked);
-        const absl::Status status =
-            is_tracked ? reconstructor->Reconstruct(frame, state, workspace, surface)
-                       : reconstructor->Reconstruct(frame, workspace, surface);
-        ASSERT_TRUE(status.ok());
-        ASSERT_EQ(surface.TriangleCount() > 0, !frames[k].empty());
-      });
-    }
-    if (round == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
-}
-
-INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
-                         testing::Combine(testing::Values(SurfacePlacement::kMarchingCubes,
-                                                          SurfacePlacement::kQef,
-                                                          SurfacePlacement::kVirtualPlane),
-                                          testing::Values(1, 2), testing::Bool()));
-
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {
@@ -330,23 +208,6 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                                   std::to_string(tested.param.threads) +
                                   (tested.param.estimates_spacing ? "_spacing" : "");
                          });
-
-// Grants a number of requests, and records the requested bytes.
-class Guard final : public MemoryGuard {
- public:
-  explicit Guard(int granted) : granted_(granted) {}
-  bool Reserve(std::uint64_t bytes) override {
-    EXPECT_GE(bytes, last_);
-    last_ = bytes;
-    return granted_-- > 0;
-  }
-  std::uint64_t last() const { return last_; }
-
- private:
-  int granted_;
-  std::uint64_t last_ = 0;
-};
-
 struct MemoryCase {
   std::string name;
   Particles particles;
@@ -406,14 +267,14 @@ TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
     Frame frame = tested.particles.AsFrame();
     if (tested.carries != MemoryCase::kNothing) frame.attributes = attributes;
     const std::size_t before = live_bytes;
-    Guard guard(100);
+    RecordingGuard guard(100);
     std::size_t held = 0;
     {
       State state;
       Workspace workspace;
       Result result;
       for (int k = 0; k < 2; ++k) {  // The second one remembers the first.
-        guard = Guard(100);
+        guard = RecordingGuard(100);
         const absl::Status status =
             reconstructor->Reconstruct(frame, state, workspace, result, {.memory = &guard});
         ASSERT_TRUE(status.ok()) << status;
@@ -441,7 +302,7 @@ TEST(MemoryGuard, RefusesAFrameBeforeItsTilesTakeMemory) {
   for (const int granted : {0, 1}) {
     SCOPED_TRACE(granted);
     const std::size_t live = live_bytes;
-    Guard guard(granted);
+    RecordingGuard guard(granted);
     const absl::Status status = reconstructor->Reconstruct(tested.particles.AsFrame(), state,
                                                            workspace, result, {.memory = &guard});
     EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
@@ -461,165 +322,5 @@ TEST(MemoryGuard, RefusesAFrameBeforeItsTilesTakeMemory) {
   ASSERT_TRUE(reconstructor->Reconstruct(drop.AsFrame(), again, workspace, result).ok());
   EXPECT_EQ(result, drop_result);
 }
-
-struct SurfaceCase {
-  std::string name;
-  std::vector<double> xyz;
-  SurfaceParameters parameters;
-};
-
-// Frames in space that differ in their largest consumer of memory.
-std::vector<SurfaceCase> SurfaceCases() {
-  std::vector<SurfaceCase> cases;
-  const auto spread = [](int side, double distance, double x0 = 0) {
-    std::vector<double> xyz;
-    for (int p = 0; p < side * side * side; ++p) {
-      for (const int at : {p % side, p / side % side, p / side / side}) {
-        xyz.push_back(x0 + distance * at);
-      }
-    }
-    return xyz;
-  };
-  support::Random random(3);
-  std::vector<double> noise;
-  for (int p = 0; p < 30'000; ++p) noise.push_back(random.Uniform(0, 30));
-  for (const SurfacePlacement placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
-                                           SurfacePlacement::kVirtualPlane}) {
-    const SurfaceParameters parameters{.placement = placement};
-    SurfaceParameters fine = parameters, whole = parameters;
-    fine.cell_size = .5;
-    whole.thinning_distance = 0;
-    const std::string suffix = absl::StrCat(", placement ", static_cast<int>(placement));
-    cases.push_back({"corners of bricks" + suffix, spread(10, 16), parameters});
-    cases.push_back({"middles of bricks" + suffix, spread(10, 24, 4), parameters});
-    cases.push_back({"one body" + suffix, spread(50, 1), parameters});
-    cases.push_back({"one body of a fine lattice" + suffix, spread(28, 1), fine});
-    cases.push_back({"drops" + suffix, spread(16, 5), parameters});
-    cases.push_back({"noise" + suffix, noise, parameters});
-    cases.push_back({"noise, all vertices" + suffix, noise, whole});
-  }
-  return cases;
-}
-
-TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
-  for (const SurfaceCase& tested : SurfaceCases()) {
-    SCOPED_TRACE(tested.name);
-    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
-    ASSERT_TRUE(reconstructor.ok());
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
-    const std::size_t before = live_bytes;
-    Guard guard(2);
-    SurfaceWorkspace workspace;
-    Surface surface;
-    const absl::Status status =
-        reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
-    ASSERT_TRUE(status.ok()) << status;
-    const std::size_t held = live_bytes - before;
-    EXPECT_LE(held, guard.last());
-    EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
-  }
-}
-
-// The simplification frees its memory, so the peak counts.
-TEST(MemoryGuard, IsToldNoLessThanASimplificationTakes) {
-  for (SurfaceCase& tested : SurfaceCases()) {
-    SCOPED_TRACE(tested.name);
-    tested.parameters.simplify = .1;
-    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
-    ASSERT_TRUE(reconstructor.ok());
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
-    const std::size_t before = live_bytes;
-    peak_bytes = before;
-    Guard guard(2);
-    SurfaceWorkspace workspace;
-    Surface surface;
-    ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard}).ok());
-    const std::size_t held = peak_bytes - before;
-    EXPECT_LE(held, guard.last());
-    EXPECT_GE(3 * static_cast<double>(held), static_cast<double>(guard.last()));
-  }
-}
-
-// The bound for two frames of a stream with ids, velocities and an attribute.
-TEST(MemoryGuard, IsToldNoLessThanAStreamOfSurfacesTakes) {
-  std::vector<SurfaceCase> cases;
-  std::vector<double> plates, lone, cube;
-  for (int p = 0; p < 4 * 30 * 30; ++p) {  // Plates whose edges are along x.
-    for (const int at : {p % 4 * 6, p / 4 % 30, p / 120}) plates.push_back(at);
-  }
-  for (int p = 0; p < 1000; ++p) {
-    for (const int at : {p % 10, p / 10 % 10, p / 100}) lone.push_back(7 * at + .4);
-  }
-  for (int p = 0; p < 24 * 24 * 24; ++p) {
-    for (const int at : {p % 24, p / 24 % 24, p / 576}) cube.push_back(at);
-  }
-  support::Random random(3);
-  std::vector<double> noise;
-  for (int p = 0; p < 6'000; ++p) noise.push_back(random.Uniform(0, 18));
-  for (const SurfacePlacement placement :
-       {SurfacePlacement::kMarchingCubes, SurfacePlacement::kVirtualPlane}) {
-    cases.push_back({"plates", plates, {.placement = placement}});
-    cases.push_back({"lone particles", lone, {.placement = placement}});
-    cases.push_back({"one body", cube, {.placement = placement}});
-    cases.push_back({"noise", noise, {.placement = placement}});
-  }
-  for (const SurfaceCase& tested : cases) {
-    SCOPED_TRACE(tested.name);
-    const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
-    ASSERT_TRUE(reconstructor.ok());
-    const std::vector<std::vector<double>> frames = {tested.xyz};
-    const TrackedFrames tracked(frames);
-    const std::size_t before = live_bytes;
-    std::uint64_t told = 0;
-    SurfaceWorkspace workspace;
-    Surface surface;
-    SurfaceState state;
-    for (int frame = 0; frame < 2; ++frame) {
-      Guard guard(2);
-      const absl::Status status =
-          reconstructor->Reconstruct(tracked.At(0), state, workspace, surface, {.memory = &guard});
-      ASSERT_TRUE(status.ok()) << status;
-      told = guard.last();
-    }
-    const std::size_t held = live_bytes - before;
-    RecordProperty("ratio", std::to_string(static_cast<double>(told) / static_cast<double>(held)));
-    EXPECT_LE(held, told);
-    EXPECT_GE(2.6 * static_cast<double>(held), static_cast<double>(told));
-  }
-}
-
-TEST(MemoryGuard, RefusesASurfaceBeforeItsBricksTakeMemory) {
-  const SurfaceCase tested = SurfaceCases().front();
-  const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
-  ASSERT_TRUE(reconstructor.ok());
-  const std::vector<double> drop = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1};
-  const Frame small{.positions = std::span<const double>(drop), .components = 3};
-  SurfaceWorkspace workspace;
-  Surface surface;
-  ASSERT_TRUE(reconstructor->Reconstruct(small, workspace, surface).ok());
-  const Surface drop_surface = surface;
-  for (const int granted : {0, 1}) {
-    SCOPED_TRACE(granted);
-    const std::size_t live = live_bytes;
-    Guard guard(granted);
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
-    const absl::Status status =
-        reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
-    EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
-    const auto violation = FindViolation(status);
-    ASSERT_TRUE(violation.has_value());
-    EXPECT_EQ(violation->reason, kReasonOutOfMemory);
-    EXPECT_EQ(violation->field, "positions");
-    EXPECT_EQ(violation->value, "8000 bricks of 8 x 8 x 8 nodes");
-    EXPECT_EQ(surface, Surface());
-    // The directory of the bricks and the particles' places in it, but nothing stored on bricks.
-    if (granted == 0) {
-      EXPECT_LE(live_bytes - live, 8'000 * 250u);
-    }
-  }
-  ASSERT_TRUE(reconstructor->Reconstruct(small, workspace, surface).ok());
-  EXPECT_EQ(surface, drop_surface);
-}
-
 }  // namespace
 }  // namespace partiemc

@@ -84,7 +84,9 @@ inline TriangleGrid::TriangleGrid(std::span<const double> points,
   edge_ = std::max({extents / 3 / static_cast<double>(boxes_.size()), extent / 0x1p20,
                     std::numeric_limits<double>::min()});
   constexpr double kMostCells = 16;  // For each triangle.
-  while (Reached() > kMostCells * static_cast<double>(boxes_.size())) edge_ *= 2;
+  double reached = Reached();
+  for (; reached > kMostCells * static_cast<double>(boxes_.size()); reached = Reached()) edge_ *= 2;
+  entries_.reserve(static_cast<std::size_t>(reached));
   for (std::uint32_t t = 0; t < boxes_.size(); ++t) {
     const Box& box = boxes_[t];
     for (auto z = CellOf(box.low[2], 2); z <= CellOf(box.high[2], 2); ++z) {

@@ -64,6 +64,7 @@ struct Placed {
 void SimplifyEachBlock(std::span<const double> points, double error, double side,
                        const Vec3& origin, std::vector<std::uint32_t>& triangles) {
   std::vector<Placed> placed;
+  placed.reserve(triangles.size() / 3);
   for (std::uint32_t t = 0; t < triangles.size() / 3; ++t) {
     const Vec3 at = (1 / side) * (Vec3At(points, triangles[3 * t]) - origin);
     const auto floor = [](double value) { return static_cast<std::int64_t>(std::floor(value)); };

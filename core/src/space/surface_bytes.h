@@ -40,7 +40,7 @@ inline constexpr std::uint64_t kBytesPerValue = 8;
 inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
-inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 500;
+inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
