@@ -5,6 +5,7 @@
 #include "client/python/research.h"
 #include "client/python/results.h"
 #include "client/python/streams.h"
+#include "client/python/watch.h"
 
 PYBIND11_MODULE(_native, module) {
   module.attr("version") = PARTIEMC_VERSION;
@@ -12,4 +13,5 @@ PYBIND11_MODULE(_native, module) {
   partiemc::python::DefineReconstructor(module);
   partiemc::python::DefineResearch(module);
   partiemc::python::DefineStreams(module);
+  partiemc::python::DefineWatch(module);
 }

@@ -243,6 +243,13 @@ client::WatcherOptions TakeWatcherOptions(py::dict arguments) {
   }
   TakeInto(arguments, "credits", options.credits);
   TakeInto(arguments, "from_sequence", options.from_sequence);
+  LevelOfDetail level;
+  TakeInto(arguments, "max_error", level.max_error);
+  TakeInto(arguments, "max_triangles", level.max_triangles);
+  if (level.max_error || level.max_triangles) {
+    RaiseUnlessOk(Validate(level));
+    options.level_of_detail = level;
+  }
   TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
   TakeTime(arguments, "connect_timeout", options.connect_timeout);
   TakeTime(arguments, "deadline", options.deadline);

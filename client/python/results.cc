@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@
 #include "partiemc/gauges.h"
 #include "partiemc/stage.h"
 #include "wire/codec.h"
+#include "wire/surface_level.h"
 
 namespace partiemc::python {
 namespace {
@@ -298,6 +300,11 @@ py::tuple ToState(PythonResult& result) {
     message.set_mesh_digest(frame.mesh_digest);
     message.set_surface_digest(frame.surface_digest);
   }
+  if (result.level && message.has_surface()) {
+    v1::SurfaceLevel& level = *message.mutable_surface()->mutable_level();
+    level.set_error(result.level->error);
+    level.set_digest(result.level->digest);
+  }
   std::string bytes;
   if (!message.SerializeToString(&bytes)) {
     throw py::value_error("pickle: the result has more than 2 GiB");
@@ -326,6 +333,7 @@ std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
   RaiseUnlessOk(wire::DecodeResult(message, decoded));
   result->sequence = decoded.sequence;
   result->time = decoded.time;
+  result->level = wire::LevelOf(message);
   result->frame.result = std::move(decoded.result);
   result->frame.times = {decoded.times.stages_ms, decoded.times.total_ms};
   result->frame.rings_digest = decoded.rings_digest;
@@ -433,6 +441,21 @@ void DefineResults(py::module_& module) {
           },
           "(N, 2) float64, or (N, 3) with output='surface': particles of a watched frame; N is 0 "
           "unless its producer echoes them.")
+      .def_property_readonly(
+          "level_error",
+          [](const PythonResult& r) {
+            return r.level ? std::optional(r.level->error) : std::nullopt;
+          },
+          "Frames watched with max_error or max_triangles: the limit of the root mean square "
+          "distance between `surface` and the exact surface, in spacings; 0 if no point was "
+          "removed. None for an exact surface.")
+      .def_property_readonly(
+          "level_digest",
+          [](const PythonResult& r) {
+            return r.level ? std::optional(r.level->digest) : std::nullopt;
+          },
+          "64-bit digest of `surface` if it is a level of detail, else None. `surface_digest` is "
+          "the digest of the exact surface.")
       .def_readonly("dropped", &PythonResult::dropped,
                     "Watched frames: number of frames dropped since the previous one.")
       .def_readonly("gap", &PythonResult::gap,

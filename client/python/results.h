@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/mutex.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/doubt.h"
+#include "partiemc/surface_level.h"
 
 namespace partiemc::python {
 
@@ -25,6 +27,7 @@ struct PythonResult {
   /// True if the output of the stream is surfaces: particles then have three coordinates.
   bool in_space = false;
   // Set for watched frames:
+  std::optional<SurfaceLevel> level;  ///< Absent: the surface is exact.
   std::vector<double> particles;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;

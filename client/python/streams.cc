@@ -1,9 +1,7 @@
 #include "client/python/streams.h"
 
-#include <grpc/grpc.h>
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -20,12 +18,12 @@
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
 #include "client/python/results.h"
+#include "client/python/waiting.h"
 #include "common/mutex.h"
 #include "partiemc/client/latest_sender.h"
 #include "partiemc/client/server_info.h"
 #include "partiemc/client/stream.h"
 #include "partiemc/client/stream_list.h"
-#include "partiemc/client/watcher.h"
 
 namespace partiemc::python {
 namespace {
@@ -35,9 +33,6 @@ using client::Event;
 using client::Received;
 using std::chrono::milliseconds;
 
-// Poll interval for Ctrl-C while waiting for a response.
-constexpr milliseconds kSlice(100);
-
 // Maximum time that `send` waits for another thread to receive for the first time, and its poll
 // interval.
 constexpr milliseconds kReceiverWait(500), kReceiverPoll(5);
@@ -45,46 +40,6 @@ constexpr milliseconds kReceiverWait(500), kReceiverPoll(5);
 // Maximum time to wait for the last frames of a stream that the program drops after `finish`. A
 // healthy server needs far less. A lost server must not keep a program from ending.
 constexpr std::chrono::seconds kDropWait(10);
-
-std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
-  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
-  if (!seconds) return std::nullopt;
-  return std::chrono::steady_clock::now() +
-         std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-             std::chrono::duration<double>(std::min(std::max(*seconds, 0.0), kLongest)));
-}
-
-// Calls `receive` repeatedly, each time with a short wait, until it returns an event or `seconds`
-// have passed. Waits without the GIL. Between the waits it checks for signals, whose handlers may
-// raise.
-template <typename Receive>
-absl::StatusOr<Received> Wait(std::optional<double> seconds, Receive receive) {
-  const auto until = Until(seconds);
-  for (;;) {
-    auto slice = kSlice;
-    if (until) {
-      slice = std::min(slice,
-                       std::chrono::ceil<milliseconds>(*until - std::chrono::steady_clock::now()));
-    }
-    absl::StatusOr<Received> received = Received::kNothingYet;
-    {
-      const py::gil_scoped_release others_may_run;
-      received = receive(std::max(slice, milliseconds(0)));
-    }
-    if (!received.ok() || *received != Received::kNothingYet) return received;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (until && std::chrono::steady_clock::now() >= *until) return received;
-  }
-}
-
-// Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream.
-// This shutdown can wait 10 s for gRPC's own objects.
-void KeepGrpc() { [[maybe_unused]] static const bool is_kept = (grpc_init(), true); }
-
-std::string AddressOf(const std::optional<std::string>& address) {
-  KeepGrpc();
-  return address ? *address : client::ServerFromEnvironment();
-}
 
 [[noreturn]] void RaiseEnd() {
   PyErr_SetString(PyExc_EOFError, "the stream has ended: every frame has been answered");
@@ -174,12 +129,7 @@ class ProducerStream {
   }
 
   std::shared_ptr<PythonResult> Next() {
-    try {
-      return Receive(std::nullopt);
-    } catch (py::error_already_set& error) {
-      if (error.matches(PyExc_EOFError)) throw py::stop_iteration();
-      throw;
-    }
+    return NextBy([this] { return Receive(std::nullopt); });
   }
 
   void Finish() {
@@ -315,76 +265,6 @@ class ProducerStream {
   bool finished_ ABSL_GUARDED_BY(sending_) = false;
 };
 
-class Watch {
- public:
-  Watch(const std::optional<std::string>& address, const std::string& name, py::dict arguments) {
-    const client::WatcherOptions options = TakeWatcherOptions(arguments);
-    ExpectNothingElse(arguments, "watch");
-    absl::StatusOr<std::unique_ptr<client::Watcher>> watcher = nullptr;
-    {
-      const py::gil_scoped_release others_may_run;
-      watcher = client::Watcher::Open(AddressOf(address), name, options);
-    }
-    RaiseUnlessOk(watcher.status());
-    watcher_ = *std::move(watcher);
-  }
-  ~Watch() {
-    const py::gil_scoped_release others_may_run;
-    watcher_.reset();
-  }
-
-  // Returns None if no frame arrives in time. Raises an exception at the end of the watch.
-  std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
-    const auto result = results_->Take();
-    client::WatchedFrame frame;
-    frame.frame = std::move(result->frame);
-    const auto received = Wait(wait, [&](milliseconds slice) -> absl::StatusOr<Received> {
-      const std::unique_lock lock(receiving_, slice);
-      if (!lock.owns_lock()) return Received::kNothingYet;
-      return watcher_->Receive(frame, slice);
-    });
-    result->frame = std::move(frame.frame);  // Returns unused buffers.
-    RaiseUnlessOk(received.status());
-    if (*received == Received::kNothingYet) return nullptr;
-    if (*received == Received::kEnd) {
-      PyErr_SetString(PyExc_EOFError,
-                      (watcher_->end().reason + ": " + watcher_->end().message).c_str());
-      throw py::error_already_set();
-    }
-    result->sequence = frame.sequence;
-    result->time = frame.time;
-    result->in_space = watcher_->stream().parameters.output == Output::kSurface;
-    result->particles = std::move(frame.particles);
-    result->dropped = frame.dropped;
-    result->gap = frame.gap;
-    result->rejoined = std::move(frame.rejoined);
-    WarnOfDoubts(result, warned_);
-    return result;
-  }
-
-  std::shared_ptr<PythonResult> Next() {
-    try {
-      return Receive(std::nullopt);
-    } catch (py::error_already_set& error) {
-      if (error.matches(PyExc_EOFError)) throw py::stop_iteration();
-      throw;
-    }
-  }
-
-  void Cancel() {
-    const py::gil_scoped_release others_may_run;
-    watcher_->Cancel();
-  }
-  py::dict Parameters() const { return ToDict(watcher_->stream().parameters); }
-  std::string End() const { return watcher_->end().reason; }
-
- private:
-  const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
-  std::unique_ptr<client::Watcher> watcher_;
-  Doubts warned_;               // With the GIL.
-  std::timed_mutex receiving_;  // Held by the receiving thread.
-};
-
 py::list Streams(const std::optional<std::string>& address, const py::kwargs& arguments) {
   const client::Credentials credentials = TakeCredentials(arguments);
   ExpectNothingElse(arguments, "streams");
@@ -476,22 +356,6 @@ void DefineStreams(py::module_& module) {
                              "Resolved parameters by name.")
       .def_property_readonly("counts", &ProducerStream::Counts,
                              "With latest=True: frames 'sent', 'skipped', 'refused'.");
-  py::class_<Watch>(
-      module, "Watch",
-      "An iterator over the results of another producer's stream, opened by partiemc.watch.")
-      .def(py::init<const std::optional<std::string>&, const std::string&, py::dict>())
-      .def(
-          "receive", &Watch::Receive, "wait"_a = py::none(),
-          "The next Result; None if no frame arrives within `wait` seconds. Raises EOFError at the "
-          "end of the stream, partiemc.Error if the watch was lost.")
-      .def("__iter__", [](py::object self) { return self; })
-      .def("__next__", &Watch::Next)
-      .def("cancel", &Watch::Cancel, "Ends the watch at once, from any thread.")
-      .def("__enter__", [](py::object self) { return self; })
-      .def("__exit__", [](Watch& watch, const py::args&) { watch.Cancel(); })
-      .def_property_readonly("parameters", &Watch::Parameters, "Parameters of the stream by name.")
-      .def_property_readonly("end", &Watch::End,
-                             "Reason of the end: 'FINISHED', 'PRODUCER_LOST', ...");
   module.def("streams", &Streams, "address"_a = py::none(),
              "Lists the open streams of a server: dicts.");
   module.def("server", &Server, "address"_a = py::none(),

@@ -1,4 +1,4 @@
-// Python classes for streams and watches.
+// Python class for streams of a producer, and functions that query a server.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -127,6 +127,12 @@ def watch(address, name, **options):
     credits: number of frames on the way or waiting to be received.
     from_sequence: begin with the frame of this number, or with the oldest held frame if 0. The
         server sends its history without gaps, then live frames.
+    max_error: for streams of surfaces: receive surfaces with fewer triangles, within this root mean
+        square distance to the exact surface, in spacings, in (0, 1].
+    max_triangles: the same, by the smallest error up to 0.35 spacings that leaves at most this many
+        triangles. Results have `level_error`; their measures, `area`, `volume` and `surface_digest`
+        are those of the exact surface. A server without the capability "surface-levels" sends exact
+        surfaces.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
         deadline: see connect. give_up_after: seconds to look for a lost stream; 30.
         Raises Error.

@@ -245,6 +245,53 @@ class Streams(unittest.TestCase):
                 with self.assertRaisesRegex(ValueError, "damaged"):
                     seen.__class__.__new__(seen.__class__).__setstate__((*state[:2], bytes(16), *state[3:]))
 
+    def test_watchers_choose_a_level_of_detail(self):
+        levels = ({"max_error": .1}, {"max_triangles": 300}, {"max_triangles": 1}, {})
+        with contextlib.ExitStack() as opened:
+            stream = opened.enter_context(partiemc.connect(self.address, name="levels", attributes=["x"],
+                                                           **self.parameters))
+            watches = [opened.enter_context(partiemc.watch(self.address, "levels", mode="every", **level))
+                       for level in levels]
+            for frame in self.frames:
+                stream.send(**frame)
+                made, seen = stream.receive(), [next(watch) for watch in watches]
+                self.assertIsNone(made.level_error)
+                exact = seen.pop()
+                assert_equal(self, exact, made, but=["particles"])
+                self.assert_levels(seen, made)
+            self.assertEqual([level.level_error for level in seen][::2], [.1, .35])
+            self.assertLessEqual(len(seen[1].surface.triangles), 300)
+
+    def assert_levels(self, levels, exact):
+        """Closed surfaces of points of the exact one, with its measures."""
+        points = {point.tobytes(): value for point, value in zip(exact.surface.points, exact.attributes["x"])}
+        for level in levels:
+            surface = level.surface
+            self.assertLess(len(surface.triangles), len(exact.surface.triangles))
+            self.assertEqual([points[point.tobytes()] for point in surface.points], list(level.attributes["x"]))
+            edges = surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+            self.assertEqual(sorted(map(tuple, edges)), sorted(map(tuple, edges[:, ::-1])))
+            for name in ("identities", "volume", "area", "particle_counts", "outer_of"):
+                numpy.testing.assert_array_equal(getattr(surface, name), getattr(exact.surface, name))
+            self.assertEqual((level.volume, level.surface_digest), (exact.volume, exact.surface_digest))
+            self.assertNotEqual(level.level_digest, exact.surface_digest)
+            assert_equal(self, pickle.loads(pickle.dumps(level)), level)
+
+    def test_an_impossible_level_is_told(self):
+        for arguments, field in (({"max_error": 0}, ".max_error"), ({"max_error": 1.5}, ".max_error"),
+                                 ({"max_error": numpy.nan}, ".max_error"), ({"max_triangles": 0}, ".max_triangles"),
+                                 ({"max_error": .1, "max_triangles": 9}, "")):
+            with self.assertRaises(partiemc.Error) as raised:
+                partiemc.watch(self.address, "levels", **arguments)
+            self.assertEqual((raised.exception.reason, raised.exception.field), ("OUT_OF_RANGE", "level_of_detail" + field))
+        for wrong in ({"max_triangles": -1}, {"max_triangles": .5}, {"max_error": "small"}):
+            with self.assertRaisesRegex(TypeError, next(iter(wrong))):
+                partiemc.watch(self.address, "levels", **wrong)
+        with partiemc.connect(self.address, name="flat", spacing=1):
+            with self.assertRaises(partiemc.Error) as raised:
+                partiemc.watch(self.address, "flat", max_error=.1)
+            self.assertIn("open.level_of_detail: set; must be absent", str(raised.exception))
+
     def test_latest_delivers_the_newest(self):
         with partiemc.connect(self.address, latest=True, output="surface", spacing=1) as stream:
             *_, newest = stream.map(self.positions)
