@@ -188,6 +188,12 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
   TakeInto(arguments, "min_component_volume", parameters.surface.min_component_volume);
+  // The core's rule, and the function that helps to keep it.
+  if (!parameters.spacing && (parameters.output == Output::kSurface || parameters.slice)) {
+    Raise(Invalid(kReasonOutOfRange, "parameters.spacing", "absent",
+                  "must be given for surfaces and slices; partiemc.estimate_spacing(positions) "
+                  "estimates it from a frame"));
+  }
   return parameters;
 }
 

@@ -39,9 +39,11 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}. `fill` and
         `attribute_tolerance` decide how well triangles represent them.
     output: "outline", or "surface" for closed surfaces of particles in space (Result.surface).
-        A surface requires (N, 3) positions and spacing, such as estimate_spacing(positions);
-        `volumes` are then volumes, and each of `sections` is a slice.
+        A surface requires (N, 3) positions and spacing; `volumes` are then volumes, and each of
+        `sections` is a slice.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
+        Required for surfaces and slices, also in Reconstructor and connect: pass
+        estimate_spacing(positions) of one frame if you do not know it.
     threads: number of compute threads; one per processor if None.
     placement: "virtual-plane", "marching-squares" (surfaces: marching cubes), "qef" or
         "farthest-particle" (outlines only).

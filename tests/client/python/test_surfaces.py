@@ -36,6 +36,12 @@ class Surfaces(unittest.TestCase):
         with self.assertRaises(partiemc.Error):
             partiemc.estimate_spacing(numpy.zeros((3, 4)))
 
+    def test_estimated_spacing_gives_the_surface_of_replay(self):
+        estimated = partiemc.estimate_spacing(self.particles)
+        made = partiemc.reconstruct(self.particles, output="surface", spacing=float(f"{estimated:.4g}"))
+        self.assertEqual([f"{made.surface_digest:016x}"], digests_of_replay(
+            [self.particles], spacing="first-frame", flags=["--surface"], columns=["surface_digest"]))
+
     def test_shapes_and_values_are_as_documented(self):
         result, surface = self.result, self.result.surface
         count, points = len(surface), len(surface.points)
@@ -113,6 +119,14 @@ class Surfaces(unittest.TestCase):
             with self.assertRaises(partiemc.Error) as raised:
                 partiemc.reconstruct(self.particles, output="surface", **arguments)
             self.assertEqual(raised.exception.field, field)
+        for call in (lambda: partiemc.reconstruct(self.particles, output="surface"),
+                     lambda: partiemc.reconstruct(self.particles, slice=("z", 0)),
+                     lambda: partiemc.Reconstructor(output="surface"),
+                     lambda: partiemc.connect("unix:/nowhere", output="surface")):
+            with self.assertRaises(partiemc.Error) as raised:
+                call()
+            self.assertEqual((raised.exception.field, raised.exception.value), ("parameters.spacing", "absent"))
+            self.assertIn("partiemc.estimate_spacing(positions)", raised.exception.rule)
         with self.assertRaises(partiemc.Error) as raised:
             partiemc.reconstruct(self.particles[:, :2], output="surface", spacing=1)
         self.assertEqual(raised.exception.field, "components")
