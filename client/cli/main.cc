@@ -1,5 +1,8 @@
 // `partiemc`: the command line. Connects flags with verbs.
 #include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
@@ -15,12 +18,18 @@ namespace {
 
 using partiemc::client::Complain;
 
-// Reports a wrong flag and refers to the help of its verb.
-int ComplainUsage(const CLI::App& app, const CLI::ParseError& error) {
-  std::string help = "partiemc";
-  for (const CLI::App* verb : app.get_subcommands()) help += " " + verb->get_name();
-  return Complain(partiemc::client::kUsage,
-                  std::string(error.what()) + "; see `" + help + " --help`");
+// Reports a wrong verb or flag and refers to the help of its verb. `first`: the first argument.
+int ComplainUsage(const CLI::App& app, const CLI::ParseError& error, std::string_view first) {
+  std::string help = "partiemc", wrong = error.what();
+  const std::vector<CLI::App*> given = app.get_subcommands();
+  if (given.empty() && !first.empty() && !first.starts_with('-')) {
+    wrong = "'" + std::string(first) + "'; must be a verb:";
+    for (const CLI::App* verb : app.get_subcommands(/*filter=*/{})) {
+      wrong += (wrong.ends_with(':') ? " " : ", ") + verb->get_name();
+    }
+  }
+  for (const CLI::App* verb : given) help += " " + verb->get_name();
+  return Complain(partiemc::client::kUsage, wrong + "; see `" + help + " --help`");
 }
 
 }  // namespace
@@ -29,7 +38,7 @@ int main(int argc, char** argv) {
   // Disables gRPC's log lines, which are for its developers. This program reports connection errors
   // itself.
   setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
-  CLI::App app("Outlines and meshes of streamed particle frames (SPH, granular), stable over time.",
+  CLI::App app("Outlines and surfaces of particle frames (SPH, granular), stable over time.",
                "partiemc");
   app.set_version_flag("--version", "partiemc " PARTIEMC_VERSION);
   app.require_subcommand(1);
@@ -52,7 +61,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return ComplainUsage(app, error);
+    return ComplainUsage(app, error, argc > 1 ? argv[1] : "");
   }
   if (replay_verb->parsed()) return Replay(replay);
   if (watch_verb->parsed()) return Watch(watch);

@@ -23,7 +23,9 @@ absl::Status CheckCombinations(const CLI::App& app) {
     for (const char* flat : {"--report", "--gauge", "--color-by"}) {
       if (app.count(flat) > 0) {
         return absl::InvalidArgumentError(
-            Concat(flat, ": shows outlines, so it cannot be combined with --surface"));
+            Concat(flat,
+                   ": shows outlines, so it cannot be combined with --surface; surfaces are "
+                   "written by --output-dir, --stats"));
       }
     }
   }

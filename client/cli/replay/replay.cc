@@ -241,6 +241,12 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
                                       : std::string()));
     if (!expected) code = kFailed;
   }
+  const bool has_files = !flags.output_dir.empty() || !flags.stats.empty() || !flags.report.empty();
+  if (flags.local && !has_files && !flags.check && !flags.quiet) {
+    Complain(kGood, flags.surface ? "no file was written; --output-dir and --stats write files"
+                                  : "no file was written; --output-dir, --stats and --report write "
+                                    "files");
+  }
   return code;
 }
 

@@ -138,8 +138,10 @@ constexpr Entry kEntries[] = {
      "a PDB file, which is not read; write the particles as VTP, NPY or CSV"},
     {[](const FileHead& head) { return head.extension == "xyz" && !head.text; },
      {},
-     "raw binary xyz (splashsurf's float32 triples), which tells neither count nor byte order and "
-     "is not read; write the particles as VTP, NPY or CSV"},
+     "raw binary xyz (splashsurf's float32 triples), which has neither a count nor a byte order "
+     "and "
+     "is not read; convert it with NumPy: numpy.save('frame.npy', numpy.fromfile('frame.xyz', "
+     "'<f4').reshape(-1, 3))"},
     {IsPickle, {}, "a Python pickle, which is not read; save plain arrays with numpy.savez"},
     {IsLammpsScript,
      {},

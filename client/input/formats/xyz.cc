@@ -39,6 +39,11 @@ class XyzReader final : public FrameReader {
       }
       if (rows == nullptr) continue;
       SplitAtBlanks(line, cells_);
+      if (properties_.empty() && cells_.size() == 3) {
+        return Error(
+            "the row has 3 values; must have type, x, y and z. Without the count and the comment, "
+            "the file is a table of x, y and z, which is read");
+      }
       if (absl::Status status = AppendTextRow(cells_, plan_, request_, *rows); !status.ok()) {
         return Error(std::string(status.message()));
       }

@@ -159,5 +159,6 @@ test('plain XYZ has type, x, y, z; a cut file is refused', async () => {
   assert.deepEqual(doubles((await source.frame(0)).positions), [1, 2, 3, 4]);
   await assert.rejects(openDropped([file('a.xyz', XYZ.slice(0, -20))]), /ends after 1 of 2|of 8 columns/);
   await assert.rejects(openDropped([file('a.xyz', '3\n\nA 1 2 0\n')]), /frame 0 ends after 1 of 3 particles/);
-  await assert.rejects(openDropped([data('splashsurf_raw_f4.xyz')]), /raw binary XYZ/);
+  await assert.rejects(openDropped([file('a.xyz', '1\n\n1 2 0\n')]), /3 of 4 columns: type, x, y, z\./);
+  await assert.rejects(openDropped([data('splashsurf_raw_f4.xyz')]), /raw binary XYZ.*numpy\.fromfile/);
 });

@@ -15,6 +15,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // Two balls of particles with the attribute `p`, in two frames that differ by a shift.
@@ -72,6 +73,16 @@ TEST(SurfaceReplay, WritesPlyByDefault) {
   const Ran ran = RunPartiemc(Flags(input, {"--frames", "0:1", "--output-dir", output.Path("")}));
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
   EXPECT_THAT(FilesIn(output.path()), ElementsAre("frame_000000.ply"));
+}
+
+TEST(SurfaceReplay, WithoutOutputsNamesThem) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const Ran without = RunPartiemc(Flags(input, {"--frames", "0:1"}));
+  EXPECT_EQ(without.exit_code, 0);
+  EXPECT_THAT(without.error, AllOf(HasSubstr("no file was written"), HasSubstr("--output-dir")));
+  const Ran with = RunPartiemc(Flags(input, {"--frames", "0:1", "--stats", output.Path("s.csv")}));
+  EXPECT_THAT(with.error, Not(HasSubstr("no file was written")));
 }
 
 TEST(SurfaceReplay, DropsSmallBodiesOnRequest) {

@@ -9,6 +9,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
@@ -112,6 +113,12 @@ TEST(Usage, AWrongWordIsOneLineAndExitCodeTwo) {
     EXPECT_EQ(ran.exit_code, 2);
     ExpectOneLine(ran);
   }
+}
+
+TEST(Usage, AWrongVerbIsAnsweredWithTheVerbs) {
+  EXPECT_THAT(RunPartiemc({"reconstruct", kDamBreak}).error,
+              AllOf(HasSubstr("'reconstruct'"), HasSubstr("replay, watch"), HasSubstr("convert"),
+                    HasSubstr("see `partiemc --help`")));
 }
 
 TEST(Usage, AWrongFlagPointsToTheHelpOfItsVerb) {

@@ -22,7 +22,8 @@ TEST(Refusals, FormatsThatAreNotReadAreNamedWithWhatToDo) {
     ExpectRefused(hdf5, absl::StatusCode::kDataLoss, {"a.h5", "libhdf5", "truncated"});
   }
   ExpectRefused(Refusal("a.pdb", "ATOM 1\n"), code, {"PDB"});
-  ExpectRefused(Refusal("a.xyz", "\x01\x02\0\0\0\0\x80\x3f"s), code, {"raw binary xyz"});
+  ExpectRefused(Refusal("a.xyz", "\x01\x02\0\0\0\0\x80\x3f"s), code,
+                {"raw binary xyz", "numpy.fromfile"});
   ExpectRefused(Refusal("in.dam", "# a script\nunits lj\n"), code, {"LAMMPS input script"});
   ExpectRefused(Refusal("run.py", "x,y\n1,2\n"), code, {"program"});
   ExpectRefused(Refusal("data.dam", "LAMMPS data\n\n12 atoms\n0 1 xlo xhi\n"), code,

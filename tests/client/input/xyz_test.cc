@@ -33,6 +33,12 @@ TEST(Xyz, AFrameThatIsCutOffIsNamedAndThoseBeforeAreDelivered) {
   ExpectRefused(read.status, absl::StatusCode::kDataLoss, {"frame 1", "after 1 of 3 particles"});
 }
 
+TEST(Xyz, RowsWithoutATypeAreRefusedWithTheRemedy) {
+  const support::TemporaryFolder directory;
+  ExpectRefused(ReadAll(directory.Write("a.xyz", "2\ncomment\n1 2 0\n3 4 0\n")).status,
+                absl::StatusCode::kDataLoss, {"a.xyz:3", "must have type, x, y and z", "table"});
+}
+
 TEST(Xyz, DeclaredCountsAreNotBelieved) {
   const support::TemporaryFolder directory;
   ExpectRefused(ReadAll(directory.Write("a.xyz", "18446744073709551615\nAtoms.\n1 1 2 0\n")).status,

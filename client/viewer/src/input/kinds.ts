@@ -24,7 +24,8 @@ const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?:
     matches: ({ text }) => /(^|\n)(units|atom_style|pair_style|dimension|read_data) /.test(text),
   },
   {
-    name: 'raw binary XYZ', remedy: 'Save the particles as NPY or CSV.',
+    name: 'raw binary XYZ',
+    remedy: "Convert it with NumPy: numpy.save('frame.npy', numpy.fromfile('frame.xyz', '<f4').reshape(-1, 3)).",
     matches: ({ text, extension }) => extension === 'xyz' && !/^\s*\d/.test(text),
   },
 ];

@@ -78,7 +78,7 @@ export class XyzReader implements TableReader {
     const rows = this.lines.slice(start + 2, start + 2 + Number(this.lines[start])).map(splitAtBlanks);
     const short = rows.findIndex((cells) => cells.length < names.length);
     if (short >= 0) {
-      throw new InputError(`${this.name}, line ${start + 3 + short}: ${rows[short].length} of ${names.length} columns.`);
+      throw new InputError(`${this.name}, line ${start + 3 + short}: ${rows[short].length} of ${names.length} columns: ${names.join(', ')}.`);
     }
     const time = valueOf(comment, 'Time=');
     return {
