@@ -69,12 +69,23 @@ std::optional<SlicePlane> SliceOf(const double* numbers) {
   return slice;
 }
 
+// Reads six numbers; empty for a null pointer.
+std::optional<PeriodicBox> BoxOf(const double* numbers) {
+  if (numbers == nullptr) return std::nullopt;
+  PeriodicBox box;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (numbers[2 * k + 1] != 0) box.axes[k] = PeriodicAxis{numbers[2 * k], numbers[2 * k + 1]};
+  }
+  return box;
+}
+
 absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
   ReconstructionParameters parameters;
   if (options.spacing != 0) parameters.spacing = options.spacing;
   if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;
   if (options.cell_size != 0) parameters.cell_size = options.cell_size;
   parameters.slice = SliceOf(options.slice);
+  parameters.box = BoxOf(options.box);
   if (options.isovalue != 0) parameters.isovalue = options.isovalue;
   if (options.attribute_tolerance != 0) {
     parameters.attribute_tolerance = options.attribute_tolerance;
@@ -243,6 +254,9 @@ void AddResult(const Result& result, const OutlineDigests& digests, bool shows_n
   event.cell_size = statistics.cell_size;
   event.rings_digest = digests.rings;
   event.mesh_digest = digests.mesh;
+  event.cut_count = rings.cuts.size();
+  event.cuts = rings.cuts.data();
+  event.cut_bodies = statistics.cut_bodies;
   AddAttributes(result.attributes, values, event);
 }
 

@@ -76,6 +76,30 @@ static void check_result(const partiemc_event* event) {
   }
 }
 
+/* The particles fill a periodic box: the outline is the box, cut on all sides. Along x alone, the
+ * body is cut at two sides. */
+static void try_box(const char* address) {
+  for (int axes = 1; axes <= 2; ++axes) {
+    const double box[6] = {-.5, kSide, -.5, axes == 2 ? kSide : 0, 0, 0};
+    partiemc_options options;
+    partiemc_options_init(&options, sizeof options);
+    options.spacing = 1;
+    options.box = box;
+    partiemc_stream* stream = NULL;
+    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+    partiemc_event event;
+    partiemc_event_init(&event, sizeof event);
+    fill(0);
+    const partiemc_particles particles = plain();
+    EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+    EXPECT(event.kind == PARTIEMC_RESULT && event.ring_count == 1);
+    EXPECT(fabs(event.area - kCount) < 1e-3 && event.cut_bodies == 1);
+    EXPECT(event.cut_count == (axes == 2 ? 4u : 2u) && event.cuts[1] < event.point_count);
+    EXPECT(fabs(event.perimeter - (axes == 2 ? 0 : 2 * kSide)) < 1e-3);
+    partiemc_close(stream);
+  }
+}
+
 /* The same particles in every layout give the same digests. */
 static void try_layouts(const char* address) {
   partiemc_event event;
@@ -460,6 +484,7 @@ int main(int argc, char** argv) {
   EXPECT(partiemc_last_error()->code == PARTIEMC_OK && partiemc_last_error()->message[0] == 0);
   fill(0);
   try_layouts(address);
+  try_box(address);
   try_window(address);
   try_refusals(address);
   try_latest(address);

@@ -135,6 +135,9 @@ typedef struct partiemc_options {
                               triangle: coordinates move by at most .0009 spacings, points and
                               triangles have another order within their shell). Digests are those of
                               float64. NULL: float64. */
+  const double* box; /* Six numbers: lower end and length of a periodic box along x, y and z; length
+                        0: the axis is not periodic. A body that crosses a face is one body; an
+                        outline that reaches its own image is cut at the faces. NULL: no box. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -327,6 +330,12 @@ typedef struct partiemc_event {
   const partiemc_surface* surface;
   double volume; /* Sum over shells. */
   uint64_t surface_digest;
+
+  /* With `box`: cut_count points, ascending, whose segment to the next point of the ring lies on a
+   * face of the box, where a body was cut. Perimeters do not count these segments. */
+  size_t cut_count;
+  const uint32_t* cuts;
+  uint64_t cut_bodies; /* Number of bodies that were cut. */
 } partiemc_event;
 /* Sets an empty event. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
