@@ -86,6 +86,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   if (options.cell_size != 0) parameters.cell_size = options.cell_size;
   parameters.slice = SliceOf(options.slice);
   parameters.box = BoxOf(options.box);
+  if (parameters.box) parameters.box->wraps = options.wrap != 0;
   if (options.isovalue != 0) parameters.isovalue = options.isovalue;
   if (options.attribute_tolerance != 0) {
     parameters.attribute_tolerance = options.attribute_tolerance;

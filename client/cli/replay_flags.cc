@@ -201,6 +201,9 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("X0,X1,Y0,Y1[,Z0,Z1]")
       ->needs(periodic)
       ->group(kGroup);
+  app.add_flag("--wrap", flags.wrap, "Cut all outlines at the periodic box")
+      ->needs(periodic)
+      ->group(kGroup);
   app.add_option(
          "--slice", flags.slices,
          "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "

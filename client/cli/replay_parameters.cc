@@ -79,6 +79,7 @@ absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& 
     }
     box.axes[axis] = PeriodicAxis{bounds->low[axis], bounds->high[axis] - bounds->low[axis]};
   }
+  box.wraps = flags.wrap;
   if (bounds) parameters.box = box;
   return absl::OkStatus();
 }

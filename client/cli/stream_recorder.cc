@@ -79,7 +79,8 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
       AppendAll(bounds, bounds.empty() ? "" : ",", ShortestNumber(origin), ",",
                 ShortestNumber(origin + length));
     }
-    AppendAll(flags, " --periodic ", axes, " --box ", bounds);
+    AppendAll(flags, " --periodic ", axes, " --box ", bounds,
+              parameters.box->wraps ? " --wrap" : "");
   }
   std::string isovalues;
   for (const Section& section : parameters.sections) {

@@ -101,11 +101,15 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
   }
 }
 
-// Removes the argument `box`: a dict of axes with their lower and upper bounds, such as
-// {"x": (0, 10), "y": (0, 10)}.
+// Removes the arguments `box`, a dict of axes with their lower and upper bounds, such as
+// {"x": (0, 10), "y": (0, 10)}, and `wrap`.
 void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
   const auto given = Take<py::dict>(arguments, "box");
-  if (!given) return;
+  const bool wraps = Take<bool>(arguments, "wrap").value_or(false);
+  if (!given) {
+    if (wraps) Raise(Invalid("UNSUPPORTED", "wrap", "True", "requires a periodic box (box=)"));
+    return;
+  }
   box.emplace();
   for (const auto& [key, value] : *given) {
     std::size_t axis = std::string_view::npos;
@@ -123,6 +127,7 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
     }
     box->axes[axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
   }
+  box->wraps = wraps;
 }
 
 py::object ToPython(const std::optional<PeriodicBox>& box) {
@@ -291,7 +296,8 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "min_component_area"_a = parameters.min_component_area,
                 "min_component_particles"_a = parameters.min_component_particles,
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
-                "sections"_a = sections, "box"_a = ToPython(parameters.box));
+                "sections"_a = sections, "box"_a = ToPython(parameters.box),
+                "wrap"_a = parameters.box && parameters.box->wraps);
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

@@ -45,6 +45,7 @@ absl::Status LiftOutline(const ReconstructionParameters& parameters, const Frame
                  .axes = axes,
                  .range = 2 * radius,
                  .margin = margin,
+                 .wraps = parameters.box->wraps,
                  .reserve = reserve},
                 scratch, periodic.lifted);
   periodic.reach = margin - kCopyEnd * radius;

@@ -237,13 +237,13 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     ChooseBodies({.lifted = periodic.lifted,
                   .window = periodic.window,
                   .reach = periodic.reach,
+                  .wraps = parameters.box->wraps,
                   .cell_size = scale.cell_size,
                   .bins = b.bins,
                   .crossings = b.crossings},
                  b.choice, b.topology);
     percolation = {periodic.window, static_cast<std::uint32_t>(periodic.lifted.particles),
-                   b.choice.fates};
-    result.statistics.cut_bodies = b.choice.cut_bodies;
+                   b.choice.fates, b.choice.bodies};
   }
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
@@ -262,7 +262,8 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   });
   if (percolates) {
     const double spacing = scale.spacing * scale.cell_size;
-    if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings)) {
+    if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings,
+                  result.statistics.cut_bodies)) {
       return absl::InternalError("rings cannot be cut at the faces of the box");
     }
     ClearOutside(percolation, b.bins.tiles, b.topology.components, scale.cell_size, b.crossings);

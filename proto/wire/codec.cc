@@ -267,6 +267,7 @@ PeriodicBox FromWire(const v1::PeriodicBox& message) {
   if (message.has_x()) box.axes[0] = axis(message.x());
   if (message.has_y()) box.axes[1] = axis(message.y());
   if (message.has_z()) box.axes[2] = axis(message.z());
+  box.wraps = message.wraps();
   return box;
 }
 
@@ -279,6 +280,7 @@ v1::PeriodicBox ToWire(const PeriodicBox& box) {
   if (box.axes[0]) set(*box.axes[0], *message.mutable_x());
   if (box.axes[1]) set(*box.axes[1], *message.mutable_y());
   if (box.axes[2]) set(*box.axes[2], *message.mutable_z());
+  message.set_wraps(box.wraps);
   return message;
 }
 

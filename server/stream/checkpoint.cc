@@ -98,6 +98,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
       PutNumber(axis.value_or(PeriodicAxis{}).origin, bytes);
       PutNumber(axis.value_or(PeriodicAxis{}).length, bytes);
     }
+    if (box->wraps) put_small('w');
   }
   return ChecksumOf(bytes);
 }

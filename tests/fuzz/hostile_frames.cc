@@ -160,6 +160,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
       if (size > 0) axis = PeriodicAxis{unit * static_cast<double>(choices.Below(9)), unit * size};
     }
     if (choices.Below(4) != 1) parameters.box->axes[2].reset();
+    parameters.box->wraps = choices.Below(4) == 1;
   }
   return parameters;
 }

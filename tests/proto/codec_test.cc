@@ -74,8 +74,8 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.isovalue = 0.25;
   parameters.sections = {
       {.isovalue = 0.75}, {.slice = SlicePlane{.origin = {7, 8, 9}, .normal = {1, 2, 3}}}, {}};
-  parameters.box =
-      PeriodicBox{.axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}};
+  parameters.box = PeriodicBox{
+      .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

@@ -73,6 +73,7 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses the box is
         one body, and results are unwrapped. An outline that reaches its own image is cut at the
         faces (`rings.cuts`).
+    wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

@@ -85,6 +85,10 @@ struct PeriodicAxis {
 struct PeriodicBox {
   std::array<std::optional<PeriodicAxis>, 3> axes{};
 
+  /// Whether results are wrapped: every outline is cut at the faces, so nothing lies beyond them.
+  /// Only for outlines with KeepsGuarantees.
+  bool wraps = false;
+
   static constexpr double kMostSpacings = 1e8;  ///< Limit of a length, in spacings.
 
   friend bool operator==(const PeriodicBox&, const PeriodicBox&) = default;
@@ -198,10 +202,10 @@ struct ReconstructionParameters {
   SurfaceOptions surface = {};
 
   /// If present, a body that crosses a face of the box is one body (core/PERIODIC.md).
-  /// Particles may lie in the box or beside it. Results are unwrapped: each body is whole,
-  /// and the centre of its bounding box lies in the box. A body that reaches its own image is cut
-  /// at the faces (Rings::cuts). Surfaces and `farthest-particle` refuse such a frame with the
-  /// reason PERCOLATES. A length must be at least four kernel radii and at most kMostSpacings
+  /// Particles may lie in the box or beside it. Results are unwrapped unless `wraps`: each body is
+  /// whole, and the centre of its bounding box lies in the box. A body that reaches its own image
+  /// is cut at the faces (Rings::cuts). Surfaces and `farthest-particle` refuse such a frame with
+  /// the reason PERCOLATES. A length must be at least four kernel radii and at most kMostSpacings
   /// spacings. For outlines, the box may have the axes of the plane of the particles. Excludes
   /// slices.
   std::optional<PeriodicBox> box = std::nullopt;

@@ -65,7 +65,7 @@ bool CutAtSides(const RingCutInput& input, int steps, RingCutScratch& s) {
 }
 
 // Writes the new rings: rings that are not cut, and in the place of each outer ring that is cut its
-// loops. Requires: the loops of a component follow each other.
+// loops.
 class Assembly {
  public:
   Assembly(const RingCutInput& input, const Rings& from, const PlacedVertices& placed,
@@ -74,7 +74,9 @@ class Assembly {
     to_.Clear();
     s_.roots.clear();
     s_.group.clear();
-    s_.hole_of.clear();
+    s_.is_hole.clear();
+    s_.continues.clear();
+    s_.largest.assign(input.topology.components.size(), kNoRing);
   }
 
   // Returns false if a loop is too thin to have a direction.
@@ -88,34 +90,27 @@ class Assembly {
         AddRing(ring);
         continue;
       }
-      const std::size_t first = loop;
       while (loop < s_.loops.loops.size() && s_.loops.loops[loop].outer == ring) {
         if (!AddLoop(s_.loops.loops[loop++])) return false;
       }
-      if (loop > first) GiveToLargest(ring, loop - first);
     }
+    NameLargest();
+    AddParents();
     return true;
   }
 
  private:
-  void EndRing(std::uint32_t group, bool is_hole) {
+  // The body of a ring, by its first component.
+  std::uint32_t BodyOf(std::uint32_t ring) const {
+    return input_.percolation.bodies[input_.topology.component_of_ring[s_.topology_ring[ring]]];
+  }
+
+  // Ends a ring that continues the ring `continues`, or none.
+  void EndRing(std::uint32_t outer, bool is_hole, std::uint32_t continues) {
     to_.offsets.push_back(static_cast<std::uint32_t>(to_.PointCount()));
-    s_.group.push_back(group);
-    s_.hole_of.push_back(is_hole ? 0 : kNoRing);
-  }
-
-  std::uint32_t GroupOf(std::uint32_t ring) const {
-    const std::uint32_t outer = from_.outer_of[ring];
-    return s_.topology_ring[outer == kNoRing ? ring : outer];
-  }
-
-  void AddParents(std::uint32_t ring) {
-    if (from_.parent_offsets.size() < 2) return;
-    if (ring != kNoRing) {
-      const auto parents = from_.ParentsOf(ring);
-      to_.parents.insert(to_.parents.end(), parents.begin(), parents.end());
-    }
-    to_.parent_offsets.push_back(static_cast<std::uint32_t>(to_.parents.size()));
+    s_.group.push_back(s_.topology_ring[outer]);
+    s_.is_hole.push_back(is_hole ? 1 : 0);
+    s_.continues.push_back(continues);
   }
 
   void AddRing(std::uint32_t ring) {
@@ -128,8 +123,8 @@ class Assembly {
     append(from_.normals, to_.normals);
     append(placed_.roots, s_.roots);
     to_.measures.push_back(from_.measures[ring]);
-    AddParents(ring);
-    EndRing(GroupOf(ring), from_.outer_of[ring] != kNoRing);
+    const std::uint32_t outer = from_.outer_of[ring];
+    EndRing(outer == kNoRing ? ring : outer, outer != kNoRing, ring);
   }
 
   bool AddLoop(const Loops::Loop& loop) {
@@ -146,33 +141,47 @@ class Assembly {
       const Point& next = points[(k + 1) % points.size()].at;
       cut += std::abs(next.x - point.at.x) + std::abs(next.y - point.at.y);
     }
+    const auto number = static_cast<std::uint32_t>(to_.measures.size());
     const bool is_hole = loop.ring != kNoSource && from_.outer_of[loop.ring] != kNoRing;
-    EndRing(GroupOf(loop.outer), is_hole);
-    RingMeasures measures = MeasureRing(to_.RingPoints(to_.offsets.size() - 2));
+    EndRing(loop.outer, is_hole, is_hole ? loop.ring : kNoRing);
+    RingMeasures& measures = to_.measures.emplace_back(MeasureRing(to_.RingPoints(number)));
     if ((measures.area > 0) == is_hole || measures.area == 0) return false;
     measures.perimeter = std::max(0.0, measures.perimeter - cut);
-    if (is_hole) measures.identity = from_.measures[loop.ring].identity;
-    to_.measures.push_back(measures);
-    AddParents(is_hole ? loop.ring : kNoRing);
+    if (is_hole) {
+      measures.identity = from_.measures[loop.ring].identity;
+      return true;
+    }
+    std::uint32_t& largest = s_.largest[BodyOf(loop.outer)];
+    if (largest == kNoRing || measures.area > to_.measures[largest].area) largest = number;
+    s_.continues[number] = loop.outer;
     return true;
   }
 
-  // Gives the identity, parents and number of particles of a ring to the largest of its pieces, the
-  // last `count` loops.
-  void GiveToLargest(std::uint32_t ring, std::size_t count) {
-    const auto last = to_.measures.end();
-    const auto largest = std::ranges::max_element(last - static_cast<std::ptrdiff_t>(count), last,
-                                                  {}, &RingMeasures::area);
-    if (largest->area < 0) return;  // Holes alone: the outer ring encloses the window.
-    largest->identity = from_.measures[ring].identity;
-    largest->particle_count = from_.measures[ring].particle_count;
+  // Gives the largest piece of each body its identity and number of particles. The other pieces
+  // continue nothing.
+  void NameLargest() {
+    for (std::uint32_t ring = 0; ring < from_.RingCount(); ++ring) {
+      if (from_.outer_of[ring] != kNoRing || !IsCut(input_, s_, ring)) continue;
+      const std::uint32_t largest = s_.largest[BodyOf(ring)];
+      if (largest == kNoRing) continue;
+      to_.measures[largest].identity = from_.measures[ring].identity;
+      to_.measures[largest].particle_count += from_.measures[ring].particle_count;
+    }
+    for (std::uint32_t number = 0; number < s_.continues.size(); ++number) {
+      const std::uint32_t ring = s_.continues[number];
+      if (ring == kNoRing || !IsCut(input_, s_, ring) || s_.is_hole[number]) continue;
+      if (s_.largest[BodyOf(ring)] != number) s_.continues[number] = kNoRing;
+    }
+  }
+
+  void AddParents() {
     if (from_.parent_offsets.size() < 2) return;
-    const auto parents = from_.ParentsOf(ring);
-    const auto index = static_cast<std::size_t>(largest - to_.measures.begin());
-    to_.parents.insert(to_.parents.begin() + to_.parent_offsets[index], parents.begin(),
-                       parents.end());
-    for (std::size_t k = index + 1; k < to_.parent_offsets.size(); ++k) {
-      to_.parent_offsets[k] += static_cast<std::uint32_t>(parents.size());
+    for (const std::uint32_t ring : s_.continues) {
+      if (ring != kNoRing) {
+        const auto parents = from_.ParentsOf(ring);
+        to_.parents.insert(to_.parents.end(), parents.begin(), parents.end());
+      }
+      to_.parent_offsets.push_back(static_cast<std::uint32_t>(to_.parents.size()));
     }
   }
 
@@ -183,6 +192,21 @@ class Assembly {
   Rings& to_;
 };
 
+// The number of bodies with pieces.
+std::uint64_t CountCutBodies(const RingCutInput& input, const RingCutScratch& s,
+                             std::vector<std::uint8_t>& seen) {
+  seen.assign(input.topology.components.size(), 0);
+  std::uint64_t count = 0;
+  for (const Loops::Loop& loop : s.loops.loops) {
+    if (loop.ring != kNoSource) continue;
+    const std::uint32_t component = input.topology.component_of_ring[s.topology_ring[loop.outer]];
+    std::uint8_t& is_seen = seen[input.percolation.bodies[component]];
+    count += is_seen ? 0 : 1;
+    is_seen = 1;
+  }
+  return count;
+}
+
 // Assigns holes to outer rings. Returns false if rings touch or are nested wrongly.
 bool NestRings(RingCutScratch& s) {
   Rings& rings = s.rings;
@@ -192,9 +216,9 @@ bool NestRings(RingCutScratch& s) {
   rings.outer_of.assign(count, kNoRing);
   for (std::size_t ring = 0; ring < count; ++ring) {
     const std::uint32_t around = s.depths.AroundOf(ring);
-    const bool is_hole = s.hole_of[ring] != kNoRing;
+    const bool is_hole = s.is_hole[ring] != 0;
     if (is_hole) rings.outer_of[ring] = around;
-    const bool is_in_hole = around != kNoRing && s.hole_of[around] != kNoRing;
+    const bool is_in_hole = around != kNoRing && s.is_hole[around] != 0;
     if (is_hole ? around == kNoRing || is_in_hole : around != kNoRing && !is_in_hole) return false;
   }
   return true;
@@ -238,7 +262,8 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
   }
 }
 
-bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& placed, Rings& rings) {
+bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& placed, Rings& rings,
+              std::uint64_t& cut_bodies) {
   s.topology_ring.resize(rings.RingCount());
   for (std::uint32_t ring = 0; ring < placed.kept_as.size(); ++ring) {
     if (placed.kept_as[ring] != kNoRing) s.topology_ring[placed.kept_as[ring]] = ring;
@@ -250,6 +275,7 @@ bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& plac
     std::swap(rings, s.rings);
     std::swap(placed.roots, s.roots);
     std::swap(placed.group_of_ring, s.group);
+    cut_bodies = CountCutBodies(input, s, s.seen);
     return true;
   }
   return false;

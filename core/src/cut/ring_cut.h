@@ -20,7 +20,10 @@ struct RingCutScratch {
   std::vector<std::uint32_t> topology_ring;  // By ring: its ring of the topology.
   std::vector<std::uint32_t> group;          // By new ring.
   std::vector<double> roots;
-  std::vector<std::uint32_t> hole_of;  // By new ring: kNoRing, or any value for a hole.
+  std::vector<std::uint8_t> is_hole;     // By new ring.
+  std::vector<std::uint32_t> continues;  // By new ring: the ring whose parents it has, or kNoRing.
+  std::vector<std::uint32_t> largest;    // By body: its largest piece.
+  std::vector<std::uint8_t> seen;        // By body.
   Rings rings;
   TouchingPairsBuffers pairs;
   RingDepths depths;
@@ -37,16 +40,17 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
                      PlacedVertices& placed, Rings& rings);
 
 /// Replaces the rings of components with Fate::kCut by their parts in the window. `rings.cuts`
-/// lists the segments on its sides; perimeters do not count them. The largest piece of a ring has
+/// lists the segments on its sides; perimeters do not count them. The largest piece of a body has
 /// its identity, parents and number of particles; the other pieces have none. Sets
-/// `placed.group_of_ring`, and keeps `placed.roots` parallel to the points.
+/// `placed.group_of_ring`, keeps `placed.roots` parallel to the points, and counts the bodies that
+/// have pieces.
 ///
 /// Where a ring has a vertex on a side, or pieces would touch, both opposite sides move by up to
 /// some billionths of the spacing (kMostShifts in ring_cut.cc). Returns false if this does not
 /// help, which is a bug.
 /// Cost: as CutAtLine, CountTouchingPairs and RingDepths.
 [[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
-                            PlacedVertices& placed, Rings& rings);
+                            PlacedVertices& placed, Rings& rings, std::uint64_t& cut_bodies);
 
 /// Clears interior cells: all cells of components that are gone, and the cells of cut components
 /// that are not strictly inside the window. Cost: linear in tiles.

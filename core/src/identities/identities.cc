@@ -20,6 +20,11 @@ std::uint32_t NumberOf(std::uint32_t ring, IdentityScratch& s) {
   return s.number[ring];
 }
 
+// The outer ring that stands for the body of a ring that will be cut.
+std::uint32_t StandInOf(const IdentityInput& input, std::uint32_t ring) {
+  return input.percolation->OuterOf(input.topology, input.topology.component_of_ring[ring]);
+}
+
 // The nodes of a window.
 struct NodeWindow {
   std::array<std::int64_t, 2> first{}, last{};
@@ -74,11 +79,25 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
     NodeRun run{edge.row, from.column + 1, edge.column, 0};
     if (input.percolation != nullptr && input.percolation->IsCut(topology, ring)) {
       if (!window.Clip(run)) return;
-      if (topology.outer_of[ring] != kNoRing) NumberOf(topology.outer_of[ring], s);
+      const std::uint32_t outer = StandInOf(input, ring);
+      NumberOf(outer, s);
+      if (topology.outer_of[ring] == kNoRing) ring = outer;
     }
     run.ring = NumberOf(ring, s);
     runs.push_back(run);
   });
+}
+
+// Gives the rings of all images of a body the number of the body.
+void ShareNumbers(const IdentityInput& input, IdentityScratch& s) {
+  if (input.percolation == nullptr) return;
+  const RingTopology& topology = input.topology;
+  for (std::uint32_t ring = 0; ring < topology.RingCount(); ++ring) {
+    const bool is_outer = topology.outer_of[ring] == kNoRing;
+    if (is_outer && input.percolation->IsCut(topology, ring)) {
+      s.number[ring] = s.number[StandInOf(input, ring)];
+    }
+  }
 }
 
 // Fills the arrays by number, and finds the outer ring of each component.
@@ -90,7 +109,11 @@ void FillNumberedRings(const IdentityInput& input, IdentityScratch& s) {
     const std::uint32_t outer = topology.outer_of[ring];
     s.rings.push_back(
         {.is_hole = outer != kNoRing, .outer = outer == kNoRing ? kNoRing : s.number[outer]});
-    s.particle_count.push_back(topology.particle_count[ring]);
+  }
+  s.particle_count.assign(s.rings.size(), 0);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    if (s.number[ring] != kNoRing)
+      s.particle_count[s.number[ring]] += topology.particle_count[ring];
   }
   s.ring_of_component.assign(input.topology.components.size(), kNoRing);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
@@ -152,6 +175,7 @@ void WriteHistory(const IdentityInput& input, IdentityScratch& s, RingHistory& n
 void ContinueRings(const IdentityInput& input, const RingHistory& previous,
                    IdentityScratch& scratch, RingHistory& next, Rings& rings) {
   CollectRuns(input, scratch, next.runs);
+  ShareNumbers(input, scratch);
   FillNumberedRings(input, scratch);
   FollowParticles({.frame = input.frame,
                    .plane = input.plane,

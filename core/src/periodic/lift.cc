@@ -255,6 +255,19 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
   return {(all & AxisBit(0)) != 0, (all & AxisBit(1)) != 0, (all & AxisBit(2)) != 0};
 }
 
+// Makes a cluster of each cell that percolates along all periodic axes. Returns these axes.
+std::array<bool, 3> WrapCells(const Grid& grid, LiftScratch& s) {
+  std::array<bool, 3> axes{};
+  std::uint8_t bits = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    axes[k] = grid.length[k] > 0;
+    if (axes[k]) bits |= AxisBit(k);
+  }
+  s.sets.Reset(s.cells.size());
+  for (LiftCell& cell : s.cells) cell.percolates = bits;
+  return axes;
+}
+
 // Finds the bounding box of each cluster, and the image of each cell that moves the centre of this
 // box into the periodic box. Along axes along which the cluster percolates, cells stay in the box.
 void ChooseImages(const Grid& grid, LiftScratch& s) {
@@ -451,7 +464,7 @@ absl::Status Lift(const LiftInput& input, LiftScratch& s, LiftedFrame& lifted) {
   if (!checked.ok()) return checked;
   ListCells(cells, s);
   IndexCells(s);
-  lifted.percolates = JoinCells(grid, s);
+  lifted.percolates = input.wraps ? WrapCells(grid, s) : JoinCells(grid, s);
   const bool has_copies = lifted.percolates != std::array<bool, 3>{};
   if (has_copies && input.margin == 0) return Percolates(lifted.percolates);
   ChooseImages(grid, s);

@@ -62,6 +62,8 @@ struct LiftInput {
   /// Copies of percolating clusters reach this far beyond the faces, at most one length. World
   /// units. 0: such clusters are refused.
   double margin;
+  /// Treats all clusters as percolating along all periodic axes: none is lifted, all get copies.
+  bool wraps = false;
   /// Called twice with the bytes that the scratch requires, before they are allocated: a lower
   /// bound by particles, then the sum. Its error ends Lift.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;

@@ -60,28 +60,36 @@ bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::ui
   return true;
 }
 
-void DecideFates(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
+// The component of each body that remains whole.
+void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.best.assign(components, kNoComponent);
-  const auto has_copies = [&](std::uint32_t component) {
-    return c.has_copies[RootOf(component, c.set)] != 0;
-  };
   for (std::uint32_t component = 0; component < components; ++component) {
     const std::uint32_t outer = topology.outer_ring[component];
-    if (outer == kNoRing || !has_copies(component) || !IsWhole(input, topology, outer)) continue;
-    std::uint32_t& best = c.best[RootOf(component, c.set)];
+    const std::uint32_t root = RootOf(component, c.set);
+    if (outer == kNoRing || !c.has_copies[root] || !IsWhole(input, topology, outer)) continue;
+    std::uint32_t& best = c.best[root];
     if (best == kNoComponent || c.given_count[component] > c.given_count[best]) best = component;
   }
+}
+
+Fate FateOf(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t component,
+            std::uint32_t root) {
+  if (input.wraps) return Fate::kCut;
+  if (!c.has_copies[root]) return Fate::kWhole;
+  if (c.best[root] == kNoComponent) return Fate::kCut;
+  return c.best[root] == component ? Fate::kWhole : Fate::kGone;
+}
+
+void DecideFates(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
+  const std::uint32_t components = topology.components.size();
+  FindBest(input, topology, c);
   c.fates.resize(components);
+  c.bodies.resize(components);
   for (std::uint32_t component = 0; component < components; ++component) {
-    const std::uint32_t best = c.best[RootOf(component, c.set)];
-    c.fates[component] = !has_copies(component) || best == component ? Fate::kWhole
-                         : best == kNoComponent                      ? Fate::kCut
-                                                                     : Fate::kGone;
-  }
-  c.cut_bodies = 0;
-  for (std::uint32_t component = 0; component < components; ++component) {
-    c.cut_bodies += c.fates[component] == Fate::kCut && c.set[component] == component ? 1 : 0;
+    const std::uint32_t root = RootOf(component, c.set);
+    c.fates[component] = FateOf(input, c, component, root);
+    c.bodies[component] = c.fates[component] == Fate::kCut ? root : component;
   }
 }
 

@@ -14,8 +14,9 @@ namespace partiemc {
 
 /// The result of ChooseBodies, and its warm buffers.
 struct BodyChoice {
-  std::vector<Fate> fates;       ///< By component.
-  std::uint64_t cut_bodies = 0;  ///< Bodies with Fate::kCut that have particles.
+  std::vector<Fate> fates;  ///< By component.
+  /// By component: the first component of the same body. If the body is not cut: the component.
+  std::vector<std::uint32_t> bodies;
 
   // Scratch.
   std::vector<std::uint32_t> component_of;  // By particle, with the copies.
@@ -30,6 +31,7 @@ struct BodyChoiceInput {
   const LiftedFrame& lifted;
   const Window& window;  ///< The box along the axes along which bodies percolate.
   double reach;          ///< Bodies are complete up to this far beyond the window. World units.
+  bool wraps;            ///< Every body is cut.
   double cell_size;      ///< World units.
   const ParticleBins& bins;
   const Crossings& crossings;
@@ -41,7 +43,7 @@ struct BodyChoiceInput {
 ///   - If images of a body lie in the window and its margin of `reach`, they are whole: the image
 ///     with the most given particles remains, of several the one with the lowest number.
 ///   - Otherwise the body percolates, or is too long: all its images are cut. In `topology`, their
-///     particles are then the given ones.
+///     particles are then the given ones. If `wraps`, this is so for all bodies.
 /// Deterministic. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);
 

@@ -27,9 +27,14 @@ struct Window {
 /// A frame with copies of particles (periodic/lift.h).
 struct Percolation {
   Window window;
-  std::uint32_t particles;      ///< Given particles; copies follow.
-  std::span<const Fate> fates;  ///< By component.
+  std::uint32_t particles;                ///< Given particles; copies follow.
+  std::span<const Fate> fates;            ///< By component.
+  std::span<const std::uint32_t> bodies;  ///< By component: the first component of the same body.
 
+  /// The outer ring that stands for the body of a component: that of its first component.
+  std::uint32_t OuterOf(const RingTopology& topology, std::uint32_t component) const {
+    return topology.outer_ring[bodies[component]];
+  }
   bool IsCut(const RingTopology& topology, std::size_t ring) const {
     return fates[topology.component_of_ring[ring]] == Fate::kCut;
   }

@@ -138,6 +138,7 @@ typedef struct partiemc_options {
   const double* box; /* Six numbers: lower end and length of a periodic box along x, y and z; length
                         0: the axis is not periodic. A body that crosses a face is one body; an
                         outline that reaches its own image is cut at the faces. NULL: no box. */
+  int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
