@@ -17,9 +17,10 @@
 #include "frame/in_stage.h"
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
+#include "frame_memory.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
-#include "periodic_outline.h"
+#include "prepared_frame.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 
@@ -62,46 +63,6 @@ ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const
   parameters.isovalue = section.isovalue;
   return parameters;
 }
-
-// Reserves memory for the outlines and the surface of a frame, one after another. The memory of
-// earlier ones stays reserved.
-class FrameMemory final : public MemoryGuard {
- public:
-  explicit FrameMemory(MemoryGuard* guard) : guard_(guard) {}
-
-  bool Reserve(std::uint64_t bytes) override {
-    last_ = bytes;
-    return guard_ == nullptr || guard_->Reserve(done_ + last_);
-  }
-
-  // Returns RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier
-  // ones.
-  absl::Status ReserveOutline(const FrameSize& size) {
-    const std::uint64_t bytes = done_ + WorkspaceBytes(size);
-    if (Reserve(WorkspaceBytes(size))) return absl::OkStatus();
-    return ViolationError(
-        absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonOutOfMemory), "positions",
-         absl::StrCat(size.tiles, " tiles of 32 x 32 cells"),
-         absl::StrCat("must fit into the memory budget, but needs ", (bytes >> 20) + 1,
-                      " MiB: reach fewer tiles, or try again later")});
-  }
-  void Done() { done_ += last_; }
-
-  // Returns RESOURCE_EXHAUSTED if the guard refuses the memory to lift particles.
-  absl::Status ReserveLift(std::uint64_t bytes) {
-    if (Reserve(bytes)) return absl::OkStatus();
-    return ViolationError(
-        absl::StatusCode::kResourceExhausted,
-        {std::string(kReasonOutOfMemory), "positions", "particles in a periodic box",
-         absl::StrCat("must fit into the memory budget, but need ", (bytes >> 20) + 1,
-                      " MiB: try again later")});
-  }
-
- private:
-  MemoryGuard* const guard_;
-  std::uint64_t done_ = 0, last_ = 0;
-};
 
 // Fills in the statistics that no stage sets.
 void Summarise(const Workspace::Buffers& b, Result& result) {
@@ -155,8 +116,8 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;                  // The first outline checks the frame.
-  const PeriodicFrame* periodic;  // Null without a periodic box; else the frame has been lifted.
+  bool is_first;             // The first outline checks the frame.
+  const Prepared* prepared;  // Null for a frame as given.
 };
 
 // Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
@@ -169,10 +130,10 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   const Frame& frame = task.frame;
   seen = frame;
   statistics.particles = frame.ParticleCount();
-  if (task.periodic != nullptr) {
-    lengths = task.periodic->lengths;
-    statistics.doubts = task.periodic->doubts;
-    statistics.particles = task.periodic->lifted.particles;
+  if (task.prepared != nullptr) {
+    lengths = task.prepared->lengths;
+    statistics.doubts = task.prepared->doubts;
+    statistics.particles = task.prepared->lifted.particles;
   } else {
     auto decided = DecideLengths(parameters, frame, task.previous, b.spacing);
     if (!decided.ok()) return decided.status();
@@ -225,24 +186,25 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
                     traits.takes_particles);
     // In a periodic box, a body may have changed its image since the last frame.
-    const auto known = task.periodic == nullptr ? std::span<const CellNormal>(previous.normals)
-                                                : std::span<const CellNormal>();
+    const bool is_lifted = task.prepared != nullptr && task.prepared->is_lifted;
+    const auto known =
+        is_lifted ? std::span<const CellNormal>() : std::span<const CellNormal>(previous.normals);
     EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
                     b.normal_scratch, b.planes, b.next_normals);
   });
-  const bool percolates = task.periodic != nullptr && task.periodic->HasCopies();
+  const bool percolates = task.prepared != nullptr && task.prepared->HasCopies();
   Percolation percolation;
   if (percolates) {
-    const PeriodicFrame& periodic = *task.periodic;
-    ChooseBodies({.lifted = periodic.lifted,
-                  .window = periodic.window,
-                  .reach = periodic.reach,
+    const Prepared& prepared = *task.prepared;
+    ChooseBodies({.lifted = prepared.lifted,
+                  .window = prepared.window,
+                  .reach = prepared.reach,
                   .wraps = parameters.box->wraps,
                   .cell_size = scale.cell_size,
                   .bins = b.bins,
                   .crossings = b.crossings},
                  b.choice, b.topology);
-    percolation = {periodic.window, static_cast<std::uint32_t>(periodic.lifted.particles),
+    percolation = {prepared.window, static_cast<std::uint32_t>(prepared.lifted.particles),
                    b.choice.fates, b.choice.bodies};
   }
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
@@ -462,33 +424,25 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   absl::Status status = CheckOutput(state, parameters_.output);
   if (!status.ok()) return status;
   const bool is_surface = surface_ != nullptr;
-  const bool is_lifted = parameters_.box && !is_surface;  // A surface lifts its frame itself.
+  const bool is_prepared = IsPrepared(parameters_);
   b.next_states.resize(std::max(b.next_states.size(), 1 + sections_.size()));
   FrameMemory memory(control.memory);
   const State unseen;
-  PeriodicFrame periodic;
-  if (is_lifted) {
+  Frame frame = given;
+  Prepared prepared;
+  if (is_prepared) {
     status = InStage(control.observer, Stage::kBins, [&] {
-      absl::Status checked = CheckFrame(given, parameters_, limits_, b.distinct_ids);
-      if (!checked.ok()) return checked;
-      const auto lengths = DecideLengths(parameters_, given, state, b.spacing);
-      if (!lengths.ok()) return lengths.status();
-      periodic.lengths = *lengths;
-      checked = LiftOutline(
-          parameters_, given, [&](std::uint64_t bytes) { return memory.ReserveLift(bytes); },
-          b.lift, periodic);
-      memory.Done();
-      return checked;
+      return PrepareFrame({parameters_, limits_, given, state}, memory,
+                          {b.distinct_ids, b.spacing, b.noise, b.lift}, frame, prepared);
     });
     if (!status.ok()) return status;
   }
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {
-    const bool is_first = outline == (is_surface ? 1 : 0) && !is_lifted;
-    const Frame& frame = is_lifted ? periodic.lifted.frame : given;
+    const bool is_first = outline == (is_surface ? 1 : 0) && !is_prepared;
     absl::Status outlined =
         ReconstructOutline({parameters, VariantFor(parameters, *variant_), limits_, frame, previous,
-                            control.observer, is_first, is_lifted ? &periodic : nullptr},
+                            control.observer, is_first, is_prepared ? &prepared : nullptr},
                            memory, b, b.next_states[outline], into);
     memory.Done();
     return outlined;
@@ -503,7 +457,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   if (is_surface) {
     // The last step that can fail, because it commits its state.
     status = surface_->Reconstruct(
-        given, state.surface, b.surface, result.surface,
+        frame, state.surface, b.surface, result.surface,
         {.observer = control.observer, .memory = &memory, .cancelled = control.cancelled});
     if (!status.ok()) return status;
     SummariseSurface(parameters_, given, result);
@@ -514,6 +468,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   for (std::size_t k = 0; k < sections_.size(); ++k) {
     CommitState(b.next_states[k + 1], state.sections[k]);
   }
+  if (prepared.is_filtered) std::swap(state.noise, b.noise.next);
   return absl::OkStatus();
 }
 

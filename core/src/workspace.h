@@ -10,6 +10,7 @@
 #include "crossings/crossings.h"
 #include "cut/ring_cut.h"
 #include "field/field.h"
+#include "filter/noise_filter.h"
 #include "frame/distinct_ids.h"
 #include "frame/slab.h"
 #include "frame/spacing.h"
@@ -36,9 +37,10 @@ struct NextState {
 struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
-  LiftScratch lift;  // Empty without a periodic box.
+  LiftScratch lift;          // Empty without a periodic box.
   BodyChoice choice;
   RingCutScratch ring_cut;  // Empty unless bodies percolate.
+  NoiseFilterScratch noise;  // Empty without a noise filter.
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;

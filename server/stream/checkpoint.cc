@@ -38,7 +38,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   const auto& [output, placement, fill, spacing, spacing_rule, kernel_radius, cell_size,
                reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
                min_component_area, min_component_particles, plane, slice, isovalue, sections,
-               surface, box] = parameters;
+               surface, box, noise_filter] = parameters;
   const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
@@ -99,6 +99,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
       PutNumber(axis.value_or(PeriodicAxis{}).length, bytes);
     }
     if (box->wraps) put_small('w');
+  }
+  if (noise_filter) {
+    put_small('n');
+    PutNumber(*noise_filter, bytes);
   }
   return ChecksumOf(bytes);
 }

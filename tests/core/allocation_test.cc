@@ -185,6 +185,43 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
   }
   EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
 }
+
+// A disc that moves, given in another order each time, with noise.
+TEST(WarmFilteredFrame, AllocatesNothing) {
+  const auto reconstructor = Reconstructor::Create(
+      {.spacing = 1.0,
+       .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}},
+       .noise_filter = .5});
+  ASSERT_TRUE(reconstructor.ok());
+  support::Random random(3);
+  std::vector<Particles> frames;
+  for (int k = 0; k < 4; ++k) {
+    Particles frame = support::Disc(12, .4 * k, .3 * k);
+    for (double& at : frame.xy) at += random.Uniform(-.1, .1);
+    for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
+    frames.push_back(support::Permuted(frame, random));
+  }
+  State state;
+  Workspace workspace;
+  Result result;
+  std::size_t before = 0;
+  tbb::task_arena arena(1);
+  for (int round = 0; round < 40; ++round) {
+    before = allocations;
+    for (const Particles& frame : frames) {
+      arena.execute([&] {
+        const absl::Status status =
+            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
+        ASSERT_TRUE(status.ok()) << status;
+      });
+    }
+    if (round == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  EXPECT_EQ(state.noise.ids.size(), frames[3].size());
+}
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {
@@ -252,6 +289,14 @@ std::vector<MemoryCase> MemoryCases() {
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});
   add("full periodic box", support::Lattice(150, 150, -74.7, -74.7), {.box = boxed(150)});
   add("percolating noise", support::Noise(random, 30'000, 300), {.box = boxed(600)});
+  for (const auto& [name, particles] :
+       {std::pair("filtered body", support::Disc(120)), std::pair("filtered drops", spread(150, 7)),
+        std::pair("filtered body in few tiles", support::Scaled(support::Disc(160), .25))}) {
+    add(name, particles, {.noise_filter = .5});
+    std::erase_if(cases, [](const MemoryCase& tested) {
+      return tested.parameters.noise_filter && tested.particles.ids.empty();
+    });
+  }
   return cases;
 }
 

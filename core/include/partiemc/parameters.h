@@ -210,6 +210,13 @@ struct ReconstructionParameters {
   /// slices.
   std::optional<PeriodicBox> box = std::nullopt;
 
+  /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md):
+  /// the weight, in (0, 1], of the given position of a particle against the position that the last
+  /// frame and the motion of its neighbours predict. 0.5 is a good value; 1 filters nothing. Frames
+  /// must have ids. A new particle has its given position. The given positions are filtered only
+  /// once the stream has a spacing.
+  std::optional<double> noise_filter = std::nullopt;
+
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;
 };

@@ -70,10 +70,10 @@ class Reconstructor {
   /// result does not depend on the number of threads. Cost: linear in particles and tiles, n log n
   /// in the points of the rings.
   /// Errors with a Violation:
-  ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, particles
-  ///   outside one plane, a state of another kind of stream. RESOURCE_EXHAUSTED: too many particles
-  ///   or tiles, or `control.memory` refused the memory. OUT_OF_RANGE: float32 too coarse for the
-  ///   spacing.
+  ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, no ids with a
+  ///   noise filter, particles outside one plane, a state of another kind of stream.
+  ///   RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory` refused the memory.
+  ///   OUT_OF_RANGE: float32 too coarse for the spacing.
   /// Errors without a Violation: CANCELLED, if `control.cancelled` was set; INTERNAL, a bug.
   /// On an error or exception (std::bad_alloc) `state` is unchanged and `result` is empty. After
   /// CANCELLED or an exception `workspace` is empty, too.

@@ -69,6 +69,16 @@ struct RingHistory {
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
 
+/// The particles of the last frame, if the stream filters noise
+/// (ReconstructionParameters::noise_filter).
+struct NoiseHistory {
+  std::vector<std::uint64_t> ids;  ///< Ascending.
+  std::vector<double> given;       ///< Given coordinates, world units: 2 or 3 per particle.
+  std::vector<float> offsets;      ///< Filtered minus given coordinates, in cells; as `given`.
+
+  friend bool operator==(const NoiseHistory&, const NoiseHistory&) = default;
+};
+
 /// The complete state of a stream. A default-constructed State is the state before the first frame.
 /// Reconstruction is a pure function of frame and state, so a stream that resumes from a restored
 /// State gives the same bits as without interruption.
@@ -86,6 +96,8 @@ struct State {
   RingHistory history;
   /// The state of the surface. With Output::kSurface the members above stay empty.
   SurfaceState surface;
+  /// Of all outlines and the surface; empty without a noise filter, and in sections.
+  NoiseHistory noise;
   /// The states of the sections (ReconstructionParameters::sections).
   std::vector<State> sections;
 
@@ -95,7 +107,8 @@ struct State {
 /// Writes a state with version and checksum; same bytes on every machine. Size: 88 bytes, 16 per
 /// normal, 32 per ring, 16 per run, 20 per sample. A state with sections takes 24 bytes, and for
 /// each outline 8 bytes plus the size of its state. A state of a stream of surfaces does the same,
-/// with the surface in place of the first outline.
+/// with the surface in place of the first outline. A noise filter adds 48 bytes, and 32 per
+/// particle of an outline or 44 per particle in space.
 std::string Serialize(const State& state);
 
 /// The size of Serialize(state), without writing it.

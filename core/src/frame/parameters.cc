@@ -212,6 +212,10 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
     return OutOfRange("min_component_area", p.min_component_area,
                       "must be 0 or more squared spacings, and finite");
   }
+  if (p.noise_filter && !(*p.noise_filter > 0 && *p.noise_filter <= 1)) {
+    return OutOfRange("noise_filter", *p.noise_filter,
+                      "must be in (0, 1]: the weight of given positions");
+  }
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   if (absl::Status status = CheckBox(p); !status.ok()) return status;
   return CheckOutlines(p);

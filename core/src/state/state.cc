@@ -6,6 +6,8 @@
 // follows, the main one first: the number of its bytes, then its bytes. The checksum is last. The
 // state of a stream of surfaces has a third magic and the same layout. Its first state is a
 // SurfaceState.
+//
+// A NoiseHistory is written around these bytes, in its own layout (noise_history.h).
 #include "partiemc/state.h"
 
 #include <array>
@@ -22,6 +24,7 @@
 #include "core/internal/byte_string.h"
 #include "partiemc/parameters.h"
 #include "partiemc/status.h"
+#include "state/noise_history.h"
 #include "state/state_bytes.h"
 
 namespace partiemc {
@@ -250,9 +253,7 @@ absl::StatusOr<State> ParseStates(std::string_view bytes, bool has_surface) {
   return Corrupt(absl::StrCat(rest.size(), " bytes too many"), kAsWritten);
 }
 
-}  // namespace
-
-std::size_t SerializedBytes(const State& state) {
+std::size_t BytesWithoutNoise(const State& state) {
   const bool has_surface = HasSurface(state);
   if (state.sections.empty() && !has_surface) return OwnBytes(state);
   const std::size_t first = has_surface ? SerializedBytes(state.surface) : OwnBytes(state);
@@ -261,9 +262,9 @@ std::size_t SerializedBytes(const State& state) {
   return bytes;
 }
 
-std::string Serialize(const State& state) {
+std::string SerializeWithoutNoise(const State& state) {
   std::string bytes;
-  bytes.reserve(SerializedBytes(state));
+  bytes.reserve(BytesWithoutNoise(state));
   const bool has_surface = HasSurface(state);
   if (state.sections.empty() && !has_surface) {
     PutOwn(state, bytes);
@@ -288,11 +289,37 @@ std::string Serialize(const State& state) {
   return bytes;
 }
 
-absl::StatusOr<State> ParseState(std::string_view bytes) {
-  std::string_view rest = bytes;
-  const auto magic = rest.size() < 4 ? 0 : TakeNumber<std::uint32_t>(rest);
+std::uint32_t MagicOf(std::string_view bytes) {
+  return bytes.size() < 4 ? 0 : TakeNumber<std::uint32_t>(bytes);
+}
+
+absl::StatusOr<State> ParseWithoutNoise(std::string_view bytes) {
+  const std::uint32_t magic = MagicOf(bytes);
   if (magic != kSectionsMagic && magic != kWithSurfaceMagic) return ParseOwn(bytes);
   return ParseStates(bytes, magic == kWithSurfaceMagic);
+}
+
+}  // namespace
+
+std::size_t SerializedBytes(const State& state) {
+  const std::size_t bytes = BytesWithoutNoise(state);
+  return state.noise == NoiseHistory{} ? bytes : SerializedNoiseBytes(state.noise, bytes);
+}
+
+std::string Serialize(const State& state) {
+  std::string bytes = SerializeWithoutNoise(state);
+  if (state.noise != NoiseHistory{}) bytes = SerializeWithNoise(state.noise, bytes);
+  return bytes;
+}
+
+absl::StatusOr<State> ParseState(std::string_view bytes) {
+  if (MagicOf(bytes) != kWithNoiseMagic) return ParseWithoutNoise(bytes);
+  NoiseHistory noise;
+  const auto rest = TakeNoise(bytes, noise);
+  if (!rest.ok()) return rest.status();
+  auto state = ParseWithoutNoise(*rest);
+  if (state.ok()) state->noise = std::move(noise);
+  return state;
 }
 
 }  // namespace partiemc

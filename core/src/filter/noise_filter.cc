@@ -1,0 +1,223 @@
+#include "filter/noise_filter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <variant>
+
+#include "base/parallel.h"
+
+namespace partiemc {
+namespace {
+
+constexpr std::uint32_t kNew = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t kGrain = 1 << 12;
+
+// Reads and writes the coordinates that are filtered.
+class Coordinates {
+ public:
+  explicit Coordinates(const NoiseFilterInput& input)
+      : axes_(input.axes), components_(static_cast<std::size_t>(input.frame.components)) {}
+
+  std::size_t AxisCount() const { return axes_.size(); }
+
+  // The place of a coordinate in the positions of the frame.
+  std::size_t PlaceOf(std::size_t particle, std::size_t axis) const {
+    return particle * components_ + static_cast<std::size_t>(axes_[axis]);
+  }
+
+ private:
+  std::span<const int> axes_;
+  std::size_t components_;
+};
+
+// Makes a vector of the values at(axis); other components are 0.
+template <typename At>
+Vec3 VectorOf(std::size_t axes, const At& at) {
+  return {at(std::size_t{0}), at(std::size_t{1}), axes == 3 ? at(std::size_t{2}) : 0.0};
+}
+
+// Sets the rank of each particle in the order of the ids.
+void SortById(const Frame& frame, NoiseFilterScratch& s) {
+  const std::span<const std::uint64_t> ids = frame.ids;
+  s.particles.resize(ids.size());
+  std::iota(s.particles.begin(), s.particles.end(), std::uint32_t{0});
+  if (std::ranges::is_sorted(ids)) return;
+  ParallelSort(std::span(s.particles),
+               [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; });
+}
+
+// Finds each particle in the last history.
+void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScratch& s) {
+  const std::span<const std::uint64_t> ids = previous.ids;
+  s.last.resize(s.particles.size());
+  ParallelForRanges(s.last.size(), kGrain, [&](std::size_t first, std::size_t last) {
+    auto found = std::ranges::lower_bound(ids, frame.ids[s.particles[first]]);
+    for (std::size_t rank = first; rank < last; ++rank) {
+      const std::uint64_t id = frame.ids[s.particles[rank]];
+      while (found != ids.end() && *found < id) ++found;
+      const bool is_known = found != ids.end() && *found == id;
+      s.last[rank] = is_known ? static_cast<std::uint32_t>(found - ids.begin()) : kNew;
+    }
+  });
+}
+
+// The displacement since the last frame in spacings, to the nearest image in a periodic box.
+Vec3 DisplacementOf(const NoiseFilterInput& input, const MotionGrid& grid,
+                    const NoiseFilterScratch& s, std::size_t rank) {
+  const std::size_t axes = input.axes.size();
+  return VectorOf(axes, [&](std::size_t axis) {
+    const double moved =
+        (s.next.given[rank * axes + axis] - input.previous.given[s.last[rank] * axes + axis]) /
+        input.spacing;
+    const double length = grid.length[axis];
+    return length > 0 ? moved - length * std::floor(moved / length + .5) : moved;
+  });
+}
+
+// Starts the next history with the given positions.
+template <typename Real>
+void StartHistory(const Frame& frame, std::span<const Real> positions, const Coordinates& at,
+                  NoiseFilterScratch& s) {
+  const std::size_t axes = at.AxisCount(), count = s.particles.size();
+  s.next.ids.resize(count);
+  s.next.given.resize(count * axes);
+  s.next.offsets.assign(count * axes, 0);
+  ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t rank = first; rank < last; ++rank) {
+      s.next.ids[rank] = frame.ids[s.particles[rank]];
+      for (std::size_t axis = 0; axis < axes; ++axis) {
+        s.next.given[rank * axes + axis] =
+            static_cast<double>(positions[at.PlaceOf(s.particles[rank], axis)]);
+      }
+    }
+  });
+}
+
+// Lists the particles of both frames by cell. Particles that moved too far become new.
+void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
+  const std::size_t axes = input.axes.size(), count = s.particles.size();
+  const auto position_of = [&](std::size_t rank) {
+    return VectorOf(
+        axes, [&](std::size_t axis) { return s.next.given[rank * axes + axis] / input.spacing; });
+  };
+  s.known.resize(count);
+  ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t rank = first; rank < last; ++rank) {
+      if (s.last[rank] == kNew) continue;
+      const Vec3 moved = DisplacementOf(input, grid, s, rank);
+      if (!(Dot(moved, moved) <= kMostDisplacement * kMostDisplacement)) s.last[rank] = kNew;
+    }
+  });
+  std::size_t known = 0;
+  for (std::size_t rank = 0; rank < count; ++rank) {
+    if (s.last[rank] != kNew) s.known[known++].rank = static_cast<std::uint32_t>(rank);
+  }
+  s.known.resize(known);
+  s.movers.resize(known);
+  ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      Vec3 unused;
+      s.known[k].cell = CellOf(grid, position_of(s.known[k].rank), unused);
+    }
+  });
+  ParallelSort(std::span(s.known),
+               [](const NoiseFilterScratch::Known& a, const NoiseFilterScratch::Known& b) {
+                 return a.cell != b.cell ? a.cell < b.cell : a.rank < b.rank;
+               });
+  ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const std::uint32_t rank = s.known[k].rank;
+      CellOf(grid, position_of(rank), s.movers[k].at);
+      s.movers[k].moved = DisplacementOf(input, grid, s, rank);
+    }
+  });
+}
+
+bool StartsCell(const NoiseFilterScratch& s, std::size_t k) {
+  return k == 0 || s.known[k].cell != s.known[k - 1].cell;
+}
+
+std::size_t CountCells(const NoiseFilterScratch& s) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < s.known.size(); ++k) count += StartsCell(s, k) ? 1 : 0;
+  return count;
+}
+
+void ListCells(std::size_t count, NoiseFilterScratch& s) {
+  s.cells.clear();
+  s.cells.reserve(count);
+  for (std::uint32_t k = 0; k < s.known.size(); ++k) {
+    if (StartsCell(s, k)) s.cells.push_back({.at = s.known[k].cell, .first = k});
+    s.cells.back().last = k + 1;
+  }
+}
+
+// Sets the offsets of the particles of both frames. In spacings, from the given position: the old
+// filtered position is at `offset - moved`, the local motion predicts `offset - moved + motion`.
+void SetOffsets(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
+  const std::size_t axes = input.axes.size();
+  const double cell = input.cell_size / input.spacing;
+  const NoiseHistory& previous = input.previous;
+  ParallelFor(s.cells.size(), [&](std::size_t k) {
+    const LocalMotion motion = FitMotion(grid, s.cells, k);
+    for (std::uint32_t i = s.cells[k].first; i < s.cells[k].last; ++i) {
+      const std::uint32_t rank = s.known[i].rank;
+      const Vec3 offset = VectorOf(axes, [&](std::size_t axis) {
+        return cell * static_cast<double>(previous.offsets[s.last[rank] * axes + axis]);
+      });
+      const Vec3 predicted = offset + (motion.At(s.movers[i].at) - s.movers[i].moved);
+      if (!(Dot(predicted, predicted) <= kMostSurprise * kMostSurprise)) continue;
+      const Vec3 kept = ((1 - input.weight) / cell) * predicted;
+      const std::array<double, 3> values{kept.x, kept.y, kept.z};
+      for (std::size_t axis = 0; axis < axes; ++axis) {
+        s.next.offsets[rank * axes + axis] = static_cast<float>(values[axis]);
+      }
+    }
+  });
+}
+
+template <typename Real>
+void WritePositions(std::span<const Real> given, double cell_size, const Coordinates& at,
+                    NoiseFilterScratch& s) {
+  const std::size_t axes = at.AxisCount();
+  s.positions.assign(given.begin(), given.end());
+  ParallelForRanges(s.particles.size(), kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t rank = first; rank < last; ++rank) {
+      for (std::size_t axis = 0; axis < axes; ++axis) {
+        s.positions[at.PlaceOf(s.particles[rank], axis)] +=
+            cell_size * static_cast<double>(s.next.offsets[rank * axes + axis]);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& s, Frame& filtered) {
+  filtered = input.frame;
+  const std::uint64_t bytes = kBytesPerFilteredParticle * input.frame.ParticleCount();
+  absl::Status status = input.reserve(bytes);
+  if (!status.ok()) return status;
+  const Coordinates at(input);
+  const MotionGrid grid = MakeMotionGrid(input.axes, input.box, input.spacing);
+  SortById(input.frame, s);
+  FindLast(input.frame, input.previous, s);
+  std::visit([&](auto positions) { StartHistory(input.frame, positions, at, s); },
+             input.frame.positions);
+  SortByCell(input, grid, s);
+  const std::size_t cells = CountCells(s);
+  status = input.reserve(bytes + kBytesPerMotionCell * cells);
+  if (!status.ok()) return status;
+  ListCells(cells, s);
+  SumMoments(s.movers, s.cells);
+  SetOffsets(input, grid, s);
+  std::visit([&](auto positions) { WritePositions(positions, input.cell_size, at, s); },
+             input.frame.positions);
+  filtered.positions = std::span<const double>(s.positions);
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,163 @@
+#include "prepared_frame.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "bins/resolution.h"
+#include "frame/frame_view.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+// Copies of percolating bodies reach this many kernel radii beyond the box, at most one length. Two
+// radii inside this margin, an outline does not depend on where the copies end: smoothing uses the
+// outline less than a radius away.
+constexpr double kCopyMargin = 6, kCopyEnd = 2;
+
+// Checks a frame as the output of the stream requires.
+absl::Status CheckForOutput(const PreparationInput& input, DistinctIdsScratch& scratch) {
+  if (input.parameters.output == Output::kOutline) {
+    return CheckFrame(input.given, input.parameters, input.limits, scratch);
+  }
+  ReconstructionParameters in_space;
+  in_space.slice = SlicePlane{};  // Particles fill space.
+  return CheckFrame(input.given, in_space, input.limits, scratch);
+}
+
+absl::Status CheckGiven(const PreparationInput& input, DistinctIdsScratch& scratch) {
+  absl::Status status = CheckForOutput(input, scratch);
+  const Frame& given = input.given;
+  if (!status.ok() || !input.parameters.noise_filter) return status;
+  if (given.ids.size() == given.ParticleCount()) return status;
+  return InvalidFrame(kReasonCount, "ids", absl::StrCat(given.ids.size(), " values"),
+                      absl::StrCat("must be one per particle (", given.ParticleCount(),
+                                   "): the noise filter follows particles by their ids"));
+}
+
+// The coordinates that the outlines or the surface use: the first two or three of `axes`.
+std::span<const int> AxesInUse(const PreparationInput& input, std::array<int, 3>& axes) {
+  axes = {0, 1, 2};
+  if (input.parameters.output == Output::kSurface || input.parameters.slice) return axes;
+  const Axes in_plane = AxesOf(input.given, input.parameters.plane);
+  axes = {in_plane.first, in_plane.second, in_plane.normal};
+  return std::span(axes).first(2);
+}
+
+// CORRUPT_STATE if the state belongs to a stream with another number of coordinates.
+absl::Status CheckHistory(const NoiseHistory& noise, std::size_t axes) {
+  if (noise.given.size() == axes * noise.ids.size()) return absl::OkStatus();
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonCorruptState), "state.noise",
+       absl::StrCat(noise.given.size(), " coordinates of ", noise.ids.size(), " particles"),
+       absl::StrCat("must have ", axes, " coordinates per particle")});
+}
+
+absl::Status Filter(const PreparationInput& input, const Lengths& lengths,
+                    std::span<const int> axes, FrameMemory& memory, NoiseFilterScratch& scratch,
+                    Frame& frame) {
+  absl::Status status = CheckHistory(input.state.noise, axes.size());
+  if (!status.ok()) return status;
+  status = FilterNoise({.frame = input.given,
+                        .axes = axes,
+                        .weight = *input.parameters.noise_filter,
+                        .spacing = lengths.spacing,
+                        .cell_size = lengths.cell_size,
+                        .box = input.parameters.box,
+                        .previous = input.state.noise,
+                        .reserve =
+                            [&](std::uint64_t bytes) {
+                              return memory.ReserveParticles(bytes, "particles to filter");
+                            }},
+                       scratch, frame);
+  memory.Done();
+  return status;
+}
+
+absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<const int> axes,
+                       FrameMemory& memory, LiftScratch& scratch, Frame& frame,
+                       Prepared& prepared) {
+  const ReconstructionParameters& parameters = input.parameters;
+  const double radius = parameters.kernel_radius * spacing;
+  // Rings that may cross themselves cannot be cut.
+  double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
+  for (const auto& axis : parameters.box->axes) {
+    if (axis) margin = std::min(margin, axis->length);
+  }
+  absl::Status status =
+      Lift({.frame = frame,
+            .box = *parameters.box,
+            .axes = axes,
+            .range = 2 * radius,
+            .margin = margin,
+            .wraps = parameters.box->wraps,
+            .reserve =
+                [&](std::uint64_t bytes) {
+                  return memory.ReserveParticles(bytes, "particles in a periodic box");
+                }},
+           scratch, prepared.lifted);
+  memory.Done();
+  prepared.reach = margin - kCopyEnd * radius;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const auto axis = static_cast<std::size_t>(axes[k]);
+    if (prepared.lifted.percolates[axis]) prepared.window.axes[k] = parameters.box->axes[axis];
+  }
+  frame = prepared.lifted.frame;
+  return status;
+}
+
+}  // namespace
+
+absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
+                          const PreparationScratch& scratch, Frame& frame, Prepared& prepared) {
+  const ReconstructionParameters& parameters = input.parameters;
+  const bool is_outline = parameters.output == Output::kOutline;
+  frame = input.given;
+  prepared.lifted = {.frame = frame, .particles = frame.ParticleCount()};
+  absl::Status status = CheckGiven(input, scratch.distinct_ids);
+  if (!status.ok()) return status;
+  const auto decided = DecideLengths(parameters, input.given, input.state, scratch.spacing);
+  if (!decided.ok()) return decided.status();
+  prepared.lengths = *decided;
+  if (!prepared.lengths) return absl::OkStatus();
+  const Lengths& lengths = *prepared.lengths;
+  // Slices and surfaces have no check of the resolution.
+  if (is_outline && !parameters.slice) {
+    status = CheckStep(input.given, parameters.plane, lengths.spacing, prepared.doubts);
+    if (!status.ok() && !lengths.is_provisional) return status;
+  }
+  if (parameters.box) {
+    status = Validate(*parameters.box, parameters.kernel_radius, lengths.spacing);
+    if (!status.ok()) return status;
+  }
+  std::array<int, 3> all_axes;
+  const std::span<const int> axes = AxesInUse(input, all_axes);
+  if (parameters.noise_filter && !lengths.is_provisional) {
+    status = Filter(input, lengths, axes, memory, scratch.noise, frame);
+    if (!status.ok()) return status;
+    prepared.is_filtered = true;
+  }
+  if (!parameters.box || !is_outline) return absl::OkStatus();
+  prepared.is_lifted = true;
+  return LiftFrame(input, lengths.spacing, axes, memory, scratch.lift, frame, prepared);
+}
+
+LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
+                         double cell_size) {
+  LatticePeriods periods;
+  if (!parameters.box) return periods;
+  const Axes axes = AxesOf(frame, parameters.plane);
+  const std::array<int, 2> in_plane{axes.first, axes.second};
+  for (std::size_t k = 0; k < in_plane.size(); ++k) {
+    const auto& axis = parameters.box->axes[static_cast<std::size_t>(in_plane[k])];
+    if (axis) periods.cells[k] = axis->length / cell_size;
+  }
+  return periods;
+}
+
+}  // namespace partiemc

@@ -1,0 +1,64 @@
+// Prepares a frame for its outlines or its surface: filters noise, lifts particles out of a
+// periodic box.
+#pragma once
+
+#include <optional>
+
+#include "absl/status/status.h"
+#include "filter/noise_filter.h"
+#include "frame/distinct_ids.h"
+#include "frame/spacing.h"
+#include "frame_lengths.h"
+#include "frame_memory.h"
+#include "partiemc/doubt.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/state.h"
+#include "periodic/lift.h"
+#include "periodic/run_periods.h"
+#include "rings/percolation.h"
+
+namespace partiemc {
+
+/// What is known about a frame that was filtered or lifted before its outlines.
+struct Prepared {
+  std::optional<Lengths> lengths;
+  Doubts doubts;
+  bool is_filtered = false, is_lifted = false;
+  LiftedFrame lifted;  ///< As given, if no particle was lifted.
+  Window window;       ///< The box along the axes along which bodies percolate.
+  double reach = 0;    ///< Bodies are complete up to this far beyond the window. World units.
+
+  bool HasCopies() const { return !lifted.originals.empty(); }
+};
+
+struct PreparationInput {
+  const ReconstructionParameters& parameters;
+  const FrameLimits& limits;
+  const Frame& given;
+  const State& state;
+};
+
+struct PreparationScratch {
+  DistinctIdsScratch& distinct_ids;
+  SpacingScratch& spacing;
+  NoiseFilterScratch& noise;
+  LiftScratch& lift;
+};
+
+/// Whether frames are prepared. A surface lifts its frame itself.
+inline bool IsPrepared(const ReconstructionParameters& parameters) {
+  return parameters.noise_filter || (parameters.box && parameters.output == Output::kOutline);
+}
+
+/// The periods of the lattice; without a box, none.
+LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
+                         double cell_size);
+
+/// Checks a frame, decides its lengths, and sets `frame` to the filtered and lifted frame, a view
+/// of `scratch`. A frame without lengths stays as given; one with provisional lengths is not
+/// filtered. Requires: IsPrepared. Errors: see Reconstructor::Reconstruct.
+absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
+                          const PreparationScratch& scratch, Frame& frame, Prepared& prepared);
+
+}  // namespace partiemc
