@@ -29,6 +29,9 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->box != requested.box) {
     return absl::UnimplementedError("the server does not support periodic boxes: use a newer one");
   }
+  if (parameters->noise_filter != requested.noise_filter) {
+    return absl::UnimplementedError("the server does not support noise filters: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

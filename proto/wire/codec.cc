@@ -396,6 +396,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   }
   if (message.has_surface()) parameters.surface = FromWire(message.surface());
   if (message.has_box()) parameters.box = FromWire(message.box());
+  if (message.has_noise_filter()) parameters.noise_filter = message.noise_filter();
   return parameters;
 }
 
@@ -428,6 +429,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
     if (from.isovalue) section.set_isovalue(*from.isovalue);
   }
   if (parameters.box) *message.mutable_box() = ToWire(*parameters.box);
+  if (parameters.noise_filter) message.set_noise_filter(*parameters.noise_filter);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

@@ -162,6 +162,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     if (choices.Below(4) != 1) parameters.box->axes[2].reset();
     parameters.box->wraps = choices.Below(4) == 1;
   }
+  if (choices.Below(4) == 1) parameters.noise_filter = HostileRatio(choices, 0, .5, 1);
   return parameters;
 }
 

@@ -76,6 +76,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
       {.isovalue = 0.75}, {.slice = SlicePlane{.origin = {7, 8, 9}, .normal = {1, 2, 3}}}, {}};
   parameters.box = PeriodicBox{
       .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
+  parameters.noise_filter = 0.375;
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

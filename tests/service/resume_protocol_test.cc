@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "partiemc/partiemc.h"
 #include "server/moving_blob.h"
 #include "service/captured_log.h"
 #include "service/service_testing.h"
@@ -125,6 +126,51 @@ TEST_P(ResumeProtocol, AResumedStreamGivesTheDigestsOfAnUndisturbedOne) {
     EXPECT_EQ((Digests{answer.frame().rings_digest(), answer.frame().mesh_digest()}), expected[k]);
     checkpoint = answer.checkpoint();
   }
+}
+
+TEST_P(ResumeProtocol, ANoiseFilterGoesOnAndGivesTheDigestsOfThisProcess) {
+  const auto filtered = [](v1::ReconstructRequest open) {
+    open.mutable_open()->mutable_parameters()->set_noise_filter(.5);
+    return open;
+  };
+  ReconstructionParameters parameters = BlobParameters();
+  parameters.noise_filter = .5;
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  State state;
+  Workspace workspace;
+  Result result;
+  std::string token, checkpoint;
+  const std::vector<Digests> without = LocalDigests(kSeed, kFrames);
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    const std::vector<double> positions = MovingBlob(kSeed, k);
+    std::vector<std::uint64_t> ids;
+    for (std::uint64_t id = 0; 2 * id < positions.size(); ++id) ids.push_back(id);
+    const Frame frame{.positions = std::span<const double>(positions), .ids = ids};
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, state, workspace, result).ok());
+    StreamClient client(channel_);
+    const auto opened = client.SendAndReceive(
+        filtered(k == 0 ? OpenWithCheckpoints(1) : Resume(checkpoint, token)));
+    ASSERT_TRUE(opened.has_opened());
+    EXPECT_EQ(opened.opened().parameters().noise_filter(), .5);
+    token = opened.opened().stream_token();
+    if (k + 1 == kFrames) {  // Without ids.
+      const auto refused = client.SendAndReceive(BlobRequest(k + 1, kSeed, k));
+      EXPECT_EQ(refused.error().reason(), "COUNT");
+      EXPECT_EQ(refused.error().field(), "ids");
+      checkpoint = refused.checkpoint();
+      break;
+    }
+    auto request = BlobRequest(k + 1, kSeed, k);
+    request.mutable_frame()->set_ids(ids.data(), 8 * ids.size());
+    const auto answer = client.SendAndReceive(request);
+    ASSERT_TRUE(answer.has_frame());
+    const Digests digests{answer.frame().rings_digest(), answer.frame().mesh_digest()};
+    EXPECT_EQ(digests, (Digests{DigestRings(result.rings), DigestMesh(result.mesh)})) << k;
+    EXPECT_EQ(digests == without[k], k == 0);
+    checkpoint = answer.checkpoint();
+  }
+  ExpectMismatch(Resume(checkpoint, token), "other parameters");
 }
 
 TEST_P(ResumeProtocol, SectionsGoOnToo) {

@@ -271,5 +271,23 @@ TEST(StreamFailure, ServerWithoutPeriodicBoxesIsRefused) {
   ExpectOneLine(stream.status());
 }
 
+TEST(StreamFailure, ServerWithoutNoiseFiltersIsRefused) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    v1::ReconstructRequest request;
+    rpc.Read(&request);
+    v1::ReconstructResponse response;
+    *response.mutable_opened()->mutable_parameters() = request.open().parameters();
+    response.mutable_opened()->mutable_parameters()->clear_noise_filter();
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  ReconstructionParameters parameters{.spacing = 1};
+  parameters.noise_filter = .5;
+  const auto stream = Stream::Open(server.address(), {.parameters = parameters});
+  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("noise filters"));
+  ExpectOneLine(stream.status());
+}
+
 }  // namespace
 }  // namespace partiemc::client
