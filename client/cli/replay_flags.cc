@@ -204,6 +204,11 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
   app.add_flag("--wrap", flags.wrap, "Cut all outlines at the periodic box")
       ->needs(periodic)
       ->group(kGroup);
+  app.add_option("--noise-filter", flags.noise_filter,
+                 "Filter noise of positions from frame to frame: weight, in (0, 1], of the given "
+                 "positions; .5 is a good value. Requires particle ids")
+      ->type_name("W")
+      ->group(kGroup);
   app.add_option(
          "--slice", flags.slices,
          "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "

@@ -41,6 +41,7 @@ struct ReplayFlags {
   std::string periodic;          ///< Axes: "x,y"; empty: none.
   std::string box;               ///< "X0,X1,Y0,Y1[,Z0,Z1]"; empty: the box of the input.
   bool wrap = false;             ///< Results are wrapped into the periodic box.
+  std::optional<double> noise_filter;
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   double kernel_radius = 3;
   double cell_size = 1;

@@ -152,7 +152,8 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
                                       .normal_memory = !flags.no_normal_memory,
                                       .min_component_area = flags.min_area,
                                       .min_component_particles = flags.min_particles,
-                                      .surface = flags.surface_options};
+                                      .surface = flags.surface_options,
+                                      .noise_filter = flags.noise_filter};
   const auto placement = FindPlacement(flags.placement);
   if (!placement) return WrongFlag("--placement", flags.placement, Names(AllPlacements()));
   parameters.placement = *placement;

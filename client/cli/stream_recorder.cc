@@ -82,6 +82,9 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --periodic ", axes, " --box ", bounds,
               parameters.box->wraps ? " --wrap" : "");
   }
+  if (parameters.noise_filter) {
+    AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
+  }
   std::string isovalues;
   for (const Section& section : parameters.sections) {
     // Every slice has the same isolines.

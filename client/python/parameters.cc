@@ -189,6 +189,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "isovalue", parameters.isovalue);
   TakeSections(arguments, parameters.sections);
   TakeBox(arguments, parameters.box);
+  TakeInto(arguments, "noise_filter", parameters.noise_filter);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
@@ -297,7 +298,8 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "min_component_particles"_a = parameters.min_component_particles,
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
-                "wrap"_a = parameters.box && parameters.box->wraps);
+                "wrap"_a = parameters.box && parameters.box->wraps,
+                "noise_filter"_a = parameters.noise_filter);
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

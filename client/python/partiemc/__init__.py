@@ -74,6 +74,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         one body, and results are unwrapped. An outline that reaches its own image is cut at the
         faces (`rings.cuts`).
     wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
+    noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
+        weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

@@ -106,6 +106,22 @@ class Layouts(unittest.TestCase):
         sequence.reset()
         self.assertEqual(digests(sequence.reconstruct(frames[0])), digests(results[0]))
 
+    def test_a_noise_filter_moves_particles_with_ids(self):
+        random = numpy.random.default_rng(1)
+        frames = [block() + random.normal(scale=0.1, size=block().shape) for _ in range(3)]
+        ids = numpy.arange(len(frames[0]))
+        plain = partiemc.Reconstructor(spacing=1)
+        filtered = partiemc.Reconstructor(spacing=1, noise_filter=0.5)
+        self.assertEqual(filtered.parameters["noise_filter"], 0.5)
+        self.assertIsNone(plain.parameters["noise_filter"])
+        for k, frame in enumerate(frames):
+            same = digests(filtered.reconstruct(frame, ids=ids)) == digests(
+                plain.reconstruct(frame, ids=ids))
+            self.assertEqual(same, k == 0)
+        with self.assertRaises(partiemc.Error) as caught:
+            filtered.reconstruct(frames[0])
+        self.assertEqual(caught.exception.field, "ids")
+
     def test_what_goes_along_counts(self):
         # A drop that leaps over a body: ids and velocities identify it.
         def leap(frame):
