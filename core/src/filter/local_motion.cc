@@ -24,8 +24,8 @@ void AddProduct(double weight, const Vec3& a, const Vec3& b, std::array<Vec3, 3>
 // A cell that contributes to a fit.
 struct Contribution {
   const MotionCell* cell;
-  Vec3 shift;     // From the centre of the fitted cell to that of this one.
-  double weight;  // Of each particle.
+  Vec3 shift;     // From the centre of the fitted cell to the centre of this cell.
+  double weight;  // Of one particle.
 };
 
 // The cells that contribute to a fit. Allocates nothing.

@@ -20,8 +20,8 @@ inline constexpr double kMotionCell = 3;
 /// Cells up to this far away contribute, with weights that fall linearly to 0 one cell farther.
 inline constexpr int kMotionReach = 2;
 
-/// A cell whose mean displacement differs from that of the fitted cell by this many spacings or
-/// more does not contribute: it moves with another body.
+/// Difference of the mean displacements of two cells, in spacings, from which on they count as
+/// cells of different bodies and do not contribute to each other.
 inline constexpr double kMotionDifference = .7;
 
 /// Added to the variance of positions along each axis, in squared spacings. Few particles thus
@@ -33,7 +33,7 @@ struct MotionGrid {
   int axes = 2;                           ///< 2 or 3.
   std::array<double, 3> origin{};         ///< Lower end of the box; 0 without a period.
   std::array<double, 3> length{};         ///< Period; 0: none.
-  std::array<double, 3> side{1, 1, 1};    ///< Of a cell.
+  std::array<double, 3> side{1, 1, 1};    ///< Cell side.
   std::array<std::int32_t, 3> periods{};  ///< Cells along a period; 0: not periodic.
 };
 
@@ -78,8 +78,8 @@ struct LocalMotion {
 };
 
 /// Fits the motion of one cell to the cells within kMotionReach by least squares, with a ridge.
-/// Requires: `cells` are sorted and have moments. Deterministic: the order of the sums is that of
-/// the cells. Cost: (2 kMotionReach + 1)^(axes - 1) binary searches.
+/// Requires: `cells` are sorted and have moments. Deterministic: sums have the order of the
+/// cells. Cost: (2 kMotionReach + 1)^(axes - 1) binary searches.
 LocalMotion FitMotion(const MotionGrid& grid, std::span<const MotionCell> cells, std::size_t cell);
 
 }  // namespace partiemc

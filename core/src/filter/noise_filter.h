@@ -15,12 +15,12 @@
 
 namespace partiemc {
 
-/// A particle that moves farther than this between two frames starts anew at its given position,
-/// in spacings.
+/// Largest displacement between two frames, in spacings. After a larger one, a particle starts anew
+/// at its given position.
 inline constexpr double kMostDisplacement = 5;
 
-/// A particle that is given farther than this from where the last frame and the local motion
-/// predict it starts anew, in spacings.
+/// Largest distance, in spacings, of the given position from the prediction by the last frame and
+/// the local motion. At a larger distance, a particle starts anew.
 inline constexpr double kMostSurprise = 1;
 
 /// Warm buffers of FilterNoise.
