@@ -24,8 +24,8 @@ absl::Status CheckCombinations(const CLI::App& app) {
       if (app.count(flat) > 0) {
         return absl::InvalidArgumentError(
             Concat(flat,
-                   ": shows outlines, so it cannot be combined with --surface; surfaces are "
-                   "written by --output-dir, --stats"));
+                   ": shows outlines, so it cannot be combined with --surface; --output-dir writes "
+                   "surfaces"));
       }
     }
   }
