@@ -78,6 +78,19 @@ def to_svg(result, width=800):
     def path(rings):
         return " ".join("M" + " ".join(f"{x:.6g},{-y:.6g}" for x, y in ring) + "Z" for ring in rings)
 
+    cuts = set(result.rings.cuts.tolist())
+
+    def outline(rings):  # Without the segments on faces of a periodic box.
+        if not cuts:
+            return path(rings)
+        segments = []
+        for first, last in zip(rings.offsets[:-1].tolist(), rings.offsets[1:].tolist()):
+            for k in range(first, last):
+                if k not in cuts:
+                    ends = points[[k, k + 1 if k + 1 < last else first]]
+                    segments.append("M" + " ".join(f"{x:.6g},{-y:.6g}" for x, y in ends))
+        return " ".join(segments)
+
     box = (left - margin, -top - margin, right - left + 2 * margin, top - bottom + 2 * margin)
     style = f'stroke-width="{margin / 30:.3g}" stroke-linejoin="round"'
     return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" viewBox="'
@@ -86,4 +99,4 @@ def to_svg(result, width=800):
             f'<path fill="none" stroke="#7fa8cc" {style} '
             f'd="{path(result.mesh.points[result.mesh.triangles])}"/>\n'
             f'<path fill="none" stroke="#123a5c" stroke-width="{margin / 12:.3g}" '
-            f'd="{path(result.rings)}"/>\n</svg>\n')
+            f'd="{outline(result.rings)}"/>\n</svg>\n')

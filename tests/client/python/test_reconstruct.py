@@ -106,6 +106,33 @@ class Layouts(unittest.TestCase):
         sequence.reset()
         self.assertEqual(digests(sequence.reconstruct(frames[0])), digests(results[0]))
 
+    def test_a_layer_across_a_periodic_box_is_cut(self):
+        x, y = numpy.meshgrid(numpy.arange(30) + 0.3, numpy.arange(6))
+        layer = numpy.column_stack([x.ravel(), y.ravel() + 10])
+        drop = numpy.column_stack([x.ravel() % 5 - 2.5, y.ravel() + 20])[::6]
+        drop[:, 0] %= 30
+        box = {"x": (0, 30), "y": (0, 40)}
+        alone = partiemc.reconstruct(layer, spacing=1.0, box=box)
+        self.assertAlmostEqual(alone.area, 180, places=6)
+        self.assertAlmostEqual(alone.perimeter, 60, places=6)
+        rings = alone.rings
+        self.assertEqual(len(rings.cuts), 2)
+        for k in rings.cuts:
+            following = (k + 1) % len(rings.points)
+            self.assertEqual(rings.points[k, 0], rings.points[following, 0])
+        segments = re.findall(r"M[^MZ]*", alone.to_svg().rsplit("stroke=", 1)[1])
+        self.assertEqual(len(segments), len(rings.points) - 2)
+        both = numpy.concatenate([layer, drop])
+        whole = partiemc.reconstruct(both, spacing=1.0, box=box)
+        wrapped = partiemc.reconstruct(both, spacing=1.0, box=box, wrap=True)
+        self.assertLess(whole.rings.points[:, 0].min(), 0)
+        self.assertGreaterEqual(wrapped.rings.points[:, 0].min(), 0)
+        self.assertEqual(len(wrapped.rings), len(whole.rings) + 1)
+        numpy.testing.assert_array_equal(pickle.loads(pickle.dumps(wrapped)).rings.cuts,
+                                         wrapped.rings.cuts)
+        with self.assertRaisesRegex(partiemc.Error, "wrap"):
+            partiemc.reconstruct(both, spacing=1.0, wrap=True)
+
     def test_a_noise_filter_moves_particles_with_ids(self):
         random = numpy.random.default_rng(1)
         frames = [block() + random.normal(scale=0.1, size=block().shape) for _ in range(3)]
