@@ -25,7 +25,7 @@ void AddProduct(double weight, const Vec3& a, const Vec3& b, std::array<Vec3, 3>
 struct Contribution {
   const MotionCell* cell;
   Vec3 shift;     // From the centre of the fitted cell to the centre of this cell.
-  double weight;  // Of one particle.
+  double weight;  // Per particle.
 };
 
 // The cells that contribute to a fit. Allocates nothing.

@@ -125,7 +125,10 @@ void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
   });
   ParallelSort(std::span(s.known),
                [](const NoiseFilterScratch::Known& a, const NoiseFilterScratch::Known& b) {
-                 return a.cell != b.cell ? a.cell < b.cell : a.rank < b.rank;
+                 for (std::size_t k = 0; k < a.cell.size(); ++k) {
+                   if (a.cell[k] != b.cell[k]) return a.cell[k] < b.cell[k];
+                 }
+                 return a.rank < b.rank;
                });
   ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {

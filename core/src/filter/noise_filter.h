@@ -15,12 +15,12 @@
 
 namespace partiemc {
 
-/// Largest displacement between two frames, in spacings. After a larger one, a particle starts anew
-/// at its given position.
+/// Largest displacement of a known particle between two frames, in spacings. After a larger
+/// displacement a particle counts as new: its filtered position is its given position.
 inline constexpr double kMostDisplacement = 5;
 
 /// Largest distance, in spacings, of the given position from the prediction by the last frame and
-/// the local motion. At a larger distance, a particle starts anew.
+/// the local motion. At a larger distance a particle counts as new.
 inline constexpr double kMostSurprise = 1;
 
 /// Warm buffers of FilterNoise.
@@ -61,8 +61,8 @@ struct NoiseFilterInput {
 /// the history for the next frame. The result depends neither on the order of the particles nor on
 /// the number of threads.
 /// Requires: CheckFrame has passed the frame, which has ids; the history is empty or has
-/// `axes.size()` coordinates per particle; Validate has passed the box for this spacing. Errors:
-/// those of `reserve`. Cost: n log n in particles, however close they are.
+/// `axes.size()` coordinates per particle; Validate has passed the box for this spacing.
+/// Errors: as `reserve`. Cost: n log n in particles, however close they are.
 absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& scratch,
                          Frame& filtered);
 
