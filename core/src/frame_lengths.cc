@@ -36,13 +36,25 @@ double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scr
   return std::sqrt(*middle);
 }
 
+// The root mean square of own sizes. Requires: the frame has volumes.
+double SpacingOfSizes(std::span<const float> volumes) {
+  double sum = 0;
+  for (const float volume : volumes) sum += volume;
+  return std::sqrt(sum / static_cast<double>(volumes.size()));
+}
+
 // The spacing that the particles of a frame show; empty if there is no estimate. If the particles
 // do not agree on a spacing, the volumes give a better estimate than the distances.
-absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(const Frame& frame, Plane plane,
-                                                          SpacingScratch& scratch) {
-  std::optional<SpacingEstimate> own = EstimateSpacing(frame, plane, scratch);
-  if ((!own || !own->is_agreed) && !frame.volumes.empty()) {
-    own = SpacingEstimate{SpacingOfVolumes(frame.volumes, scratch.weights), false};
+absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(
+    const ReconstructionParameters& parameters, const Frame& frame, SpacingScratch& scratch) {
+  std::optional<SpacingEstimate> own;
+  if (parameters.sizes == Sizes::kOwn) {
+    if (!frame.volumes.empty()) own = SpacingEstimate{SpacingOfSizes(frame.volumes), true};
+  } else {
+    own = EstimateSpacing(frame, parameters.plane, scratch);
+    if ((!own || !own->is_agreed) && !frame.volumes.empty()) {
+      own = SpacingEstimate{SpacingOfVolumes(frame.volumes, scratch.weights), false};
+    }
   }
   if (!own || (own->spacing >= ReconstructionParameters::kMinSpacing &&
                own->spacing <= ReconstructionParameters::kMaxSpacing))
@@ -63,7 +75,7 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
   if (!spacing && parameters.spacing_rule == SpacingRule::kFirstFrame) spacing = state.spacing;
   bool is_provisional = false;
   if (!spacing) {
-    const auto own = OwnSpacing(frame, parameters.plane, scratch);
+    const auto own = OwnSpacing(parameters, frame, scratch);
     if (!own.ok()) return own.status();
     const bool is_agreed = *own && (*own)->is_agreed;
     is_provisional = !is_agreed && !state.spacing;
@@ -103,10 +115,38 @@ absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& 
   return lightest;
 }
 
+absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
+                                       const Lengths& lengths) {
+  if (frame.volumes.empty()) return SizeRange{};
+  const auto [least, most] = std::ranges::minmax_element(frame.volumes);
+  const double spacing = lengths.spacing;
+  const SizeRange sizes{std::sqrt(double{*least}) / spacing, std::sqrt(double{*most}) / spacing};
+  constexpr double kRatio = ReconstructionParameters::kMostSizeRatio;
+  // A kernel reaches at most the tiles beside the tile of its particle.
+  const double largest =
+      std::min(kRatio, kTileSize * lengths.cell_size / (kernel_radius * spacing));
+  if (sizes.smallest >= 1 / kRatio && sizes.largest <= largest) return sizes;
+  // Names the smallest or the largest size: the side with fewer particles is wrong.
+  const auto count = [&](auto is_beyond) {
+    return std::ranges::count_if(frame.volumes, is_beyond);
+  };
+  const auto above = count([&](float v) { return std::sqrt(double{v}) > largest * spacing; });
+  const auto below = count([&](float v) { return kRatio * std::sqrt(double{v}) < spacing; });
+  const auto half = static_cast<std::ptrdiff_t>(frame.volumes.size() / 2);
+  const bool is_large = above > 0 ? above <= half : below > half;
+  const auto worst = is_large ? most : least;
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), absl::StrCat("volumes[", worst - frame.volumes.begin(), "]"),
+       ShortestNumber(*worst),
+       absl::StrCat("must have a square root, the size, of ", ShortestNumber(1 / kRatio), " to ",
+                    ShortestNumber(largest), " spacings of ", ShortestNumber(spacing))});
+}
+
 absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
                           const Scale& scale, const ParticleBins& bins, Doubts& doubts) {
-  absl::Status fine =
-      CheckResolution(frame, plane, bins.tiles, lengths.cell_size, lengths.spacing, doubts);
+  absl::Status fine = CheckResolution(frame, plane, bins.tiles, lengths.cell_size,
+                                      lengths.spacing * scale.sizes.smallest, doubts);
   if (lengths.is_provisional) {
     doubts.Add(Doubt::kSpacingProvisional);
     return absl::OkStatus();

@@ -18,12 +18,13 @@ namespace partiemc {
 /// Spacing and cell size of a frame, in world units.
 struct Lengths {
   double spacing, cell_size;
-  bool is_provisional;  ///< No spacing is given, and no frame so far agreed on one.
+  bool is_provisional = false;  ///< No spacing is given, and no frame so far agreed on one.
 };
 
 /// Returns the lengths of a checked frame. They come from the parameters, else from the state, else
-/// from the particles. Empty if the particles do not even give an estimate. Errors:
-/// INVALID_ARGUMENT if the spacing on which the particles agree is out of range.
+/// from the particles. With own sizes, the spacing is then their root mean square, and the lattice
+/// has as many nodes per particle as with equal sizes. Empty if the particles give no estimate.
+/// Errors: INVALID_ARGUMENT if the spacing on which the particles agree is out of range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
@@ -32,6 +33,11 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
 /// is h^2, of a slice h^3. Adds the doubts about volumes. Errors: INVALID_ARGUMENT for a volume too
 /// far from `usual`.
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
+
+/// Returns the range of the sizes of a frame with own sizes. Errors: INVALID_ARGUMENT for the size
+/// that is farthest from the spacing, if it is out of range (ReconstructionParameters::sizes).
+absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
+                                       const Lengths& lengths);
 
 /// Adds the doubts about spacing and resolution. A slab gets no doubt about the spacing, because
 /// its particles, seen from above the plane, do not show the spacing. Errors: as CheckResolution

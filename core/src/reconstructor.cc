@@ -147,14 +147,21 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   statistics.cell_size = lengths->cell_size;
   const double spacing = lengths->spacing;
   const double usual = parameters.slice ? spacing * spacing * spacing : spacing * spacing;
-  const auto lightest = LightestVolume(frame, usual, statistics.doubts);
-  if (!lightest.ok()) return lightest.status();
-  scale = MakeScale(parameters, spacing, lengths->cell_size, *lightest);
+  absl::Status status;
+  if (parameters.sizes == Sizes::kOwn) {
+    const auto sizes = RangeOfSizes(frame, parameters.kernel_radius, *lengths);
+    if (!sizes.ok()) return sizes.status();
+    scale = MakeScale(parameters, spacing, lengths->cell_size, usual, *sizes);
+  } else {
+    const auto lightest = LightestVolume(frame, usual, statistics.doubts);
+    if (!lightest.ok()) return lightest.status();
+    scale = MakeScale(parameters, spacing, lengths->cell_size, *lightest);
+  }
   if (parameters.slice) {
     b.slab.Take(frame, *parameters.slice, parameters.kernel_radius * spacing);
     seen = b.slab.AsFrame();
   }
-  absl::Status status = BinParticles(seen, parameters.plane, scale, task.limits, b.bins);
+  status = BinParticles(seen, parameters.plane, scale, task.limits, b.bins);
   if (!status.ok()) return status;
   if (parameters.slice) SetHeights(b.slab.heights(), scale, b.bins);
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);

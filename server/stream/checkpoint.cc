@@ -35,7 +35,7 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Lists each member by name. If a member is added, this statement does not compile until the
   // author also hashes the new member.
-  const auto& [output, placement, fill, spacing, spacing_rule, kernel_radius, cell_size,
+  const auto& [output, placement, fill, spacing, spacing_rule, sizes, kernel_radius, cell_size,
                reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
                min_component_area, min_component_particles, plane, slice, isovalue, sections,
                surface, box, noise_filter] = parameters;
@@ -103,6 +103,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   if (noise_filter) {
     put_small('n');
     PutNumber(*noise_filter, bytes);
+  }
+  if (sizes != Sizes::kEqual) {
+    put_small('s');
+    put_small(sizes);
   }
   return ChecksumOf(bytes);
 }

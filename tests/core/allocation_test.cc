@@ -38,12 +38,21 @@ struct AllocationCase {
   int threads;
   bool volumes, ids;
   bool estimates_spacing = false;  // In each frame.
+  Sizes sizes = Sizes::kEqual;
 };
+
+// Volumes of particles whose sizes differ by a factor of up to three.
+std::vector<float> VaryingVolumes(std::size_t count) {
+  std::vector<float> volumes(count);
+  for (std::size_t k = 0; k < count; ++k) volumes[k] = .4f + static_cast<float>(k % 7) / 2;
+  return volumes;
+}
 
 void PrintTo(const AllocationCase& tested, std::ostream* out) {
   *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
        << " threads" << (tested.volumes ? ", volumes" : "") << (tested.ids ? ", ids" : "")
-       << (tested.estimates_spacing ? ", spacing estimated" : "");
+       << (tested.estimates_spacing ? ", spacing estimated" : "") << ", sizes "
+       << Name(tested.sizes);
 }
 
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
@@ -52,8 +61,10 @@ TEST_P(WarmFrame, AllocatesNothing) {
   const AllocationCase& tested = GetParam();
   tbb::global_control control(tbb::global_control::max_allowed_parallelism, tested.threads);
   tbb::task_arena arena(tested.threads);
-  ReconstructionParameters parameters{
-      .placement = tested.placement, .fill = tested.fill, .min_component_particles = 3};
+  ReconstructionParameters parameters{.placement = tested.placement,
+                                      .fill = tested.fill,
+                                      .sizes = tested.sizes,
+                                      .min_component_particles = 3};
   if (tested.estimates_spacing) {
     parameters.spacing_rule = SpacingRule::kEveryFrame;
   } else {
@@ -70,6 +81,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
     frame.Add(support::Shifted(support::Blob(random, 12), 118 + 6 * k, 5));
     frame.Add(support::Shifted(support::Noise(random, 200, 60), -200, 150));
     if (tested.volumes) frame.volumes.assign(frame.size(), 1.0f);
+    if (tested.sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());
     for (std::size_t id = 0; tested.ids && id < frame.size(); ++id) {
       // Numbers without and with large gaps; frames that follow each other know their particles.
       frame.ids.push_back(k < 2 ? id : id << 32);
@@ -77,6 +89,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
     frames.push_back(frame);
   }
   frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
+  if (tested.sizes == Sizes::kOwn) frames[2].volumes = VaryingVolumes(frames[2].size());
   const std::vector<float> values = NoisyValues(2 * frames[0].size() + 4000);
   State state;
   Workspace workspace;
@@ -233,6 +246,8 @@ std::vector<AllocationCase> Cases() {
   }
   for (const int threads : {1, 2}) {
     cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, false, true});
+    cases.push_back(
+        {Placement::kVirtualPlane, Fill::kGreedy, threads, true, threads == 2, false, Sizes::kOwn});
   }
   return cases;
 }
@@ -243,7 +258,8 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                            std::erase(name, '-');
                            return name + "_" + std::string(Name(tested.param.fill)) +
                                   std::to_string(tested.param.threads) +
-                                  (tested.param.estimates_spacing ? "_spacing" : "");
+                                  (tested.param.estimates_spacing ? "_spacing" : "") +
+                                  (tested.param.sizes == Sizes::kOwn ? "_sizes" : "");
                          });
 struct MemoryCase {
   std::string name;
@@ -284,6 +300,12 @@ std::vector<MemoryCase> MemoryCases() {
     return PeriodicBox{
         .axes = {PeriodicAxis{-length / 2, length}, PeriodicAxis{-length / 2, length}}};
   };
+  const auto sized = [](Particles particles) {
+    particles.volumes = VaryingVolumes(particles.size());
+    return particles;
+  };
+  add("body of own sizes", sized(support::Disc(300)), {.sizes = Sizes::kOwn});
+  add("drops of own sizes", sized(spread(150, 5)), {.sizes = Sizes::kOwn});
   add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
   add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});

@@ -58,7 +58,7 @@ TEST(PeriodicRings, MarginsHoldEveryVertexOfAWindow) {
     const double reach = random.Uniform(3, 18);
     const std::vector<Point> ring = CrowdedSquare(random, reach);
     const std::size_t count = ring.size();
-    const auto size = SizeForWindows(ring, reach);
+    const auto size = SizeForWindows(ring, {}, reach);
     ASSERT_EQ(size.count, count);
     const auto step = [&](std::size_t k) {
       const Point &from = ring[k % count], &to = ring[(k + 1) % count];

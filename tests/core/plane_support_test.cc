@@ -24,6 +24,9 @@ NeighbourRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys
   near.x = xs.data();
   near.y = ys.data();
   near.weight = weights;
+  near.size = nullptr;
+  near.reach = 100;
+  near.reach_per_size = 0;
   near.origin_x = origin_x;
   near.origin_y = band.origin_y = origin_y;
   near.column = origin_x < 0 ? origin_x + kColumnPeriod : origin_x;
@@ -128,6 +131,41 @@ TEST(PlaneSupport, AgreesWithASumOverAllParticles) {
       EXPECT_NEAR(sums.distance, sum, 1e-5 * std::max(weight, 1.0)) << "seed " << seed;
       EXPECT_NEAR(sums.square, squares, 1e-5 * std::max(weight, 1.0)) << "seed " << seed;
     }
+  }
+}
+
+TEST(PlaneSupport, AgreesWithASumOverParticlesOfDifferentSizes) {
+  SupportShape shape = kShape;
+  shape.lift = shape.spacing / 2;
+  for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    support::Random random(seed);
+    const Rows rows(random);
+    BentPlane plane = RandomPlane(random);
+    plane.size = random.Uniform(.5, 2);
+    double sum = 0, weight = 0, squares = 0;
+    for (std::size_t k = 0; k < rows.is_near.size(); ++k) {
+      const double dx = rows.x[k] - plane.x, dy = rows.y[k] - plane.y;
+      const double size = rows.weight[k];
+      const double along = (plane.normal_x * dy - plane.normal_y * dx) / plane.size;
+      // The boundary lies half the size above the particle.
+      const double boundary = plane.normal_x * dx + plane.normal_y * dy + size * shape.spacing / 2;
+      const double above = boundary / plane.size - shape.spacing / 2;
+      const double distance = above + plane.size * plane.curvature * along * along / 2;
+      const double apart = std::hypot(along, above);
+      if (!rows.is_near[k] || apart >= shape.radius || above >= shape.height) continue;
+      const double w = size / plane.size * Bump(apart, shape.radius) *
+                       std::pow(std::max(0.0, distance / shape.spacing + shape.depth), 8);
+      weight += w;
+      sum += w * distance;
+      squares += w * distance * distance;
+    }
+    NeighbourRows near = rows.AsNear(false);
+    near.size = rows.weight.data();
+    const SupportSums sums = SumSupport(near, plane, shape);
+    EXPECT_NEAR(sums.weight, weight, 1e-5 * std::max(weight, 1.0));
+    EXPECT_NEAR(sums.distance, sum, 1e-5 * std::max(weight, 1.0));
+    EXPECT_NEAR(sums.square, squares, 1e-5 * std::max(weight, 1.0));
   }
 }
 

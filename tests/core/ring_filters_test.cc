@@ -141,7 +141,7 @@ TEST(RingFilters, UseSameLengthsOnAnyInstructionSet) {
     support::ForEachInstructionSet([&] {
       PeriodicRings rings;
       const PeriodicRing ring = source.Copied(rings);
-      MeasureArc(ring);
+      MeasureArc(ring, {});
       for (std::ptrdiff_t k = 0; k + 1 < ring.count + ring.margin; ++k) {
         const auto step = [&](std::ptrdiff_t from) {
           return LengthInUnits(UnitsBetween(ring.x[from], ring.x[from + 1]),
@@ -213,7 +213,7 @@ TEST(RingFilters, ReadNothingBeyondMargins) {
     const auto count = static_cast<std::ptrdiff_t>(points.size());
     // Elements beyond the margins would be near and would change every sum.
     const auto results_with = [&](std::uint32_t more) {
-      PeriodicRingSize size = SizeForWindows(points, kReach);
+      PeriodicRingSize size = SizeForWindows(points, {}, kReach);
       size.margin += static_cast<std::uint32_t>(kWindowPadding) + more;
       const std::ptrdiff_t room = 3 * count;
       std::vector<std::int32_t> units(3 * room, 0);
@@ -230,7 +230,7 @@ TEST(RingFilters, ReadNothingBeyondMargins) {
       }
       for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, count);
       for (float* values : {ring.normal_x, ring.normal_y, ring.base}) ring.Repeat(values, 0, count);
-      MeasureArc(ring);
+      MeasureArc(ring, {});
       std::vector<float> results;
       const auto keep = [&](const float* of) { results.insert(results.end(), of, of + count); };
       for (const bool by_angle : {false, true}) {

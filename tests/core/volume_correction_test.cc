@@ -39,7 +39,7 @@ std::vector<double> OffsetPlainly(const std::vector<double>& points, double offs
 
 std::vector<double> Offset(const std::vector<double>& points, double offset) {
   std::vector<double> target(points.size());
-  OffsetRing(points, offset, target.data());
+  OffsetRing(points, {}, offset, target.data());
   return target;
 }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "frame_lengths.h"
+
 namespace partiemc::support {
 
 LevelSet LevelSetOf(const std::function<double(int, int)>& function, const TileDirectory& tiles) {
@@ -31,7 +33,15 @@ void Stages::SetScale(const ReconstructionParameters& wanted) {
   if (!particles.volumes.empty()) {
     lightest = *std::min_element(particles.volumes.begin(), particles.volumes.end());
   }
-  scale = MakeScale(parameters, spacing, parameters.cell_size * spacing, lightest);
+  const double cell_size = parameters.cell_size * spacing;
+  if (parameters.sizes == Sizes::kOwn) {
+    const auto sizes = RangeOfSizes(particles.AsFrame(), parameters.kernel_radius,
+                                    {.spacing = spacing, .cell_size = cell_size});
+    ASSERT_TRUE(sizes.ok()) << sizes.status();
+    scale = MakeScale(parameters, spacing, cell_size, spacing * spacing, *sizes);
+    return;
+  }
+  scale = MakeScale(parameters, spacing, cell_size, lightest);
 }
 
 void Stages::Run(const Particles& frame, const ReconstructionParameters& wanted,

@@ -33,7 +33,7 @@ struct Frame {
   int components = 2;
 
   /// Area of each particle in world units squared, positive and finite; with a `slice` its volume
-  /// in world units cubed. Empty: h^2, with a `slice` h^3.
+  /// in world units cubed. Empty: h^2, with a `slice` h^3. Sizes::kOwn requires volumes.
   std::span<const float> volumes = {};
 
   /// Distinct numbers that particles keep from frame to frame. Empty if the particles have no

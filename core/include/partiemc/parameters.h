@@ -45,6 +45,12 @@ enum class SpacingRule : std::uint8_t {
   kEveryFrame,  ///< From each frame whose particles agree on a spacing. The lattice stays as it is.
 };
 
+/// The size h_i of a particle: the spacing that it needs between its neighbours and itself.
+enum class Sizes : std::uint8_t {
+  kEqual,  ///< The spacing h, for all particles.
+  kOwn,    ///< h_i = sqrt(v_i) with the particle's volume v_i (core/SIZES.md).
+};
+
 /// The plane in which the particles lie, by the two coordinates that span it.
 enum class Plane : std::uint8_t { kXy, kXz, kYz };
 
@@ -136,6 +142,14 @@ struct ReconstructionParameters {
   /// multiples of h.
   std::optional<double> spacing = std::nullopt;
   SpacingRule spacing_rule = SpacingRule::kFirstFrame;
+
+  /// With own sizes, a particle acts within kernel_radius h_i, and smoothing follows the local
+  /// size. Frames must have volumes. An absent spacing is the root mean square of the sizes; it
+  /// sets the lattice. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
+  /// kernel radius at most 32 cells. Excludes surfaces, slices, `box` and
+  /// Placement::kFarthestParticle.
+  static constexpr double kMostSizeRatio = 10;
+  Sizes sizes = Sizes::kEqual;
 
   /// Kernel radius R in spacings, in [1.5, 8]. With a larger radius the outline is smoother, and
   /// the cost grows with the square of R; with a smaller radius the outline follows single
@@ -241,6 +255,7 @@ std::string_view Name(Output output);
 std::string_view Name(Placement placement);
 std::string_view Name(Fill fill);
 std::string_view Name(SpacingRule rule);
+std::string_view Name(Sizes sizes);
 std::string_view Name(Plane plane);
 std::span<const Placement> AllPlacements();
 std::span<const Fill> AllFills();

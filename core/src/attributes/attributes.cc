@@ -37,11 +37,7 @@ class Interpolation {
  public:
   Interpolation(const Frame& frame, const ParticleBins& bins, const Scale& scale,
                 AttributeScratch& scratch)
-      : frame_(frame),
-        bins_(bins),
-        scale_(scale),
-        scratch_(scratch),
-        buckets_(scale.kernel_radius) {}
+      : frame_(frame), bins_(bins), scale_(scale), scratch_(scratch), buckets_(scale.reach) {}
 
   void FindTiles(std::span<const double> vertices) {
     const TileDirectory& directory = bins_.tiles;
@@ -67,6 +63,7 @@ class Interpolation {
   // range of indices as in the bins.
   void SortParticles() {
     scratch_.particles.resize(bins_.particles.size());
+    scratch_.inverse_size.resize(bins_.size.size());
     scratch_.buckets.resize(bins_.tiles.size() * buckets_.OffsetCount());
     scratch_.sorted.resize(bins_.tiles.size());
     ParallelFor(bins_.tiles.size(), [&](std::size_t tile) {
@@ -112,14 +109,17 @@ class Interpolation {
       scratch_.particles[--offsets[buckets_.Of(particle)]] = {
           particle.x, particle.y, bins_.height.empty() ? 0 : bins_.height[i],
           static_cast<float>(weight), particle.source};
+      if (!bins_.size.empty()) {
+        scratch_.inverse_size[offsets[buckets_.Of(particle)]] = 1 / bins_.size[i];
+      }
     }
   }
 
-  // Calls visit(particle, w k, D_x, D_y, D_z) for each particle within the kernel radius of
-  // `point`.
+  // Calls visit(particle, w k, D_x, D_y, D_z) for each particle whose kernel reaches `point`. D is
+  // in units of R times `size`, the local size in spacings: 1 for equal sizes.
   template <typename Visit>
-  void ForEachAround(std::uint32_t tile, Point point, const Visit& visit) const {
-    const double radius = scale_.kernel_radius;
+  void ForEachAround(std::uint32_t tile, Point point, double size, const Visit& visit) const {
+    const double radius = scale_.reach, unit = scale_.kernel_radius * size;
     for (std::size_t beside = 0; beside < 9; ++beside) {
       const std::uint32_t near = bins_.tiles.neighbours(tile)[beside];
       if (near == kNoTile || bins_.CountOf(near) == 0) continue;
@@ -135,14 +135,29 @@ class Interpolation {
         const std::uint32_t* const offsets = OffsetsOf(near) + row * buckets_.Along();
         for (std::uint32_t i = offsets[left]; i < offsets[right + 1]; ++i) {
           const CarryingParticle& particle = scratch_.particles[i];
-          const double dx = (particle.x - x) / radius, dy = (particle.y - y) / radius;
-          const double dz = particle.height / radius;
-          const double within = 1 - dx * dx - dy * dy - dz * dz;
+          const double dx = (particle.x - x) / unit, dy = (particle.y - y) / unit;
+          const double dz = particle.height / unit;
+          const double per_own =
+              scratch_.inverse_size.empty() ? 1 : scratch_.inverse_size[i] * size;
+          const double x_own = dx * per_own, y_own = dy * per_own;
+          const double within = 1 - x_own * x_own - y_own * y_own - dz * dz;
           if (within <= 0) continue;
           visit(particle, particle.weight * within * within * within, dx, dy, dz);
         }
       }
     }
+  }
+
+  // The mean size around a point, in spacings, weighted by kernels.
+  double SizeAt(std::uint32_t tile, Point point) const {
+    if (!scale_.has_own_sizes) return 1;
+    double sum = 0, weights = 0;
+    ForEachAround(tile, point, 1,
+                  [&](const CarryingParticle& particle, double weight, double, double, double) {
+                    sum += weight * std::sqrt(particle.weight / scale_.uniform_weight);
+                    weights += weight;
+                  });
+    return weights > 0 ? sum / weights : 1;
   }
 
   void AtVertex(std::size_t vertex, Point world, std::vector<AttributeValues>& values) const {
@@ -153,7 +168,7 @@ class Interpolation {
       const Point point{world.x / scale_.cell_size - double{kTileSize} * at.x,
                         world.y / scale_.cell_size - double{kTileSize} * at.y};
       ForEachAround(
-          tile, point,
+          tile, point, SizeAt(tile, point),
           [&](const CarryingParticle& particle, double weight, double dx, double dy, double dz) {
             fit.Add(weight, dx, dy, dz);
             carried.Add(frame_.attributes, particle.source, weight, dx, dy, dz);

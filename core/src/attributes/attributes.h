@@ -23,6 +23,7 @@ struct CarryingParticle {
 /// Warm buffers of InterpolateAttributes.
 struct AttributeScratch {
   std::vector<std::uint32_t> tile_of;   ///< By vertex.
+  std::vector<float> inverse_size;      ///< By particle, of own sizes in spacings; else empty.
   std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if it or a neighbour has a vertex.
   std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.

@@ -26,7 +26,7 @@ constexpr double kPi = 3.14159265358979323846;
 // most one cell farther. The nodes of a small hole are farther by at most the radius of a disk with
 // the area of the hole.
 double TileMargin(const Scale& scale) {
-  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
+  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing * scale.sizes.largest;
 }
 
 // Particles per block, few enough that the data of a block stay in the nearest cache.
@@ -142,7 +142,8 @@ constexpr std::size_t kNextLine = 64 / sizeof(BinnedParticle) + 1;
 
 // Second pass over a stretch: writes its particles to the lists of their tiles.
 void FillTiles(std::size_t first, std::size_t last, std::span<const float> volumes,
-               double weight_per_world_volume, BinStretch& stretch, ParticleBins& bins) {
+               double weight_per_world_volume, const Scale& scale, BinStretch& stretch,
+               ParticleBins& bins) {
   const float* const positions = bins.scratch.positions.data();
   const std::uint32_t* const home = bins.scratch.home.data();
   std::uint32_t* const next = stretch.places.data();
@@ -155,12 +156,19 @@ void FillTiles(std::size_t first, std::size_t last, std::span<const float> volum
       set_weight(place, k);
     }
   };
+  const auto set_weight = [&](std::uint32_t place, std::size_t k) {
+    bins.weight[place] = static_cast<float>(volumes[k] * weight_per_world_volume);
+  };
   if (volumes.empty()) {
     fill([](std::uint32_t, std::size_t) {});
-  } else {
+  } else if (scale.has_own_sizes) {
+    const double spacing = scale.spacing * scale.cell_size;
     fill([&](std::uint32_t place, std::size_t k) {
-      bins.weight[place] = static_cast<float>(volumes[k] * weight_per_world_volume);
+      set_weight(place, k);
+      bins.size[place] = static_cast<float>(std::sqrt(double{volumes[k]}) / spacing);
     });
+  } else {
+    fill(set_weight);
   }
 }
 
@@ -264,6 +272,7 @@ void ParticleBins::Clear() {
   particles.clear();
   weight.clear();
   height.clear();
+  size.clear();
 }
 
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
@@ -305,13 +314,13 @@ absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
   const std::uint32_t particles = PlaceParticles(scratch);
   bins.particles.resize(particles);
   bins.weight.resize(frame.volumes.empty() ? 0 : particles);
+  bins.size.resize(scale.has_own_sizes ? particles : 0);
   double weight_per_world_volume = scale.weight_per_volume / scale.cell_size / scale.cell_size;
   if (scale.is_slice) weight_per_world_volume /= scale.cell_size;
   for_each_stretch([&](BinStretch& stretch, std::size_t first, std::size_t last) {
-    FillTiles(first, last, frame.volumes, weight_per_world_volume, stretch, bins);
+    FillTiles(first, last, frame.volumes, weight_per_world_volume, scale, stretch, bins);
   });
-  if (!AddReachedTiles(RoundedUp(scale.kernel_radius + TileMargin(scale)), limits.max_tiles,
-                       bins)) {
+  if (!AddReachedTiles(RoundedUp(scale.reach + TileMargin(scale)), limits.max_tiles, bins)) {
     return Refusal(frame, plane, scale, limits.max_tiles);
   }
   SetOffsets(bins);

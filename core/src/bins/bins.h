@@ -62,6 +62,7 @@ struct ParticleBins {
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
   std::vector<float> weight;              ///< By particle: its weight w; empty if all are equal.
   std::vector<float> height;              ///< By particle of a slice: height in cells; else empty.
+  std::vector<float> size;                ///< By particle: its size in spacings; empty if equal.
   BinScratch scratch;
 
   std::uint32_t CountOf(std::size_t tile) const { return offsets[tile + 1] - offsets[tile]; }

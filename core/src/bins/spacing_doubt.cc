@@ -55,23 +55,26 @@ class Probe {
   Probe(const ParticleBins& bins, const Scale& scale)
       : bins_(bins),
         spacing_(scale.spacing),
+        largest_(scale.sizes.largest),
         most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
 
   // Whether the k-th sample of `tile` contradicts the spacing.
   bool Contradicts(std::size_t tile, std::uint64_t k) {
     const auto particles = ParticlesOf(tile);
-    if (static_cast<double>(particles.size()) > most_in_tile_) return true;
+    if (SquaredSizesOf(tile) > most_in_tile_) return true;
     looks_ += particles.size();
     // Small frames are sampled completely.
-    const BinnedParticle& at =
+    const BinnedParticle& chosen =
         bins_.particles.size() <= kAsked ? particles[k] : Chosen(particles, k);
+    const Sample at{chosen.x, chosen.y, SizeOf(&chosen - bins_.particles.data())};
     NearRing ring;
     Gather(tile, tile, at, ring);
     const Neighbourhood& neighbours = bins_.tiles.neighbours(tile);
     for (const std::uint32_t neighbour : neighbours) {
       if (neighbour != kNoTile && neighbour != tile) Gather(neighbour, tile, at, ring);
     }
-    if (ring.reach_square() > kTileSize * kTileSize) GatherFar(tile, at, ring);
+    const double reach = WidestPair(at) * WidestPair(at) * ring.reach_square();
+    if (reach > kTileSize * kTileSize) GatherFar(tile, at, ring);
     if (!ring.IsAround()) return false;
     const double distance = ring.Distance();
     return distance > kMaxDistance * spacing_ || distance < kMinDistance * spacing_;
@@ -80,27 +83,54 @@ class Probe {
   bool IsExhausted() const { return looks_ > kMaxLooks; }
 
  private:
+  // A sampled particle, with its size in spacings.
+  struct Sample {
+    float x, y;
+    double size;
+  };
+
+  double SizeOf(std::ptrdiff_t particle) const {
+    return bins_.size.empty() ? 1.0 : double{bins_.size[particle]};
+  }
+
+  // The sum of the squared sizes of the particles of a tile; their number if sizes are equal.
+  double SquaredSizesOf(std::size_t tile) const {
+    if (bins_.size.empty()) return bins_.CountOf(tile);
+    double sum = 0;
+    for (std::uint32_t p = bins_.offsets[tile]; p < bins_.offsets[tile + 1]; ++p) {
+      sum += double{bins_.size[p]} * bins_.size[p];
+    }
+    return sum;
+  }
+
+  // The largest mean size of the sample and another particle.
+  double WidestPair(const Sample& at) const { return (at.size + largest_) / 2; }
+
   std::span<const BinnedParticle> ParticlesOf(std::size_t tile) const {
     return std::span(bins_.particles).subspan(bins_.offsets[tile], bins_.CountOf(tile));
   }
 
   // Adds the particles of `other`, unless the whole tile lies beyond the six nearest positions so
-  // far.
-  void Gather(std::size_t other, std::size_t tile, const BinnedParticle& at, NearRing& ring) {
+  // far. Distances count in mean sizes of both particles.
+  void Gather(std::size_t other, std::size_t tile, const Sample& at, NearRing& ring) {
     const double x =
         (static_cast<double>(bins_.tiles[other].x) - bins_.tiles[tile].x) * kTileSize - at.x;
     const double y =
         (static_cast<double>(bins_.tiles[other].y) - bins_.tiles[tile].y) * kTileSize - at.y;
     const double across_x = std::max({0.0, x, -x - kTileSize});
     const double across_y = std::max({0.0, y, -y - kTileSize});
-    if (across_x * across_x + across_y * across_y >= ring.reach_square()) return;
+    const double widest = WidestPair(at);
+    if (across_x * across_x + across_y * across_y >= widest * widest * ring.reach_square()) return;
     const auto particles = ParticlesOf(other);
     looks_ += particles.size();
-    for (const BinnedParticle& particle : particles) ring.Add(x + particle.x, y + particle.y);
+    for (const BinnedParticle& particle : particles) {
+      const double pair = (at.size + SizeOf(&particle - bins_.particles.data())) / 2;
+      ring.Add((x + particle.x) / pair, (y + particle.y) / pair);
+    }
   }
 
   // Adds the particles of all tiles that are not neighbours.
-  void GatherFar(std::size_t tile, const BinnedParticle& at, NearRing& ring) {
+  void GatherFar(std::size_t tile, const Sample& at, NearRing& ring) {
     looks_ += bins_.tiles.size();
     for (std::size_t other = 0; other < bins_.tiles.size() && !IsExhausted(); ++other) {
       const auto& neighbours = bins_.tiles.neighbours(tile);
@@ -110,7 +140,7 @@ class Probe {
   }
 
   const ParticleBins& bins_;
-  double spacing_, most_in_tile_;
+  double spacing_, largest_, most_in_tile_;
   std::size_t looks_ = 0;
 };
 

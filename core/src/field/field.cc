@@ -20,23 +20,38 @@ enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
 // Tiles per task: enough that most tiles have all neighbours in the same task.
 constexpr std::size_t kTilesAtOnce = 64;
 
+// Whether the density is a sum of equal weights. Particles of different sizes have equal weights.
+bool HasUniformWeights(const ParticleBins& bins) {
+  return bins.weight.empty() || !bins.size.empty();
+}
+
 // Null if weights are uniform.
 const float* WeightsOf(const ParticleBins& bins) {
-  return bins.weight.empty() ? nullptr : bins.weight.data();
+  return HasUniformWeights(bins) ? nullptr : bins.weight.data();
+}
+
+// Null if sizes are equal.
+const float* SizesOf(const ParticleBins& bins) {
+  return bins.size.empty() ? nullptr : bins.size.data();
 }
 
 TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
   const std::uint32_t first = bins.offsets[tile];
-  const float* const weights = WeightsOf(bins);
-  return {bins.particles.data() + first, weights == nullptr ? nullptr : weights + first,
+  const auto from = [first](const float* values) {
+    return values == nullptr ? nullptr : values + first;
+  };
+  return {bins.particles.data() + first, from(WeightsOf(bins)), from(SizesOf(bins)),
           bins.CountOf(tile)};
 }
 
 // Factor from kernel sums to density; 1 if particles have weights, because the sums are then
 // weighted.
 float WeightOf(const ParticleBins& bins, const Scale& scale) {
-  return bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
+  return HasUniformWeights(bins) ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
+
+// Whether the kernels of a tile's particles reach no farther than the margin of its sums.
+bool FitMargin(const Scale& scale) { return static_cast<float>(scale.reach) <= kSumMargin; }
 
 // First pass: sums the kernels of a tile's own particles, or of all particles around it if kernels
 // reach beyond the margin of the sums.
@@ -44,7 +59,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
              LevelSet& level_set) {
   std::array<float, kTileNodes>& values = level_set.tiles[tile];
   const auto radius = static_cast<float>(scale.kernel_radius);
-  const bool fits = radius <= kSumMargin;
+  const bool fits = FitMargin(scale);
   if (fits && bins.CountOf(tile) == 0) {
     values.fill(0);
     return;
@@ -59,7 +74,8 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     level_set.halo.Keep(tile, sums);
   } else {
     MaskedParticles(bins, tile, nullptr).ForEachBlock([&](const ParticleBlock& near) {
-      ScatterNearKernels(near, WeightsOf(bins), radius, sums);
+      bins.size.empty() ? ScatterNearKernels(near, WeightsOf(bins), radius, sums)
+                        : ScatterNearSizedKernels(near, bins.size.data(), radius, sums);
     });
   }
   // memcpy of a fixed size is inlined, unlike copy_n.
@@ -73,9 +89,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
-  if (static_cast<float>(scale.kernel_radius) <= kSumMargin) {
-    level_set.halo.AddTo(bins.tiles, tile, values);
-  }
+  if (FitMargin(scale)) level_set.halo.AddTo(bins.tiles, tile, values);
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
@@ -86,7 +100,7 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   MomentSums sums;
   std::fill_n(sums.begin(), blocks.count, BlockSums{});
   CellMask mask = MaskOf(asked.rows);
-  const int reach = static_cast<int>(std::ceil(scale.kernel_radius));
+  const int reach = static_cast<int>(std::ceil(scale.reach));
   const bool masked = reach < kMaskMargin;
   // A kernel reaches node i from the cells i - reach to i + reach - 1: cell c extends from c to c +
   // 1.
@@ -94,7 +108,7 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   const auto radius = static_cast<float>(scale.kernel_radius);
   MaskedParticles(bins, tile, masked ? &mask : nullptr)
       .ForEachBlock([&](const ParticleBlock& near) {
-        AddNearMoments(near, radius, blocks, asked.has_kernel_sums, sums);
+        AddNearMoments(near, SizesOf(bins), radius, blocks, asked.has_kernel_sums, sums);
       });
   return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
                        level_set.tiles[tile].data());
@@ -109,7 +123,7 @@ void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t ti
   const BitRows& open = level_set.open[tile];
   if (IsEmpty(open)) return;
   const BitRows inside =
-      SampleNodes(bins, scale, tile, {open, true, bins.weight.empty()}, level_set);
+      SampleNodes(bins, scale, tile, {open, true, HasUniformWeights(bins)}, level_set);
   for (int j = 0; j < kTileSize; ++j) level_set.inside[tile][j] |= inside[j];
 }
 
@@ -183,8 +197,7 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   level_set.inside.resize(tiles);
   level_set.open.resize(tiles);
   level_set.passes.assign(tiles, 0);
-  const auto radius = static_cast<float>(scale.kernel_radius);
-  if (radius <= kSumMargin) level_set.halo.Prepare(bins, radius);
+  if (FitMargin(scale)) level_set.halo.Prepare(bins, static_cast<float>(scale.reach));
   ParallelForRanges(tiles, kTilesAtOnce, [&](std::size_t first, std::size_t last) {
     SampleTiles(bins, scale, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                 level_set);

@@ -22,16 +22,18 @@ using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// Selected particles: their coordinates along the axis of selection, and along the other axis.
+// Selected particles: their coordinates along the axis of selection, and along the other axis;
+// their sizes if sizes differ.
 struct Chosen {
-  alignas(64) ParticleBlock::PerParticle<float> along, across;
+  alignas(64) ParticleBlock::PerParticle<float> along, across, size;
   int count;
 };
 
 // Selects the particles whose kernels may reach nodes `first` to `first` + kSide - 1 along an axis.
 // Their coordinates along this axis become relative to node `first`.
-HWY_INLINE void Choose(const float* along, const float* across, int count, int first, float radius,
-                       Chosen& chosen) {
+template <bool kSized>
+HWY_INLINE void Choose(const float* along, const float* across, [[maybe_unused]] const float* size,
+                       int count, int first, float radius, Chosen& chosen) {
   const Lanes d;
   constexpr float kMiddle = (NodeBlock::kSide - 1) / 2.0f;
   const auto origin = hn::Set(d, static_cast<float>(first));
@@ -40,11 +42,18 @@ HWY_INLINE void Choose(const float* along, const float* across, int count, int f
   int chosen_count = 0;
   for (int k = 0; k < count; k += kLanes) {
     const Vector at = hn::Sub(hn::LoadU(d, along + k), origin);
-    const auto reaches = hn::Lt(hn::Abs(hn::Sub(at, middle)), reach);
+    Vector own = reach;
+    if constexpr (kSized) {
+      own = hn::Add(hn::Mul(hn::LoadU(d, size + k), hn::Set(d, radius)), middle);
+    }
+    const auto reaches = hn::Lt(hn::Abs(hn::Sub(at, middle)), own);
     const auto is_in = hn::And(reaches, hn::FirstN(d, static_cast<std::size_t>(count - k)));
     const Compressor compress(hn::RebindMask(hn::RebindToSigned<Lanes>(), is_in));
     hn::StoreU(compress(d, at), d, chosen.along.data() + chosen_count);
     hn::StoreU(compress(d, hn::LoadU(d, across + k)), d, chosen.across.data() + chosen_count);
+    if constexpr (kSized) {
+      hn::StoreU(compress(d, hn::LoadU(d, size + k)), d, chosen.size.data() + chosen_count);
+    }
     chosen_count += static_cast<int>(hn::CountTrue(d, is_in));
   }
   chosen.count = chosen_count;
@@ -56,9 +65,9 @@ alignas(64) constexpr float kRows[] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3,
 
 // Adds the moments of particles; x and y are relative to the first node of the block. The sums stay
 // in registers.
-template <bool kKernel>
-HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inverse_square,
-                           BlockSums& sums) {
+template <bool kKernel, bool kSized>
+HWY_INLINE void AddMoments(const float* x, const float* y, [[maybe_unused]] const float* size,
+                           int count, float inverse_square, BlockSums& sums) {
   const Lanes d;
   const Vector scale = hn::Set(d, inverse_square);
   const Vector one = hn::Set(d, 1.0f);
@@ -66,14 +75,20 @@ HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inve
     const Vector column = hn::Load(d, kColumns + part), row = hn::Load(d, kRows + part);
     const auto sum = [&](BlockSums::Channel& of) HWY_ATTR { return hn::Load(d, of.data() + part); };
     Vector kernel = sum(sums.kernel), moment_x = sum(sums.moment_x), moment_y = sum(sums.moment_y);
-    Vector xx = sum(sums.xx), xy = sum(sums.xy), yy = sum(sums.yy);
+    Vector xx = sum(sums.xx), xy = sum(sums.xy), yy = sum(sums.yy), sizes = sum(sums.size);
     for (int e = 0; e < count; ++e) {
-      const Vector dx = hn::Sub(hn::Set(d, x[e]), column);
-      const Vector dy = hn::Sub(hn::Set(d, y[e]), row);
+      Vector dx = hn::Sub(hn::Set(d, x[e]), column);
+      Vector dy = hn::Sub(hn::Set(d, y[e]), row);
+      if constexpr (kSized) {
+        const Vector per_size = hn::Set(d, 1 / size[e]);
+        dx = hn::Mul(dx, per_size);
+        dy = hn::Mul(dy, per_size);
+      }
       const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
       const Vector t = hn::Max(hn::Zero(d), hn::Sub(one, hn::Mul(square, scale)));
       const Vector k = hn::Mul(hn::Mul(t, t), t);
       if constexpr (kKernel) kernel = hn::Add(kernel, k);
+      if constexpr (kSized) sizes = hn::Add(sizes, hn::Mul(k, hn::Set(d, size[e])));
       const Vector kx = hn::Mul(k, dx);
       const Vector ky = hn::Mul(k, dy);
       moment_x = hn::Add(moment_x, kx);
@@ -85,6 +100,7 @@ HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inve
     const auto set = [&](Vector value, BlockSums::Channel& of)
                          HWY_ATTR { hn::Store(value, d, of.data() + part); };
     if constexpr (kKernel) set(kernel, sums.kernel);
+    if constexpr (kSized) set(sizes, sums.size);
     set(moment_x, sums.moment_x);
     set(moment_y, sums.moment_y);
     set(xx, sums.xx);
@@ -93,8 +109,13 @@ HWY_INLINE void AddMoments(const float* x, const float* y, int count, float inve
   }
 }
 
-void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
-                    bool has_kernel_sums, MomentSums& sums) {
+template <bool kSized>
+void AddNearMomentsOf(const ParticleBlock& near, [[maybe_unused]] const float* size, float radius,
+                      const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+  alignas(64) ParticleBlock::PerParticle<float> sizes;
+  if constexpr (kSized) {
+    for (int k = 0; k < near.count; ++k) sizes[k] = size[near.particle[k]];
+  }
   const float inverse_square = 1 / (radius * radius);
   Chosen of_rows, of_block;
   int row = -1;
@@ -102,13 +123,20 @@ void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& b
     const NodeBlock& block = blocks[b];
     if (block.row != row) {
       row = block.row;
-      Choose(near.y.data(), near.x.data(), near.count, row, radius, of_rows);
+      Choose<kSized>(near.y.data(), near.x.data(), sizes.data(), near.count, row, radius, of_rows);
     }
-    Choose(of_rows.across.data(), of_rows.along.data(), of_rows.count, block.column, radius,
-           of_block);
-    const auto add = has_kernel_sums ? AddMoments<false> : AddMoments<true>;
-    add(of_block.along.data(), of_block.across.data(), of_block.count, inverse_square, sums[b]);
+    Choose<kSized>(of_rows.across.data(), of_rows.along.data(), of_rows.size.data(), of_rows.count,
+                   block.column, radius, of_block);
+    const auto add = has_kernel_sums ? AddMoments<false, kSized> : AddMoments<true, kSized>;
+    add(of_block.along.data(), of_block.across.data(), of_block.size.data(), of_block.count,
+        inverse_square, sums[b]);
   }
+}
+
+void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+                    const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+  const auto add = size != nullptr ? AddNearMomentsOf<true> : AddNearMomentsOf<false>;
+  add(near, size, radius, blocks, has_kernel_sums, sums);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -120,9 +148,9 @@ namespace partiemc {
 
 HWY_EXPORT(AddNearMoments);
 
-void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
-                    bool has_kernel_sums, MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, radius, blocks, has_kernel_sums, sums);
+void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+                    const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, size, radius, blocks, has_kernel_sums, sums);
 }
 
 NodeBlocks BlocksOf(const BitRows& asked) {

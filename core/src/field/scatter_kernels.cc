@@ -188,7 +188,37 @@ void ScatterKernelsOf(const TileParticles& tile, float radius, NodeSums& sums) {
   });
 }
 
+// The nodes that the kernel of a particle at (x, y) reaches, those of columns and rows [low, high).
+struct KernelNodes {
+  int column, row, columns, rows;
+
+  HWY_INLINE KernelNodes(float x, float y, float radius, int low, int high)
+      : column(std::max(NodeAfter(x - radius), low)),
+        row(std::max(NodeAfter(y - radius), low)),
+        columns(std::min(NodeAfter(x + radius), high) - column),
+        rows(std::min(NodeAfter(y + radius), high) - row) {}
+};
+
+// Adds the kernel of one particle at its nodes.
+template <bool kWeighted>
+HWY_INLINE void AddAtNodes(float x, float y, const KernelNodes& at, float inverse_square,
+                           float weight, NodeSums& sums) {
+  AddKernel<kWeighted>(x - static_cast<float>(at.column), y - static_cast<float>(at.row),
+                       at.columns, at.rows, inverse_square, weight,
+                       sums.data() + SumIndex(at.column, at.row));
+}
+
+void ScatterSizedKernels(const TileParticles& tile, float radius, NodeSums& sums) {
+  for (std::size_t k = 0; k < tile.count; ++k) {
+    const auto& [x, y, source] = tile.particles[k];
+    const float reach = radius * tile.size[k];
+    const KernelNodes at(x, y, reach, -kSumMargin, kTileSize + kSumMargin);
+    AddAtNodes<false>(x, y, at, 1 / (reach * reach), 1, sums);
+  }
+}
+
 void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums) {
+  if (tile.size != nullptr) return ScatterSizedKernels(tile, radius, sums);
   tile.weight != nullptr ? ScatterKernelsOf<true>(tile, radius, sums)
                          : ScatterKernelsOf<false>(tile, radius, sums);
 }
@@ -199,12 +229,20 @@ void ScatterNearKernelsOf(const ParticleBlock& near, const float* weight, float 
   const float inverse_square = 1 / (radius * radius);
   for (int p = 0; p < near.count; ++p) {
     const float x = near.x[p], y = near.y[p];
-    const int column = std::max(NodeAfter(x - radius), 0), row = std::max(NodeAfter(y - radius), 0);
-    const int columns = std::min(NodeAfter(x + radius), kTileSize) - column;
-    const int rows = std::min(NodeAfter(y + radius), kTileSize) - row;
-    AddKernel<kWeighted>(x - static_cast<float>(column), y - static_cast<float>(row), columns, rows,
-                         inverse_square, kWeighted ? weight[near.particle[p]] : 1.0f,
-                         sums.data() + SumIndex(column, row));
+    const KernelNodes at(x, y, radius, 0, kTileSize);
+    AddAtNodes<kWeighted>(x, y, at, inverse_square, kWeighted ? weight[near.particle[p]] : 1.0f,
+                          sums);
+  }
+}
+
+void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
+                             NodeSums& sums) {
+  for (int p = 0; p < near.count; ++p) {
+    const float x = near.x[p], y = near.y[p];
+    const float reach = radius * size[near.particle[p]];
+    const KernelNodes at(x, y, reach, 0, kTileSize);
+    if (at.columns <= 0 || at.rows <= 0) continue;
+    AddAtNodes<false>(x, y, at, 1 / (reach * reach), 1, sums);
   }
 }
 
@@ -223,6 +261,7 @@ namespace partiemc {
 
 HWY_EXPORT(ScatterKernels);
 HWY_EXPORT(ScatterNearKernels);
+HWY_EXPORT(ScatterNearSizedKernels);
 
 void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums) {
   HWY_DYNAMIC_DISPATCH(ScatterKernels)(tile, radius, sums);
@@ -231,6 +270,11 @@ void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums) {
 void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums) {
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
+}
+
+void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
+                             NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearSizedKernels)(near, size, radius, sums);
 }
 
 }  // namespace partiemc

@@ -66,6 +66,7 @@ class NodeFormula {
  public:
   HWY_INLINE NodeFormula(const AskedNodes& asked, float weight, const Scale& scale)
       : asked_(asked),
+        has_own_sizes_(scale.has_own_sizes),
         weight_(hn::Set(d_, weight)),
         guard_(Constant(scale.guard)),
         saturation_(Constant(scale.saturation)),
@@ -95,7 +96,8 @@ class NodeFormula {
         hn::Add(hn::Mul(hn::Add(xx, yy), half), Length(hn::Mul(hn::Sub(xx, yy), half), xy));
     const Vector gap = hn::Mul(hn::Sub(spread, gap_spread_), gap_slope_);
     const DensityBranches branches = BranchesOf(value);
-    const Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
+    Vector f = hn::Min(hn::Max(hn::Max(phi, branches.guard), gap), branches.saturation);
+    if (has_own_sizes_) f = hn::Mul(f, hn::Mul(load(sums.size), inverse));
     // If k is 0, no kernel reaches the node.
     return hn::IfThenElse(hn::Gt(k, hn::Zero(d_)), f, asked_.is_open ? void_value_ : value);
   }
@@ -123,6 +125,7 @@ class NodeFormula {
 
   const Lanes d_;
   const AskedNodes& asked_;
+  const bool has_own_sizes_;
   const Vector weight_, guard_, saturation_, slope_, gap_spread_, gap_slope_, reference_radius_,
       void_value_, inverse_square_;
 };

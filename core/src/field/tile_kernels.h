@@ -56,7 +56,7 @@ struct NodeBlocks {
 NodeBlocks BlocksOf(const BitRows& asked);
 
 /// Kernel sums at the nodes of one block. Moments are relative to the node, so that the mean loses
-/// no digits far from the corner of the tile.
+/// no digits far from the corner of the tile. With sizes q, x_i - x is divided by q_i.
 struct alignas(64) BlockSums {
   using Channel = std::array<float, NodeBlock::kNodes>;
   Channel kernel;    ///< sum k; unused if the density gives it.
@@ -65,6 +65,7 @@ struct alignas(64) BlockSums {
   Channel xx;  ///< sum k (x_i - x)^2, and so on.
   Channel xy;
   Channel yy;
+  Channel size;  ///< sum k q; 0 if sizes are equal.
 };
 using MomentSums = std::array<BlockSums, NodeBlocks::kMost>;
 
@@ -75,15 +76,17 @@ struct AskedNodes {
   bool has_kernel_sums;  ///< Their values are sum k (ClassifyNodes).
 };
 
-/// The particles of one tile. `weight` is null if weights are uniform.
+/// The particles of one tile. `weight` is null if weights are uniform, `size` if sizes are equal.
+/// Sizes exclude weights.
 struct TileParticles {
   const BinnedParticle* particles;
   const float* weight;
+  const float* size;  ///< A particle's kernel radius is `radius` times its size.
   std::size_t count;
 };
 
 /// Adds the weighted kernels of a tile's own particles to `sums`, including the margin. Requires:
-/// radius <= kSumMargin.
+/// the largest kernel radius is at most kSumMargin.
 void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 
 /// Adds the kernels of particles in and around a tile to the tile's own nodes, for any radius.
@@ -91,18 +94,22 @@ void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums);
 
-/// Adds particles to the moments of blocks, one after another. `has_kernel_sums`: sum k is known,
-/// so it is not added.
-void AddNearMoments(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
-                    bool has_kernel_sums, MomentSums& sums);
+/// As ScatterNearKernels, for particles of different sizes. `size`: by particle of the bins.
+void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
+                             NodeSums& sums);
+
+/// Adds particles to the moments of blocks, one after another. `size`: by particle of the bins,
+/// null if sizes are equal. `has_kernel_sums`: sum k is known, so it is not added.
+void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+                    const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums);
 
 /// Classifies the nodes of a tile by the density f = weight * sum. Sets `inside`, and `open` for
 /// undecided nodes. Replaces the sums of decided nodes by the term of F that decides, or by F
 /// itself if f = 0.
 void ClassifyNodes(float weight, const Scale& scale, float* values, BitRows& inside, BitRows& open);
 
-/// Replaces the requested values, which ClassifyNodes has set, by F. Returns the requested nodes
-/// that are inside.
+/// Replaces the requested values, which ClassifyNodes has set, by F; if sizes differ, by F times
+/// the local size. Returns the requested nodes that are inside.
 BitRows EvaluateNodes(const AskedNodes& asked, const NodeBlocks& blocks, const MomentSums& sums,
                       float weight, const Scale& scale, float* values);
 

@@ -234,6 +234,10 @@ absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& para
     if (absl::Status status = CheckPlanar(frame, parameters.plane); !status.ok()) return status;
   }
   if (absl::Status status = CheckVolumes(frame); !status.ok()) return status;
+  if (parameters.sizes == Sizes::kOwn && frame.volumes.empty() && frame.ParticleCount() > 0) {
+    return InvalidFrame(kReasonCount, "volumes", "0 values",
+                        "must be one per particle: parameters.sizes is own");
+  }
   if (absl::Status status = CheckIds(frame, scratch); !status.ok()) return status;
   if (absl::Status status = CheckVelocities(frame); !status.ok()) return status;
   return CheckAttributes(frame);

@@ -149,6 +149,21 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
+// Checks that nothing excludes own sizes.
+absl::Status CheckSizes(const ReconstructionParameters& p) {
+  if (p.sizes == Sizes::kEqual) return absl::OkStatus();
+  const auto refused = [&](const std::string& with) {
+    return Refused("sizes", std::string(Name(p.sizes)), "must be equal " + with);
+  };
+  if (p.output == Output::kSurface) return refused("for a surface");
+  if (p.slice) return refused("for a slice");
+  if (p.box) return refused("with a periodic box");
+  if (!KeepsGuarantees(p.placement)) {
+    return refused("for the placement " + std::string(Name(p.placement)));
+  }
+  return absl::OkStatus();
+}
+
 // Checks what only surfaces require.
 absl::Status CheckSurface(const ReconstructionParameters& p) {
   const auto check = [](const char* field, double value, const char* rule) {
@@ -218,6 +233,7 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   }
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   if (absl::Status status = CheckBox(p); !status.ok()) return status;
+  if (absl::Status status = CheckSizes(p); !status.ok()) return status;
   return CheckOutlines(p);
 }
 
@@ -275,6 +291,8 @@ std::string_view Name(Fill fill) { return NameOf(kFillNames, fill); }
 std::string_view Name(SpacingRule rule) {
   return rule == SpacingRule::kFirstFrame ? "first-frame" : "every-frame";
 }
+
+std::string_view Name(Sizes sizes) { return sizes == Sizes::kEqual ? "equal" : "own"; }
 
 std::string_view Name(Plane plane) { return NameOf(kPlaneNames, plane); }
 

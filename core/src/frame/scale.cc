@@ -38,13 +38,16 @@ constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 }  // namespace
 
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
-                double lightest_volume) {
+                double lightest_volume, const SizeRange& sizes) {
   Scale scale;
   scale.cell_size = cell_size;
   scale.spacing = spacing / cell_size;
   scale.kernel_radius = parameters.kernel_radius * scale.spacing;
   scale.reference_radius = *parameters.reference_radius * scale.spacing;
   scale.is_slice = parameters.slice.has_value();
+  scale.has_own_sizes = parameters.sizes == Sizes::kOwn;
+  scale.sizes = sizes;
+  scale.reach = scale.kernel_radius * sizes.largest;
   const double radius_square = scale.kernel_radius * scale.kernel_radius;
   scale.weight_per_volume = scale.is_slice ? kSpaceNorm / (radius_square * scale.kernel_radius)
                                            : kFourOverPi / radius_square;

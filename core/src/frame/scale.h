@@ -5,13 +5,21 @@
 
 namespace partiemc {
 
+/// The smallest and the largest size of the particles of a frame, in spacings.
+struct SizeRange {
+  double smallest = 1, largest = 1;
+};
+
 /// Parameters, spacing and lattice in the form that the stages use. Lengths are in cells (lattice
 /// spacings) unless noted otherwise.
 struct Scale {
   double cell_size = 0;          ///< World units.
   bool is_slice = false;         ///< Particles fill space; volumes are cubic.
+  bool has_own_sizes = false;    ///< Sizes::kOwn: particle i has the kernel radius beta h_i.
+  SizeRange sizes;               ///< Both 1 for equal sizes.
   double spacing = 0;            ///< h.
   double kernel_radius = 0;      ///< R = beta h.
+  double reach = 0;              ///< The largest kernel radius of a particle.
   double reference_radius = 0;   ///< r_0 = alpha_r h.
   double uniform_weight = 0;     ///< w of a particle of volume h^2 (slice: h^3); gives f of about 1
                                  ///< inside.
@@ -24,8 +32,9 @@ struct Scale {
 };
 
 /// Arguments in world units. `lightest_volume`: the smallest volume of a particle; an area (h^2
-/// without volumes), but for a slice a volume in space. Requires: resolved parameters.
+/// without volumes), but for a slice a volume in space. Requires: resolved parameters; for
+/// Sizes::kOwn, `lightest_volume` is h^2, because weights do not contain volumes.
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
-                double lightest_volume);
+                double lightest_volume, const SizeRange& sizes = {});
 
 }  // namespace partiemc

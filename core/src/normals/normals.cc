@@ -70,6 +70,7 @@ void SetSample(std::size_t vertex, const LevelSetSample& sample, std::span<CellP
   (at_middle ? plane.value : plane.entry_value) = static_cast<float>(sample.value);
   (at_middle ? plane.gradient_x : plane.entry_gradient_x) = static_cast<float>(sample.gradient_x);
   (at_middle ? plane.gradient_y : plane.entry_gradient_y) = static_cast<float>(sample.gradient_y);
+  (at_middle ? plane.size : plane.entry_size) = static_cast<float>(sample.size);
 }
 
 // The first segment of the group that contains `segment`.

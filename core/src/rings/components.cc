@@ -131,7 +131,14 @@ Components::TileShare Components::ShareOf(const ParticleBins& bins, const Crossi
   const std::uint32_t component =
       full ? label_[first_run_[tile * kTileSize]] : ComponentSeenFrom(bins.tiles, crossings, tile);
   if (component == kNoComponent || component == kSeveralComponents) return {component, 0, 0};
-  if (full && bins.weight.empty()) return {component, bins.CountOf(tile), 0};
+  if (full) {
+    TileShare share{component, bins.CountOf(tile), 0};
+    if (bins.weight.empty()) return share;
+    for (std::uint32_t p = bins.offsets[tile]; p < bins.offsets[tile + 1]; ++p) {
+      share.weight += bins.weight[p];
+    }
+    return share;
+  }
 
   BitRows cells;  // Cells with an inside corner.
   const NodeRows rows = InsideRows(bins.tiles, crossings.tiles, tile);

@@ -43,7 +43,7 @@ void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& cross
   all_cells.fill(~std::uint32_t{0});
   // A mask ends at its margin. If the reach is larger, all cells are marked.
   const double distance = std::ceil(wander);
-  const double reach = distance + std::ceil(scale_.kernel_radius);
+  const double reach = distance + std::ceil(scale_.reach);
   const int margin = static_cast<int>(std::min<double>(reach, kMaskMargin));
   const auto mark = [](CellMask& mask, double cells) {
     Widen(mask, static_cast<int>(cells), static_cast<int>(cells));
@@ -68,7 +68,7 @@ void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& cross
 void LevelSetSampler::Build(const ParticleBins& bins, const Crossings& crossings,
                             const Scale& scale, double wander, bool tells_sources) {
   scale_ = scale;
-  grid_ = NeighbourGrid(scale.kernel_radius);
+  grid_ = NeighbourGrid(scale.reach);
   MarkTiles(bins, crossings, wander);
   FindRuns(bins, tells_sources);
   ParallelFor(runs_.size(), [&](std::size_t run) { SortRun(bins, runs_[run]); });
@@ -108,8 +108,10 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   chosen_.resize(particle_count);
   chosen_end_.resize(tiles_.size());
   source_.resize(tells_sources ? particle_count : 0);
-  weight_.resize(bins.weight.empty() ? 0 : particle_count + kRowPadding);
+  const bool is_weighted = !bins.weight.empty() && bins.size.empty();
+  weight_.resize(is_weighted ? particle_count + kRowPadding : 0);
   height_.resize(bins.height.empty() ? 0 : particle_count);
+  size_.resize(bins.size.empty() ? 0 : particle_count + kRowPadding);
 }
 
 // Finds the buckets around a tile.
@@ -180,8 +182,9 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
       x_[to] = tiles_[tile].column + bins.particles[particle].x;
       y_[to] = bins.particles[particle].y;
       if (!source_.empty()) source_[to] = bins.particles[particle].source;
-      if (!bins.weight.empty()) weight_[to] = bins.weight[particle];
+      if (!weight_.empty()) weight_[to] = bins.weight[particle];
       if (!bins.height.empty()) height_[to] = bins.height[particle];
+      if (!bins.size.empty()) size_[to] = bins.size[particle];
     }
   });
 }
@@ -252,7 +255,7 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
   const Point point{x, y};
   PointQuery query;
   query.points = {&point, 1};
-  FindNear(tile, query.points, scale_.kernel_radius, query.near);
+  FindNear(tile, query.points, KernelRange(), query.near);
   PointSamples samples;
   SampleAtPoints(scale_, {&query, 1}, samples);
   return {.density = samples.density[0],
@@ -265,6 +268,7 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
           .value = samples.value[0],
           .gradient_x = samples.gradient_x[0],
           .gradient_y = samples.gradient_y[0],
+          .size = samples.size[0],
           .has_support = samples.kernel[0] > 0};
 }
 
@@ -283,14 +287,14 @@ void LevelSetSampler::Sample(std::span<const FieldPoints> groups,
   std::array<PointQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < groups.size(); ++q) {
     queries[q].points = std::span(groups[q].points).first(groups[q].count);
-    FindNear(groups[q].tile, queries[q].points, scale_.kernel_radius, queries[q].near);
+    FindNear(groups[q].tile, queries[q].points, KernelRange(), queries[q].near);
   }
   PointSamples at;
   SampleAtPoints(scale_, std::span(queries).first(groups.size()), at);
   std::size_t point = 0;
   for (std::size_t q = 0; q < groups.size(); ++q) {
     for (std::size_t k = 0; k < groups[q].count; ++k, ++point) {
-      samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point]};
+      samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point], at.size[point]};
     }
   }
 }

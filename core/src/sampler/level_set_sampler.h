@@ -21,14 +21,16 @@ namespace partiemc {
 
 /// F, phi and their gradients at a point. Lengths in cells, gradients without unit.
 struct FieldSample {
-  double density = 0;                     ///< f
-  double mean_x = 0, mean_y = 0;          ///< xbar - x, the weighted mean relative to the point.
-  double phi = 0;                         ///< |x - xbar| - r
-  double phi_x = 0, phi_y = 0;            ///< grad phi; 0 if x = xbar.
-  double spread = 0;                      ///< sigma
-  double value = 0;                       ///< F (level_set_formula.h)
-  double gradient_x = 0, gradient_y = 0;  ///< grad F, of the term that F equals.
-  bool has_support = false;               ///< A particle is within the kernel radius.
+  double density = 0;             ///< f
+  double mean_x = 0, mean_y = 0;  ///< xbar - x, the weighted mean relative to the point.
+  double phi = 0;                 ///< |x - xbar| - r
+  double phi_x = 0, phi_y = 0;    ///< grad phi; 0 if x = xbar.
+  double spread = 0;              ///< sigma
+  double value = 0;               ///< F (level_set_formula.h)
+  /// grad F, of the term that F equals; of different sizes without the gradient of the local size.
+  double gradient_x = 0, gradient_y = 0;
+  double size = 1;           ///< The local size, in spacings.
+  bool has_support = false;  ///< A particle is within the kernel radius.
 };
 
 /// A point in cells relative to a tile; kNoTile if no particle is near.
@@ -37,10 +39,11 @@ struct FieldPoint {
   double x = 0, y = 0;
 };
 
-/// F and grad F at a point.
+/// F, grad F and the local size at a point (FieldSample).
 struct LevelSetSample {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;
+  double size = 1;
 };
 using FieldPoints = PointGroup<Point>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
@@ -67,14 +70,21 @@ class LevelSetSampler {
   void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
   /// Calls visit(x, y, particle) for the particles within `radius` of a point, in cells relative to
-  /// `tile`, and for some particles farther away. Requires: radius <= R.
+  /// `tile`, and for some particles farther away. Requires: radius <= Scale::reach.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// Sets `near` to the particles within `radius` of any of `points`, and some particles farther
-  /// away. Points have members x and y, in cells relative to the tile.
+  /// Distances at which particles count, in cells: `radius`, and if sizes differ, additionally
+  /// `per_size` times the particle's size.
+  struct Range {
+    double radius, per_size;
+  };
+
+  /// Sets `near` to the particles within `range` of any of `points`, and some particles farther
+  /// away. Points have members x and y, in cells relative to the tile. Requires: no distance in the
+  /// range exceeds Scale::reach.
   template <typename Member>
-  void FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
+  void FindNear(std::uint32_t tile, std::span<const Member> points, const Range& range,
                 NeighbourRows& near) const;
 
   /// The index in the frame of a particle of ForEachNear. Requires: Build with `tells_sources`.
@@ -121,6 +131,10 @@ class LevelSetSampler {
     bool is_asked;                  // Points may lie in its cells.
   };
 
+  // The range of kernels.
+  Range KernelRange() const {
+    return scale_.has_own_sizes ? Range{0, scale_.kernel_radius} : Range{scale_.kernel_radius, 0};
+  }
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
   // Number of offsets of a run: its buckets and two more.
   std::uint32_t OffsetCount(const Run& run) const {
@@ -148,13 +162,17 @@ class LevelSetSampler {
   };
   std::vector<Chosen> chosen_;
   std::vector<std::uint32_t> chosen_end_;
-  std::vector<float> x_, y_, weight_, height_;
+  std::vector<float> x_, y_, weight_, height_, size_;
   std::vector<std::uint32_t> source_;
 };
 
 template <typename Member>
-void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> points, double radius,
-                               NeighbourRows& near) const {
+void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> points,
+                               const Range& range, NeighbourRows& near) const {
+  const bool has_sizes = scale_.has_own_sizes;
+  const double radius =
+      has_sizes ? std::min(range.radius + range.per_size * scale_.sizes.largest, scale_.reach)
+                : range.radius;
   Point low{points.front().x, points.front().y};
   Point high = low;
   for (const Member& point : points.subspan(1)) {
@@ -165,6 +183,7 @@ void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> point
   near.x = x_.data();
   near.y = y_.data();
   near.weight = weight_.empty() ? nullptr : weight_.data();
+  near.size = size_.empty() ? nullptr : size_.data();
   near.origin_x = static_cast<float>(static_cast<int>(low.x));
   near.origin_y = static_cast<float>(static_cast<int>(low.y));
   near.column = of.column + near.origin_x;
@@ -175,6 +194,8 @@ void LevelSetSampler::FindNear(std::uint32_t tile, std::span<const Member> point
   const double half = (std::max(width, height) + kDiagonal * std::min(width, height)) / 2;
   const double disc = radius + half + kDiscMargin;
   near.reach_square = static_cast<float>(disc * disc);
+  near.reach = static_cast<float>(range.radius + half + kDiscMargin);
+  near.reach_per_size = static_cast<float>(range.per_size);
   // A particle nearer to the rim than half the resolution of positions has a kernel of 0, so it
   // need not be found.
   const double reach = radius - NeighbourGrid::kStep / 2;
@@ -204,7 +225,7 @@ void LevelSetSampler::ForEachNear(std::uint32_t tile, double x, double y, double
                                   Visit visit) const {
   const Point point{x, y};
   NeighbourRows near;
-  FindNear(tile, std::span(&point, 1), radius + NeighbourGrid::kStep, near);
+  FindNear(tile, std::span(&point, 1), {radius + NeighbourGrid::kStep, 0}, near);
   for (const NeighbourBand& band : std::span(near.bands).first(near.band_count)) {
     for (int row = 0; row < band.rows; ++row) {
       const std::uint32_t* const offsets = band.offsets + row * band.row_stride;

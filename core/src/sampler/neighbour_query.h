@@ -32,12 +32,15 @@ struct NeighbourRows {
   const float* x;       ///< By particle, in cells, modulo kColumnPeriod.
   const float* y;       ///< By particle, in cells relative to its own tile.
   const float* weight;  ///< By particle; null if all have Scale::uniform_weight.
+  const float* size;    ///< By particle, in spacings; null if equal. Excludes weights.
   /// The corner of a cell near the points, relative to the tile. Sums use floats relative to this
   /// corner.
   float origin_x, origin_y;
   float column;  ///< The origin in the coordinates of `x`.
-  /// Only particles in this disk count; its centre is relative to the origin.
+  /// Only particles in this disk count; its centre is relative to the origin. If sizes differ, a
+  /// particle counts within reach + reach_per_size times its size.
   float centre_x, centre_y, reach_square;
+  float reach, reach_per_size;
   std::array<NeighbourBand, 3> bands;
   int band_count;
 };

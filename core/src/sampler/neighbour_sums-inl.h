@@ -34,6 +34,9 @@ using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPartialSums / kLanes;
 
+// A factor of each particle, which some sums need.
+enum class Factor { kNone, kWeight, kSize };
+
 // Packed particles in coordinates relative to the origin of NeighbourRows. At least kPartialSums
 // distant dummies follow, whose kernels are 0.
 struct NeighbourChunk {
@@ -43,7 +46,7 @@ struct NeighbourChunk {
 
   HWY_ALIGN float x[kRoom];
   HWY_ALIGN float y[kRoom];
-  HWY_ALIGN float weight[kRoom];
+  HWY_ALIGN float factor[kRoom];
   int count;
 };
 
@@ -53,16 +56,18 @@ class NeighbourDisc {
   HWY_INLINE explicit NeighbourDisc(const NeighbourRows& near)
       : xs_(near.x),
         ys_(near.y),
-        weights_(near.weight),
+        factors_(near.size != nullptr ? near.size : near.weight),
         column_(hn::Set(Lanes(), near.column)),
         centre_x_(hn::Set(Lanes(), near.centre_x)),
         centre_y_(hn::Set(Lanes(), near.centre_y)),
-        reach_square_(hn::Set(Lanes(), near.reach_square)) {}
+        reach_square_(hn::Set(Lanes(), near.reach_square)),
+        reach_(hn::Set(Lanes(), near.reach)),
+        reach_per_size_(hn::Set(Lanes(), near.reach_per_size)) {}
 
   // Reads the first kPartialSums particles of [first, last) and appends the ones in the disc to a
   // chunk, which has `to` particles. Requires: space for kPartialSums. Returns the new number of
   // particles.
-  template <bool kWeighted>
+  template <Factor kFactor>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
                         NeighbourChunk& chunk) const {
     const Lanes d;
@@ -76,15 +81,21 @@ class NeighbourDisc {
       const auto dx = hn::Sub(x, centre_x_);
       const auto dy = hn::Sub(y, centre_y_);
       const auto square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
-      const auto is_near = hn::RebindMask(d_bits, hn::Lt(square, reach_square_));
+      Vector reach_square = reach_square_;
+      if constexpr (kFactor == Factor::kSize) {
+        const auto size = hn::LoadU(d, factors_ + first);
+        const Vector reach = hn::Add(reach_, hn::Mul(reach_per_size_, size));
+        reach_square = hn::Mul(reach, reach);
+      }
+      const auto is_near = hn::RebindMask(d_bits, hn::Lt(square, reach_square));
       const auto place = hn::Add(hn::Iota(d_bits, 0), hn::Set(d_bits, static_cast<int>(first)));
       const auto is_particle = hn::Lt(place, hn::Set(d_bits, static_cast<int>(last)));
       const auto is_in = hn::And(is_near, is_particle);
       const Compressor compress(is_in);
       hn::StoreU(compress(d, x), d, chunk.x + to);
       hn::StoreU(compress(d, y), d, chunk.y + to);
-      if constexpr (kWeighted) {
-        hn::StoreU(compress(d, hn::LoadU(d, weights_ + first)), d, chunk.weight + to);
+      if constexpr (kFactor != Factor::kNone) {
+        hn::StoreU(compress(d, hn::LoadU(d, factors_ + first)), d, chunk.factor + to);
       }
       to += static_cast<int>(hn::CountTrue(d_bits, is_in));
     }
@@ -92,25 +103,25 @@ class NeighbourDisc {
   }
 
  private:
-  const float *xs_, *ys_, *weights_;
-  Vector column_, centre_x_, centre_y_, reach_square_;
+  const float *xs_, *ys_, *factors_;
+  Vector column_, centre_x_, centre_y_, reach_square_, reach_, reach_per_size_;
 };
 
 // Appends distant dummies, which fill the last vector.
-template <bool kWeighted>
+template <Factor kFactor>
 HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
   for (int part = 0; part < kParts; ++part) {
     const int to = chunk.count + part * kLanes;
     hn::StoreU(hn::Set(d, NeighbourChunk::kFar), d, chunk.x + to);
     hn::StoreU(hn::Set(d, NeighbourChunk::kFar), d, chunk.y + to);
-    if constexpr (kWeighted) hn::StoreU(hn::Zero(d), d, chunk.weight + to);
+    if constexpr (kFactor != Factor::kNone) hn::StoreU(hn::Set(d, 1.0f), d, chunk.factor + to);
   }
 }
 
 // Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(), which
 // consumes it, or returns false to stop. Returns false if stopped.
-template <bool kWeighted, typename MakeRoom>
+template <Factor kFactor, typename MakeRoom>
 HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);
   int count = 0;
@@ -127,7 +138,7 @@ HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRo
           chunk.count = std::exchange(count, 0);
           if (!make_room()) return false;
         }
-        count = disc.Append<kWeighted>(origin_y, first, last, count, chunk);
+        count = disc.Append<kFactor>(origin_y, first, last, count, chunk);
         first += kPartialSums;
       } while (HWY_UNLIKELY(first < last));
     }
@@ -137,42 +148,41 @@ HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRo
 }
 
 // Calls visit(chunk) for the particles of `near`, one full chunk at a time.
-template <bool kWeighted, typename Visit>
+template <Factor kFactor, typename Visit>
 HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, Visit visit) {
   const auto empty = [&]() HWY_ATTR {
-    Close<kWeighted>(chunk);
+    Close<kFactor>(chunk);
     visit(std::as_const(chunk));
     return true;
   };
-  Collect<kWeighted>(near, chunk, empty);
+  Collect<kFactor>(near, chunk, empty);
   if (chunk.count > 0) empty();
 }
 
 // Collects the particles of `near` in one chunk. Returns false if they may not fit.
-template <bool kWeighted>
+template <Factor kFactor>
 HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
-  const bool fits = Collect<kWeighted>(near, chunk, [] { return false; });
-  if (fits) Close<kWeighted>(chunk);
+  const bool fits = Collect<kFactor>(near, chunk, [] { return false; });
+  if (fits) Close<kFactor>(chunk);
   return fits;
 }
 
 // Calls visit(query, chunk, is_all) for the particles of each query, one full chunk at a time.
 // `is_all`: the chunk has all particles of the query. The particles of all queries are copied
 // first, so that the sums of a query do not wait for memory.
-template <bool kWeighted, typename Query, typename Visit>
+template <Factor kFactor, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NeighbourChunk chunks[kQueriesAtOnce];
   bool fits[kQueriesAtOnce];
   for (std::size_t k = 0; k < queries.size(); ++k) {
-    fits[k] = Gather<kWeighted>(queries[k].near, chunks[k]);
+    fits[k] = Gather<kFactor>(queries[k].near, chunks[k]);
   }
   for (std::size_t k = 0; k < queries.size(); ++k) {
     if (HWY_LIKELY(fits[k])) {
       visit(k, chunks[k], true);
     } else {
-      ForEachChunk<kWeighted>(queries[k].near, chunks[k],
-                              [&](const NeighbourChunk& chunk)
-                                  HWY_ATTR { visit(k, chunk, false); });
+      ForEachChunk<kFactor>(queries[k].near, chunks[k],
+                            [&](const NeighbourChunk& chunk) HWY_ATTR { visit(k, chunk, false); });
     }
   }
 }

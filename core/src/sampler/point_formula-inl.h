@@ -26,7 +26,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, where the factor 6 / R^2 is
 // applied last. d = x_i - x; a and b are x or y. With uniform weights, the weighted sums follow
-// from the others.
+// from the others. With sizes q, d = (x_i - x) / q, and each dk / da has a factor 1 / q.
 enum Channel {
   kKernel,  // k
   kMomentX,
@@ -42,14 +42,23 @@ enum Channel {
   kSums
 };
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
-// (dk / da) d_b d_c, symmetric in a, b, c. Only points where the gap term determines F need them.
-enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kThirdSums };
+// k q and k / q.
+enum SizedChannel { kSize = kSums, kPerSize, kSizedSums };
+// (dk / da) d_b d_c, symmetric in a, b, c, and k d_a / q. Only points where the gap term determines
+// F need them.
+enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kPerSizeX, kPerSizeY, kThirdSums };
 
-template <bool kWeighted>
+// The number of channels for particles with a factor.
+template <Factor kFactor>
+constexpr int kChannelsOf = kFactor == Factor::kWeight ? int{kWeightedSums}
+                            : kFactor == Factor::kSize ? int{kSizedSums}
+                                                       : int{kSums};
+
+template <Factor kFactor>
 class PointFormula {
  public:
   // Indexed by channel and point.
-  using Totals = double[kWeighted ? int{kWeightedSums} : int{kSums}][PointSamples::kCapacity];
+  using Totals = double[kChannelsOf<kFactor>][PointSamples::kCapacity];
   // Points per vector.
   static constexpr std::size_t kLanes = hn::MaxLanes(hn::CappedTag<double, 8>());
 
@@ -82,26 +91,39 @@ class PointFormula {
     const double exx = gap > 0 ? (spread - yy) / gap : 0.5;
     const double exy = gap > 0 ? xy / gap : 0;
     const double eyy = 1 - exx;
-    // ds = e . dM e. M is a ratio of sums; d_a = x_i - x decreases as x increases.
+    // ds = e . dM e. M is a ratio of sums; d_a decreases by 1 / q as x increases by 1.
     const auto along = [&](double dxx, double dxy, double dyy, double kernel_slope) {
       return ((exx * dxx + 2 * exy * dxy + eyy * dyy) * share -
               spread * kernel_slope / sum(kKernel)) *
              scale_.gap_slope;
     };
-    const double moment_x = sum(kMomentX), moment_y = sum(kMomentY);
+    const double moment_x = kSized ? third[kPerSizeX] : sum(kMomentX);
+    const double moment_y = kSized ? third[kPerSizeY] : sum(kMomentY);
     const double xxy = slope * third[kXxy], xyy = slope * third[kXyy];
-    return {along(slope * third[kXxx] - 2 * moment_x, xxy - moment_y, xyy, slope * sum(kSlopeX)),
-            along(xxy, xyy - moment_x, slope * third[kYyy] - 2 * moment_y, slope * sum(kSlopeY))};
+    const Point gradient{
+        along(slope * third[kXxx] - 2 * moment_x, xxy - moment_y, xyy, slope * sum(kSlopeX)),
+        along(xxy, xyy - moment_x, slope * third[kYyy] - 2 * moment_y, slope * sum(kSlopeY))};
+    if constexpr (!kSized) return gradient;
+    const double size = sum(kSize) / sum(kKernel);
+    return {size * gradient.x, size * gradient.y};
   }
 
  private:
   using Doubles = hn::CappedTag<double, 8>;
   using Vector = hn::Vec<Doubles>;
+  static constexpr bool kSized = kFactor == Factor::kSize;
 
   static HWY_INLINE Vector Constant(double value) { return hn::Set(Doubles(), value); }
 
   static HWY_INLINE Vector Length(Vector x, Vector y) {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
+  }
+
+  // The local sizes at the points from `at` on, where a kernel reaches. `share`: 1 / sum k.
+  static HWY_INLINE Vector SizeAt([[maybe_unused]] const Totals& totals,
+                                  [[maybe_unused]] std::size_t at, [[maybe_unused]] Vector share) {
+    if constexpr (kSized) return hn::Mul(hn::Load(Doubles(), totals[kSize] + at), share);
+    return Constant(1);
   }
 
   // Sets the samples at the points from `at` on. Returns bit k if the gap term determines F at
@@ -130,6 +152,7 @@ class PointFormula {
     const Vector unit_x = hn::Div(mean_x, distance);
     const Vector unit_y = hn::Div(mean_y, distance);
     const auto slope_of_phi = [&](Vector jx, Vector jy, Vector unit) HWY_ATTR {
+      if constexpr (kSized) unit = hn::Mul(unit, hn::Mul(load(kPerSize), share));
       const Vector along = hn::Sub(hn::Add(hn::Mul(unit_x, jx), hn::Mul(unit_y, jy)), unit);
       return hn::IfThenElseZero(hn::Gt(distance, zero), along);
     };
@@ -147,7 +170,7 @@ class PointFormula {
 
     const Vector w = Constant(scale_.uniform_weight);
     const auto weighted = [&](int weighted_channel, int channel) HWY_ATTR {
-      return kWeighted ? load(weighted_channel) : hn::Mul(w, load(channel));
+      return kFactor == Factor::kWeight ? load(weighted_channel) : hn::Mul(w, load(channel));
     };
     const Vector density = weighted(kDensity, kKernel);
     const Vector guard_slope = Constant(scale_.guard_slope);
@@ -164,6 +187,12 @@ class PointFormula {
       return hn::IfThenElse(is_phi, phi_along, hn::Neg(hn::Mul(along, guard_slope)));
     };
 
+    const Vector size = SizeAt(totals, at, share);
+    // Lengths and their gradients of a place of size 1 become those of the local size.
+    const auto sized = [&](Vector length) HWY_ATTR {
+      if constexpr (kSized) return hn::Mul(length, size);
+      return length;
+    };
     const auto store = [&](Vector sample, PointSamples::PerPoint& to) HWY_ATTR {
       hn::StoreU(hn::IfThenElseZero(has_support, sample), d, to.data() + at);
     };
@@ -172,15 +201,16 @@ class PointFormula {
     };
     store(kernel, samples.kernel);
     store(density, samples.density);
-    store(mean_x, samples.mean_x);
-    store(mean_y, samples.mean_y);
-    store(phi_x, samples.phi_x);
-    store(phi_y, samples.phi_y);
+    store(sized(mean_x), samples.mean_x);
+    store(sized(mean_y), samples.mean_y);
+    store(sized(phi_x), samples.phi_x);
+    store(sized(phi_y), samples.phi_y);
     store(spread, samples.spread);
-    store(gradient(phi_x, kDensityX, kSlopeX), samples.gradient_x);
-    store(gradient(phi_y, kDensityY, kSlopeY), samples.gradient_y);
-    store_or(phi, scale_.kernel_radius - scale_.reference_radius, samples.phi);
-    store_or(value, VoidValue(scale_), samples.value);
+    store(sized(gradient(phi_x, kDensityX, kSlopeX)), samples.gradient_x);
+    store(sized(gradient(phi_y, kDensityY, kSlopeY)), samples.gradient_y);
+    store_or(size, 1, samples.size);
+    store_or(sized(phi), scale_.kernel_radius - scale_.reference_radius, samples.phi);
+    store_or(sized(value), VoidValue(scale_), samples.value);
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, is_gap, bits);
     return bits[0];

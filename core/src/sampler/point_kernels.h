@@ -28,13 +28,14 @@ struct PointSamples {
 
   PerPoint kernel;  ///< sum k
   PerPoint density, mean_x, mean_y, phi, phi_x, phi_y, spread, value, gradient_x, gradient_y;
+  PerPoint size;  ///< The local size, in spacings.
 };
 
 /// Samples the points of at most kQueriesAtOnce queries. Requires: all queries have weights, or no
-/// query has. Terms, and their sums over up to 128 particles, are floats with an error of a few
-/// 1e-7 of the sum of their magnitudes; all else is computed in doubles. The bits depend neither on
-/// the processor nor on the other queries. The particles of a query go to sixteen partial sums by
-/// their index, and these sums are added in one order (neighbour_sums-inl.h).
+/// query has; the same of sizes. Terms, and their sums over up to 128 particles, are floats with an
+/// error of a few 1e-7 of the sum of their magnitudes; all else is computed in doubles. The bits
+/// depend neither on the processor nor on the other queries. The particles of a query go to sixteen
+/// partial sums by their index, and these sums are added in one order (neighbour_sums-inl.h).
 void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries, PointSamples& samples);
 
 }  // namespace partiemc

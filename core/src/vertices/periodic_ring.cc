@@ -10,13 +10,16 @@ constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
 
-PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach) {
+PeriodicRingSize SizeForWindows(std::span<const Point> ring, std::span<const float> sizes,
+                                double reach) {
   const std::size_t count = ring.size();
   const auto length_after = [&](std::size_t k) {
+    const std::size_t next = k + 1 == count ? 0 : k + 1;
     const Point& from = ring[k];
-    const Point& to = ring[k + 1 == count ? 0 : k + 1];
-    return std::int64_t{LengthInUnits(UnitsBetween(RingUnits(from.x), RingUnits(to.x)),
-                                      UnitsBetween(RingUnits(from.y), RingUnits(to.y)))};
+    const Point& to = ring[next];
+    const std::int32_t length = LengthInUnits(UnitsBetween(RingUnits(from.x), RingUnits(to.x)),
+                                              UnitsBetween(RingUnits(from.y), RingUnits(to.y)));
+    return std::int64_t{sizes.empty() ? length : LengthInSizes(length, sizes[k], sizes[next])};
   };
   const auto limit =
       static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;

@@ -42,11 +42,19 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
 }
 
+/// A length between two vertices with these local sizes, divided by their mean size.
+/// Requires: sizes are at least 1/16.
+inline std::int32_t LengthInSizes(std::int32_t length, float from_size, float to_size) {
+  return static_cast<std::int32_t>(static_cast<float>(length) * (2 / (from_size + to_size)));
+}
+
 /// The size of a closed ring. Its margin is the largest number of vertices that a window of `reach`
 /// cells needs beyond either end. The lengths are computed by LengthInUnits, as in the windows:
-/// with exact lengths, the margin could be too short for nearly coincident vertices.
+/// with exact lengths, the margin could be too short for nearly coincident vertices. `sizes`: the
+/// local size of each vertex, by which lengths are divided; empty if all are 1.
 /// Cost: linear in the vertices.
-PeriodicRingSize SizeForWindows(std::span<const Point> ring, double reach);
+PeriodicRingSize SizeForWindows(std::span<const Point> ring, std::span<const float> sizes,
+                                double reach);
 
 /// One ring. Arrays are indexed by vertex, 0 <= k < count. They extend by `margin` elements beyond
 /// both ends, which repeat the ring, so that a window is a contiguous range.
@@ -73,11 +81,12 @@ struct PeriodicRing {
   std::ptrdiff_t count, margin;
   std::int32_t *x, *y;         ///< Position relative to the origin of the world, in units.
   std::int32_t* arc;           ///< Arc length up to the vertex, in units; continues in the margins.
+                               ///< With own sizes, lengths are divided by the local size.
   float *normal_x, *normal_y;  ///< Unit, outward.
   float *next_x, *next_y;      ///< Scratch: next normals; later next_x is the variance of supports.
-  float* weight;               ///< l: half the length of the two segments at the vertex, in cells.
-  float* base;                 ///< Shift of the vertex's plane along the normal, in cells.
-  float* shift;                ///< Scratch of the steps; has no margins.
+  float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells.
+  float* base;    ///< Shift of the vertex's plane along the normal, in cells.
+  float* shift;   ///< Scratch of the steps; has no margins.
 
   /// Copies the elements [begin, end) of an array to their repetitions in the margins. Calls with
   /// disjoint ranges may run in parallel.

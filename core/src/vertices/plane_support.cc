@@ -32,12 +32,14 @@ struct Shape {
         height(Constant(support.height)),
         inverse_square(Constant(1 / (support.radius * support.radius))),
         depth(Constant(support.depth)),
-        inverse_spacing(Constant(1 / support.spacing)) {}
+        inverse_spacing(Constant(1 / support.spacing)),
+        lift(Constant(support.lift)) {}
 
-  Vector radius_square, height, inverse_square, depth, inverse_spacing;
+  Vector radius_square, height, inverse_square, depth, inverse_spacing, lift;
 };
 
 // The sums of one plane over the particles of a chunk.
+template <bool kSized>
 HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
                                               const NeighbourChunk& chunk, const BentPlane& plane,
                                               const Shape& shape) {
@@ -46,10 +48,19 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
   const Vector y = Constant(plane.y - near.origin_y);
   const Vector normal_x = Constant(plane.normal_x);
   const Vector normal_y = Constant(plane.normal_y);
-  const Vector half_curvature = Constant(plane.curvature / 2);
+  const Vector half_curvature = Constant(plane.curvature * plane.size / 2);
+  const Vector per_size = Constant(1 / plane.size);
   return PartialSums<kSupportSums>(chunk, [&](int k, Vector(&channels)[kSupportSums]) HWY_ATTR {
-    const Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
-    const Vector dy = hn::Sub(hn::Load(d, chunk.y + k), y);
+    Vector dx = hn::Sub(hn::Load(d, chunk.x + k), x);
+    Vector dy = hn::Sub(hn::Load(d, chunk.y + k), y);
+    Vector own = hn::Set(d, 1.0f);  // The particle's size over the plane's.
+    if constexpr (kSized) {
+      own = hn::Mul(hn::LoadU(d, chunk.factor + k), per_size);
+      // The place at which a particle of the plane's size would have the same boundary.
+      const Vector lift = hn::Mul(hn::Sub(own, hn::Set(d, 1.0f)), shape.lift);
+      dx = hn::Add(hn::Mul(dx, per_size), hn::Mul(lift, normal_x));
+      dy = hn::Add(hn::Mul(dy, per_size), hn::Mul(lift, normal_y));
+    }
     const Vector along = hn::Sub(hn::Mul(normal_x, dy), hn::Mul(normal_y, dx));
     const Vector above = hn::Add(hn::Mul(dx, normal_x), hn::Mul(dy, normal_y));
     const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
@@ -58,6 +69,7 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
 
     Vector w = hn::Max(hn::Add(hn::Mul(distance, shape.inverse_spacing), shape.depth), hn::Zero(d));
     for (int squaring = 0; squaring < 3; ++squaring) w = hn::Mul(w, w);
+    if constexpr (kSized) w = hn::Mul(w, own);
     // Every term is masked, because weights and distances of far particles and of padding may be
     // NaN.
     const auto supports = hn::And(hn::Lt(square, shape.radius_square), hn::Lt(above, shape.height));
@@ -70,8 +82,9 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
   });
 }
 
-void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
-                 std::span<QuerySupports> sums) {
+template <Factor kFactor>
+void SumSupportsOf(std::span<const SupportQuery> queries, const SupportShape& support,
+                   std::span<QuerySupports> sums) {
   const Shape shape(support);
   for (std::size_t q = 0; q < queries.size(); ++q) {
     for (std::size_t k = 0; k < queries[q].planes.size(); ++k) sums[q][k] = {};
@@ -80,13 +93,19 @@ void SumSupports(std::span<const SupportQuery> queries, const SupportShape& supp
     const SupportQuery& query = queries[q];
     for (std::size_t k = 0; k < query.planes.size(); ++k) {
       double totals[kSupportSums] = {};
-      SumChunk(query.near, chunk, query.planes[k], shape).AddTo(totals);
+      SumChunk<kFactor == Factor::kSize>(query.near, chunk, query.planes[k], shape).AddTo(totals);
       sums[q][k].weight += totals[kWeight];
       sums[q][k].distance += totals[kDistance];
       sums[q][k].square += totals[kSquare];
     }
   };
-  ForEachQuery<false>(queries, visit);
+  ForEachQuery<kFactor>(queries, visit);
+}
+
+void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
+                 std::span<QuerySupports> sums) {
+  queries.front().near.size != nullptr ? SumSupportsOf<Factor::kSize>(queries, support, sums)
+                                       : SumSupportsOf<Factor::kNone>(queries, support, sums);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -237,8 +237,11 @@ HWY_EXPORT(MeanNormals);
 HWY_EXPORT(MeanCurvature);
 HWY_EXPORT(MeanShift);
 
-void MeasureArc(const PeriodicRing& ring) {
+void MeasureArc(const PeriodicRing& ring, std::span<const float> sizes) {
   HWY_DYNAMIC_DISPATCH(MeasureSteps)(ring);
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    ring.arc[k] = LengthInSizes(ring.arc[k], sizes[k], sizes[k + 1 == sizes.size() ? 0 : k + 1]);
+  }
   std::uint32_t length = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
     const auto step = static_cast<std::uint32_t>(ring.arc[k]);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "vertices/periodic_ring.h"
 
@@ -11,10 +12,11 @@ namespace partiemc {
 /// Largest number of vertices that vectors read beyond the end of a window.
 inline constexpr std::ptrdiff_t kWindowPadding = 17;
 
-/// Computes arc lengths and weights of a ring, including the margins.
+/// Computes arc lengths and weights of a ring, including the margins. `sizes`: the local size of
+/// each vertex, by which lengths are divided (LengthInSizes); empty if all are 1.
 /// Requires: coordinates are repeated in the margins; margins have at least kWindowPadding
 /// vertices.
-void MeasureArc(const PeriodicRing& ring);
+void MeasureArc(const PeriodicRing& ring, std::span<const float> sizes);
 
 /// The three functions below process the vertices [begin, end) of a ring. Each sums over the
 /// vertices j nearer than `reach` cells along the ring, with weights that contain l_j B(d, reach).

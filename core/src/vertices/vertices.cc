@@ -146,6 +146,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
+  scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
@@ -157,12 +158,13 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
       rings.normals[2 * point] = vertices.normal[i].x;
       rings.normals[2 * point + 1] = vertices.normal[i].y;
+      if (!vertices.size.empty()) scratch.sizes[point] = vertices.size[i];
       ++point;
     }
   });
   rings.outer_of = topology.outer_of;
   std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
-  CorrectVolume(input, scratch.offset_points, area_offset, rings);
+  CorrectVolume(input, scratch.sizes, scratch.offset_points, area_offset, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   return RepairRings(placed.roots, scratch.repair, rings);

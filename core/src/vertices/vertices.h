@@ -49,10 +49,15 @@ struct RingVertices {
   std::vector<Point> point;
   std::vector<Point> root;  ///< The anchor: with all vertices at their anchors, rings are simple.
   std::vector<VertexNormal> normal;
+  std::vector<float> size;            ///< The local size, in spacings; empty for equal sizes.
   std::vector<std::uint8_t> is_kept;  ///< 0 if thinning dropped the vertex.
   PeriodicRings periodic_rings;       ///< Scratch of the steps.
 
-  void Resize(std::size_t count) {
+  /// The local size at a vertex, in spacings.
+  double SizeOf(std::size_t vertex) const { return size.empty() ? 1.0 : double{size[vertex]}; }
+
+  void Resize(std::size_t count, bool has_sizes) {
+    size.resize(has_sizes ? count : 0);
     point.resize(count);
     root.resize(count);
     normal.resize(count);
@@ -64,6 +69,7 @@ struct RingVertices {
 struct VertexScratch {
   std::vector<double> points;         ///< One or two points for each segment, in world units.
   RingVertices vertices;              ///< `virtual-plane` only.
+  std::vector<float> sizes;           ///< By point: the local size; empty for equal sizes.
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
 };

@@ -86,6 +86,14 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   };
   set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
+  if (v.size.empty()) return;
+  v.size[edge] = plane.entry_size;
+  v.size[inner] = plane.size;
+}
+
+// The local sizes of the vertices of a ring; empty for equal sizes.
+std::span<const float> SizesOf(const RingVertices& v, std::size_t first, std::size_t count) {
+  return v.size.empty() ? std::span<const float>() : std::span(v.size).subspan(first, count);
 }
 
 // Size of a ring with its margin; 0 vertices if the ring is too short for steps 2 and 3.
@@ -93,17 +101,19 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
   const auto length_after = [&](std::size_t k) {
-    const Point& a = v.point[first + k];
-    const Point& b = v.point[first + (k + 1 == count ? 0 : k + 1)];
+    const std::size_t from = first + k;
+    const std::size_t to = first + (k + 1 == count ? 0 : k + 1);
+    const Point& a = v.point[from];
+    const Point& b = v.point[to];
     const Point chord{b.x - a.x, b.y - a.y};
-    return std::sqrt(Dot(chord, chord));
+    return std::sqrt(Dot(chord, chord)) * 2 / (v.SizeOf(from) + v.SizeOf(to));
   };
   const double min_length = input.variant.constants.ShortestRing() * input.scale.spacing;
   double length = 0;
   for (std::size_t k = 0; k < count && length < min_length; ++k) length += length_after(k);
   if (length < min_length) return {};
-  PeriodicRings::Size size =
-      SizeForWindows(std::span(v.point).subspan(first, count), min_length / 2);
+  PeriodicRings::Size size = SizeForWindows(std::span(v.point).subspan(first, count),
+                                            SizesOf(v, first, count), min_length / 2);
   size.margin += kWindowPadding;
   return size;
 }
@@ -118,7 +128,7 @@ void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring
   }
   for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
   for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
-  MeasureArc(ring);
+  MeasureArc(ring, SizesOf(v, first, static_cast<std::size_t>(ring.count)));
 }
 
 // Calls body(begin, end) for stretches of a ring, in parallel if the ring is long.
@@ -176,7 +186,10 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
   std::array<SupportQuery, kQueriesAtOnce> queries;
   for (std::size_t q = 0; q < groups.size(); ++q) {
     queries[q].planes = std::span(groups[q].points).first(groups[q].count);
-    field.FindNear(groups[q].tile, queries[q].planes, support.radius, queries[q].near);
+    double size = 0;
+    for (const BentPlane& plane : queries[q].planes) size = std::max(size, plane.size);
+    field.FindNear(groups[q].tile, queries[q].planes,
+                   {(support.radius + support.lift) * size, support.lift}, queries[q].near);
   }
   SumSupports(std::span(queries).first(groups.size()), support, sums);
 }
@@ -184,19 +197,24 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 // Step 3: computes the shift `base` of each vertex's plane along its normal. The mean of the
 // estimates along the ring is subtracted: it depends on the arrangement of the particles, not on
 // the shape. A larger variance of the supporting particles reduces the weight of the estimates.
+// Estimates and their mean are in units of the local size.
 void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.variant.steps;
   const VirtualPlaneConstants& c = input.variant.constants;
-  const SupportShape support{// The sampler finds particles within the kernel radius.
-                             .radius = std::min(c.support_radius * h, input.scale.kernel_radius),
-                             .height = c.support_height * h,
-                             .spacing = h,
-                             .depth = c.support_depth};
+  const double lift = input.scale.has_own_sizes ? h / 2 : 0;
+  const SupportShape support{
+      // The sampler finds particles within the kernel radius.
+      .radius = std::min(c.support_radius * h, input.scale.kernel_radius - lift),
+      .lift = lift,
+      .height = c.support_height * h,
+      .spacing = h,
+      .depth = c.support_depth};
   // The kernel moves a boundary of curvature kappa inward by R^2 kappa / 18.
   const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
+  const std::size_t first = 2 * first_segment;
   ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
     auto planes = CollectPoints<BentPlane>([&](std::span<const PointGroup<BentPlane>> groups) {
@@ -206,7 +224,8 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
         for (std::size_t of = 0; of < groups[q].count; ++of) {
           const std::size_t i = groups[q].vertices[of];
           const auto [offset, variance] = EstimateOf(sums[q][of], support);
-          ring.shift[i] = static_cast<float>(offset) - ring.base[i];
+          ring.shift[i] =
+              static_cast<float>(offset) - static_cast<float>(ring.base[i] / v.SizeOf(first + i));
           scatter[i] = static_cast<float>(variance);
         }
       }
@@ -217,19 +236,23 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
       const ActiveCell& cell = input.planes[first_segment + k / 2].cell;
       for (std::ptrdiff_t i = k; i < k + 2; ++i) {
         // A radius of curvature below one spacing is noise.
-        const double curvature = std::clamp<double>(ring.shift[i], -1 / h, 1 / h);
-        ring.base[i] = steps.curvature ? static_cast<float>(rounding * curvature) : 0;
-        ring.shift[i] = -ring.base[i];  // Stays so if no particle supports the plane.
+        const double size = v.SizeOf(first + i);
+        const double sharpest = 1 / (h * size);
+        const double curvature = std::clamp<double>(ring.shift[i], -sharpest, sharpest);
+        ring.base[i] = steps.curvature ? static_cast<float>(rounding * size * size * curvature) : 0;
+        // Stays so if no particle supports the plane.
+        ring.shift[i] = static_cast<float>(-ring.base[i] / size);
         scatter[i] = 0;
         if (!steps.support) continue;
-        const FieldPoint at = Locate(input, cell, v.point[2 * first_segment + i]);
+        const FieldPoint at = Locate(input, cell, v.point[first + i]);
         if (at.tile == kNoTile) continue;
         planes.Add(i, at.tile,
                    {.x = at.x,
                     .y = at.y,
                     .normal_x = ring.normal_x[i],
                     .normal_y = ring.normal_y[i],
-                    .curvature = curvature});
+                    .curvature = curvature,
+                    .size = size});
       }
     }
     planes.Finish();
@@ -238,7 +261,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
     const double mean = MeanOf(ring, ring.shift);
     const double trust = c.support_scatter / (c.support_scatter + MeanOf(ring, scatter));
     for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean));
+      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean) * v.SizeOf(first + k));
     }
   }
   ring.Repeat(ring.base, 0, ring.count);
@@ -286,7 +309,7 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
     const Point chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
     v.is_kept[k] = input.variant.steps.edge_vertices &&
-                   std::abs(cross) >= min_distance * std::sqrt(Dot(chord, chord));
+                   std::abs(cross) >= min_distance * v.SizeOf(k) * std::sqrt(Dot(chord, chord));
     v.is_kept[k + 1] = 1;
   }
 }
@@ -314,7 +337,7 @@ Point VirtualPlaneVertex(const CellPlane& plane, double max_step) {
 
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
-  vertices.Resize(2 * topology.segments.size());
+  vertices.Resize(2 * topology.segments.size(), input.scale.has_own_sizes);
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
   // A task computes all steps of a short ring, so that its data stay in the cache.

@@ -42,8 +42,27 @@ RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) 
   return {true, part.area, part.perimeter};
 }
 
+// The length of a ring, each segment times the local size.
+double SizedLength(std::span<const double> points, std::span<const float> sizes) {
+  double sum = 0;
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    const std::size_t next = k + 1 < sizes.size() ? k + 1 : 0;
+    const Point from = PointAt(points, k), to = PointAt(points, next);
+    const double x = to.x - from.x, y = to.y - from.y;
+    sum += std::sqrt(x * x + y * y) * (double{sizes[k]} + sizes[next]) / 2;
+  }
+  return sum;
+}
+
+// The local sizes at the points of a ring.
+std::span<const float> SizesOf(const Rings& rings, std::size_t ring, std::span<const float> sizes) {
+  if (sizes.empty()) return {};
+  return sizes.subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
+}
+
 // The target of the offset for this frame, in spacings; empty if no component is long enough.
-std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& rings) {
+std::optional<double> TargetOf(const VertexInput& input, std::span<const float> sizes,
+                               double spacing, Rings& rings) {
   const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
   double volume = 0, area = 0, perimeter = 0;
@@ -56,7 +75,8 @@ std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& 
     if (!counts) continue;
     if (is_outer) volume += VolumeOf(input, ring);
     area += ring_area;
-    perimeter += ring_perimeter;
+    perimeter += sizes.empty() ? ring_perimeter
+                               : SizedLength(rings.RingPoints(ring), SizesOf(rings, ring, sizes));
   }
   if (perimeter <= 0) return std::nullopt;
   volume *= input.scale.cell_size * input.scale.cell_size;
@@ -66,7 +86,8 @@ std::optional<double> TargetOf(const VertexInput& input, double spacing, Rings& 
 
 }  // namespace
 
-void OffsetRing(std::span<const double> points, double offset, double* target) {
+void OffsetRing(std::span<const double> points, std::span<const float> sizes, double offset,
+                double* target) {
   // Unit normal to the right of the segment between two points; 0 if they are equal.
   const auto normal_of = [](const Point& from, const Point& to) {
     const Point normal{to.y - from.y, from.x - to.x};
@@ -83,26 +104,27 @@ void OffsetRing(std::span<const double> points, double offset, double* target) {
     // turn).
     const double divisor =
         std::max(1 + before.x * after.x + before.y * after.y, 2 / (kMaxMitre * kMaxMitre));
-    target[2 * k] = point.x + offset * (before.x + after.x) / divisor;
-    target[2 * k + 1] = point.y + offset * (before.y + after.y) / divisor;
+    const double own = sizes.empty() ? offset : offset * sizes[k];
+    target[2 * k] = point.x + own * (before.x + after.x) / divisor;
+    target[2 * k + 1] = point.y + own * (before.y + after.y) / divisor;
     point = next;
     before = after;
   }
 }
 
-void CorrectVolume(const VertexInput& input, std::vector<double>& scratch,
-                   std::optional<double>& offset, Rings& rings) {
+void CorrectVolume(const VertexInput& input, std::span<const float> sizes,
+                   std::vector<double>& scratch, std::optional<double>& offset, Rings& rings) {
   const bool is_known = input.parameters.spacing.has_value() || !input.frame.volumes.empty();
   if (!is_known || !input.variant.steps.area) return;
   const double spacing = input.scale.spacing * input.scale.cell_size;
-  if (const std::optional<double> target = TargetOf(input, spacing, rings)) {
+  if (const std::optional<double> target = TargetOf(input, sizes, spacing, rings)) {
     const double change = input.variant.constants.area_change;
     offset = offset ? std::clamp(*target, *offset - change, *offset + change) : *target;
   }
   if (!offset) return;
   scratch.resize(rings.points.size());
   ParallelFor(rings.RingCount(), [&](std::size_t ring) {
-    OffsetRing(rings.RingPoints(ring), *offset * spacing,
+    OffsetRing(rings.RingPoints(ring), SizesOf(rings, ring, sizes), *offset * spacing,
                scratch.data() + 2 * std::size_t{rings.offsets[ring]});
   });
   std::swap(rings.points, scratch);
