@@ -113,6 +113,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
     named.Update(SetByName(options.placement, parameters.placement));
   if (options.fill != nullptr) named.Update(SetByName(options.fill, parameters.fill));
   if (options.plane != nullptr) named.Update(SetByName(options.plane, parameters.plane));
+  if (options.sizes != nullptr) named.Update(SetByName(options.sizes, parameters.sizes));
   if (!named.ok()) return named;
   return parameters;
 }

@@ -32,6 +32,10 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->noise_filter != requested.noise_filter) {
     return absl::UnimplementedError("the server does not support noise filters: use a newer one");
   }
+  // Servers of before there were own sizes ignore them.
+  if (parameters->sizes != requested.sizes) {
+    return absl::UnimplementedError("the server does not support own sizes: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

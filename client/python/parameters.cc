@@ -175,6 +175,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeNamed(arguments, "fill", parameters.fill);
   TakeNamed(arguments, "plane", parameters.plane);
   TakeNamed(arguments, "spacing_rule", parameters.spacing_rule);
+  TakeNamed(arguments, "sizes", parameters.sizes);
   TakeInto(arguments, "spacing", parameters.spacing);
   TakeInto(arguments, "kernel_radius", parameters.kernel_radius);
   TakeInto(arguments, "cell_size", parameters.cell_size);
@@ -299,7 +300,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
                 "wrap"_a = parameters.box && parameters.box->wraps,
-                "noise_filter"_a = parameters.noise_filter);
+                "noise_filter"_a = parameters.noise_filter, "sizes"_a = named(parameters.sizes));
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

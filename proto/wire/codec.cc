@@ -99,6 +99,19 @@ std::optional<SpacingRule> FromWire(v1::SpacingRule rule) {
   }
 }
 
+std::optional<Sizes> FromWire(v1::Sizes sizes) {
+  switch (sizes) {
+    case v1::SIZES_UNSPECIFIED:
+      return ReconstructionParameters{}.sizes;
+    case v1::SIZES_EQUAL:
+      return Sizes::kEqual;
+    case v1::SIZES_OWN:
+      return Sizes::kOwn;
+    default:
+      return std::nullopt;
+  }
+}
+
 std::optional<Plane> FromWire(v1::Plane plane) {
   switch (plane) {
     case v1::PLANE_UNSPECIFIED:
@@ -362,6 +375,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (!fill) return UnknownEnum("parameters.fill", message.fill());
   const auto spacing_rule = FromWire(message.spacing_rule());
   if (!spacing_rule) return UnknownEnum("parameters.spacing_rule", message.spacing_rule());
+  const auto sizes = FromWire(message.sizes());
+  if (!sizes) return UnknownEnum("parameters.sizes", message.sizes());
   const auto plane = FromWire(message.plane());
   if (!plane) return UnknownEnum("parameters.plane", message.plane());
 
@@ -370,6 +385,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   parameters.placement = *placement;
   parameters.fill = *fill;
   parameters.spacing_rule = *spacing_rule;
+  parameters.sizes = *sizes;
   parameters.plane = *plane;
   if (message.has_spacing()) parameters.spacing = message.spacing();
   if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
@@ -430,6 +446,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   }
   if (parameters.box) *message.mutable_box() = ToWire(*parameters.box);
   if (parameters.noise_filter) message.set_noise_filter(*parameters.noise_filter);
+  if (parameters.sizes == Sizes::kOwn) message.set_sizes(v1::SIZES_OWN);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

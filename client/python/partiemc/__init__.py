@@ -76,6 +76,7 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
         weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.
+    sizes: "equal" (the default), or "own": each particle has the size sqrt(volume).
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

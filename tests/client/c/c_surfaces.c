@@ -201,6 +201,12 @@ static void try_wrong_surfaces(const char* address) {
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
   EXPECT(strcmp(partiemc_last_error()->field, "outputs.coordinates") == 0);
   options.coordinates = NULL;
+  for (int k = 0; k < 2; ++k) {
+    options.sizes = k == 0 ? "large" : "own"; /* Surfaces have no own sizes. */
+    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
+    EXPECT(strcmp(partiemc_last_error()->field, "parameters.sizes") == 0);
+  }
+  options.sizes = NULL;
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
   partiemc_event event;
   partiemc_event_init(&event, sizeof event);

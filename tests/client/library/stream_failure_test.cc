@@ -253,40 +253,38 @@ TEST(StreamFailure, ServerWithoutSurfacesIsRefused) {
   ExpectOneLine(stream.status());
 }
 
-TEST(StreamFailure, ServerWithoutPeriodicBoxesIsRefused) {
-  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+// Opens a stream to a server that ignores a parameter.
+void ExpectRefused(const ReconstructionParameters& parameters,
+                   void (*ignore)(v1::ReconstructionParameters&), const std::string& named) {
+  FakeServer server([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     v1::ReconstructRequest request;
     rpc.Read(&request);
     v1::ReconstructResponse response;
-    *response.mutable_opened()->mutable_parameters() = request.open().parameters();
-    response.mutable_opened()->mutable_parameters()->clear_box();
+    auto& opened = *response.mutable_opened()->mutable_parameters();
+    opened = request.open().parameters();
+    ignore(opened);
     rpc.Write(response);
     return WaitForCancel(context);
   });
-  ReconstructionParameters parameters{.spacing = 1};
-  parameters.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
   const auto stream = Stream::Open(server.address(), {.parameters = parameters});
   EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnimplemented);
-  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("periodic boxes"));
+  EXPECT_THAT(std::string(stream.status().message()), HasSubstr(named));
   ExpectOneLine(stream.status());
 }
 
-TEST(StreamFailure, ServerWithoutNoiseFiltersIsRefused) {
-  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
-    v1::ReconstructRequest request;
-    rpc.Read(&request);
-    v1::ReconstructResponse response;
-    *response.mutable_opened()->mutable_parameters() = request.open().parameters();
-    response.mutable_opened()->mutable_parameters()->clear_noise_filter();
-    rpc.Write(response);
-    return WaitForCancel(context);
-  });
-  ReconstructionParameters parameters{.spacing = 1};
-  parameters.noise_filter = .5;
-  const auto stream = Stream::Open(server.address(), {.parameters = parameters});
-  EXPECT_EQ(stream.status().code(), absl::StatusCode::kUnimplemented);
-  EXPECT_THAT(std::string(stream.status().message()), HasSubstr("noise filters"));
-  ExpectOneLine(stream.status());
+TEST(StreamFailure, ServersThatIgnoreAParameterAreRefused) {
+  using Message = v1::ReconstructionParameters;
+  const PeriodicBox box{.axes = {PeriodicAxis{0, 100}}, .wraps = true};
+  ExpectRefused(
+      {.spacing = 1, .box = box}, [](Message& m) { m.clear_box(); }, "periodic boxes");
+  ExpectRefused(
+      {.spacing = 1, .box = box}, [](Message& m) { m.mutable_box()->clear_wraps(); },
+      "periodic boxes");
+  ExpectRefused(
+      {.spacing = 1, .noise_filter = .5}, [](Message& m) { m.clear_noise_filter(); },
+      "noise filters");
+  ExpectRefused(
+      {.sizes = Sizes::kOwn}, [](Message& m) { m.clear_sizes(); }, "own sizes");
 }
 
 }  // namespace

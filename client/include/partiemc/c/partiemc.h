@@ -139,6 +139,7 @@ typedef struct partiemc_options {
                         0: the axis is not periodic. A body that crosses a face is one body; an
                         outline that reaches its own image is cut at the faces. NULL: no box. */
   int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
+  const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume). NULL: equal. */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);

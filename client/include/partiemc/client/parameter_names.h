@@ -63,6 +63,10 @@ inline absl::Status SetByName(std::string_view name, SpacingRule& rule) {
   constexpr std::array kAll = {SpacingRule::kFirstFrame, SpacingRule::kEveryFrame};
   return SetByName("parameters.spacing_rule", name, std::span<const SpacingRule>(kAll), rule);
 }
+inline absl::Status SetByName(std::string_view name, Sizes& sizes) {
+  static constexpr std::array kAll = {Sizes::kEqual, Sizes::kOwn};
+  return SetByName("parameters.sizes", name, std::span<const Sizes>(kAll), sizes);
+}
 inline absl::Status SetByName(std::string_view name, Coordinates& coordinates) {
   static constexpr std::array kAll = {Coordinates::kFloat64, Coordinates::kRelativeFloat32,
                                       Coordinates::kCompact};

@@ -140,6 +140,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     fill: settings.fill || (base?.fill ?? Fill.UNSPECIFIED),
     spacing: base?.spacing ?? (spacing || undefined),
     spacingRule: base?.spacingRule,
+    sizes: base?.sizes,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
     // A reference radius is calibrated for one placement and one kernel. With another placement or
