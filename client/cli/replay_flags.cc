@@ -188,6 +188,13 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
          "surfaces: first-frame). Default: the spacing of the recording, else first-frame")
       ->type_name("S|RULE")
       ->group(kGroup);
+  app.add_option(
+         "--sizes", flags.sizes,
+         "Sizes of the particles: equal, or own, from the column volume, diameter or radius")
+      ->type_name("WHICH")
+      ->each([&flags](const std::string& sizes) { flags.sequence.needs_sizes = sizes == "own"; })
+      ->capture_default_str()
+      ->group(kGroup);
   AddSurfaceFlags(app, flags, kGroup);
   CLI::Option* const periodic =
       app.add_option(

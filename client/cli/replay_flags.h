@@ -43,6 +43,7 @@ struct ReplayFlags {
   bool wrap = false;             ///< Results are wrapped into the periodic box.
   std::optional<double> noise_filter;
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
+  std::string sizes = "equal";
   double kernel_radius = 3;
   double cell_size = 1;
   std::optional<double> reference_radius;

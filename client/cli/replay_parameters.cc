@@ -160,6 +160,11 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   const auto fill = FindFill(flags.fill);
   if (!fill) return WrongFlag("--fill", flags.fill, Names(AllFills()));
   parameters.fill = *fill;
+  if (flags.sizes == Name(Sizes::kOwn)) {
+    parameters.sizes = Sizes::kOwn;
+  } else if (flags.sizes != Name(Sizes::kEqual)) {
+    return WrongFlag("--sizes", flags.sizes, "equal or own");
+  }
 
   if (flags.spacing == "first-frame" || flags.spacing == "every-frame") {
     // In space, the spacing of the first frame is given.

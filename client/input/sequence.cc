@@ -311,6 +311,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   recording.request = *std::move(request);
   recording.request.attributes = options.attributes;
   recording.request.max_expansion = options.max_expansion;
+  recording.request.needs_sizes = options.needs_sizes;
   const auto range = ParseFrameRange(options.frames);
   if (!range.ok()) return range.status();
   recording.range = *range;

@@ -66,6 +66,10 @@ struct SequenceOptions {
   /// selects `velocities`. A file without one of the attributes is refused.
   std::vector<std::string> attributes = {};
 
+  /// Read volumes from a column of diameters d or radii r if there is none of volumes: d^2, (2
+  /// r)^2.
+  bool needs_sizes = false;
+
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
   bool in_space = false;
 

@@ -235,6 +235,15 @@ bool AllNumbers(const Names& columns) {
                      [](const std::string& column) { return ParseCount(column).has_value(); });
 }
 
+// Uses a column of diameters or radii for volumes.
+void PlanSizes(const Names& canonical, ColumnPlan& plan) {
+  plan.volume = FindFirst(canonical, {"diameter", "diameters", "particlediameter"});
+  plan.size_of_length = 1;
+  if (plan.volume) return;
+  plan.volume = FindFirst(canonical, {"radius", "radii", "particleradius"});
+  plan.size_of_length = 2;
+}
+
 }  // namespace
 
 bool Condition::Holds(std::string_view cell) const {
@@ -281,6 +290,7 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
   if (!plan.id && request.tag_is_id) plan.id = FindFirst(canonical, {"tag"});
   plan.volume = FindFirst(canonical, {"volume", "volumes", "vol", "area", "areas", "particlevolume",
                                       "particlearea", "volumetricmeasure"});
+  if (request.needs_sizes && !plan.volume) PlanSizes(canonical, plan);
   const absl::Status positions = request.columns.empty()
                                      ? PlanRecognisedPositions(names, canonical, plan)
                                      : PlanAskedPositions(names, canonical, request, plan);

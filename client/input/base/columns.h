@@ -34,6 +34,7 @@ struct ColumnRequest {
   std::vector<std::string> columns;      ///< SequenceOptions::columns, split; empty: by names.
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
   bool tag_is_id = true;                 ///< Whether a column "tag" can hold the ids.
+  bool needs_sizes = false;              ///< SequenceOptions::needs_sizes.
 };
 
 /// Parses the options --select and --columns. kInvalidArgument if an expression is not
@@ -53,6 +54,9 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> velocities;
   std::optional<std::size_t> id;
   std::optional<std::size_t> volume;
+  /// If not 0, the column of volumes holds lengths: a volume is the square of the length times
+  /// this.
+  double size_of_length = 0;
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
   /// Columns ix iy iz of LAMMPS (image flags): how often the particle has crossed the periodic box
@@ -61,6 +65,13 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> images;
   std::size_t column_count = 0;
   bool scaled = false;  ///< Positions are LAMMPS's xs ys zs: fractions of the box.
+
+  /// The volume that a value of the column of volumes stands for.
+  double VolumeOf(double value) const {
+    if (size_of_length == 0) return value;
+    // A negative length is no size.
+    return value > 0 ? size_of_length * value * (size_of_length * value) : value;
+  }
 };
 
 /// Makes a plan for a table with column names. Recognises x, Pos.x, Points:0, Position_X, xu, xs,

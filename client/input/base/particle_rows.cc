@@ -135,7 +135,7 @@ absl::Status AppendTextRow(std::span<const std::string_view> cells, const Column
   if (plan.volume) {
     const auto number = NumberOf(cells[*plan.volume]);
     if (!number.ok()) return number.status();
-    rows.volumes.push_back(*number);
+    rows.volumes.push_back(plan.VolumeOf(*number));
   }
   for (std::size_t k = 0; k < plan.attributes.size(); ++k) {
     for (const std::size_t column : plan.attributes[k].columns) {
@@ -213,7 +213,7 @@ absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t r
   }
   if (plan.volume) {
     for (const std::size_t row : *selected) {
-      rows.volumes.push_back(columns[*plan.volume].Number(row));
+      rows.volumes.push_back(plan.VolumeOf(columns[*plan.volume].Number(row)));
     }
   }
   for (std::size_t k = 0; k < plan.attributes.size(); ++k) {

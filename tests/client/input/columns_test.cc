@@ -65,6 +65,21 @@ TEST(Columns, NumberDensitiesAreNoVolumes) {
   EXPECT_EQ(Plan({"x", "y", "area [m2]"}).volume, 2u);
 }
 
+TEST(Columns, SizesComeFromVolumesElseDiametersElseRadii) {
+  const auto plan = [](const std::vector<std::string>& names, bool needs_sizes = true) {
+    ColumnRequest request;
+    request.needs_sizes = needs_sizes;
+    return *PlanNamedColumns(names, request);
+  };
+  EXPECT_FALSE(plan({"x", "y", "radius"}, false).volume.has_value());
+  EXPECT_EQ(plan({"x", "y", "radius"}).VolumeOf(3), 36);
+  EXPECT_EQ(plan({"x", "y", "radius", "Diameter"}).volume, 3u);
+  EXPECT_EQ(plan({"x", "y", "radius", "diameter"}).VolumeOf(3), 9);
+  EXPECT_EQ(plan({"x", "y", "radius", "volume"}).volume, 3u);
+  EXPECT_EQ(plan({"x", "y", "radius", "volume"}).VolumeOf(3), 3);
+  EXPECT_LT(plan({"x", "y", "radius"}).VolumeOf(-3), 0);
+}
+
 TEST(Columns, WhatIsMissingIsNamedWithWhatIsThere) {
   ExpectRefused(PlanNamedColumns({"rho", "p"}, {}).status(), absl::StatusCode::kFailedPrecondition,
                 {"rho,p", "--columns"});

@@ -1,0 +1,75 @@
+// `partiemc replay --sizes own` as a program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A square of 20 x 20: on the left particles 2 apart, on the right 1 apart. `column` has their
+// diameters times `factor`, to the power of `power`.
+void WriteZones(const std::string& path, const std::string& column, double factor, int power) {
+  std::ofstream file(path);
+  file << "x,y," << column << "\n";
+  const auto add = [&](double x, double y, double size) {
+    const double length = factor * size;
+    file << x << "," << y << "," << (power == 2 ? length * length : length) << "\n";
+  };
+  for (int j = 0; j < 10; ++j) {
+    for (int i = 0; i < 5; ++i) add(2 * i + 1, 2 * j + 1, 2);
+  }
+  for (int j = 0; j < 20; ++j) {
+    for (int i = 0; i < 10; ++i) add(10.5 + i, j + .5, 1);
+  }
+}
+
+std::string DigestOf(const std::string& input, std::vector<std::string> more) {
+  const support::TemporaryFolder output;
+  more.insert(more.begin(), {"replay", input, "--stats", output.Path("s.csv")});
+  const Ran ran = RunPartiemc(more);
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  const auto digests = Column(Content(output.Path("s.csv")), "rings_digest");
+  return digests.empty() ? "" : digests[0];
+}
+
+TEST(SizedReplay, VolumesDiametersAndRadiiGiveTheSame) {
+  const support::TemporaryFolder input;
+  const std::vector<std::string> flags = {"--local", "--sizes", "own", "--check"};
+  WriteZones(input.Path("volumes.csv"), "volume", 1, 2);
+  const std::string digest = DigestOf(input.Path("volumes.csv"), flags);
+  WriteZones(input.Path("diameters.csv"), "diameter", 1, 1);
+  EXPECT_EQ(DigestOf(input.Path("diameters.csv"), flags), digest);
+  WriteZones(input.Path("radii.csv"), "radius", .5, 1);
+  EXPECT_EQ(DigestOf(input.Path("radii.csv"), flags), digest);
+  EXPECT_NE(DigestOf(input.Path("volumes.csv"), {"--local"}), digest);
+  // A server gives the same bits.
+  ServerProgram server;
+  EXPECT_EQ(DigestOf(input.Path("volumes.csv"), {"--server", server.address(), "--sizes", "own"}),
+            digest);
+}
+
+TEST(SizedReplay, WrongSizesAreRefused) {
+  const support::TemporaryFolder input;
+  WriteZones(input.Path("zones.csv"), "pressure", 1, 1);
+  const auto refusal = [&](const std::vector<std::string>& flags, int exit_code) {
+    std::vector<std::string> all = {"replay", input.Path("zones.csv"), "--local"};
+    all.insert(all.end(), flags.begin(), flags.end());
+    const Ran ran = RunPartiemc(all);
+    EXPECT_EQ(ran.exit_code, exit_code) << ran.error;
+    return ran.error;
+  };
+  EXPECT_THAT(refusal({"--sizes", "own"}, 3), HasSubstr("volumes"));
+  EXPECT_THAT(refusal({"--sizes", "large"}, 2), HasSubstr("equal or own"));
+  EXPECT_THAT(refusal({"--sizes", "own", "--placement", "farthest-particle"}, 2),
+              HasSubstr("--sizes"));
+}
+
+}  // namespace
+}  // namespace partiemc::client
