@@ -171,6 +171,14 @@ class Layouts(unittest.TestCase):
         heavy = partiemc.reconstruct(block(), spacing=1, volumes=numpy.full(len(block()), 1.2))
         self.assertGreater(heavy.area, partiemc.reconstruct(block(), spacing=1).area)
 
+    def test_own_sizes_set_the_spacing(self):
+        sequence = partiemc.Reconstructor(sizes="own")
+        result = sequence.reconstruct(3 * block(), volumes=numpy.full(len(block()), 9))
+        self.assertEqual(sequence.parameters["sizes"], "own")
+        self.assertEqual(result.spacing, 3)
+        equal = partiemc.reconstruct(3 * block(), spacing=3)
+        self.assertAlmostEqual(result.area / equal.area, 1, places=3)
+
 
 class Results(unittest.TestCase):
     def setUp(self):
@@ -499,6 +507,8 @@ class Errors(unittest.TestCase):
         self.assert_refused("COUNT", "positions", positions=object())
         self.assert_refused("COUNT", "volumes", volumes=numpy.ones(count - 1))
         self.assert_refused("COUNT", "volumes", volumes=numpy.ones((count, 1)))
+        self.assert_refused("COUNT", "volumes", sizes="own")
+        self.assert_refused("UNSUPPORTED", "parameters.sizes", sizes="large")
         self.assert_refused("COUNT", "ids", ids=numpy.arange(count + 1))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count, numpy.int16))
