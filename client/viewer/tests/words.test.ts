@@ -66,6 +66,16 @@ test('another placement gets its own reference radius', () => {
   assert.equal(parametersOf({ ...AS_STREAMED, surfaceOffset: 0.5 }, base, null).surfaceOffset, undefined);
 });
 
+test('another placement has the same periodic box', () => {
+  const base = create(ReconstructionParametersSchema, {
+    placement: Placement.VIRTUAL_PLANE, box: { x: { origin: 1, length: 40 }, wraps: true },
+  });
+  const boxOf = (placement: Placement) => parametersOf({ ...AS_STREAMED, placement }, base, 1).box;
+  assert.deepEqual([boxOf(Placement.QEF)?.x?.length, boxOf(Placement.QEF)?.wraps], [40, true]);
+  assert.equal(boxOf(Placement.FARTHEST_PARTICLE)?.wraps, false);
+  assert.equal(parametersOf(AS_STREAMED, null, 1).box, undefined);
+});
+
 test('a status becomes a sentence with a remedy', () => {
   const status = parseStatus('{"code": 5, "reason": "NO_SUCH_STREAM", "message": "stream_name: dam; no open stream has it"}');
   assert.ok(status);

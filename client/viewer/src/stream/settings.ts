@@ -158,6 +158,8 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     minComponentParticles: base?.minComponentParticles,
     output: base?.output,
     surface: base?.surface,
+    // Farthest-particle cannot be wrapped.
+    box: base?.box && { ...base.box, wraps: base.box.wraps && !farthest },
   });
 }
 
