@@ -15,8 +15,8 @@ namespace partiemc {
 namespace {
 
 // Copies of percolating bodies reach this many kernel radii beyond the box, at most one length. Two
-// radii inside this margin, an outline does not depend on where the copies end: smoothing uses the
-// outline less than a radius away.
+// radii inside this margin, the field and the windows of an outline do not depend on where the
+// copies end. Means along a whole ring do (vertices/virtual_plane.cc), but little.
 constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
 // Checks a frame as the output of the stream requires.
@@ -85,10 +85,7 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
   const ReconstructionParameters& parameters = input.parameters;
   const double radius = parameters.kernel_radius * spacing;
   // Rings that may cross themselves cannot be cut.
-  double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
-  for (const auto& axis : parameters.box->axes) {
-    if (axis) margin = std::min(margin, axis->length);
-  }
+  const double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
   absl::Status status =
       Lift({.frame = frame,
             .box = *parameters.box,
@@ -102,10 +99,11 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
                 }},
            scratch, prepared.lifted);
   memory.Done();
-  prepared.reach = margin - kCopyEnd * radius;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const auto axis = static_cast<std::size_t>(axes[k]);
-    if (prepared.lifted.percolates[axis]) prepared.window.axes[k] = parameters.box->axes[axis];
+    if (!prepared.lifted.percolates[axis]) continue;
+    prepared.window.axes[k] = parameters.box->axes[axis];
+    prepared.reach[k] = std::min(margin, parameters.box->axes[axis]->length) - kCopyEnd * radius;
   }
   frame = prepared.lifted.frame;
   return status;

@@ -2,6 +2,7 @@
 // periodic box.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "absl/status/status.h"
@@ -27,7 +28,9 @@ struct Prepared {
   bool is_filtered = false, is_lifted = false;
   LiftedFrame lifted;  ///< As given, if no particle was lifted.
   Window window;       ///< The box along the axes along which bodies percolate.
-  double reach = 0;    ///< Bodies are complete up to this far beyond the window. World units.
+  /// Bodies are complete up to this far beyond the sides of the window, along each of its axes.
+  /// World units.
+  std::array<double, 2> reach{};
 
   bool HasCopies() const { return !lifted.originals.empty(); }
 };

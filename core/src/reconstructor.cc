@@ -18,6 +18,7 @@
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
 #include "frame_memory.h"
+#include "mesh/touched_cells.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "prepared_frame.h"
@@ -118,6 +119,8 @@ struct OutlineTask {
   StageObserver* observer;
   bool is_first;             // The first outline checks the frame.
   const Prepared* prepared;  // Null for a frame as given.
+
+  bool HasCopies() const { return prepared != nullptr && prepared->HasCopies(); }
 };
 
 // Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
@@ -168,8 +171,8 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
 }
 
 // Runs the stages field, crossings and rings.
-void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
-               StageObserver* observer, Workspace::Buffers& b) {
+void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& b) {
+  StageObserver* const observer = task.observer;
   InStage(observer, Stage::kField, [&] {
     scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
                    : SampleField(b.bins, scale, b.level_set);
@@ -177,7 +180,8 @@ void FindRings(const ReconstructionParameters& parameters, const Scale& scale,
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
   InStage(observer, Stage::kRings, [&] {
-    TraceRings(b.bins, b.level_set, scale, parameters, b.crossings, b.ring_scratch, b.topology);
+    TraceRings(b.bins, b.level_set, scale, task.parameters, b.crossings, b.ring_scratch, b.topology,
+               task.HasCopies());
   });
 }
 
@@ -199,14 +203,15 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
                     b.normal_scratch, b.planes, b.next_normals);
   });
-  const bool percolates = task.prepared != nullptr && task.prepared->HasCopies();
+  const bool percolates = task.HasCopies();
   Percolation percolation;
   if (percolates) {
     const Prepared& prepared = *task.prepared;
     ChooseBodies({.lifted = prepared.lifted,
                   .window = prepared.window,
                   .reach = prepared.reach,
-                  .wraps = parameters.box->wraps,
+                  .parameters = parameters,
+                  .spacing = scale.spacing * scale.cell_size,
                   .cell_size = scale.cell_size,
                   .bins = b.bins,
                   .crossings = b.crossings},
@@ -231,6 +236,11 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   });
   if (percolates) {
     const double spacing = scale.spacing * scale.cell_size;
+    if (TraitsOf(parameters.placement).refines) {
+      // Rings may have moved away from cells that they pass only outside of the window.
+      ExcludeTouchedCells(b.bins.tiles, result.rings.points, result.rings.offsets, b.placed.roots,
+                          scale.cell_size, b.crossings.interior);
+    }
     if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings,
                   result.statistics.cut_bodies)) {
       return absl::InternalError("rings cannot be cut at the faces of the box");
@@ -276,8 +286,10 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
                                   .tiles = b.bins.tiles.size(),
                                   .attribute_values = AttributeValuesOf(seen)});
   if (!status.ok()) return status;
-  FindRings(parameters, scale, observer, b);
-  status = memory.ReserveOutline(SizeOf(parameters, seen, b));
+  FindRings(task, scale, b);
+  FrameSize size = SizeOf(parameters, seen, b);
+  if (task.HasCopies()) size.cut_segments = size.segments;
+  status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
   status = FillOutline(task, seen, scale, b, result);
   if (!status.ok()) return status;

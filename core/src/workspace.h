@@ -37,9 +37,9 @@ struct NextState {
 struct Workspace::Buffers {
   DistinctIdsScratch distinct_ids;
   SpacingScratch spacing;
-  LiftScratch lift;          // Empty without a periodic box.
+  LiftScratch lift;  // Empty without a periodic box.
   BodyChoice choice;
-  RingCutScratch ring_cut;  // Empty unless bodies percolate.
+  RingCutScratch ring_cut;   // Empty unless bodies percolate.
   NoiseFilterScratch noise;  // Empty without a noise filter.
   Slab slab;
   ParticleBins bins;

@@ -10,6 +10,7 @@ struct FrameSize {
   std::uint64_t particles = 0;
   std::uint64_t tiles = 0;
   std::uint64_t segments = 0;          ///< Pieces of the outline, one per cell.
+  std::uint64_t cut_segments = 0;      ///< Segments if rings are cut at a periodic box, else 0.
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t block_tiles = 0;       ///< Tiles with such cells.
@@ -22,6 +23,7 @@ struct FrameSize {
 inline constexpr std::uint64_t kBytesPerParticle = 60;
 inline constexpr std::uint64_t kBytesPerTile = 10'000;
 inline constexpr std::uint64_t kBytesPerSegment = 1'000;
+inline constexpr std::uint64_t kBytesPerCutSegment = 250;
 inline constexpr std::uint64_t kBytesPerGridCell = 80;
 
 /// Additional bytes if the frame has attributes: to sort the particles, and per value at a vertex.
@@ -51,6 +53,7 @@ inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +
+                        kBytesPerCutSegment * size.cut_segments +
                         kBytesPerGridCell * size.grid_cells + kBytesPerBlockCell * size.block_cells;
   if (size.attribute_values > 0) {
     bytes += kBytesPerCarryingParticle * size.particles + kBytesPerCarryingTile * size.tiles +

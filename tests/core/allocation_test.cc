@@ -311,6 +311,12 @@ std::vector<MemoryCase> MemoryCases() {
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});
   add("full periodic box", support::Lattice(150, 150, -74.7, -74.7), {.box = boxed(150)});
   add("percolating noise", support::Noise(random, 30'000, 300), {.box = boxed(600)});
+  PeriodicBox wrapped = boxed(750);
+  wrapped.wraps = true;
+  add("wrapped drops", spread(150, 5), {.box = wrapped});
+  wrapped = boxed(600);
+  wrapped.wraps = true;
+  add("wrapped noise", support::Noise(random, 30'000, 300), {.box = wrapped});
   for (const auto& [name, particles] :
        {std::pair("filtered body", support::Disc(120)), std::pair("filtered drops", spread(150, 7)),
         std::pair("filtered body in few tiles", support::Scaled(support::Disc(160), .25))}) {

@@ -16,15 +16,14 @@
 #include <string>
 #include <vector>
 
+#include "core/boxes.h"
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
-#include "partiemc/validate.h"
 #include "support/reconstruct.h"
 #include "support/ring_stream.h"
 #include "support/tracked_scene.h"
 #include "support/tries.h"
-#include "vertices/measure.h"
 
 namespace partiemc {
 namespace {
@@ -37,24 +36,6 @@ using testing::ElementsAre;
 
 constexpr double kWidth = 60, kHeight = 50;
 
-PeriodicBox BoxOf(double length_x, double length_y, double x = 0, double y = 0) {
-  return {.axes = {PeriodicAxis{x, length_x}, PeriodicAxis{y, length_y}, std::nullopt}};
-}
-
-ReconstructionParameters In(const PeriodicBox& box, Fill fill = Fill::kGreedy,
-                            Placement placement = Placement::kVirtualPlane) {
-  return {.placement = placement, .fill = fill, .spacing = 1.0, .box = box};
-}
-
-Particles Wrapped(Particles particles, const PeriodicBox& box) {
-  for (std::size_t k = 0; k < particles.xy.size(); ++k) {
-    const auto& axis = box.axes[k % 2];
-    double& at = particles.xy[k];
-    at -= axis->length * std::floor((at - axis->origin) / axis->length);
-  }
-  return particles;
-}
-
 // The particles of a lattice below a wave that repeats after kWidth, above a flat bottom.
 Particles Wave(double phase, double amplitude = 4, double noise = 0, std::uint64_t seed = 1) {
   Random random(seed);
@@ -62,7 +43,8 @@ Particles Wave(double phase, double amplitude = 4, double noise = 0, std::uint64
   for (int i = 0; i < kWidth; ++i) {
     const double top = 20 + amplitude * std::sin(2 * M_PI * (i + phase) / kWidth);
     for (int j = 0; j < top; ++j) {
-      wave.Add(i + .5 + random.Uniform(-noise, noise), j + 10 + random.Uniform(-noise, noise));
+      const double x = random.Uniform(-noise, noise), y = random.Uniform(-noise, noise);
+      wave.Add(i + .5 + x, j + 10 + y);
     }
   }
   return wave;
@@ -79,16 +61,6 @@ double CutLength(const Rings& rings) {
     }
   }
   return length;
-}
-
-void ExpectValid(const Result& result, Fill fill) {
-  const absl::Status valid = Validate(result, fill);
-  EXPECT_TRUE(valid.ok()) << valid;
-  EXPECT_TRUE(std::ranges::is_sorted(result.rings.cuts));
-  for (std::size_t ring = 0; ring < result.rings.RingCount(); ++ring) {
-    const auto points = result.rings.RingPoints(ring);
-    EXPECT_LE(result.rings.measures[ring].perimeter, MeasureRing(points).perimeter + 1e-9);
-  }
 }
 
 TEST(Percolation, FlatLayerIsCutAtTheFaces) {
@@ -275,8 +247,9 @@ TEST(Percolation, RandomFramesKeepTheGuarantees) {
   for (std::uint64_t seed = 1; seed <= support::Tries(400u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
-    const PeriodicBox box = BoxOf(random.Uniform(12, 50), random.Uniform(12, 50),
-                                  random.Uniform(-20, 20), random.Uniform(-20, 20));
+    const double length_x = random.Uniform(12, 50), length_y = random.Uniform(12, 50);
+    const double origin_x = random.Uniform(-20, 20), origin_y = random.Uniform(-20, 20);
+    const PeriodicBox box = BoxOf(length_x, length_y, origin_x, origin_y);
     const double density = random.Uniform(.02, 1.2);
     Particles scene;
     const auto count =
@@ -294,6 +267,8 @@ TEST(Percolation, RandomFramesKeepTheGuarantees) {
     if (seed % 5 == 0) parameters.placement = Placement::kMarchingSquares;
     if (seed % 7 == 0) parameters.placement = Placement::kQef;
     if (seed % 11 == 0) parameters.isovalue = .6;
+    if (seed % 4 == 1) parameters.cell_size = seed % 8 == 1 ? .25 : .5;
+    if (seed % 9 == 0) parameters.box->wraps = true;
     const Result result = ReconstructOnce(parameters, scene);
     ExpectValid(result, fill);
     cut += result.statistics.cut_bodies;

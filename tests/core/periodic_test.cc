@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/boxes.h"
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
@@ -34,23 +35,6 @@ using testing::IsEmpty;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-PeriodicBox BoxOf(double length_x, double length_y, double x = 0, double y = 0) {
-  return {.axes = {PeriodicAxis{x, length_x}, PeriodicAxis{y, length_y}, std::nullopt}};
-}
-
-ReconstructionParameters In(const PeriodicBox& box) { return {.spacing = 1.0, .box = box}; }
-
-// Moves particles into the box, as simulators do.
-Particles Wrapped(Particles particles, const PeriodicBox& box) {
-  for (std::size_t k = 0; k < particles.xy.size(); ++k) {
-    const auto& axis = box.axes[k % 2];
-    if (!axis) continue;
-    double& at = particles.xy[k];
-    at -= axis->length * std::floor((at - axis->origin) / axis->length);
-  }
-  return particles;
-}
 
 std::optional<Violation> RefusalOf(const ReconstructionParameters& parameters,
                                    const Particles& particles) {

@@ -14,6 +14,9 @@ namespace {
 
 // Sides move by at most this number of steps.
 constexpr int kMostShifts = 16;
+// Sides closer to an axis than this, in spacings, lie on it: predicates are not exact for tiny
+// coordinates (vertices.cc).
+constexpr double kAxisReach = 0x1p-96;
 // A step, in spacings and in last bits of the coordinate.
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 8;
 
@@ -52,7 +55,8 @@ bool CutAtSides(const RingCutInput& input, int steps, RingCutScratch& s) {
     const double step = kShiftSpacings * input.spacing +
                         kShiftBits * std::numeric_limits<double>::epsilon() * farthest;
     for (const bool is_lower : {true, false}) {
-      const double side = ends->origin + (is_lower ? 0 : ends->length);
+      double side = ends->origin + (is_lower ? 0 : ends->length);
+      if (std::abs(side) < kAxisReach * input.spacing) side = 0;
       s.kept.Clear();
       if (!CutAtLine({.axis = axis, .at = side + steps * step, .keeps_above = is_lower}, s.loops,
                      s.line, s.kept)) {
@@ -135,7 +139,9 @@ class Assembly {
       const LoopPoint& point = points[k];
       to_.points.insert(to_.points.end(), {point.at.x, point.at.y});
       to_.normals.insert(to_.normals.end(), {point.normal_x, point.normal_y});
-      s_.roots.insert(s_.roots.end(), {point.root.x, point.root.y});
+      if (!placed_.roots.empty()) {
+        s_.roots.insert(s_.roots.end(), {point.root.x, point.root.y});
+      }
       if (!point.is_cut) continue;
       to_.cuts.push_back(first + static_cast<std::uint32_t>(k));
       const Point& next = points[(k + 1) % points.size()].at;

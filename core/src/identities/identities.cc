@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <tuple>
 
 #include "base/bits.h"
 
@@ -51,17 +52,11 @@ NodeWindow NodesOf(const Window& window, double cell_size) {
   return nodes;
 }
 
-// Collects the runs of this frame and numbers the rings. Each run lies between two crossed edges of
-// a row. Every ring has a run: it encloses a node, so it crosses the row of that node. Of a body
-// that will be cut, only the nodes in the window count; its rings without such nodes get no number.
-void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
+// Calls visit(run, ring) for each run of this frame. Each run lies between two crossed edges of a
+// row.
+template <typename Visit>
+void ForEachRun(const IdentityInput& input, IdentityScratch& s, const Visit& visit) {
   const RingTopology& topology = input.topology;
-  const NodeWindow window = input.percolation != nullptr
-                                ? NodesOf(input.percolation->window, input.cell_size)
-                                : NodeWindow{};
-  runs.clear();
-  s.number.assign(topology.RingCount(), kNoRing);
-  s.topology_ring.clear();
   CrossedEdge last;
   s.rows.SetRings(input.crossings, topology.segments, topology.offsets);
   s.rows.ForEachEdge(input.bins.tiles, input.crossings, [&](const CrossedEdge& edge) {
@@ -76,7 +71,47 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
       if (topology.outer_of[ring] == kNoRing) return;
     }
     if (input.placed.kept_as[ring] == kNoRing) return;
-    NodeRun run{edge.row, from.column + 1, edge.column, 0};
+    visit(NodeRun{edge.row, from.column + 1, edge.column, 0}, ring);
+  });
+}
+
+// Adds the runs of bodies that will be cut and have no nodes in the window, with all their nodes.
+void AddBodiesBesideNodes(const IdentityInput& input, IdentityScratch& s,
+                          std::vector<NodeRun>& runs) {
+  const RingTopology& topology = input.topology;
+  const auto has_number = [&](std::uint32_t ring) {
+    return s.number[StandInOf(input, ring)] != kNoRing;
+  };
+  bool any = false;
+  for (std::uint32_t ring = 0; ring < topology.RingCount(); ++ring) {
+    any |= topology.outer_of[ring] == kNoRing && input.percolation->IsCut(topology, ring) &&
+           !has_number(ring);
+  }
+  if (!any) return;
+  const std::size_t numbered = s.topology_ring.size();
+  ForEachRun(input, s, [&](NodeRun run, std::uint32_t ring) {
+    if (topology.outer_of[ring] != kNoRing || !input.percolation->IsCut(topology, ring)) return;
+    if (has_number(ring) && s.number[StandInOf(input, ring)] < numbered) return;
+    run.ring = NumberOf(StandInOf(input, ring), s);
+    runs.push_back(run);
+  });
+  std::ranges::sort(runs, [](const NodeRun& a, const NodeRun& b) {
+    return std::tie(a.row, a.first, a.ring) < std::tie(b.row, b.first, b.ring);
+  });
+}
+
+// Collects the runs of this frame and numbers the rings. Every ring has a run: it encloses a node,
+// so it crosses the row of that node. Of a body that will be cut, only the nodes in the window
+// count; its holes without such nodes get no number.
+void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
+  const RingTopology& topology = input.topology;
+  const NodeWindow window = input.percolation != nullptr
+                                ? NodesOf(input.percolation->window, input.cell_size)
+                                : NodeWindow{};
+  runs.clear();
+  s.number.assign(topology.RingCount(), kNoRing);
+  s.topology_ring.clear();
+  ForEachRun(input, s, [&](NodeRun run, std::uint32_t ring) {
     if (input.percolation != nullptr && input.percolation->IsCut(topology, ring)) {
       if (!window.Clip(run)) return;
       const std::uint32_t outer = StandInOf(input, ring);
@@ -86,6 +121,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
     run.ring = NumberOf(ring, s);
     runs.push_back(run);
   });
+  if (input.percolation != nullptr) AddBodiesBesideNodes(input, s, runs);
 }
 
 // Gives the rings of all images of a body the number of the body.

@@ -363,8 +363,9 @@ void ForEachCopy(const Grid& grid, LiftScratch& s, std::size_t components, doubl
       for (std::size_t axis = 0; axis < components; ++axis) {
         if ((axes & AxisBit(axis)) == 0) continue;
         const double above = s.positions[particle * components + axis] - grid.origin[axis];
-        most[axis] = above <= margin ? 1 : 0;
-        least[axis] = grid.length[axis] - above <= margin ? -1 : 0;
+        const double reach = std::min(margin, grid.length[axis]);
+        most[axis] = above <= reach ? 1 : 0;
+        least[axis] = grid.length[axis] - above <= reach ? -1 : 0;
       }
       for (std::int64_t x = least[0]; x <= most[0]; ++x) {
         for (std::int64_t y = least[1]; y <= most[1]; ++y) {

@@ -50,7 +50,7 @@ struct LiftScratch {
 
 /// Bytes of a LiftScratch, at most.
 inline constexpr std::uint64_t kBytesPerLiftedParticle = 72;
-inline constexpr std::uint64_t kBytesPerLiftCell = 192;
+inline constexpr std::uint64_t kBytesPerLiftCell = 200;
 
 struct LiftInput {
   const Frame& frame;
@@ -59,8 +59,8 @@ struct LiftInput {
   std::span<const int> axes;
   /// Particles at most this far apart are in one cluster. World units.
   double range;
-  /// Copies of percolating clusters reach this far beyond the faces, at most one length. World
-  /// units. 0: such clusters are refused.
+  /// Copies of percolating clusters reach this far beyond the faces, along each axis at most one
+  /// length. World units. 0: such clusters are refused.
   double margin;
   /// Treats all clusters as percolating along all periodic axes: none is lifted, all get copies.
   bool wraps = false;
@@ -93,8 +93,9 @@ struct LiftedFrame {
 /// Errors: INVALID_ARGUMENT: OUT_OF_RANGE if a periodic axis is not one of `axes`, or a particle is
 /// more than 1e6 lengths away from the box; PERCOLATES if a cluster percolates and `margin` is 0;
 /// TOO_MANY_PARTICLES if there are more than FrameLimits::kMostParticles with the copies; errors of
-/// `reserve`. The result depends neither on the order of the particles nor on the number of
-/// threads. Cost: n log n in particles.
+/// `reserve`. Positions depend neither on the order of the particles nor on the number of threads.
+/// Copies are in the order of the cells of the grid, then of their particles. Cost: n log n in
+/// particles.
 absl::Status Lift(const LiftInput& input, LiftScratch& scratch, LiftedFrame& lifted);
 
 }  // namespace partiemc

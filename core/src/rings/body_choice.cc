@@ -35,8 +35,8 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
     const std::uint32_t of_copy = c.component_of[given + copy];
     if (of_copy == kNoComponent) continue;
     c.has_copies[of_copy] = 1;
-    const std::uint32_t of_given = c.component_of[input.lifted.originals[copy]];
-    if (of_given == kNoComponent) continue;
+    std::uint32_t& of_given = c.component_of[input.lifted.originals[copy]];
+    if (of_given == kNoComponent) of_given = of_copy;  // Further copies join this one.
     const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
     c.set[std::max(a, b)] = std::min(a, b);
   }
@@ -54,13 +54,28 @@ bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::ui
       const auto& ends = input.window.axes[axis];
       if (!ends) continue;
       const double above = at[axis] - ends->origin;
-      if (above < -input.reach || above > ends->length + input.reach) return false;
+      if (above < -input.reach[axis] || above > ends->length + input.reach[axis]) return false;
     }
   }
   return true;
 }
 
-// The component of each body that remains whole.
+// Adds up the particles of each body, and finds its largest image.
+void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
+  const std::uint32_t components = topology.components.size();
+  c.total.assign(components, 0);
+  c.largest.assign(components, 0);
+  for (std::uint32_t component = 0; component < components; ++component) {
+    const std::uint32_t root = RootOf(component, c.set);
+    const std::uint32_t outer = topology.outer_ring[component];
+    c.total[root] += c.given_count[component];
+    if (outer != kNoRing) {
+      c.largest[root] = std::max(c.largest[root], AreaOfRing(topology, outer));
+    }
+  }
+}
+
+// The component of each body that remains whole: one that has all its particles.
 void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.best.assign(components, kNoComponent);
@@ -71,18 +86,32 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent || c.given_count[component] > c.given_count[best]) best = component;
   }
+  for (std::uint32_t root = 0; root < components; ++root) {
+    std::uint32_t& best = c.best[root];
+    if (best == kNoComponent) continue;
+    if (topology.particle_count[topology.outer_ring[best]] < c.total[root]) best = kNoComponent;
+  }
+}
+
+bool IsSpray(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t root) {
+  const ReconstructionParameters& parameters = input.parameters;
+  const double spacing = input.spacing / input.cell_size;
+  return c.total[root] < parameters.min_component_particles ||
+         c.largest[root] < parameters.min_component_area * spacing * spacing;
 }
 
 Fate FateOf(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t component,
             std::uint32_t root) {
-  if (input.wraps) return Fate::kCut;
+  if (IsSpray(input, c, root)) return Fate::kGone;
+  if (input.parameters.box->wraps) return Fate::kCut;
   if (!c.has_copies[root]) return Fate::kWhole;
   if (c.best[root] == kNoComponent) return Fate::kCut;
   return c.best[root] == component ? Fate::kWhole : Fate::kGone;
 }
 
-void DecideFates(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
+void DecideFates(const BodyChoiceInput& input, RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
+  MeasureBodies(topology, c);
   FindBest(input, topology, c);
   c.fates.resize(components);
   c.bodies.resize(components);
@@ -90,6 +119,7 @@ void DecideFates(const BodyChoiceInput& input, const RingTopology& topology, Bod
     const std::uint32_t root = RootOf(component, c.set);
     c.fates[component] = FateOf(input, c, component, root);
     c.bodies[component] = c.fates[component] == Fate::kCut ? root : component;
+    if (root == component && IsSpray(input, c, root)) ++topology.dropped_spray;
   }
 }
 

@@ -1,6 +1,7 @@
 // Decides which bodies of a periodic box are whole, and which must be cut at its faces.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -25,14 +26,16 @@ struct BodyChoice {
   std::vector<double> given_weight;         // By component: their summed weight; 0 if uniform.
   std::vector<std::uint8_t> has_copies;     // By component: of its set.
   std::vector<std::uint32_t> best;          // By set: the whole component that remains.
+  std::vector<std::uint64_t> total;         // By set: its particles.
+  std::vector<double> largest;              // By set: area of its largest image, squared cells.
 };
 
 struct BodyChoiceInput {
   const LiftedFrame& lifted;
-  const Window& window;  ///< The box along the axes along which bodies percolate.
-  double reach;          ///< Bodies are complete up to this far beyond the window. World units.
-  bool wraps;            ///< Every body is cut.
-  double cell_size;      ///< World units.
+  const Window& window;         ///< The box along the axes along which bodies percolate.
+  std::array<double, 2> reach;  ///< Bodies are complete up to this far beyond it. World units.
+  const ReconstructionParameters& parameters;
+  double spacing, cell_size;  ///< World units.
   const ParticleBins& bins;
   const Crossings& crossings;
 };
@@ -40,10 +43,14 @@ struct BodyChoiceInput {
 /// Decides the fate of each component of a frame with copies. Components that share a particle,
 /// given or copied, are images of one body.
 ///   - A body without copies remains.
-///   - If images of a body lie in the window and its margin of `reach`, they are whole: the image
-///     with the most given particles remains, of several the one with the lowest number.
+///   - Images of a body in the window and its margin of `reach` are complete. The one with the most
+///     given particles remains, whole; of several the one with the lowest number.
 ///   - Otherwise the body percolates, or is too long: all its images are cut. In `topology`, their
-///     particles are then the given ones. If `wraps`, this is so for all bodies.
+///     particles are then the given ones. If the box wraps, this is so for all bodies.
+///   - Bodies in different cells of the lattice may be joined in one image and apart in another. If
+///     the chosen image lacks particles, all images are cut.
+///   - Spray is gone (ReconstructionParameters::min_component_*): bodies with too few particles, or
+///     whose largest image has too little area. TraceRings must have kept it.
 /// Deterministic. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);
 

@@ -12,7 +12,7 @@
 
 namespace partiemc {
 
-/// What happens to a component of inside nodes (rings/components.h).
+/// The fate of a component of inside nodes (rings/components.h).
 enum class Fate : std::uint8_t {
   kWhole,  ///< It remains as it is.
   kCut,    ///< Its part in the box remains.
@@ -31,7 +31,7 @@ struct Percolation {
   std::span<const Fate> fates;            ///< By component.
   std::span<const std::uint32_t> bodies;  ///< By component: the first component of the same body.
 
-  /// The outer ring that stands for the body of a component: that of its first component.
+  /// The outer ring of the first component of the same body.
   std::uint32_t OuterOf(const RingTopology& topology, std::uint32_t component) const {
     return topology.outer_ring[bodies[component]];
   }

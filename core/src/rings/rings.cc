@@ -98,24 +98,11 @@ void FindEntryPoints(const TileDirectory& directory, const LevelSet& level_set,
   });
 }
 
-// The signed area of a ring through its edge crossings, in squared cells.
-double AreaOf(const RingTopology& rings, std::size_t ring) {
-  const std::span<const Point> points =
-      std::span(rings.entry_points)
-          .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
-  double twice_area = 0;
-  const Point origin = points[0];
-  for (std::size_t k = 1; k + 1 < points.size(); ++k) {
-    twice_area += (points[k].x - origin.x) * (points[k + 1].y - origin.y) -
-                  (points[k + 1].x - origin.x) * (points[k].y - origin.y);
-  }
-  return twice_area / 2;
-}
-
 void MeasureAreas(const RingTopology& rings, RingScratch& scratch) {
   scratch.area.resize(rings.offsets.size() - 1);
   ParallelForRanges(scratch.area.size(), kRingGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t ring = first; ring < last; ++ring) scratch.area[ring] = AreaOf(rings, ring);
+    for (std::size_t ring = first; ring < last; ++ring)
+      scratch.area[ring] = AreaOfRing(rings, ring);
   });
 }
 
@@ -304,9 +291,22 @@ void DropSpray(const ParticleBins& bins, const Scale& scale,
 
 }  // namespace
 
+double AreaOfRing(const RingTopology& rings, std::size_t ring) {
+  const std::span<const Point> points =
+      std::span(rings.entry_points)
+          .subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
+  double twice_area = 0;
+  const Point origin = points[0];
+  for (std::size_t k = 1; k + 1 < points.size(); ++k) {
+    twice_area += (points[k].x - origin.x) * (points[k + 1].y - origin.y) -
+                  (points[k + 1].x - origin.x) * (points[k].y - origin.y);
+  }
+  return twice_area / 2;
+}
+
 void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
                 const ReconstructionParameters& parameters, Crossings& crossings,
-                RingScratch& scratch, RingTopology& rings) {
+                RingScratch& scratch, RingTopology& rings, bool keeps_spray) {
   rings.dropped_holes = 0;
   rings.dropped_components = 0;
   rings.dropped_spray = 0;
@@ -319,7 +319,9 @@ void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale
       [&] { CountComponents(bins, crossings, scratch, rings); });
   if (*parameters.clean) Clean(bins, scale, crossings, scratch, rings);
   Nest(bins, crossings, scratch, rings);
-  if (parameters.min_component_area > 0 || parameters.min_component_particles > 0) {
+  const bool has_limit =
+      parameters.min_component_area > 0 || parameters.min_component_particles > 0;
+  if (has_limit && !keeps_spray) {
     DropSpray(bins, scale, parameters, crossings, scratch, rings);
   }
 }

@@ -54,11 +54,15 @@ struct RingScratch {
 /// - `parameters.clean`: drops components without particles, and holes below 2 h^2 with everything
 ///   in them (core/METHOD.md, "Cleaning").
 /// - `min_component_area`, `min_component_particles`: afterwards, and also without `clean`, drops
-///   outer rings that enclose less area (in h^2) or fewer particles, with everything in them.
+///   outer rings that enclose less area (in h^2) or fewer particles, with everything in them;
+///   not if `keeps_spray`.
 /// In `crossings`, the nodes of a dropped component become outside, and the nodes of a dropped hole
 /// inside. Areas are measured on the level set, before vertices are placed.
 void TraceRings(const ParticleBins& bins, const LevelSet& level_set, const Scale& scale,
                 const ReconstructionParameters& parameters, Crossings& crossings,
-                RingScratch& scratch, RingTopology& rings);
+                RingScratch& scratch, RingTopology& rings, bool keeps_spray = false);
+
+/// The signed area of a ring through its edge crossings, in squared cells.
+double AreaOfRing(const RingTopology& rings, std::size_t ring);
 
 }  // namespace partiemc

@@ -89,8 +89,8 @@ TEST(PeriodicReplay, LayerIsCutAtTheFaces) {
   for (int k = 0; k < 180; ++k) file << k % 30 + .5 << "," << k / 30 << "\n";
   file.close();
   const std::vector<std::string> flags = {"--periodic", "x", "--box", "0,30,0,30"};
-  std::vector<std::string> local = {"--local", "--check", "--format",
-                                    "svg",     "--out",   folder.Path("out")};
+  std::vector<std::string> local = {"--local", "--check",      "--format",
+                                    "svg",     "--output-dir", folder.Path("out")};
   local.insert(local.end(), flags.begin(), flags.end());
   const Columns cut = Replayed(csv, local);
   ASSERT_THAT(cut.rings, ElementsAre("1"));
