@@ -159,6 +159,7 @@ TEST(NoiseFilter, WrongWeightsAndFramesWithoutIdsAreRefused) {
 TEST(NoiseFilter, RefusedFramesChangeNothing) {
   ReconstructionParameters parameters = Filtering();
   parameters.box = PeriodicBox{.axes = {PeriodicAxis{-20, 40}, PeriodicAxis{-20, 40}}};
+  parameters.placement = Placement::kFarthestParticle;  // Refuses bodies that must be cut.
   RingStream stream(parameters), undisturbed(parameters);
   Random random(7);
   for (int frame = 0; frame < 4; ++frame) {
