@@ -173,6 +173,7 @@ TEST_F(FrameRefused, PERCOLATES) {
   auto& parameters = *open.mutable_open()->mutable_parameters();
   parameters.set_spacing(kBlobSpacing);
   parameters.mutable_box()->mutable_x()->set_length(400 * kBlobSpacing);
+  parameters.set_placement(v1::PLACEMENT_FARTHEST_PARTICLE);  // Its rings cannot be cut.
   auto request = BlobRequest(1, 1, 0);
   std::vector<double> layer;
   for (int k = 0; k < 400; ++k) layer.insert(layer.end(), {k * kBlobSpacing, 0.0});
