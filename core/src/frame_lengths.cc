@@ -125,15 +125,18 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
   // A kernel reaches at most the tiles beside the tile of its particle.
   const double largest =
       std::min(kRatio, kTileSize * lengths.cell_size / (kernel_radius * spacing));
-  if (sizes.smallest >= 1 / kRatio && sizes.largest <= largest) return sizes;
-  // Names the smallest or the largest size: the side with fewer particles is wrong.
+  // Volumes are rounded to float.
+  constexpr double kSmallest = (1 - 1e-6) / kRatio, kRounded = 1 + 1e-6;
+  if (sizes.smallest >= kSmallest && sizes.largest <= largest * kRounded) return sizes;
+  // Names the smallest or the largest size. If both are wrong, the side with fewer particles is
+  // named.
   const auto count = [&](auto is_beyond) {
     return std::ranges::count_if(frame.volumes, is_beyond);
   };
-  const auto above = count([&](float v) { return std::sqrt(double{v}) > largest * spacing; });
-  const auto below = count([&](float v) { return kRatio * std::sqrt(double{v}) < spacing; });
-  const auto half = static_cast<std::ptrdiff_t>(frame.volumes.size() / 2);
-  const bool is_large = above > 0 ? above <= half : below > half;
+  const auto above =
+      count([&](float v) { return std::sqrt(double{v}) > largest * kRounded * spacing; });
+  const auto below = count([&](float v) { return std::sqrt(double{v}) < kSmallest * spacing; });
+  const bool is_large = above > 0 && (below == 0 || above <= below);
   const auto worst = is_large ? most : least;
   return ViolationError(
       absl::StatusCode::kInvalidArgument,

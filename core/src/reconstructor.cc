@@ -488,6 +488,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     CommitState(b.next_states[k + 1], state.sections[k]);
   }
   if (prepared.is_filtered) std::swap(state.noise, b.noise.next);
+  if (!parameters_.noise_filter) state.noise = {};
   return absl::OkStatus();
 }
 

@@ -12,7 +12,8 @@
 
 namespace partiemc::server {
 
-/// The sum of these terms bounds the server's memory (MemoryPlan computes it):
+/// The sum of these terms bounds the server's memory (MemoryPlan computes it), except for the
+/// states of streams between their frames:
 /// - `memory_budget` for requests, responses, workers and histories;
 /// - frames beyond the budget (ReadBytesBeyond);
 /// - the worker that computes a frame beyond the budget (WorkerBytesBeyond);
@@ -35,7 +36,8 @@ struct ServerLimits {
 
   /// Maximum size of a checkpoint, sent or received. A resuming client sends its checkpoint in
   /// `open`, so this limit keeps `open` as small as a frame. A state has one or two bytes for each
-  /// particle of a compact body, but 370 or more for an isolated particle. Therefore the limits of
+  /// particle of a compact body, but 370 or more for an isolated particle, and 32 to 44 for each
+  /// particle of a stream with a noise filter. Therefore the limits of
   /// tiles and particles would permit states larger than any message.
   std::uint64_t MaxCheckpointBytes() const { return max_frame_bytes; }
 
@@ -88,7 +90,7 @@ struct ServerLimits {
   /// The budget without the histories.
   std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
 
-  /// An idle stream costs little memory, but it occupies a name and a slot.
+  /// An idle stream costs little memory except for its state, but it occupies a name and a slot.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
 
   /// Limits of unary calls. If the client does not receive a response in time, the server drops it,

@@ -66,6 +66,9 @@ TEST(PercolationBodies, DropBesideNodesIsKeptOnce) {
   const Rings& rings = stream.Next(scene);
   EXPECT_LE(rings.RingCount(), 2u);
   EXPECT_TRUE(ParseState(Serialize(stream.state())).ok());
+  const std::uint64_t particles = ParticlesOf(rings);
+  parameters.min_component_particles = 1;
+  EXPECT_EQ(ParticlesOf(ReconstructOnce(parameters, scene).rings), particles);
 }
 
 // Rings of a fine lattice move over whole cells, also beyond the face.
@@ -100,6 +103,17 @@ TEST(PercolationBodies, LongBodiesAreNoSpray) {
   EXPECT_EQ(ParticlesOf(result.rings), 600u);
   EXPECT_EQ(result.statistics.dropped_spray, 1u);
   EXPECT_NEAR(result.statistics.area, 600, 3);
+}
+
+TEST(PercolationBodies, AreaOfALongBodyDoesNotDependOnTheFace) {
+  PeriodicBox box = BoxOf(100, 100);
+  box.wraps = true;
+  ReconstructionParameters parameters = In(box);
+  parameters.min_component_area = 800;
+  for (const double x : {51.3, 1.3}) {
+    const Particles body = Wrapped(support::Lattice(98, 10, x, 20), box);
+    EXPECT_EQ(ParticlesOf(ReconstructOnce(parameters, body).rings), 980u) << x;
+  }
 }
 
 TEST(PercolationBodies, TinyOriginIsZero) {

@@ -283,10 +283,34 @@ TEST(Sizes, RefusesSizesFarFromTheSpacing) {
     EXPECT_EQ(violation->reason, kReasonOutOfRange);
     EXPECT_EQ(violation->field, "volumes[7]");
   }
-  for (const float volume : {99.0f, .0101f}) {
+  for (const float volume : {100.0f, .01f}) {
     particles.volumes[7] = volume;
     ReconstructOnce(kOwn, particles);
   }
+  // A wrong majority is named, too, not the particle whose size is allowed.
+  particles.volumes.assign(particles.size(), .00390625f);
+  particles.volumes[7] = 1;
+  const auto violation = RefusalOf(kOwn, particles);
+  ASSERT_TRUE(violation);
+  EXPECT_EQ(violation->value, "0.00390625");
+}
+
+// Spray does not count in the area step, however large its particles are.
+TEST(Sizes, LoneLargeParticlesLeaveTheBodyAlone) {
+  Particles body = support::Disc(20);
+  body.volumes.assign(body.size(), 1);
+  const Result alone = ReconstructOnce(kOwn, body);
+  const double count = static_cast<double>(body.size());
+  for (int k = 0; k < 5; ++k) {
+    body.Add(60 + 20 * k, 0);
+    body.volumes.push_back(9);
+  }
+  const Result both = ReconstructOnce(kOwn, body);
+  const auto largest = [](const Result& result) {
+    return std::ranges::max(result.rings.measures, {}, &RingMeasures::area).area;
+  };
+  EXPECT_NEAR(largest(alone), count, .002 * count);
+  EXPECT_NEAR(largest(both), largest(alone), 1e-9 * count);
 }
 
 TEST(Sizes, RefusesHugeSizeAlsoWithoutSpacing) {
@@ -332,6 +356,9 @@ TEST(Sizes, RefusesWhatHasNoOwnSizes) {
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = kOwn;
   parameters.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+  EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
+  parameters = kOwn;
+  parameters.noise_filter = .5;
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = kOwn;
   parameters.placement = Placement::kFarthestParticle;

@@ -163,7 +163,8 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     parameters.box->wraps = choices.Below(4) == 1;
   }
   if (choices.Below(4) == 1) parameters.noise_filter = HostileRatio(choices, 0, .5, 1);
-  if (!parameters.box && choices.Below(4) == 1) parameters.sizes = Sizes::kOwn;
+  if (!parameters.box && !parameters.noise_filter && choices.Below(4) == 1)
+    parameters.sizes = Sizes::kOwn;
   return parameters;
 }
 

@@ -146,7 +146,7 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within kernel_radius h_i, and smoothing follows the local
   /// size. Frames must have volumes. An absent spacing is the root mean square of the sizes; it
   /// sets the lattice. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
-  /// kernel radius at most 32 cells. Excludes surfaces, slices, `box` and
+  /// kernel radius at most 32 cells. Excludes surfaces, slices, `box`, `noise_filter` and
   /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;

@@ -148,7 +148,7 @@ class Interpolation {
     }
   }
 
-  // The mean size around a point, in spacings, weighted by kernels.
+  // The mean size around a point, in spacings, weighted by kernels and volumes.
   double SizeAt(std::uint32_t tile, Point point) const {
     if (!scale_.has_own_sizes) return 1;
     double sum = 0, weights = 0;

@@ -26,7 +26,7 @@ constexpr double kPi = 3.14159265358979323846;
 // most one cell farther. The nodes of a small hole are farther by at most the radius of a disk with
 // the area of the hole.
 double TileMargin(const Scale& scale) {
-  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing * scale.sizes.largest;
+  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
 }
 
 // Particles per block, few enough that the data of a block stay in the nearest cache.

@@ -39,10 +39,17 @@ Vec3 VectorOf(std::size_t axes, const At& at) {
   return {at(std::size_t{0}), at(std::size_t{1}), axes == 3 ? at(std::size_t{2}) : 0.0};
 }
 
+// Resizes without the surplus of growth by doubling.
+template <typename Value>
+void ResizeExactly(std::size_t count, std::vector<Value>& values) {
+  values.reserve(count);
+  values.resize(count);
+}
+
 // Sets the rank of each particle in the order of the ids.
 void SortById(const Frame& frame, NoiseFilterScratch& s) {
   const std::span<const std::uint64_t> ids = frame.ids;
-  s.particles.resize(ids.size());
+  ResizeExactly(ids.size(), s.particles);
   std::iota(s.particles.begin(), s.particles.end(), std::uint32_t{0});
   if (std::ranges::is_sorted(ids)) return;
   ParallelSort(std::span(s.particles),
@@ -52,7 +59,7 @@ void SortById(const Frame& frame, NoiseFilterScratch& s) {
 // Finds each particle in the last history.
 void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScratch& s) {
   const std::span<const std::uint64_t> ids = previous.ids;
-  s.last.resize(s.particles.size());
+  ResizeExactly(s.particles.size(), s.last);
   ParallelForRanges(s.last.size(), kGrain, [&](std::size_t first, std::size_t last) {
     auto found = std::ranges::lower_bound(ids, frame.ids[s.particles[first]]);
     for (std::size_t rank = first; rank < last; ++rank) {
@@ -82,8 +89,9 @@ template <typename Real>
 void StartHistory(const Frame& frame, std::span<const Real> positions, const Coordinates& at,
                   NoiseFilterScratch& s) {
   const std::size_t axes = at.AxisCount(), count = s.particles.size();
-  s.next.ids.resize(count);
-  s.next.given.resize(count * axes);
+  ResizeExactly(count, s.next.ids);
+  ResizeExactly(count * axes, s.next.given);
+  s.next.offsets.reserve(count * axes);
   s.next.offsets.assign(count * axes, 0);
   ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t rank = first; rank < last; ++rank) {
@@ -103,7 +111,7 @@ void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
     return VectorOf(
         axes, [&](std::size_t axis) { return s.next.given[rank * axes + axis] / input.spacing; });
   };
-  s.known.resize(count);
+  ResizeExactly(count, s.known);
   ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t rank = first; rank < last; ++rank) {
       if (s.last[rank] == kNew) continue;
@@ -116,7 +124,7 @@ void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
     if (s.last[rank] != kNew) s.known[known++].rank = static_cast<std::uint32_t>(rank);
   }
   s.known.resize(known);
-  s.movers.resize(known);
+  ResizeExactly(known, s.movers);
   ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       Vec3 unused;
@@ -201,7 +209,9 @@ void WritePositions(std::span<const Real> given, double cell_size, const Coordin
 
 absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& s, Frame& filtered) {
   filtered = input.frame;
-  const std::uint64_t bytes = kBytesPerFilteredParticle * input.frame.ParticleCount();
+  // The last history stays in the buffers.
+  const std::uint64_t bytes =
+      kBytesPerFilteredParticle * std::max(input.frame.ParticleCount(), input.previous.ids.size());
   absl::Status status = input.reserve(bytes);
   if (!status.ok()) return status;
   const Coordinates at(input);

@@ -158,6 +158,7 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
   if (p.output == Output::kSurface) return refused("for a surface");
   if (p.slice) return refused("for a slice");
   if (p.box) return refused("with a periodic box");
+  if (p.noise_filter) return refused("with a noise filter");
   if (!KeepsGuarantees(p.placement)) {
     return refused("for the placement " + std::string(Name(p.placement)));
   }

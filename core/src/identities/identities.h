@@ -21,7 +21,7 @@
 namespace partiemc {
 
 /// Warm buffers of ContinueRings. The kept rings of the frame are numbered from 0, in the order of
-/// their first runs (NodeRun): by row, then column.
+/// their first runs (NodeRun): by row, then column. Cut bodies without nodes in the box are last.
 struct IdentityScratch {
   Scanlines rows;
   std::vector<std::uint32_t> number;             // By ring of the topology.

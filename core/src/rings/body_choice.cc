@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <utility>
 
 namespace partiemc {
 namespace {
@@ -20,6 +21,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
   c.given_count.assign(components, 0);
   c.given_weight.assign(components, 0);
   c.has_copies.assign(components, 0);
+  c.total.assign(components, 0);
   c.set.resize(components);
   std::iota(c.set.begin(), c.set.end(), 0u);
   topology.components.ForEachParticle(
@@ -36,7 +38,10 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
     if (of_copy == kNoComponent) continue;
     c.has_copies[of_copy] = 1;
     std::uint32_t& of_given = c.component_of[input.lifted.originals[copy]];
-    if (of_given == kNoComponent) of_given = of_copy;  // Further copies join this one.
+    if (of_given == kNoComponent) {
+      of_given = of_copy;  // Further copies join this one.
+      ++c.total[of_copy];
+    }
     const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
     c.set[std::max(a, b)] = std::min(a, b);
   }
@@ -63,12 +68,12 @@ bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::ui
 // Adds up the particles of each body, and finds its largest image.
 void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
-  c.total.assign(components, 0);
   c.largest.assign(components, 0);
   for (std::uint32_t component = 0; component < components; ++component) {
     const std::uint32_t root = RootOf(component, c.set);
     const std::uint32_t outer = topology.outer_ring[component];
-    c.total[root] += c.given_count[component];
+    // Particles that have a component only by their copies are in `total` already.
+    c.total[root] += std::exchange(c.total[component], 0) + c.given_count[component];
     if (outer != kNoRing) {
       c.largest[root] = std::max(c.largest[root], AreaOfRing(topology, outer));
     }
@@ -95,9 +100,11 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
 
 bool IsSpray(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t root) {
   const ReconstructionParameters& parameters = input.parameters;
-  const double spacing = input.spacing / input.cell_size;
+  const double square = input.spacing * input.spacing / (input.cell_size * input.cell_size);
+  // An image of a long body ends where its copies end.
+  const double area = std::max(c.largest[root], static_cast<double>(c.total[root]) * square);
   return c.total[root] < parameters.min_component_particles ||
-         c.largest[root] < parameters.min_component_area * spacing * spacing;
+         area < parameters.min_component_area * square;
 }
 
 Fate FateOf(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t component,

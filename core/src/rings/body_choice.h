@@ -50,7 +50,8 @@ struct BodyChoiceInput {
 ///   - Bodies in different cells of the lattice may be joined in one image and apart in another. If
 ///     the chosen image lacks particles, all images are cut.
 ///   - Spray is gone (ReconstructionParameters::min_component_*): bodies with too few particles, or
-///     whose largest image has too little area. TraceRings must have kept it.
+///     with too little area: that of their largest image, or h^2 per particle if this is more.
+///     TraceRings must have kept it.
 /// Deterministic. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);
 

@@ -84,7 +84,8 @@ struct PeriodicRing {
                                ///< With own sizes, lengths are divided by the local size.
   float *normal_x, *normal_y;  ///< Unit, outward.
   float *next_x, *next_y;      ///< Scratch: next normals; later next_x is the variance of supports.
-  float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells.
+  float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells; with
+                  ///< own sizes divided by the local size.
   float* base;    ///< Shift of the vertex's plane along the normal, in cells.
   float* shift;   ///< Scratch of the steps; has no margins.
 

@@ -19,12 +19,12 @@ inline constexpr std::ptrdiff_t kWindowPadding = 17;
 void MeasureArc(const PeriodicRing& ring, std::span<const float> sizes);
 
 /// The three functions below process the vertices [begin, end) of a ring. Each sums over the
-/// vertices j nearer than `reach` cells along the ring, with weights that contain l_j B(d, reach).
-/// Arithmetic is in floats, one vertex for each lane. A sum starts with the vertex itself. It
-/// continues outward with one vertex on each side, the earlier one first, until the window ends.
-/// The bits depend neither on the width of vectors nor on `begin`.
-/// Requires: the ring is at least two reaches long; its margins have the size of SizeForWindows
-/// plus kWindowPadding.
+/// vertices j nearer than `reach` cells (with own sizes, local sizes times cells) along the ring,
+/// with weights that contain l_j B(d, reach). Arithmetic is in floats, one vertex for each lane. A
+/// sum starts with the vertex itself. It continues outward with one vertex on each side, the
+/// earlier one first, until the window ends. The bits depend neither on the width of vectors nor on
+/// `begin`. Requires: the ring is at least two reaches long; its margins have the size of
+/// SizeForWindows plus kWindowPadding.
 
 /// Writes the unit mean of the normals to next_x and next_y. `by_angle` multiplies the weights by
 /// max(0, n_i . n_j)^16. If normals cancel, the vertex keeps its own normal.

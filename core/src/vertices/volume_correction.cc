@@ -42,16 +42,27 @@ RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) 
   return {true, part.area, part.perimeter};
 }
 
-// The length of a ring, each segment times the local size.
-double SizedLength(std::span<const double> points, std::span<const float> sizes) {
+// Sums term(length, local size) over the segments of a ring.
+template <typename Term>
+double SumOverSegments(std::span<const double> points, std::span<const float> sizes, Term term) {
   double sum = 0;
   for (std::size_t k = 0; k < sizes.size(); ++k) {
     const std::size_t next = k + 1 < sizes.size() ? k + 1 : 0;
     const Point from = PointAt(points, k), to = PointAt(points, next);
     const double x = to.x - from.x, y = to.y - from.y;
-    sum += std::sqrt(x * x + y * y) * (double{sizes[k]} + sizes[next]) / 2;
+    sum += term(std::sqrt(x * x + y * y), (double{sizes[k]} + sizes[next]) / 2);
   }
   return sum;
+}
+
+// The length of a ring, each segment times the local size.
+double SizedLength(std::span<const double> points, std::span<const float> sizes) {
+  return SumOverSegments(points, sizes, [](double length, double size) { return length * size; });
+}
+
+// The length of a ring, each segment divided by the local size.
+double LengthInLocalSizes(std::span<const double> points, std::span<const float> sizes) {
+  return SumOverSegments(points, sizes, [](double length, double size) { return length / size; });
 }
 
 // The local sizes at the points of a ring.
@@ -66,11 +77,15 @@ std::optional<double> TargetOf(const VertexInput& input, std::span<const float> 
   const VirtualPlaneConstants& constants = input.variant.constants;
   MeasureRings(rings);
   double volume = 0, area = 0, perimeter = 0;
+  const auto length_in_sizes = [&](std::size_t ring) {
+    return sizes.empty() ? rings.measures[ring].perimeter
+                         : LengthInLocalSizes(rings.RingPoints(ring), SizesOf(rings, ring, sizes));
+  };
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_outer = rings.outer_of[ring] == kNoRing;
     const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
     // Spray does not count: its area depends on how it broke off.
-    if (rings.measures[outer].perimeter < constants.ShortestRing() * spacing) continue;
+    if (length_in_sizes(outer) < constants.ShortestRing() * spacing) continue;
     const auto [counts, ring_area, ring_perimeter] = PartOf(input, rings, ring);
     if (!counts) continue;
     if (is_outer) volume += VolumeOf(input, ring);

@@ -141,6 +141,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     spacing: base?.spacing ?? (spacing || undefined),
     spacingRule: base?.spacingRule,
     sizes: base?.sizes,
+    noiseFilter: base?.noiseFilter,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
     // A reference radius is calibrated for one placement and one kernel. With another placement or
