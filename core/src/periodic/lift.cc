@@ -378,7 +378,8 @@ void ForEachCopy(const Grid& grid, LiftScratch& s, std::size_t components, doubl
   }
 }
 
-// Appends to `values` those of the copies. `given`: `components` per particle.
+// Sets `values` to the values of the given particles and of the copies. `given`: `components` per
+// particle.
 template <typename Value>
 std::span<const Value> WithCopies(std::span<const Value> given, std::size_t components,
                                   std::span<const std::uint32_t> originals,

@@ -23,7 +23,7 @@ struct LiftCell {
   std::uint32_t first = 0, last = 0;  ///< Its particles, [first, last) in the order of the cells.
   Vec3 low, high;                     ///< Bounding box of its particles, wrapped into the box.
   Image image{};                      ///< Image into which its particles are lifted.
-  /// Of the first cell of a cluster: the axes along which the cluster percolates, a bit each.
+  /// The axes along which the cluster percolates, a bit each; for the first cell of the cluster.
   std::uint8_t percolates = 0;
 };
 

@@ -49,8 +49,8 @@ struct BodyChoiceInput {
 ///     particles are then the given ones. If the box wraps, this is so for all bodies.
 ///   - Bodies in different cells of the lattice may be joined in one image and apart in another. If
 ///     the chosen image lacks particles, all images are cut.
-///   - Spray is gone (ReconstructionParameters::min_component_*): bodies with too few particles, or
-///     with too little area: that of their largest image, or h^2 per particle if this is more.
+///   - Spray is gone (ReconstructionParameters::min_component_*): bodies with too few particles or
+///     too little area. The area is the largest image's, or h^2 per particle if this is more.
 ///     TraceRings must have kept it.
 /// Deterministic. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);
