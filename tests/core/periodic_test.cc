@@ -29,22 +29,13 @@ namespace {
 using support::Particles;
 using support::Random;
 using support::ReconstructOnce;
+using support::RefusalOf;
 using support::RingStream;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::optional<Violation> RefusalOf(const ReconstructionParameters& parameters,
-                                   const Particles& particles) {
-  RingStream stream(parameters);
-  const absl::Status status = stream.Try(particles);
-  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
-  EXPECT_EQ(stream.rings().RingCount(), 0u);
-  EXPECT_EQ(stream.state(), State());
-  return FindViolation(status);
-}
 
 // Area and perimeter of each outer ring, ascending.
 std::vector<std::pair<double, double>> SizesOf(const Rings& rings) {

@@ -26,6 +26,7 @@ namespace {
 using support::Particles;
 using support::Random;
 using support::ReconstructOnce;
+using support::RefusalOf;
 using support::RingStream;
 using support::Stages;
 
@@ -255,16 +256,6 @@ TEST(Sizes, LargerUnitsScaleTheOutline) {
 }
 
 // The violation of a refused frame; the state stays as it is.
-std::optional<Violation> RefusalOf(const ReconstructionParameters& parameters,
-                                   const Particles& particles) {
-  RingStream stream(parameters);
-  const absl::Status status = stream.Try(particles);
-  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
-  EXPECT_EQ(stream.rings().RingCount(), 0u);
-  EXPECT_EQ(stream.state(), State());
-  return FindViolation(status);
-}
-
 TEST(Sizes, RefusesFramesWithoutVolumes) {
   const auto violation = RefusalOf(kOwn, support::Lattice(5, 5));
   ASSERT_TRUE(violation);

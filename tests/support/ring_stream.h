@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "partiemc/partiemc.h"
+#include "partiemc/status.h"
 #include "support/particles.h"
 
 namespace partiemc::support {
@@ -66,5 +68,16 @@ class RingStream {
   Workspace workspace_;
   Result result_;
 };
+
+/// Sends one frame, which must be refused and change nothing. Returns the broken rule.
+inline std::optional<Violation> RefusalOf(const ReconstructionParameters& parameters,
+                                          const Particles& particles) {
+  RingStream stream(parameters);
+  const absl::Status status = stream.Try(particles);
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
+  EXPECT_EQ(stream.rings().RingCount(), 0u);
+  EXPECT_EQ(stream.state(), State());
+  return FindViolation(status);
+}
 
 }  // namespace partiemc::support
