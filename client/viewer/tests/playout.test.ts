@@ -34,6 +34,20 @@ test('the clock adapts after a pause', () => {
   assert.ok(Math.abs(clock.rate - 100) < 1, `${clock.rate}`);
 });
 
+test('no frame is drawn after a later one', () => {
+  const clock = new PlayoutClock(100);
+  clock.passed(10);
+  assert.equal(clock.position(0), 10, 'a frame of the history is drawn at once');
+  clock.arrived(11, 10);
+  assert.equal(clock.position(10), 10, 'the first arrival does not take the position back');
+  assert.equal(clock.position(200), 11);
+  clock.arrived(12, 5000);
+  assert.equal(clock.position(5000), 11, 'nor does an arrival after a long pause');
+  assert.equal(clock.position(5200), 12);
+  clock.arrived(1, 5300);
+  assert.ok((clock.position(5300) ?? NaN) <= 1, 'a stream that starts again does');
+});
+
 function player(range: Range | null, live = true): Player {
   return new Player({ range: () => range, rate: () => 10, livePosition: () => range?.last ?? null }, live);
 }

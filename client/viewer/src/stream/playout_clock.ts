@@ -15,19 +15,29 @@ const FIRST_RATE = 30;
 export class PlayoutClock {
   private arrivals: Arrival[] = [];
   private shown = -Infinity;
+  /** The sequence of the last arrival, of an earlier line too. */
+  private newest = -Infinity;
 
   /** `latencyMs`: delay of drawing after arrival. */
   constructor(readonly latencyMs = 100) {}
 
   arrived(sequence: number, now: number): void {
+    if (sequence <= this.newest) this.reset();
     const last = this.arrivals[this.arrivals.length - 1];
     if (last) {
       const pause = now - last.at;
       const longest = Math.max(LONG_PAUSE_MS, LONG_PAUSE_INTERVALS * 1000 / this.rate);
-      if (sequence <= last.sequence || pause > longest) this.reset();
+      if (pause > longest) this.arrivals = [];
     }
+    this.newest = sequence;
     this.arrivals.push({ sequence, at: now });
     if (this.arrivals.length > WINDOW) this.arrivals.shift();
+  }
+
+  /** A frame of the history may be drawn at once. No earlier frame is drawn after it. */
+  passed(sequence: number): void {
+    this.shown = Math.max(this.shown, sequence);
+    this.newest = Math.max(this.newest, sequence);
   }
 
   /** Frames per second. */
@@ -40,21 +50,24 @@ export class PlayoutClock {
     return seconds > 0 ? (last.sequence - first.sequence) / seconds : FIRST_RATE;
   }
 
-  /** The sequence to draw now, with a fraction; null before any arrival. Never decreases. */
+  /**
+   * The sequence to draw now, with a fraction; null before any frame. Never decreases until the stream
+   * starts again.
+   */
   position(now: number): number | null {
     const n = this.arrivals.length;
-    if (n === 0) return null;
+    if (n === 0) return Number.isFinite(this.shown) ? this.shown : null;
     const perMs = this.rate / 1000;
     let sum = 0;
     for (const { sequence, at } of this.arrivals) sum += sequence - perMs * at;
     const line = sum / n + perMs * (now - this.latencyMs);
-    const newest = this.arrivals[n - 1].sequence;
-    this.shown = Math.min(newest, Math.max(this.shown, line));
+    this.shown = Math.min(this.newest, Math.max(this.shown, line));
     return this.shown;
   }
 
   reset(): void {
     this.arrivals = [];
     this.shown = -Infinity;
+    this.newest = -Infinity;
   }
 }

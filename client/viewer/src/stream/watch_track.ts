@@ -236,6 +236,7 @@ export class WatchTrack implements Track {
       this.counts.dropped += Number(watched.dropped);
       if (watched.oldestSequence > 0n) this.serverOldest = Number(watched.oldestSequence);
       if (sequence > this.historyEnd) this.clock.arrived(sequence, now);
+      else this.clock.passed(sequence);
     }
     const keepFrom = this.player.mode === 'live' ? Infinity : this.player.sequence ?? Infinity;
     const parse = () => parseWatchedFrame(message);
