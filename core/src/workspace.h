@@ -12,8 +12,10 @@
 #include "field/field.h"
 #include "filter/noise_filter.h"
 #include "frame/distinct_ids.h"
+#include "frame/scale.h"
 #include "frame/slab.h"
 #include "frame/spacing.h"
+#include "frame_lengths.h"
 #include "identities/identities.h"
 #include "mesh/mesh.h"
 #include "normals/normals.h"
@@ -21,6 +23,7 @@
 #include "partiemc/state.h"
 #include "partiemc/surface_reconstructor.h"
 #include "periodic/lift.h"
+#include "phases/phases.h"
 #include "rings/body_choice.h"
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
@@ -32,6 +35,13 @@ namespace partiemc {
 struct NextState {
   bool is_kept = false;  // False: the stream keeps its old state.
   State state;
+};
+
+// The outline that was reconstructed last.
+struct LastOutline {
+  Frame frame;                     // Its particles.
+  std::optional<Lengths> lengths;  // Empty if it has no rings.
+  Scale scale;
 };
 
 struct Workspace::Buffers {
@@ -60,6 +70,10 @@ struct Workspace::Buffers {
   AttributeScratch attribute_scratch;
   std::vector<AttributeValues> node_attributes;  // At the nodes around interior cells.
   std::vector<NextState> next_states;            // By outline: the main one, then the sections.
+  LastOutline last;
+  Phases phases;                      // Empty unless sections have phases.
+  std::vector<Attribute> attributes;  // Without that of the phases.
+  PlacedVertices placed_phase;
   SurfaceWorkspace surface;
 };
 

@@ -43,6 +43,7 @@ void Particles::Add(const Particles& others) {
   xy.insert(xy.end(), others.xy.begin(), others.xy.end());
   ids.insert(ids.end(), others.ids.begin(), others.ids.end());
   velocities.insert(velocities.end(), others.velocities.begin(), others.velocities.end());
+  phases.insert(phases.end(), others.phases.begin(), others.phases.end());
 }
 
 Frame Particles::AsFrame() const {
@@ -51,6 +52,9 @@ Frame Particles::AsFrame() const {
   frame.volumes = volumes;
   frame.ids = ids;
   frame.velocities = velocities;
+  attributes.clear();
+  if (!phases.empty()) attributes.push_back({.name = "phase", .values = phases});
+  frame.attributes = attributes;
   frame.time = time;
   return frame;
 }
@@ -210,6 +214,7 @@ Particles Permuted(const Particles& particles, Random& random) {
     permuted.Add(particles.x(k), particles.y(k));
     if (!particles.volumes.empty()) permuted.volumes.push_back(particles.volumes[k]);
     if (!particles.ids.empty()) permuted.ids.push_back(particles.ids[k]);
+    if (!particles.phases.empty()) permuted.phases.push_back(particles.phases[k]);
     if (!particles.velocities.empty()) {
       permuted.velocities.push_back(particles.velocities[2 * k]);
       permuted.velocities.push_back(particles.velocities[2 * k + 1]);
@@ -224,6 +229,7 @@ Particles WithDuplicates(Particles particles, Random& random, std::size_t count)
     const std::size_t source = random.Below(originals);
     particles.Add(particles.x(source), particles.y(source));
     if (!particles.volumes.empty()) particles.volumes.push_back(particles.volumes[source]);
+    if (!particles.phases.empty()) particles.phases.push_back(particles.phases[source]);
   }
   return particles;
 }

@@ -16,6 +16,7 @@ struct Particles {
   std::vector<float> volumes;      ///< Empty, or one per particle.
   std::vector<std::uint64_t> ids;  ///< Empty, or one per particle.
   std::vector<float> velocities;   ///< Empty, or x, y per particle.
+  std::vector<float> phases;       ///< Empty, or one per particle: the attribute "phase".
   double time = 0;
 
   std::size_t size() const { return xy.size() / 2; }
@@ -25,10 +26,12 @@ struct Particles {
     xy.push_back(px);
     xy.push_back(py);
   }
-  /// Adds particles with their ids and velocities.
+  /// Adds particles with their ids, velocities and phases.
   void Add(const Particles& others);
   /// A view; valid while this object exists and does not change.
   Frame AsFrame() const;
+
+  mutable std::vector<Attribute> attributes;  ///< Set by AsFrame.
 };
 
 // Shapes filled with particles at the nodes of a lattice of spacing 1, unless stated otherwise.

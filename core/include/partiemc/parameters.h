@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -69,12 +70,18 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// A further outline of the same particles. All other parameters are those of the stream.
+/// A further outline of the same particles. All other parameters are those of the stream. At most
+/// one of its members is present, except that an isovalue may have a slice.
 struct Section {
   /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
   /// present only if the stream has a slice.
   std::optional<SlicePlane> slice = std::nullopt;
   std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
+  /// The outline of the particles of this phase (`phase_attribute`, core/PHASES.md). Sections with
+  /// phases divide the outline of the stream: two phases share the points of their interface. Phases
+  /// that no section has are one more phase. Requires Placement::kVirtualPlane; excludes surfaces,
+  /// a slice, an isovalue and `box`. Distinct.
+  std::optional<std::int32_t> phase = std::nullopt;
 
   friend bool operator==(const Section&, const Section&) = default;
 };
@@ -212,6 +219,10 @@ struct ReconstructionParameters {
   /// Further outlines of each frame (Result::sections), at most 16. Each section costs as much as
   /// another frame, except that the input is checked only once.
   std::vector<Section> sections = {};
+
+  /// The attribute of the particles (Frame::attributes) that holds their phases, such as a type: one
+  /// whole number each. Frames of a stream with Section::phase must have it. It is not interpolated.
+  std::string phase_attribute = "phase";
 
   SurfaceOptions surface = {};
 

@@ -36,8 +36,13 @@ class Buckets {
 class Interpolation {
  public:
   Interpolation(const Frame& frame, const ParticleBins& bins, const Scale& scale,
-                AttributeScratch& scratch)
-      : frame_(frame), bins_(bins), scale_(scale), scratch_(scratch), buckets_(scale.reach) {}
+                const ParticleSubset& subset, AttributeScratch& scratch)
+      : frame_(frame),
+        bins_(bins),
+        scale_(scale),
+        subset_(subset),
+        scratch_(scratch),
+        buckets_(scale.reach) {}
 
   void FindTiles(std::span<const double> vertices) {
     const TileDirectory& directory = bins_.tiles;
@@ -170,6 +175,7 @@ class Interpolation {
       ForEachAround(
           tile, point, SizeAt(tile, point),
           [&](const CarryingParticle& particle, double weight, double dx, double dy, double dz) {
+            if (!subset_.Contains(particle.source)) return;
             fit.Add(weight, dx, dy, dz);
             carried.Add(frame_.attributes, particle.source, weight, dx, dy, dz);
           });
@@ -180,6 +186,7 @@ class Interpolation {
   const Frame& frame_;
   const ParticleBins& bins_;
   const Scale& scale_;
+  const ParticleSubset& subset_;
   AttributeScratch& scratch_;
   const Buckets buckets_;
 };
@@ -193,9 +200,9 @@ std::span<const double> VerticesOf(const Rings& rings, const Mesh& mesh) {
 
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
                            std::span<const double> vertices, AttributeScratch& scratch,
-                           std::vector<AttributeValues>& values) {
+                           std::vector<AttributeValues>& values, const ParticleSubset& subset) {
   ResizeValues(frame.attributes, vertices.size() / 2, values);
-  Interpolation interpolation(frame, bins, scale, scratch);
+  Interpolation interpolation(frame, bins, scale, subset, scratch);
   interpolation.FindTiles(vertices);
   interpolation.SortParticles();
   interpolation.At(vertices, values);

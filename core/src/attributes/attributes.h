@@ -30,9 +30,19 @@ struct AttributeScratch {
   std::vector<CarryingParticle> particles;
 };
 
-/// Interpolates the attributes of the particles to `vertices`, interleaved, in world units.
-/// `values` receives one entry for each attribute of `frame`, in the same order, and reuses its
-/// buffers.
+/// Particles with one label.
+struct ParticleSubset {
+  std::span<const std::uint8_t> labels;  ///< By particle of the frame; empty: all particles.
+  std::uint8_t label = 0;
+
+  bool Contains(std::uint32_t particle) const {
+    return labels.empty() || labels[particle] == label;
+  }
+};
+
+/// Interpolates the attributes of the particles of a subset to `vertices`, interleaved, in world
+/// units. `values` receives one entry for each attribute of `frame`, in the same order, and reuses
+/// its buffers.
 ///
 /// Fits a plane (attribute over x and y, in a slice also over the height) to the particles within
 /// the kernel radius, and evaluates the plane at the vertex. The fit is a least-squares fit with
@@ -48,7 +58,7 @@ struct AttributeScratch {
 /// kernel radius of each vertex.
 void InterpolateAttributes(const Frame& frame, const ParticleBins& bins, const Scale& scale,
                            std::span<const double> vertices, AttributeScratch& scratch,
-                           std::vector<AttributeValues>& values);
+                           std::vector<AttributeValues>& values, const ParticleSubset& subset = {});
 
 /// The vertices that attributes are interpolated to: the points of the rings, then the other points
 /// of the mesh.

@@ -180,6 +180,15 @@ void MarkInteriorCells(const TileDirectory& directory, Crossings& crossings) {
   });
 }
 
+void JoinSaddle(Crossings& crossings, std::uint32_t cell) {
+  ActiveCell& saddle = crossings.cells[cell];
+  saddle.joined = 1;
+  std::uint32_t segment = saddle.first_segment;
+  for (const EdgePair& pair : kSaddles[saddle.corners == 10][1]) {
+    crossings.segments[segment++] = {cell, pair.entry, pair.exit};
+  }
+}
+
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place) {
   const TileBits& bits = crossings.tiles[place.tile];
   const std::uint32_t before = (std::uint32_t{1} << place.i) - 1;

@@ -80,6 +80,9 @@ struct NodeRows {
 NodeRows InsideRows(const TileDirectory& directory, const std::vector<TileBits>& tiles,
                     std::uint32_t tile);
 
+/// Joins the inside corners of a saddle, which must not be joined yet.
+void JoinSaddle(Crossings& crossings, std::uint32_t cell);
+
 /// Index of an active cell. Requires: the cell is active.
 std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
 

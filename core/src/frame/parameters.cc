@@ -77,6 +77,30 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
                     "must be in [0.01, 10]: the density is about 1 inside of bodies");
 }
 
+// Checks that nothing excludes the phase of a section.
+absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) {
+  const Section& of = p.sections[section];
+  const auto refused = [&](const std::string& rule) {
+    return Refused(absl::StrCat("sections[", section, "].phase"), absl::StrCat(*of.phase), rule);
+  };
+  if (p.output == Output::kSurface) return refused("must be absent for a surface");
+  if (p.slice || of.slice) return refused("must be absent with a slice");
+  if (p.isovalue || of.isovalue) return refused("must be absent with an isovalue");
+  if (p.box) return refused("must be absent with a periodic box");
+  if (p.placement != Placement::kVirtualPlane) {
+    return refused("must be absent unless the placement is virtual-plane");
+  }
+  if (p.phase_attribute.empty()) {
+    return Refused("phase_attribute", "empty", "must name an attribute: a section has a phase");
+  }
+  for (std::size_t k = 0; k < section; ++k) {
+    if (p.sections[k].phase == of.phase) {
+      return refused(absl::StrCat("must differ from sections[", k, "].phase"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 // Checks slices, isovalues and sections, and the parameters that these require.
 absl::Status CheckOutlines(const ReconstructionParameters& p) {
   bool is_isoline = p.isovalue.has_value();
@@ -102,6 +126,9 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     }
     if (section.slice) {
       if (auto status = CheckSlice(of, *section.slice); !status.ok()) return status;
+    }
+    if (section.phase) {
+      if (auto status = CheckPhase(p, k); !status.ok()) return status;
     }
     if (section.isovalue) {
       is_isoline = true;

@@ -1,5 +1,8 @@
 #include "vertices/placement.h"
 
+#include <cmath>
+#include <span>
+
 namespace partiemc {
 namespace {
 
@@ -8,7 +11,19 @@ int CornerOf(const Segment& segment) {
   return ((segment.entry + 1) & 3) == segment.exit ? segment.exit : segment.entry;
 }
 
+// Coordinates closer to an axis than this, in cells, become 0. A tiny offset could otherwise move a
+// vertex from 0 into the range where the predicates (predicates.h) are not exact.
+constexpr double kAxisReach = 0x1p-96;
+
 }  // namespace
+
+void SnapToAxes(double cell_size, std::span<double> coordinates) {
+  const double reach = kAxisReach * cell_size;
+  for (double& coordinate : coordinates) {
+    const bool is_near = (coordinate != 0) & (std::abs(coordinate) < reach);
+    coordinate = is_near ? 0 : coordinate;  // An unconditional store allows vectorisation.
+  }
+}
 
 Point ClampToHalf(const Segment& segment, Point point) {
   auto [u, v] = point;

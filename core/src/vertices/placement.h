@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 
 #include "vertices/vertices.h"
 
@@ -10,6 +11,10 @@ namespace partiemc {
 /// Distance between clamped vertices and the sides of their cells, in cells. With this distance,
 /// rounding to world coordinates neither joins neighbouring vertices nor moves one across a side.
 inline constexpr double kCellMargin = 1.0 / 1024;
+
+/// Sets coordinates, in world units, that are closer to an axis than 2^-96 cells to 0: predicates.h
+/// is not exact for tiny ones.
+void SnapToAxes(double cell_size, std::span<double> coordinates);
 
 /// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates
 /// are relative to the cell.

@@ -16,18 +16,6 @@
 namespace partiemc {
 namespace {
 
-// Coordinates closer to an axis than this, in cells, become 0. A tiny offset could otherwise move a
-// vertex from 0 into the range where the predicates (predicates.h) are not exact.
-constexpr double kAxisReach = 0x1p-96;
-
-void SnapToAxes(double cell_size, std::span<double> coordinates) {
-  const double reach = kAxisReach * cell_size;
-  for (double& coordinate : coordinates) {
-    const bool is_near = (coordinate != 0) & (std::abs(coordinate) < reach);
-    coordinate = is_near ? 0 : coordinate;  // An unconditional store allows vectorisation.
-  }
-}
-
 void Store(Point point, double cell_size, double* target) {
   target[0] = point.x * cell_size;
   target[1] = point.y * cell_size;

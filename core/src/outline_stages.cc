@@ -1,0 +1,342 @@
+#include "outline_stages.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "bins/cell_mask.h"
+#include "field/slice_field.h"
+#include "frame/frame_view.h"
+#include "frame/in_stage.h"
+#include "frame/placement_traits.h"
+#include "frame_lengths.h"
+#include "mesh/touched_cells.h"
+#include "workspace_bytes.h"
+
+namespace partiemc {
+namespace {
+
+void SumMeasures(const Rings& rings, FrameStatistics& statistics) {
+  for (const RingMeasures& measures : rings.measures) {
+    statistics.area += measures.area;
+    statistics.perimeter += measures.perimeter;
+  }
+}
+
+// Fills in the statistics that no stage sets.
+void Summarise(const Workspace::Buffers& b, Result& result) {
+  FrameStatistics& statistics = result.statistics;
+  statistics.tiles = b.bins.tiles.size();
+  statistics.active_cells = b.crossings.cells.size();
+  statistics.dropped_holes = b.topology.dropped_holes;
+  statistics.dropped_components = b.topology.dropped_components;
+  statistics.dropped_spray = b.topology.dropped_spray;
+  SumMeasures(result.rings, statistics);
+}
+
+void ClearIdentities(Rings& rings) {
+  for (RingMeasures& measures : rings.measures) measures.identity = 0;
+  rings.parents.clear();
+  rings.parent_offsets.assign(1, 0);
+}
+
+std::uint64_t AttributeValuesOf(const Frame& frame) {
+  std::uint64_t values = 0;
+  for (const Attribute& attribute : frame.attributes) values += attribute.components;
+  return values;
+}
+
+// Requires: segments are known.
+FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
+                 const Workspace::Buffers& b) {
+  FrameSize size{.particles = frame.ParticleCount(),
+                 .tiles = b.bins.tiles.size(),
+                 .segments = b.topology.segments.size(),
+                 .attribute_values = AttributeValuesOf(frame)};
+  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
+  if (HasBlocks(parameters) && size.attribute_values > 0) {
+    size.block_cells = CountCells(b.crossings.interior);
+    size.block_tiles =
+        b.crossings.interior.size() - std::ranges::count_if(b.crossings.interior, IsEmpty);
+  }
+  return size;
+}
+
+// Stage 1 of a frame that has passed CheckFrame. Sets `seen` to the particles that the later stages
+// use: the frame, or the slab around a slice. `lengths` stays empty if the particles give no
+// estimate of the spacing. Errors: see Reconstruct.
+absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame& seen,
+                           std::optional<Lengths>& lengths, Scale& scale,
+                           FrameStatistics& statistics) {
+  const ReconstructionParameters& parameters = task.parameters;
+  const Frame& frame = task.frame;
+  seen = frame;
+  statistics.particles = frame.ParticleCount();
+  if (task.prepared != nullptr) {
+    lengths = task.prepared->lengths;
+    statistics.doubts = task.prepared->doubts;
+    statistics.particles = task.prepared->lifted.particles;
+  } else {
+    auto decided = DecideLengths(parameters, frame, task.previous, b.spacing);
+    if (!decided.ok()) return decided.status();
+    lengths = *decided;
+  }
+  if (!lengths) {
+    if (frame.ParticleCount() > 0) statistics.doubts.Add(Doubt::kSpacingProvisional);
+    return absl::OkStatus();
+  }
+  statistics.spacing = lengths->spacing;
+  statistics.cell_size = lengths->cell_size;
+  const double spacing = lengths->spacing;
+  const double usual = parameters.slice ? spacing * spacing * spacing : spacing * spacing;
+  absl::Status status;
+  if (parameters.sizes == Sizes::kOwn) {
+    const auto sizes = RangeOfSizes(frame, parameters.kernel_radius, *lengths);
+    if (!sizes.ok()) return sizes.status();
+    scale = MakeScale(parameters, spacing, lengths->cell_size, usual, *sizes);
+  } else {
+    const auto lightest = LightestVolume(frame, usual, statistics.doubts);
+    if (!lightest.ok()) return lightest.status();
+    scale = MakeScale(parameters, spacing, lengths->cell_size, *lightest);
+  }
+  if (parameters.slice) {
+    b.slab.Take(frame, *parameters.slice, parameters.kernel_radius * spacing);
+    seen = b.slab.AsFrame();
+  }
+  status = BinParticles(seen, parameters.plane, scale, task.limits, b.bins);
+  if (!status.ok()) return status;
+  if (parameters.slice) SetHeights(b.slab.heights(), scale, b.bins);
+  return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
+}
+
+// Runs the stages field, crossings and rings.
+void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& b) {
+  StageObserver* const observer = task.observer;
+  InStage(observer, Stage::kField, [&] {
+    scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
+                   : SampleField(b.bins, scale, b.level_set);
+  });
+  InStage(observer, Stage::kCrossings,
+          [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
+  InStage(observer, Stage::kRings, [&] {
+    TraceRings(b.bins, b.level_set, scale, task.parameters, b.crossings, b.ring_scratch, b.topology,
+               task.HasCopies());
+  });
+}
+
+// Rings to be filled with triangles.
+struct FillTask {
+  const OutlineTask& outline;
+  const Frame& frame;
+  const Scale& scale;
+  const Crossings& crossings;
+  const RingTopology& topology;
+  const PlacedVertices& placed;
+  ParticleSubset particles;  // Those inside.
+};
+
+// Runs the stages mesh and attributes for `result.rings`. Requires: the sorted attributes are those
+// of the frame, or none. Errors: INTERNAL if BuildMesh fails, which is a bug.
+absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& result) {
+  const ReconstructionParameters& parameters = task.outline.parameters;
+  const Frame& frame = task.frame;
+  StageObserver* const observer = task.outline.observer;
+  const auto at_points = [&](std::span<const double> points) -> std::span<const AttributeValues> {
+    InterpolateAttributes(frame, b.bins, task.scale, points, b.attribute_scratch, b.node_attributes,
+                          task.particles);
+    return b.node_attributes;
+  };
+  const AttributeSource attributes = {.frame = frame,
+                                      .bins = b.bins,
+                                      .at_points = at_points,
+                                      .tolerance = parameters.attribute_tolerance};
+  const bool has_blocks = HasBlocks(parameters) && !frame.attributes.empty();
+  const bool is_filled = InStage(observer, Stage::kMesh, [&] {
+    return BuildMesh({b.bins.tiles, task.crossings, task.topology, b.planes, task.placed,
+                      result.rings, parameters, task.scale, has_blocks ? &attributes : nullptr},
+                     b.mesh_scratch, result.mesh, result.statistics);
+  });
+  if (!is_filled) return absl::InternalError("rings cannot be triangulated");
+  if (frame.attributes.empty()) return absl::OkStatus();
+  InStage(observer, Stage::kAttributes, [&] {
+    InterpolateAttributes(frame, b.bins, task.scale, VerticesOf(result.rings, result.mesh),
+                          b.attribute_scratch, result.attributes, task.particles);
+  });
+  return absl::OkStatus();
+}
+
+// Divides the outline among the phases. Errors: INTERNAL if RepairPhases fails, which is a bug.
+absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Scale& scale,
+                          Workspace::Buffers& b, Rings& rings) {
+  const bool is_divided = InStage(task.observer, Stage::kVertices, [&] {
+    return PlacePhases({frame, task.parameters, task.variant, scale, b.bins, b.crossings,
+                        b.topology, b.vertex_scratch.vertices},
+                       b.placed, b.phases, rings);
+  });
+  if (is_divided) return absl::OkStatus();
+  return absl::InternalError("outlines of phases cross although every point is at its root");
+}
+
+// Keeps the next state of an outline, unless its lengths are provisional: then its rings lose their
+// identities, because no next frame could continue them.
+void KeepState(const Lengths& lengths, Workspace::Buffers& b, NextState& next, Result& result) {
+  if (lengths.is_provisional) {
+    ClearIdentities(result.rings);
+    return;
+  }
+  next.is_kept = true;
+  next.state.cell_size = lengths.cell_size;
+  next.state.spacing = lengths.spacing;
+  std::swap(next.state.history, b.next_history);
+}
+
+// Runs the stages from normals to attributes. Errors: INTERNAL if RepairRings, RepairPhases or
+// BuildMesh fails, which is a bug; their comments explain why no input should cause it.
+absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
+                         Workspace::Buffers& b, Result& result) {
+  const ReconstructionParameters& parameters = task.parameters;
+  const State& previous = task.previous;
+  StageObserver* const observer = task.observer;
+  InStage(observer, Stage::kNormals, [&] {
+    const PlacementTraits& traits = TraitsOf(parameters.placement);
+    b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
+                    traits.takes_particles);
+    // In a periodic box, a body may have changed its image since the last frame.
+    const bool is_lifted = task.prepared != nullptr && task.prepared->is_lifted;
+    const auto known =
+        is_lifted ? std::span<const CellNormal>() : std::span<const CellNormal>(previous.normals);
+    EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
+                    b.normal_scratch, b.planes, b.next_normals);
+  });
+  const bool percolates = task.HasCopies();
+  Percolation percolation;
+  if (percolates) {
+    const Prepared& prepared = *task.prepared;
+    ChooseBodies({.lifted = prepared.lifted,
+                  .window = prepared.window,
+                  .reach = prepared.reach,
+                  .parameters = parameters,
+                  .spacing = scale.spacing * scale.cell_size,
+                  .cell_size = scale.cell_size,
+                  .bins = b.bins,
+                  .crossings = b.crossings},
+                 b.choice, b.topology);
+    percolation = {prepared.window, static_cast<std::uint32_t>(prepared.lifted.particles),
+                   b.choice.fates, b.choice.bodies};
+  }
+  const bool is_placed = InStage(observer, Stage::kVertices, [&] {
+    b.next_area_offset = previous.area_offset;
+    return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
+                          parameters, task.variant, scale, percolates ? &percolation : nullptr},
+                         b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
+  });
+  if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
+  result.statistics.self_intersections = b.placed.self_intersections;
+  if (HasPhases(parameters)) {
+    if (absl::Status status = DividePhases(task, frame, scale, b, result.rings); !status.ok()) {
+      return status;
+    }
+  }
+  if (percolates) RemoveGoneRings(percolation, b.topology, b.placed, result.rings);
+  InStage(observer, Stage::kIdentities, [&] {
+    ContinueRings(
+        {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size,
+         PeriodsOf(parameters, frame, scale.cell_size), percolates ? &percolation : nullptr},
+        previous.history, b.identity_scratch, b.next_history, result.rings);
+  });
+  if (percolates) {
+    const double spacing = scale.spacing * scale.cell_size;
+    if (TraitsOf(parameters.placement).refines) {
+      // Rings may have moved away from cells that they pass only outside of the window.
+      ExcludeTouchedCells(b.bins.tiles, result.rings.points, result.rings.offsets, b.placed.roots,
+                          scale.cell_size, b.crossings.interior);
+    }
+    if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings,
+                  result.statistics.cut_bodies)) {
+      return absl::InternalError("rings cannot be cut at the faces of the box");
+    }
+    ClearOutside(percolation, b.bins.tiles, b.topology.components, scale.cell_size, b.crossings);
+  }
+  b.attribute_scratch.sorted.clear();
+  return FillRings({task, frame, scale, b.crossings, b.topology, b.placed, {}}, b, result);
+}
+
+}  // namespace
+
+absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Workspace::Buffers& b,
+                                NextState& next, Result& result) {
+  const ReconstructionParameters& parameters = task.parameters;
+  StageObserver* const observer = task.observer;
+  Frame seen;
+  std::optional<Lengths> lengths;
+  Scale scale;
+  next.is_kept = false;
+  b.last.lengths.reset();
+  absl::Status status = InStage(observer, Stage::kBins, [&] {
+    absl::Status checked = task.is_first
+                               ? CheckFrame(task.frame, parameters, task.limits, b.distinct_ids)
+                               : absl::OkStatus();
+    return checked.ok() ? SortParticles(task, b, seen, lengths, scale, result.statistics) : checked;
+  });
+  if (!status.ok() || !lengths) return status;
+  status = memory.ReserveOutline({.particles = seen.ParticleCount(),
+                                  .tiles = b.bins.tiles.size(),
+                                  .attribute_values = AttributeValuesOf(seen)});
+  if (!status.ok()) return status;
+  FindRings(task, scale, b);
+  FrameSize size = SizeOf(parameters, seen, b);
+  if (task.HasCopies()) size.cut_segments = size.segments;
+  status = memory.ReserveOutline(size);
+  if (!status.ok()) return status;
+  status = FillOutline(task, seen, scale, b, result);
+  if (!status.ok()) return status;
+  Summarise(b, result);
+  b.last = {seen, lengths, scale};
+  next.state.area_offset = b.next_area_offset;
+  std::swap(next.state.normals, b.next_normals);
+  KeepState(*lengths, b, next, result);
+  return absl::OkStatus();
+}
+
+absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMemory& memory,
+                              Workspace::Buffers& b, NextState& next, Result& result) {
+  next.is_kept = false;
+  const LastOutline& last = b.last;
+  result.statistics.particles = task.frame.ParticleCount();
+  if (!last.lengths) return absl::OkStatus();
+  const PhaseRings& phase = b.phases.rings[label - 1u];
+  absl::Status status = memory.ReserveOutline({.tiles = b.bins.tiles.size(),
+                                               .segments = phase.points.size(),
+                                               .grid_cells = CountCells(phase.crossings.interior),
+                                               .attribute_values = AttributeValuesOf(last.frame)});
+  if (!status.ok()) return status;
+  WritePhaseRings(b.phases, label, b.placed_phase, result.rings);
+  InStage(task.observer, Stage::kIdentities, [&] {
+    ContinueRings({last.frame, task.parameters.plane, b.bins, phase.crossings, phase.topology,
+                   b.placed_phase, last.scale.cell_size},
+                  task.previous.history, b.identity_scratch, b.next_history, result.rings);
+  });
+  status = FillRings({task,
+                      last.frame,
+                      last.scale,
+                      phase.crossings,
+                      phase.topology,
+                      b.placed_phase,
+                      {b.phases.labels, label}},
+                     b, result);
+  if (!status.ok()) return status;
+  FrameStatistics& statistics = result.statistics;
+  statistics.particles = std::ranges::count(b.phases.labels, label);
+  statistics.tiles = b.bins.tiles.size();
+  statistics.active_cells = phase.crossings.cells.size();
+  statistics.spacing = last.lengths->spacing;
+  statistics.cell_size = last.lengths->cell_size;
+  SumMeasures(result.rings, statistics);
+  KeepState(*last.lengths, b, next, result);
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

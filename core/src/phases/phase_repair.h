@@ -1,0 +1,37 @@
+// Repairs the outlines of a body and of its phases, which share points.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "partiemc/result.h"
+#include "phases/phase_rings.h"
+#include "vertices/intersections.h"
+#include "vertices/ring_depths.h"
+
+namespace partiemc {
+
+/// Warm buffers of RepairPhases.
+struct PhaseRepairScratch {
+  TouchingPairsBuffers pairs;
+  RingDepths depths;
+  std::vector<double> gathered;         // Points of one outline.
+  std::vector<std::uint8_t> is_marked;  // By shared point.
+};
+
+/// Moves shared points back to their roots until the rings of the body, and those of each phase,
+/// are simple, do not touch and are nested by their topologies. Then no two phases overlap and none
+/// leaves the body: around any point, the winding numbers of the phases sum up to that of the body,
+/// because arcs between two phases cancel.
+///
+/// Points that touch return half way, from the fifth round on all the way; an outline with
+/// misplaced rings returns as a whole; after 24 rounds all points return. `points`, `roots`:
+/// interleaved, in world units. Returns false if outlines cross with all points at their roots,
+/// which is a bug (core/PHASES.md, "Why phases do not overlap"). Cost: for each round and outline
+/// as CountTouchingPairs and RingDepths.
+[[nodiscard]] bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
+                                std::span<const double> roots, PhaseRepairScratch& scratch,
+                                std::span<double> points);
+
+}  // namespace partiemc

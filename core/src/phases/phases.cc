@@ -1,0 +1,176 @@
+#include "phases/phases.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/internal/research.h"
+#include "frame/frame_view.h"
+#include "partiemc/status.h"
+#include "vertices/measure.h"
+#include "vertices/placement.h"
+
+namespace partiemc {
+namespace {
+
+// Interfaces move by at most this number of spacings to match areas.
+constexpr double kAreaLimit = .5;
+
+// Copies the vertices of the body to the shared points.
+void TakeBody(const PlacedVertices& placed, const Rings& body, double cell_size,
+              SharedPoints& points) {
+  const std::size_t count = body.PointCount();
+  points.position.resize(count);
+  points.anchor.resize(count);
+  points.normal.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Point at = PointAt(body.points, k), root = PointAt(placed.roots, k);
+    points.position[k] = {at.x / cell_size, at.y / cell_size};
+    points.anchor[k] = {root.x / cell_size, root.y / cell_size};
+    points.normal[k] = {body.normals[2 * k], body.normals[2 * k + 1]};
+  }
+}
+
+// Points in world units. Vertices of the body that are no contact keep their bits.
+void ToWorld(const PlacedVertices& placed, const Rings& body, double cell_size, Phases& p) {
+  const auto convert = [&](const std::vector<Point>& from, std::span<const double> of_body,
+                           std::vector<double>& to) {
+    to.assign(of_body.begin(), of_body.end());
+    to.resize(2 * from.size());
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      const bool moves = k >= of_body.size() / 2 ||
+                         (&from == &p.points.position && p.junctions.is_contact[k] != 0);
+      if (!moves) continue;
+      to[2 * k] = from[k].x * cell_size;
+      to[2 * k + 1] = from[k].y * cell_size;
+    }
+    SnapToAxes(cell_size, to);
+  };
+  convert(p.points.position, body.points, p.world);
+  convert(p.points.anchor, placed.roots, p.world_roots);
+}
+
+// The direction to the right of the chord from the point before to the point after.
+VertexNormal ChordNormal(std::span<const double> world, std::span<const std::uint32_t> ring,
+                         std::size_t k) {
+  const Point from = PointAt(world, ring[k == 0 ? ring.size() - 1 : k - 1]);
+  const Point to = PointAt(world, ring[k + 1 == ring.size() ? 0 : k + 1]);
+  const double x = to.y - from.y, y = from.x - to.x, length = std::sqrt(x * x + y * y);
+  if (!(length > 0)) return {1, 0};
+  return {static_cast<float>(x / length), static_cast<float>(y / length)};
+}
+
+}  // namespace
+
+bool HasPhases(const ReconstructionParameters& parameters) {
+  return std::ranges::any_of(parameters.sections,
+                             [](const Section& section) { return section.phase.has_value(); });
+}
+
+absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters, Phases& p,
+                        std::vector<Attribute>& others) {
+  p.known.clear();
+  for (const Section& section : parameters.sections) {
+    if (section.phase) p.known.push_back(static_cast<float>(*section.phase));
+  }
+  others.clear();
+  p.labels.clear();
+  const std::size_t count = frame.ParticleCount();
+  bool is_found = count == 0;
+  for (const Attribute& attribute : frame.attributes) {
+    if (attribute.name != parameters.phase_attribute) {
+      others.push_back(attribute);
+      continue;
+    }
+    if (attribute.components != 1 || attribute.values.size() != count) {
+      return InvalidFrame(kReasonCount, "attributes[" + std::string(attribute.name) + "]",
+                          absl::StrCat(attribute.values.size(), " values"),
+                          absl::StrCat("must be one per particle (", count, "): its phase"));
+    }
+    is_found = true;
+    for (const float value : attribute.values) {
+      const auto at = std::ranges::find(p.known, value);
+      p.labels.push_back(static_cast<PhaseLabel>(at - p.known.begin() + 1));
+    }
+  }
+  if (is_found) return absl::OkStatus();
+  return InvalidFrame(kReasonNoSuchAttribute, "attributes", parameters.phase_attribute,
+                      "must be an attribute of the frame: the phases of its particles");
+}
+
+bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& p, Rings& body) {
+  const TileDirectory& directory = input.bins.tiles;
+  p.field.Build(input.bins, input.scale, p.labels);
+  p.map.Build(directory, input.crossings, p.field);
+  const BodyOutline outline{input.crossings, input.topology, placed, input.vertices};
+  p.vertices.Build(outline);
+  p.numbers.edges = static_cast<std::uint32_t>(body.PointCount());
+  p.numbers.cells = p.numbers.edges + static_cast<std::uint32_t>(p.map.edges.size());
+  p.rings.resize(p.known.size() + 1);  // The last one: phases that no section has.
+  for (std::size_t k = 0; k < p.rings.size(); ++k) {
+    TracePhase(input.bins, input.scale, input.parameters, p.map, outline, p.vertices, p.numbers,
+               static_cast<PhaseLabel>(k + 1), p.trace, p.rings[k]);
+  }
+  TakeBody(placed, body, input.scale.cell_size, p.points);
+  FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
+  CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
+  SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
+  MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+  SumRegions(input.bins, input.scale, p.field, p.labels, p.map, p.rings, p.areas);
+  if (input.parameters.spacing.has_value() || !input.frame.volumes.empty()) {
+    MatchPhaseAreas(p.rings, p.interfaces, kAreaLimit * input.scale.spacing, p.areas, p.points);
+    MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+  }
+  ToWorld(placed, body, input.scale.cell_size, p);
+  if (!RepairPhases(body, p.rings, p.world_roots, p.repair, p.world)) return false;
+  std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
+  p.particle_counts.clear();
+  for (const RingMeasures& of : body.measures) p.particle_counts.push_back(of.particle_count);
+  MeasureRings(body);
+  for (std::size_t k = 0; k < body.RingCount(); ++k) {
+    body.measures[k].particle_count = p.particle_counts[k];
+  }
+  return true;
+}
+
+void WritePhaseRings(const Phases& p, PhaseLabel label, PlacedVertices& placed, Rings& rings) {
+  const PhaseRings& phase = p.rings[label - 1u];
+  rings.Clear();
+  rings.offsets = phase.offsets;
+  rings.outer_of = phase.topology.outer_of;
+  placed.roots.clear();
+  for (std::size_t ring = 0; ring < phase.RingCount(); ++ring) {
+    const std::span<const std::uint32_t> points = phase.RingPoints(ring);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const std::size_t point = points[k];
+      rings.points.insert(rings.points.end(), &p.world[2 * point], &p.world[2 * point] + 2);
+      placed.roots.insert(placed.roots.end(), &p.world_roots[2 * point],
+                          &p.world_roots[2 * point] + 2);
+      VertexNormal normal = ChordNormal(p.world, points, k);
+      if (p.numbers.IsBody(points[k])) {
+        normal = p.points.normal[point];
+      } else if (p.numbers.IsEdge(points[k])) {
+        const PhaseEdge& edge = p.map.edges[point - p.numbers.edges];
+        const float sign = label == std::min(edge.from, edge.to) ? 1.0F : -1.0F;
+        normal = {sign * p.points.normal[point].x, sign * p.points.normal[point].y};
+      }
+      rings.normals.insert(rings.normals.end(), {normal.x, normal.y});
+    }
+  }
+  MeasureRings(rings);
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    if (rings.outer_of[ring] != kNoRing) continue;
+    const std::uint32_t region =
+        p.areas.first_region[label - 1u] + phase.topology.component_of_ring[ring];
+    rings.measures[ring].particle_count = p.areas.count[region];
+  }
+  placed.point_of_segment = phase.point_of_segment;
+  placed.kept_as.resize(phase.RingCount());
+  std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
+  placed.group_of_ring.clear();
+  placed.self_intersections = 0;
+}
+
+}  // namespace partiemc

@@ -1,0 +1,75 @@
+// The outlines of the phases of a body (core/PHASES.md).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+#include "partiemc/result.h"
+#include "phases/interfaces.h"
+#include "phases/junctions.h"
+#include "phases/phase_areas.h"
+#include "phases/phase_field.h"
+#include "phases/phase_map.h"
+#include "phases/phase_repair.h"
+#include "phases/phase_rings.h"
+#include "vertices/vertices.h"
+
+namespace partiemc {
+
+/// The phases of a frame, kept warm from frame to frame.
+struct Phases {
+  std::vector<float> known;         ///< By label less one: the phase of the section.
+  std::vector<PhaseLabel> labels;   ///< By particle of the frame.
+  PhaseField field;
+  PhaseMap map;
+  BodyVertices vertices;
+  PointNumbers numbers;
+  std::vector<PhaseRings> rings;  ///< By label less one: the sections' phases, then all others.
+  SharedPoints points;
+  std::vector<double> world, world_roots;      ///< By shared point, interleaved, in world units.
+  std::vector<std::uint64_t> particle_counts;  ///< By ring of the body.
+  Interfaces interfaces;
+  PhaseTraceScratch trace;
+  JunctionScratch junctions;
+  PhaseAreaScratch areas;
+  PhaseRepairScratch repair;
+};
+
+/// Results of the earlier stages for the outline of all particles.
+struct PhaseInput {
+  const Frame& frame;
+  const ReconstructionParameters& parameters;
+  const VirtualPlaneVariant& variant;
+  const Scale& scale;
+  const ParticleBins& bins;
+  const Crossings& crossings;
+  const RingTopology& topology;
+  const RingVertices& vertices;
+};
+
+/// Whether a section of a stream has a phase. The first such section has the label 1, and so on.
+bool HasPhases(const ReconstructionParameters& parameters);
+
+/// Labels the particles of a frame by their phases. Sets `others` to the attributes without that of
+/// the phases. Errors: INVALID_ARGUMENT if the frame has particles, but no such attribute of one
+/// component.
+absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters,
+                        Phases& phases, std::vector<Attribute>& others);
+
+/// Divides the body among the phases. Vertices of `body` where interfaces end move along its rings
+/// (MoveJunctions), and those that the repair needs return to their roots; the rings are then
+/// measured again. Returns false if the repair failed, which is a bug.
+/// Requires: TakePhases; the default placement. Deterministic. Cost: for each phase, linear in tiles; the rest
+/// linear in the points and particles near interfaces.
+[[nodiscard]] bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed,
+                               Phases& phases, Rings& body);
+
+/// Writes the rings of a phase, in world units, without identities, and their placement for the
+/// stages identities and mesh.
+void WritePhaseRings(const Phases& phases, PhaseLabel label, PlacedVertices& placed, Rings& rings);
+
+}  // namespace partiemc

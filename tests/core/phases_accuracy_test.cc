@@ -1,0 +1,189 @@
+// How far interfaces and junctions are from known ones. The test prints the table of
+// core/PHASES.md.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "partiemc/partiemc.h"
+#include "support/phase_scenes.h"
+#include "support/reconstruct.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+using support::PhaseScene;
+using support::Random;
+
+using Distance = std::function<double(double, double)>;
+
+// Scenes have the phases 1 to 3 and are measured away from the outline of the body.
+constexpr double kRadius = 18, kMargin = 3.5;
+
+Distance Reversed(Distance distance) {
+  return [=](double x, double y) { return -distance(x, y); };
+}
+
+// Negative on the left of a line through (x0, y0) at this angle.
+Distance Line(double x0, double y0, double angle) {
+  return
+      [=](double x, double y) { return (x - x0) * std::sin(angle) - (y - y0) * std::cos(angle); };
+}
+
+Distance Both(Distance a, Distance b) {
+  return [=](double x, double y) { return std::max(a(x, y), b(x, y)); };
+}
+
+Distance Drop(double x0, double y0, double radius) {
+  return [=](double x, double y) { return std::hypot(x - x0, y - y0) - radius; };
+}
+
+struct KnownScene {
+  std::string name;
+  PhaseScene scene;
+  Distance interface;                                // Of phase 2.
+  double junction_x, junction_y;                     // Measured unless NaN.
+  double most_at_rest, most_with_noise;              // Bounds of the mean deviation.
+  double most_apart = 0, most_apart_with_noise = 0;  // Bounds of the junction's distance.
+};
+
+PhaseScene TwoPhases(const Distance& second) {
+  return {support::DiscBody(kRadius), {{1, Reversed(second)}, {2, second}}};
+}
+
+std::vector<KnownScene> AllScenes(std::uint64_t seed) {
+  Random random(seed);
+  const double angle = random.Uniform(0, 3), x = random.Uniform(-2, 2), y = random.Uniform(-2, 2);
+  std::vector<KnownScene> scenes;
+  const auto nowhere = std::nan("");
+  const Distance line = Line(x, y, angle);
+  scenes.push_back({"line", TwoPhases(line), line, nowhere, nowhere, .05, .055});
+  const Distance large = Drop(x, y, 9);
+  scenes.push_back({"drop of 254", TwoPhases(large), large, nowhere, nowhere, .05, .055});
+  const Distance small = Drop(x, y, std::sqrt(30 / std::numbers::pi));
+  scenes.push_back({"drop of 30", TwoPhases(small), small, nowhere, nowhere, .06, .065});
+  const double third = 2 * std::numbers::pi / 3;
+  const auto sector = [&](int k) {
+    return Both(Line(x, y, angle + k * third), Reversed(Line(x, y, angle + (k + 1) * third)));
+  };
+  scenes.push_back({"three sectors",
+                    {support::DiscBody(kRadius), {{1, sector(0)}, {2, sector(1)}, {3, sector(2)}}},
+                    sector(1),
+                    x,
+                    y,
+                    .05,
+                    .055,
+                    .1,
+                    .15});
+  // Phase 2 has one half, phases 1 and 3 share the other one.
+  const Distance across = Line(x, y, angle + std::numbers::pi / 2);
+  scenes.push_back({"T",
+                    {support::DiscBody(kRadius),
+                     {{1, Both(Reversed(line), across)},
+                      {2, line},
+                      {3, Both(Reversed(line), Reversed(across))}}},
+                    line,
+                    x,
+                    y,
+                    .05,
+                    .055,
+                    .15,
+                    .2});
+  return scenes;
+}
+
+struct Figures {
+  double deviation = 0, length = 0;
+  double area = 0;      // The largest relative error of a phase's area.
+  double junction = 0;  // Distance of the junction.
+};
+
+// The point at which most phases meet, nearest to (x, y).
+double DistanceOfJunction(const Result& result, double x, double y) {
+  double nearest = 1e300;
+  for (std::size_t k = 0; k < result.sections[0].rings.PointCount(); ++k) {
+    const double px = result.sections[0].rings.points[2 * k];
+    const double py = result.sections[0].rings.points[2 * k + 1];
+    const bool is_shared = std::ranges::all_of(result.sections, [&](const Result& phase) {
+      for (std::size_t j = 0; j < phase.rings.PointCount(); ++j) {
+        if (phase.rings.points[2 * j] == px && phase.rings.points[2 * j + 1] == py) return true;
+      }
+      return false;
+    });
+    if (is_shared) nearest = std::min(nearest, std::hypot(px - x, py - y));
+  }
+  return nearest;
+}
+
+void Measure(const KnownScene& known, double noise, Random& random, Figures& figures) {
+  Particles particles = Filled(known.scene, random);
+  particles.volumes.assign(particles.size(), 1);
+  particles = support::Shaken(particles, random, noise);
+  ReconstructionParameters parameters{.spacing = 1.0};
+  for (const auto& region : known.scene.regions) {
+    parameters.sections.push_back({.phase = region.phase});
+  }
+  const Result result = support::ReconstructOnce(parameters, particles);
+  for (std::size_t k = 0; k < result.sections.size(); ++k) {
+    const auto count =
+        std::ranges::count(particles.phases, static_cast<float>(*parameters.sections[k].phase));
+    const double error = result.sections[k].statistics.area / static_cast<double>(count) - 1;
+    figures.area = std::max(figures.area, std::abs(error));
+  }
+  const Rings& rings = result.sections[1].rings;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const auto points = rings.RingPoints(ring);
+    const std::size_t count = points.size() / 2;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t next = (k + 1) % count;
+      const double x = (points[2 * k] + points[2 * next]) / 2;
+      const double y = (points[2 * k + 1] + points[2 * next + 1]) / 2;
+      if (known.scene.body.distance(x, y) > -kMargin) continue;
+      const double step =
+          std::hypot(points[2 * next] - points[2 * k], points[2 * next + 1] - points[2 * k + 1]);
+      figures.deviation += step * std::abs(known.interface(x, y));
+      figures.length += step;
+    }
+  }
+  if (!std::isnan(known.junction_x)) {
+    figures.junction += DistanceOfJunction(result, known.junction_x, known.junction_y);
+  }
+}
+
+TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
+  constexpr int kSeeds = 8;
+  std::printf("%-14s %8s %8s %8s %8s %10s\n", "", "rest", "area", "noise", "area", "junctions");
+  std::vector<Figures> rest(5), noisy(5);
+  std::vector<KnownScene> scenes;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    scenes = AllScenes(seed);
+    for (std::size_t k = 0; k < scenes.size(); ++k) {
+      Random random(seed);
+      Measure(scenes[k], 0, random, rest[k]);
+      Measure(scenes[k], .1, random, noisy[k]);
+    }
+  }
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    const KnownScene& scene = scenes[k];
+    const double at_rest = rest[k].deviation / rest[k].length;
+    const double with_noise = noisy[k].deviation / noisy[k].length;
+    std::printf("%-14s %8.4f %8.5f %8.4f %8.5f %5.3f %5.3f\n", scene.name.c_str(), at_rest,
+                rest[k].area, with_noise, noisy[k].area, rest[k].junction / kSeeds,
+                noisy[k].junction / kSeeds);
+    EXPECT_LE(at_rest, scene.most_at_rest) << scene.name;
+    EXPECT_LE(with_noise, scene.most_with_noise) << scene.name;
+    EXPECT_LE(std::max(rest[k].area, noisy[k].area), .005) << scene.name;
+    EXPECT_LE(rest[k].junction / kSeeds, scene.most_apart) << scene.name;
+    EXPECT_LE(noisy[k].junction / kSeeds, scene.most_apart_with_noise) << scene.name;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc

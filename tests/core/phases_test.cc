@@ -1,0 +1,298 @@
+// Outlines of several phases: guarantees, shared points, areas, states, refusals.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "partiemc/partiemc.h"
+#include "partiemc/status.h"
+#include "partiemc/validate.h"
+#include "support/instruction_sets.h"
+#include "support/particles.h"
+#include "support/phase_scenes.h"
+#include "support/reconstruct.h"
+#include "support/ring_stream.h"
+#include "support/tries.h"
+
+namespace partiemc {
+namespace {
+
+using support::Particles;
+using support::Random;
+using support::ReconstructOnce;
+using support::RefusalOf;
+using support::RingStream;
+
+// A stream with an outline for each of the phases 1 to `count`.
+ReconstructionParameters WithPhases(int count) {
+  ReconstructionParameters parameters{.spacing = 1.0};
+  for (std::int32_t phase = 1; phase <= count; ++phase) {
+    parameters.sections.push_back({.phase = phase});
+  }
+  return parameters;
+}
+
+// Gives the particles of a frame phases from 1 to `count`: by sectors, stripes, drops or at random.
+void DrawPhases(Random& random, int count, Particles& particles) {
+  const std::size_t kind = random.Below(4);
+  const double width = random.Uniform(1, 12), angle = random.Uniform(0, 7);
+  const double cx = particles.size() > 0 ? particles.x(0) : 0;
+  const double cy = particles.size() > 0 ? particles.y(0) : 0;
+  const double noise = random.Chance(.3) ? random.Uniform(0, 2) : 0;
+  particles.phases.clear();
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double shift_x = random.Uniform(-noise, noise), shift_y = random.Uniform(-noise, noise);
+    const double x = particles.x(k) - cx + shift_x, y = particles.y(k) - cy + shift_y;
+    double place = 0;
+    if (kind == 0) {
+      place = (std::atan2(y, x) + angle) * count / 6.3;
+    } else if (kind == 1) {
+      place = (x * std::cos(angle) + y * std::sin(angle)) / width;
+    } else if (kind == 2) {
+      place = std::floor(x / width) + std::floor(y / width);
+    } else {
+      place = static_cast<double>(random.Below(1'000));
+    }
+    const auto cell = static_cast<std::int64_t>(std::floor(place));
+    particles.phases.push_back(static_cast<float>(1 + ((cell % count) + count) % count));
+  }
+}
+
+Particles RandomPhases(std::uint64_t seed, int count) {
+  Random random(seed);
+  Particles particles = support::RandomScene(seed);
+  DrawPhases(random, count, particles);
+  return particles;
+}
+
+using Vertex = std::pair<double, double>;
+
+// The segments of rings, from point to point.
+std::multiset<std::pair<Vertex, Vertex>> SegmentsOf(const Rings& rings) {
+  std::multiset<std::pair<Vertex, Vertex>> segments;
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    const auto points = rings.RingPoints(ring);
+    const std::size_t count = points.size() / 2;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t next = (k + 1) % count;
+      segments.insert(
+          {{points[2 * k], points[2 * k + 1]}, {points[2 * next], points[2 * next + 1]}});
+    }
+  }
+  return segments;
+}
+
+// Checks that the outlines of all phases divide the outline of the body: each is valid, their areas
+// sum up to its area, and every segment belongs to the body or, reversed, to another phase.
+void ExpectDivided(const Result& result, Fill fill) {
+  const absl::Status body = Validate(result, fill);
+  EXPECT_TRUE(body.ok()) << body;
+  double area = 0;
+  std::multiset<std::pair<Vertex, Vertex>> inner;
+  std::size_t segments = 0;
+  const auto of_body = SegmentsOf(result.rings);
+  for (const Result& phase : result.sections) {
+    const absl::Status status = Validate(phase, fill);
+    EXPECT_TRUE(status.ok()) << status;
+    area += phase.statistics.area;
+    for (const auto& segment : SegmentsOf(phase.rings)) {
+      if (of_body.contains(segment)) {
+        ++segments;
+      } else {
+        inner.insert(segment);
+      }
+    }
+  }
+  EXPECT_NEAR(area, result.statistics.area, 1e-9 * std::max(1.0, std::abs(area)));
+  EXPECT_EQ(segments, of_body.size());
+  for (const auto& [from, to] : inner) {
+    EXPECT_EQ(inner.count({to, from}), 1u) << from.first << ", " << from.second;
+  }
+}
+
+TEST(Phases, DivideTheBodyInRandomFrames) {
+  const auto tries = support::Tries<std::uint64_t>(1'000);
+  std::size_t interfaces = 0;
+  for (std::uint64_t seed = 1; seed <= tries; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    Random random(seed);
+    const int count = 1 + static_cast<int>(random.Below(4));
+    ReconstructionParameters parameters = WithPhases(count);
+    parameters.fill = AllFills()[seed % AllFills().size()];
+    if (random.Chance(.2)) parameters.kernel_radius = random.Uniform(1.5, 4);
+    if (random.Chance(.2)) parameters.cell_size = random.Uniform(.5, 2);
+    const Result result = ReconstructOnce(parameters, RandomPhases(seed, count));
+    ExpectDivided(result, parameters.fill);
+    for (const Result& phase : result.sections) interfaces += phase.rings.PointCount();
+    interfaces -= result.rings.PointCount();
+  }
+  EXPECT_GT(interfaces, 20 * tries);
+}
+
+TEST(Phases, AnyNumberOfThreadsGivesTheSameBits) {
+  const Particles particles = RandomPhases(7, 3);
+  std::vector<std::uint64_t> digests;
+  for (const std::size_t threads : {1u, 2u, 4u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const Result result = ReconstructOnce(WithPhases(3), particles);
+    for (const Result& phase : result.sections) digests.push_back(DigestRings(phase.rings));
+  }
+  for (std::size_t k = 3; k < digests.size(); ++k) EXPECT_EQ(digests[k], digests[k - 3]);
+}
+
+TEST(Phases, AnyInstructionSetGivesTheSameBits) {
+  const Particles particles = RandomPhases(7, 3);
+  const auto digests = [&] { return DigestSections(ReconstructOnce(WithPhases(3), particles)); };
+  const auto expected = digests();
+  support::ForEachInstructionSet([&] { EXPECT_EQ(digests(), expected); });
+}
+
+TEST(Phases, OnePhaseHasTheOutlineOfTheBody) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const Particles particles = RandomPhases(seed, 1);
+    const ReconstructionParameters parameters = WithPhases(1);
+    const Result result = ReconstructOnce(parameters, particles);
+    EXPECT_EQ(SegmentsOf(result.sections[0].rings), SegmentsOf(result.rings));
+    ReconstructionParameters alone = parameters;
+    alone.sections.clear();
+    EXPECT_EQ(DigestRings(ReconstructOnce(alone, particles).rings), DigestRings(result.rings));
+  }
+}
+
+// Sections name only some phases; the others are one more phase.
+TEST(Phases, OtherPhasesLeaveTheirPlace) {
+  const auto half = [](double angle) {
+    return [=](double x, double y) { return x * std::cos(angle) + y * std::sin(angle); };
+  };
+  support::PhaseScene scene{support::DiscBody(14), {}};
+  for (std::int32_t k = 0; k < 4; ++k) {
+    const double angle = .2 + 1.5708 * k;
+    scene.regions.push_back({1 + k, [=](double x, double y) {
+                               return std::max(half(angle)(x, y), half(angle + 1.5708)(x, y));
+                             }});
+  }
+  Random random(4);
+  const Particles particles = Filled(scene, random);
+  const Result all = ReconstructOnce(WithPhases(4), particles);
+  ReconstructionParameters parameters = WithPhases(4);
+  parameters.sections.erase(parameters.sections.begin() + 1);
+  const Result three = ReconstructOnce(parameters, particles);
+  for (const std::size_t phase : {0u, 2u, 3u}) {
+    const auto& expected = all.sections[phase].rings.points;
+    const auto& points = three.sections[phase > 1 ? phase - 1 : phase].rings.points;
+    ASSERT_EQ(points.size(), expected.size());
+    // Sums are in the order of the sections, and arcs run from the earlier to the later one.
+    for (std::size_t k = 0; k < points.size(); ++k) ASSERT_NEAR(points[k], expected[k], 1e-4);
+  }
+}
+
+TEST(Phases, CountsParticlesAndTracksRings) {
+  const auto line = [](double x, double y) { return .8 * x + .6 * y; };
+  const support::PhaseScene scene{
+      support::DiscBody(12), {{1, line}, {2, [=](double x, double y) { return -line(x, y); }}}};
+  Random random(3);
+  Particles particles = Filled(scene, random);
+  RingStream stream(WithPhases(2));
+  stream.Next(particles);
+  std::array<std::uint64_t, 2> identities{}, particle_count{};
+  for (std::size_t phase = 0; phase < 2; ++phase) {
+    const Rings& rings = stream.result().sections[phase].rings;
+    ASSERT_EQ(rings.RingCount(), 1u);
+    identities[phase] = rings.measures[0].identity;
+    particle_count[phase] = rings.measures[0].particle_count;
+    EXPECT_NE(identities[phase], 0u);
+    EXPECT_EQ(stream.result().sections[phase].statistics.particles,
+              std::ranges::count(particles.phases, static_cast<float>(phase + 1)));
+  }
+  EXPECT_NEAR(static_cast<double>(particle_count[0] + particle_count[1]),
+              static_cast<double>(particles.size()), 4);
+  // The state is stored between the frames.
+  const auto bytes = Serialize(stream.state());
+  const auto restored = ParseState(bytes);
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  EXPECT_EQ(*restored, stream.state());
+  for (double& coordinate : particles.xy) coordinate += .3;
+  stream.Next(particles);
+  for (std::size_t phase = 0; phase < 2; ++phase) {
+    EXPECT_EQ(stream.result().sections[phase].rings.measures[0].identity, identities[phase]);
+  }
+}
+
+// Attributes are fitted to the particles of each phase alone, so they may jump at interfaces.
+TEST(Phases, AttributesJumpAtInterfaces) {
+  const auto line = [](double x, double y) { return .8 * x + .6 * y; };
+  const support::PhaseScene scene{
+      support::DiscBody(12), {{1, line}, {2, [=](double x, double y) { return -line(x, y); }}}};
+  Random random(3);
+  const Particles particles = Filled(scene, random);
+  std::vector<float> densities;
+  for (const float phase : particles.phases) densities.push_back(phase == 1 ? 1000 : 1);
+  const std::vector<Attribute> attributes{{.name = "density", .values = densities},
+                                          {.name = "phase", .values = particles.phases}};
+  Frame frame = particles.AsFrame();
+  frame.attributes = attributes;
+  const Result result = ReconstructOnce(WithPhases(2), frame);
+  for (std::size_t phase = 0; phase < 2; ++phase) {
+    const Result& section = result.sections[phase];
+    ASSERT_EQ(section.attributes.size(), 1u);
+    EXPECT_EQ(section.attributes[0].name, "density");
+    ASSERT_EQ(section.attributes[0].values.size(), section.mesh.PointCount());
+    const float expected = phase == 0 ? 1000 : 1;
+    for (const float value : section.attributes[0].values) {
+      EXPECT_NEAR(value, expected, 1e-3 * expected);
+    }
+  }
+}
+
+TEST(Phases, RefusesFramesWithoutPhases) {
+  const auto violation = RefusalOf(WithPhases(2), support::Lattice(5, 5));
+  ASSERT_TRUE(violation);
+  EXPECT_EQ(violation->reason, kReasonNoSuchAttribute);
+  EXPECT_EQ(violation->field, "attributes");
+  EXPECT_EQ(violation->value, "phase");
+  EXPECT_EQ(ReconstructOnce(WithPhases(2), Particles()).sections[1].rings.RingCount(), 0u);
+  Particles particles = support::Lattice(5, 5);
+  particles.phases.assign(24, 1);
+  const auto few = RefusalOf(WithPhases(2), particles);
+  ASSERT_TRUE(few);
+  EXPECT_EQ(few->field, "attributes[phase]");
+}
+
+TEST(Phases, RefusesWhatHasNoPhases) {
+  const auto field_of = [](const ReconstructionParameters& parameters) {
+    const auto violation = FindViolation(Validate(parameters));
+    return violation ? violation->field + "=" + violation->value : "";
+  };
+  EXPECT_EQ(field_of(WithPhases(16)), "");
+  const auto with = [&](auto change) {
+    ReconstructionParameters parameters = WithPhases(2);
+    change(parameters);
+    return field_of(parameters);
+  };
+  using P = ReconstructionParameters;
+  EXPECT_EQ(with([](P& p) { p.isovalue = .5; }), "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) { p.slice = SlicePlane(); }), "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) {
+              p.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+            }),
+            "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) { p.placement = Placement::kQef; }), "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) { p.sections[1].phase = 1; }), "parameters.sections[1].phase=1");
+  EXPECT_EQ(with([](P& p) { p.sections[1].isovalue = .5; }), "parameters.sections[1].phase=2");
+  EXPECT_EQ(with([](P& p) { p.sections.push_back({.isovalue = .5}); }), "");
+  EXPECT_EQ(with([](P& p) { p.phase_attribute = ""; }), "parameters.phase_attribute=empty");
+}
+
+}  // namespace
+}  // namespace partiemc
