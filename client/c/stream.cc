@@ -107,6 +107,10 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
     section.slice = SliceOf(from.slice);
     if (from.isovalue != 0) section.isovalue = from.isovalue;
   }
+  for (std::size_t k = 0; k < options.phase_count; ++k) {
+    parameters.sections.push_back({.phase = options.phases[k]});
+  }
+  if (options.phase_attribute != nullptr) parameters.phase_attribute = options.phase_attribute;
   absl::Status named;
   if (options.output != nullptr) named.Update(SetByName(options.output, parameters.output));
   if (options.placement != nullptr)

@@ -61,7 +61,7 @@ std::string AsFlag(const absl::Status& status) {
   if (line.starts_with("surface.")) line.erase(0, line.find('.') + 1);
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
-        std::pair("min_component_volume:", "min-volume:")}) {
+        std::pair("phase:", "phases:"), std::pair("min_component_volume:", "min-volume:")}) {
     if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
   }
   line.insert(0, "--");

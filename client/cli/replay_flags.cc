@@ -224,6 +224,11 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->allow_extra_args(false)
       ->each([&flags](const std::string&) { flags.sequence.in_space = true; })
       ->group(kGroup);
+  app.add_option("--phases", flags.phases,
+                 "Outlines of phases that share their interfaces: the particle attribute with the "
+                 "phase, and its whole numbers, such as type=1,2")
+      ->type_name("NAME=PHASE,...")
+      ->group(kGroup);
   app.add_option("--isolines", flags.isolines,
                  "Isovalues of the density in [.01, 10], drawn beside the outline on each slice; "
                  "the density "

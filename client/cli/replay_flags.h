@@ -37,6 +37,7 @@ struct ReplayFlags {
   std::string fill = "greedy";
   /// "z=0.5" or six numbers. The first is the outline, unless the stream has a surface.
   std::vector<std::string> slices;
+  std::string phases;            ///< "NAME=PHASE,...": the attribute and the phases.
   std::vector<double> isolines;  ///< Isovalues of the density, drawn on each slice.
   std::string periodic;          ///< Axes: "x,y"; empty: none.
   std::string box;               ///< "X0,X1,Y0,Y1[,Z0,Z1]"; empty: the box of the input.

@@ -104,6 +104,24 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
+// Parses --phases and adds a section for each phase.
+absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& parameters) {
+  if (flags.phases.empty()) return absl::OkStatus();
+  const auto wrong = [&] {
+    return WrongFlag("--phases", flags.phases, "an attribute and whole numbers: type=1,2");
+  };
+  parameters.phase_attribute = PhaseAttributeOf(flags);
+  if (parameters.phase_attribute.empty()) return wrong();
+  const std::string_view list =
+      std::string_view(flags.phases).substr(parameters.phase_attribute.size() + 1);
+  for (const std::string_view text : Split(list, ',', /*blanks=*/"")) {
+    const auto phase = Number(text);
+    if (!phase || *phase != std::floor(*phase) || std::abs(*phase) > 0x1p24) return wrong();
+    parameters.sections.push_back({.phase = static_cast<std::int32_t>(*phase)});
+  }
+  return absl::OkStatus();
+}
+
 // Makes the first slice the stream's slice, unless the stream has a surface. Adds a section for the
 // outline of each other slice.
 // Adds sections for the isolines of every slice; without slices, for the isolines of the stream.
@@ -132,6 +150,11 @@ absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& par
 std::optional<double> PositiveNumber(std::string_view text) {
   const auto value = Number(text);
   return value && *value > 0 ? value : std::nullopt;
+}
+
+std::string PhaseAttributeOf(const ReplayFlags& flags) {
+  const std::size_t end = flags.phases.find('=');
+  return end == std::string::npos ? "" : flags.phases.substr(0, end);
 }
 
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing) {
@@ -178,6 +201,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
     }
   }
   if (auto status = AddSections(flags, parameters); !status.ok()) return status;
+  if (auto status = AddPhases(flags, parameters); !status.ok()) return status;
   if (auto status = SetBox(flags, box, parameters); !status.ok()) return status;
   if (flags.clean == "on" || flags.clean == "off") {
     parameters.clean = flags.clean == "on";

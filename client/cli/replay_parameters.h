@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "absl/status/statusor.h"
@@ -10,6 +11,9 @@
 #include "partiemc/parameters.h"
 
 namespace partiemc::client {
+
+/// The attribute that --phases names; empty without a name.
+std::string PhaseAttributeOf(const ReplayFlags& flags);
 
 /// Whether the spacing is estimated before the stream opens: surfaces and slices require one.
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing);

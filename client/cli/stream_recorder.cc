@@ -86,13 +86,15 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   if (parameters.noise_filter) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
-  std::string isovalues;
+  std::string isovalues, phases;
   for (const Section& section : parameters.sections) {
+    if (section.phase) AppendAll(phases, phases.empty() ? "" : ",", *section.phase);
     // Every slice has the same isolines.
     if (!section.isovalue || section.slice != parameters.sections.front().slice) continue;
     AppendAll(isovalues, isovalues.empty() ? "" : ",", ShortestNumber(*section.isovalue));
   }
   if (!isovalues.empty()) AppendAll(flags, " --isolines ", isovalues);
+  if (!phases.empty()) AppendAll(flags, " --phases ", parameters.phase_attribute, "=", phases);
   return flags;
 }
 

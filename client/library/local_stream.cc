@@ -10,6 +10,7 @@
 #include "client/library/frame_request.h"
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
+#include "client/library/phase_attribute.h"
 #include "common/clock.h"
 #include "common/mutex.h"
 #include "common/stage_clock.h"
@@ -24,7 +25,7 @@ class Worker final : public LocalStream {
  public:
   Worker(Reconstructor reconstructor, const LocalStreamOptions& options)
       : reconstructor_(std::move(reconstructor)),
-        attributes_(options.attributes),
+        attributes_(WithPhases(options.parameters, options.attributes)),
         send_timeout_(options.send_timeout),
         arena_(static_cast<unsigned>(std::max(options.threads, 0))) {
     info_ = {.parameters = reconstructor_.parameters(),

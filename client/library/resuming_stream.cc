@@ -36,6 +36,11 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->sizes != requested.sizes) {
     return absl::UnimplementedError("the server does not support own sizes: use a newer one");
   }
+  // Servers of before there were phases give outlines of the body instead.
+  if (!std::ranges::equal(parameters->sections, requested.sections, {}, &Section::phase,
+                          &Section::phase)) {
+    return absl::UnimplementedError("the server does not support phases: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

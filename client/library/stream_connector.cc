@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/library/channel.h"
+#include "client/library/phase_attribute.h"
 #include "common/address.h"
 #include "wire/codec.h"
 
@@ -38,7 +39,7 @@ v1::OpenStream OpenMessage(const StreamOptions& options) {
        .normals = options.outputs.normals || options.parameters.output == Output::kSurface,
        .coordinates = ToWire(options.outputs.coordinates),
        .echo_particles = options.outputs.echo_particles,
-       .attributes = options.outputs.attributes},
+       .attributes = WithPhases(options.parameters, options.outputs.attributes)},
       *open.mutable_outputs());
   open.mutable_labels()->insert(options.labels.begin(), options.labels.end());
   if (options.reconnect.give_up_after.count() > 0) {

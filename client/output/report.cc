@@ -245,6 +245,7 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     if (section.isovalue) {
       AppendAll(text, text.empty() ? "" : ", ", "isovalue ", ShortestNumber(*section.isovalue));
     }
+    if (section.phase) AppendAll(text, "phase ", *section.phase);
     lines.emplace_back(Concat("section ", k + 1), std::move(text));
   }
   if (parameters.attribute_tolerance != ReconstructionParameters().attribute_tolerance) {

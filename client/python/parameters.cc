@@ -151,10 +151,11 @@ void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
     Section& section = sections.emplace_back();
     TakeSlice(left, section.slice);
     TakeInto(left, "isovalue", section.isovalue);
+    TakeInto(left, "phase", section.phase);
     if (left.empty()) continue;
     Raise(Invalid("UNSUPPORTED", "sections[" + std::to_string(k) + "]",
                   py::repr((*given)[k]).cast<std::string>(),
-                  "must be a dict of slice, isovalue, or both"));
+                  "must be a dict of slice, isovalue or phase"));
   }
 }
 
@@ -189,6 +190,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeSlice(arguments, parameters.slice);
   TakeInto(arguments, "isovalue", parameters.isovalue);
   TakeSections(arguments, parameters.sections);
+  TakeInto(arguments, "phase_attribute", parameters.phase_attribute);
   TakeBox(arguments, parameters.box);
   TakeInto(arguments, "noise_filter", parameters.noise_filter);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
@@ -283,6 +285,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
     py::dict dict;
     dict["slice"] = ToPython(section.slice);
     dict["isovalue"] = section.isovalue;
+    if (section.phase) dict["phase"] = section.phase;
     sections.append(dict);
   }
   const auto named = [](auto value) { return std::string(Name(value)); };
@@ -300,7 +303,9 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
                 "wrap"_a = parameters.box && parameters.box->wraps,
-                "noise_filter"_a = parameters.noise_filter, "sizes"_a = named(parameters.sizes));
+                "noise_filter"_a = parameters.noise_filter,
+                "phase_attribute"_a = parameters.phase_attribute,
+                "sizes"_a = named(parameters.sizes));
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

@@ -55,7 +55,8 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
   FrameSize size{.particles = frame.ParticleCount(),
                  .tiles = b.bins.tiles.size(),
                  .segments = b.topology.segments.size(),
-                 .attribute_values = AttributeValuesOf(frame)};
+                 .attribute_values = AttributeValuesOf(frame),
+                 .phases = CountPhases(parameters)};
   if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
   if (HasBlocks(parameters) && size.attribute_values > 0) {
     size.block_cells = CountCells(b.crossings.interior);
@@ -138,8 +139,8 @@ struct FillTask {
   ParticleSubset particles;  // Those inside.
 };
 
-// Runs the stages mesh and attributes for `result.rings`. Requires: the sorted attributes are those
-// of the frame, or none. Errors: INTERNAL if BuildMesh fails, which is a bug.
+// Runs the stages mesh and attributes for `result.rings`. Requires: `b.attribute_scratch.sorted` is
+// empty or of this frame. Errors: INTERNAL if BuildMesh fails, which is a bug.
 absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& result) {
   const ReconstructionParameters& parameters = task.outline.parameters;
   const Frame& frame = task.frame;
@@ -168,14 +169,18 @@ absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& resu
   return absl::OkStatus();
 }
 
-// Divides the outline among the phases. Errors: INTERNAL if RepairPhases fails, which is a bug.
+// Divides the outline among the phases. Errors: RESOURCE_EXHAUSTED if memory is short; INTERNAL if
+// RepairPhases fails, which is a bug.
 absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Scale& scale,
-                          Workspace::Buffers& b, Rings& rings) {
-  const bool is_divided = InStage(task.observer, Stage::kVertices, [&] {
-    return PlacePhases({frame, task.parameters, task.variant, scale, b.bins, b.crossings,
-                        b.topology, b.vertex_scratch.vertices},
-                       b.placed, b.phases, rings);
-  });
+                          FrameMemory& memory, Workspace::Buffers& b, Rings& rings) {
+  const PhaseInput input{frame,  task.parameters, task.variant, scale,
+                         b.bins, b.crossings,     b.topology,   b.vertex_scratch.vertices};
+  InStage(task.observer, Stage::kVertices, [&] { MapPhases(input, b.phases); });
+  FrameSize size = SizeOf(task.parameters, frame, b);
+  size.interface_points = InterfacePointsOf(b.phases);
+  if (absl::Status status = memory.ReserveOutline(size); !status.ok()) return status;
+  const bool is_divided = InStage(task.observer, Stage::kVertices,
+                                  [&] { return PlacePhases(input, b.placed, b.phases, rings); });
   if (is_divided) return absl::OkStatus();
   return absl::InternalError("outlines of phases cross although every point is at its root");
 }
@@ -196,7 +201,7 @@ void KeepState(const Lengths& lengths, Workspace::Buffers& b, NextState& next, R
 // Runs the stages from normals to attributes. Errors: INTERNAL if RepairRings, RepairPhases or
 // BuildMesh fails, which is a bug; their comments explain why no input should cause it.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
-                         Workspace::Buffers& b, Result& result) {
+                         FrameMemory& memory, Workspace::Buffers& b, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
   const State& previous = task.previous;
   StageObserver* const observer = task.observer;
@@ -236,7 +241,8 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
   result.statistics.self_intersections = b.placed.self_intersections;
   if (HasPhases(parameters)) {
-    if (absl::Status status = DividePhases(task, frame, scale, b, result.rings); !status.ok()) {
+    if (absl::Status status = DividePhases(task, frame, scale, memory, b, result.rings);
+        !status.ok()) {
       return status;
     }
   }
@@ -284,14 +290,15 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   if (!status.ok() || !lengths) return status;
   status = memory.ReserveOutline({.particles = seen.ParticleCount(),
                                   .tiles = b.bins.tiles.size(),
-                                  .attribute_values = AttributeValuesOf(seen)});
+                                  .attribute_values = AttributeValuesOf(seen),
+                                  .phases = CountPhases(parameters)});
   if (!status.ok()) return status;
   FindRings(task, scale, b);
   FrameSize size = SizeOf(parameters, seen, b);
   if (task.HasCopies()) size.cut_segments = size.segments;
   status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
-  status = FillOutline(task, seen, scale, b, result);
+  status = FillOutline(task, seen, scale, memory, b, result);
   if (!status.ok()) return status;
   Summarise(b, result);
   b.last = {seen, lengths, scale};
@@ -308,8 +315,7 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
   result.statistics.particles = task.frame.ParticleCount();
   if (!last.lengths) return absl::OkStatus();
   const PhaseRings& phase = b.phases.rings[label - 1u];
-  absl::Status status = memory.ReserveOutline({.tiles = b.bins.tiles.size(),
-                                               .segments = phase.points.size(),
+  absl::Status status = memory.ReserveOutline({.segments = phase.points.size(),
                                                .grid_cells = CountCells(phase.crossings.interior),
                                                .attribute_values = AttributeValuesOf(last.frame)});
   if (!status.ok()) return status;

@@ -15,6 +15,8 @@ struct FrameSize {
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t block_tiles = 0;       ///< Tiles with such cells.
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or vertex.
+  std::uint64_t phases = 0;            ///< Phases that divide the outline.
+  std::uint64_t interface_points = 0;  ///< Points of the interfaces between phases.
 };
 
 /// Bytes per item: measured over frames of all kinds, plus a margin because vectors grow by
@@ -43,6 +45,13 @@ inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
 inline constexpr std::uint64_t kBytesPerBlockTile = 2'048;
 inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
 
+/// If phases divide the outline: bytes for each particle and tile, for each tile and phase, and for
+/// each point of an interface.
+inline constexpr std::uint64_t kBytesPerPhaseParticle = 26;
+inline constexpr std::uint64_t kBytesPerPhaseTile = 10'000;
+inline constexpr std::uint64_t kBytesPerTileOfPhase = 900;
+inline constexpr std::uint64_t kBytesPerInterfacePoint = 500;
+
 /// Bytes that any frame takes.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
@@ -55,6 +64,11 @@ inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +
                         kBytesPerCutSegment * size.cut_segments +
                         kBytesPerGridCell * size.grid_cells + kBytesPerBlockCell * size.block_cells;
+  if (size.phases > 0) {
+    bytes += kBytesPerPhaseParticle * size.particles + kBytesPerPhaseTile * size.tiles +
+             kBytesPerTileOfPhase * size.tiles * (size.phases + 1) +
+             kBytesPerInterfacePoint * size.interface_points;
+  }
   if (size.attribute_values > 0) {
     bytes += kBytesPerCarryingParticle * size.particles + kBytesPerCarryingTile * size.tiles +
              size.attribute_values * (kBytesPerValueOfSegment * size.segments +

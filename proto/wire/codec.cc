@@ -409,7 +409,9 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
     Section& section = parameters.sections.emplace_back();
     if (from.has_slice()) section.slice = FromWire(from.slice());
     if (from.has_isovalue()) section.isovalue = from.isovalue();
+    if (from.has_phase()) section.phase = from.phase();
   }
+  if (message.has_phase_attribute()) parameters.phase_attribute = message.phase_attribute();
   if (message.has_surface()) parameters.surface = FromWire(message.surface());
   if (message.has_box()) parameters.box = FromWire(message.box());
   if (message.has_noise_filter()) parameters.noise_filter = message.noise_filter();
@@ -443,6 +445,10 @@ void EncodeParameters(const ReconstructionParameters& parameters,
     v1::Section& section = *message.add_sections();
     if (from.slice) *section.mutable_slice() = ToWire(*from.slice);
     if (from.isovalue) section.set_isovalue(*from.isovalue);
+    if (from.phase) {
+      section.set_phase(*from.phase);
+      message.set_phase_attribute(parameters.phase_attribute);
+    }
   }
   if (parameters.box) *message.mutable_box() = ToWire(*parameters.box);
   if (parameters.noise_filter) message.set_noise_filter(*parameters.noise_filter);

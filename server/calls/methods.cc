@@ -232,6 +232,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("attribute-meshes");
   if (context_.limits.max_parts > 0) response.add_capabilities("parts");
   response.add_capabilities("particle-sizes");
+  response.add_capabilities("phases");
   response.add_capabilities("periodic-boxes");
   response.add_capabilities("noise-filter");
   response.add_capabilities("resume");

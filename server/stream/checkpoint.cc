@@ -38,7 +38,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   const auto& [output, placement, fill, spacing, spacing_rule, sizes, kernel_radius, cell_size,
                reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
                min_component_area, min_component_particles, plane, slice, isovalue, sections,
-               surface, box, noise_filter] = parameters;
+               phase_attribute, surface, box, noise_filter] = parameters;
   const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
@@ -90,6 +90,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     put_small(section.slice.has_value());
     if (section.slice) put_slice(*section.slice);
     put_optional(section.isovalue);
+    if (!section.phase) continue;
+    put_small('p');
+    put_small(*section.phase);
+    bytes += phase_attribute;
   }
   if (box) {
     put_small('b');

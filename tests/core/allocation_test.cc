@@ -39,7 +39,17 @@ struct AllocationCase {
   bool volumes, ids;
   bool estimates_spacing = false;  // In each frame.
   Sizes sizes = Sizes::kEqual;
+  bool has_phases = false;
 };
+
+// Phases of particles: stripes of both, then spray of the second one.
+std::vector<float> StripedPhases(const Particles& particles) {
+  std::vector<float> phases(particles.size());
+  for (std::size_t k = 0; k < phases.size(); ++k) {
+    phases[k] = std::fmod(std::abs(particles.x(k)), 40) < 20 && k % 50 > 0 ? 1 : 2;
+  }
+  return phases;
+}
 
 // Volumes of particles whose sizes differ by a factor of up to three.
 std::vector<float> VaryingVolumes(std::size_t count) {
@@ -52,7 +62,7 @@ void PrintTo(const AllocationCase& tested, std::ostream* out) {
   *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
        << " threads" << (tested.volumes ? ", volumes" : "") << (tested.ids ? ", ids" : "")
        << (tested.estimates_spacing ? ", spacing estimated" : "") << ", sizes "
-       << Name(tested.sizes);
+       << Name(tested.sizes) << (tested.has_phases ? ", phases" : "");
 }
 
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
@@ -70,6 +80,7 @@ TEST_P(WarmFrame, AllocatesNothing) {
   } else {
     parameters.spacing = 1.0;
   }
+  if (tested.has_phases) parameters.sections = {{.phase = 1}, {.phase = 2}};
   const auto reconstructor = Reconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   // Bodies that meet and part, spray, holes that cleaning fills, more than one stretch of
@@ -86,10 +97,12 @@ TEST_P(WarmFrame, AllocatesNothing) {
       // Numbers without and with large gaps; frames that follow each other know their particles.
       frame.ids.push_back(k < 2 ? id : id << 32);
     }
+    if (tested.has_phases) frame.phases = StripedPhases(frame);
     frames.push_back(frame);
   }
   frames.insert(frames.begin() + 2, {support::Disc(5), Particles()});
   if (tested.sizes == Sizes::kOwn) frames[2].volumes = VaryingVolumes(frames[2].size());
+  if (tested.has_phases) frames[2].phases = StripedPhases(frames[2]);
   const std::vector<float> values = NoisyValues(2 * frames[0].size() + 4000);
   State state;
   Workspace workspace;
@@ -101,11 +114,12 @@ TEST_P(WarmFrame, AllocatesNothing) {
     before = allocations;
     for (const Particles& frame : frames) {
       arena.execute([&] {
-        const std::array<Attribute, 2> attributes = {
+        const std::array<Attribute, 3> attributes = {
             {{"pressure", 1, std::span(values).first(frame.size())},
-             {"velocity", 2, std::span(values).first(2 * frame.size())}}};
+             {"velocity", 2, std::span(values).first(2 * frame.size())},
+             {"phase", 1, frame.phases}}};
         Frame next = frame.AsFrame();
-        if (tested.ids) next.attributes = attributes;
+        if (tested.ids) next.attributes = std::span(attributes).first(tested.has_phases ? 3 : 2);
         ASSERT_TRUE(reconstructor->Reconstruct(next, state, workspace, result).ok());
       });
     }
@@ -248,6 +262,8 @@ std::vector<AllocationCase> Cases() {
     cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, false, true});
     cases.push_back(
         {Placement::kVirtualPlane, Fill::kGreedy, threads, true, threads == 2, false, Sizes::kOwn});
+    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, threads == 1, threads == 2,
+                     false, Sizes::kEqual, true});
   }
   return cases;
 }
@@ -259,7 +275,8 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                            return name + "_" + std::string(Name(tested.param.fill)) +
                                   std::to_string(tested.param.threads) +
                                   (tested.param.estimates_spacing ? "_spacing" : "") +
-                                  (tested.param.sizes == Sizes::kOwn ? "_sizes" : "");
+                                  (tested.param.sizes == Sizes::kOwn ? "_sizes" : "") +
+                                  (tested.param.has_phases ? "_phases" : "");
                          });
 struct MemoryCase {
   std::string name;
@@ -306,6 +323,13 @@ std::vector<MemoryCase> MemoryCases() {
   };
   add("body of own sizes", sized(support::Disc(300)), {.sizes = Sizes::kOwn});
   add("drops of own sizes", sized(spread(150, 5)), {.sizes = Sizes::kOwn});
+  const auto phased = [](Particles particles) {
+    particles.phases = StripedPhases(particles);
+    return particles;
+  };
+  const std::vector<Section> phases = {{.phase = 1}, {.phase = 2}};
+  add("body of two phases", phased(support::Disc(300)), {.sections = phases});
+  add("drops of two phases", phased(spread(150, 5)), {.sections = phases});
   add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
   add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});
@@ -335,10 +359,14 @@ TEST(MemoryGuard, IsToldNoLessThanAFrameTakesAndNotMuchMore) {
     ASSERT_TRUE(reconstructor.ok());
     std::vector<float> values(3 * tested.particles.size(), 1.0f);
     if (tested.carries == MemoryCase::kNoise) values = NoisyValues(values.size());
-    const std::array<Attribute, 3> attributes = {
-        {{"a", 3, values}, {"b", 3, values}, {"c", 3, values}}};
+    const std::array<Attribute, 4> attributes = {{{"a", 3, values},
+                                                  {"b", 3, values},
+                                                  {"c", 3, values},
+                                                  {"phase", 1, tested.particles.phases}}};
     Frame frame = tested.particles.AsFrame();
-    if (tested.carries != MemoryCase::kNothing) frame.attributes = attributes;
+    if (tested.carries != MemoryCase::kNothing) {
+      frame.attributes = std::span(attributes).first(tested.particles.phases.empty() ? 3 : 4);
+    }
     const std::size_t before = live_bytes;
     RecordingGuard guard(100);
     std::size_t held = 0;

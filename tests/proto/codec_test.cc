@@ -72,8 +72,11 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.min_component_particles = 3'000'000'000'000;
   parameters.slice = {.origin = {1, 2, 3}, .normal = {4, 5, 6}};
   parameters.isovalue = 0.25;
-  parameters.sections = {
-      {.isovalue = 0.75}, {.slice = SlicePlane{.origin = {7, 8, 9}, .normal = {1, 2, 3}}}, {}};
+  parameters.sections = {{.isovalue = 0.75},
+                         {.slice = SlicePlane{.origin = {7, 8, 9}, .normal = {1, 2, 3}}},
+                         {},
+                         {.phase = -3}};
+  parameters.phase_attribute = "type";
   parameters.box = PeriodicBox{
       .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
   parameters.noise_filter = 0.375;

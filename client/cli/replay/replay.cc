@@ -270,6 +270,12 @@ absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) 
 int Replay(const ReplayFlags& given) {
   ReplayFlags flags = given;
   flags.sequence.requires_one_box = !flags.periodic.empty() && flags.box.empty();
+  // The reader keeps this attribute, too.
+  std::vector<std::string>& attributes = flags.sequence.attributes;
+  const std::string phases = PhaseAttributeOf(flags);
+  if (!phases.empty() && std::ranges::find(attributes, phases) == attributes.end()) {
+    attributes.push_back(phases);
+  }
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
   // Checks the flags before the input is opened. Slices and surfaces require a spacing, which the

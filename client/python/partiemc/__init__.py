@@ -58,8 +58,11 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     isovalue: in [0.01, 10]: draws this isoline of the density instead of the body's outline. The
         density is about 1 inside of bodies and 0.5 on flat boundaries.
     sections: additional outlines of the particles (Result.sections): a list of at most 16 dicts of
-        slice, isovalue or both. Other parameters are the same for all outlines:
-        [{"isovalue": 0.3}, {"slice": ("z", 0.7)}].
+        slice, isovalue or both, or of a phase. Other parameters are the same for all outlines:
+        [{"isovalue": 0.3}, {"slice": ("z", 0.7)}]. Phases divide the outline and share their
+        interfaces: [{"phase": 1}, {"phase": 2}]; they need the attribute "phase", a whole number
+        for each particle.
+    phase_attribute: the name of that attribute, such as "type".
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
     simplify: for output "surface": fewer triangles, within this error in spacings, in [0, 1]; .05

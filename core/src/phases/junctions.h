@@ -22,10 +22,10 @@ struct JunctionScratch {
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
 };
 
-/// Near a junction, the field of each phase sees a corner and rounds it. A junction therefore moves
-/// to the point nearest to the lines through its arcs from kNearest to kFarthest spacings away, and
-/// the points of the arcs before these go onto straight lines. A vertex of the body's rings moves
-/// along its ring, at most to the next vertices.
+/// Near a junction, the field of each phase sees a corner and rounds it. Each arc therefore has a
+/// line, fitted to its points from kNearest to kFarthest spacings away. The junction moves to the
+/// point nearest to these lines. The points before kNearest go onto a chord. A vertex of the body's
+/// rings moves along its ring, at most to the next vertices.
 /// Cost: linear in the points near junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
                    JunctionScratch& scratch, SharedPoints& points);

@@ -14,7 +14,7 @@ namespace partiemc {
 /// Warm buffers of MatchPhaseAreas. Regions are the components of all phases.
 struct PhaseAreaScratch {
   std::vector<std::uint32_t> first_region;           // By phase: its first region.
-  std::vector<std::uint64_t> count;                  // By region: its particles of its own phase.
+  std::vector<std::uint64_t> count;                  // By region: particles with its phase.
   std::vector<double> volume, area;                  // By region, in squared cells.
   std::vector<double> wanted, offset;                // By region.
   std::vector<double> residual, direction, product;  // By region: of the solver.

@@ -9,8 +9,8 @@
 namespace partiemc {
 namespace {
 
-// g is the mean of two estimates of the height above the boundary: the density changes by 4.66 /
-// (2 beta) per spacing across it, and the distance to the mean position by half of 2.8.
+// g is the mean of two estimates of the height above the boundary. Per spacing, the density changes
+// by 4.66 / (2 beta) and the distance to the mean position by 1.4.
 constexpr double kDensitySlope = 4.66, kDistanceSlope = 2.8;
 
 // g of a phase without particles.
@@ -120,8 +120,8 @@ void PhaseField::PhasesAroundCells(std::uint32_t tile,
   }
 }
 
-// Calls visit(particle, dx, dy, t) for the particles in whose kernels the point lies, with their
-// displacement from the point in cells and t = 1 - squared distance over squared kernel radius.
+// Calls visit(particle, dx, dy, t) for each particle whose kernel reaches the point. (dx, dy) leads
+// from the point to the particle, in cells; t = 1 - squared distance / squared kernel radius.
 template <typename Visit>
 void PhaseField::ForEachNear(std::uint32_t tile, double x, double y, Visit visit) const {
   // A point on the side of its tile may reach the first cell of the tile after the next, which no

@@ -71,8 +71,8 @@ class PhaseField {
   double ValueOf(const PhaseSums& sums) const;
 
   const TileDirectory* tiles_ = nullptr;
-  double kernel_radius_ = 0;                 // Of a particle of size 1, in cells.
-  double reach_ = 0;                         // Of the largest particle, in cells.
+  double kernel_radius_ = 0;                 // For the size 1, in cells.
+  double reach_ = 0;                         // The largest kernel radius, in cells.
   double beta_ = 0;                          // In spacings.
   double spacing_ = 0;                       // In cells.
   std::vector<std::uint32_t> own_, around_;  // By tile: bits of the phases.

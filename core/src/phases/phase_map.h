@@ -27,7 +27,7 @@ struct PhaseEdge {
   }
 };
 
-/// A cell with a point of its own.
+/// A cell that has a point.
 struct PhaseCell {
   std::uint32_t tile = 0;
   std::uint8_t i = 0, j = 0;
@@ -51,7 +51,7 @@ struct PhaseMap {
   }
   /// Index of an edge or cell. Requires: it exists.
   std::uint32_t EdgeAt(const TilePlace& node, bool is_up) const;
-  /// Index of a cell with a point of its own, or kNoIndex.
+  /// Index of a cell in `cells`, or kNoIndex.
   std::uint32_t CellAt(const TilePlace& cell) const;
 
   /// The labels of the corners of a cell, in the order of crossings.h.

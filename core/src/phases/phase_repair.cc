@@ -13,7 +13,7 @@ constexpr int kGentleRounds = 4, kMostRounds = 24;
 
 // The rings of the body or of a phase, by numbers of shared points.
 struct Outline {
-  std::span<const std::uint32_t> numbers;  // Empty: the numbers are those of the points.
+  std::span<const std::uint32_t> numbers;  // Empty: point k has the number k.
   std::span<const std::uint32_t> offsets;
   std::span<const std::uint32_t> outer_of;
 

@@ -20,10 +20,9 @@ struct PhaseRepairScratch {
   std::vector<std::uint8_t> is_marked;  // By shared point.
 };
 
-/// Moves shared points back to their roots until the rings of the body, and those of each phase,
-/// are simple, do not touch and are nested by their topologies. Then no two phases overlap and none
-/// leaves the body: around any point, the winding numbers of the phases sum up to that of the body,
-/// because arcs between two phases cancel.
+/// Moves shared points back to their roots until the outlines of the body and of each phase are
+/// valid: rings are simple, do not touch, and are nested by their topologies. Then no two phases
+/// overlap, and none leaves the body (core/PHASES.md, "Why phases do not overlap").
 ///
 /// Points that touch return half way, from the fifth round on all the way; an outline with
 /// misplaced rings returns as a whole; after 24 rounds all points return. `points`, `roots`:

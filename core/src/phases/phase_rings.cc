@@ -40,7 +40,7 @@ struct Tracing {
     rings.across.push_back(across);
   }
 
-  // Adds the points of a segment: that of its entry edge, then those in its cell.
+  // Adds the points of a segment: first the one on its entry edge, then those in its cell.
   void AddSegment(std::uint32_t segment) {
     const Segment& here = rings.crossings.segments[segment];
     const ActiveCell& cell = rings.crossings.cells[here.cell];

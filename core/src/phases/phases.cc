@@ -64,9 +64,9 @@ VertexNormal ChordNormal(std::span<const double> world, std::span<const std::uin
 
 }  // namespace
 
-bool HasPhases(const ReconstructionParameters& parameters) {
-  return std::ranges::any_of(parameters.sections,
-                             [](const Section& section) { return section.phase.has_value(); });
+std::uint64_t CountPhases(const ReconstructionParameters& parameters) {
+  return static_cast<std::uint64_t>(std::ranges::count_if(
+      parameters.sections, [](const Section& section) { return section.phase.has_value(); }));
 }
 
 absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters, Phases& p,
@@ -100,10 +100,13 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
                       "must be an attribute of the frame: the phases of its particles");
 }
 
+void MapPhases(const PhaseInput& input, Phases& p) {
+  p.field.Build(input.bins, input.scale, p.labels);
+  p.map.Build(input.bins.tiles, input.crossings, p.field);
+}
+
 bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& p, Rings& body) {
   const TileDirectory& directory = input.bins.tiles;
-  p.field.Build(input.bins, input.scale, p.labels);
-  p.map.Build(directory, input.crossings, p.field);
   const BodyOutline outline{input.crossings, input.topology, placed, input.vertices};
   p.vertices.Build(outline);
   p.numbers.edges = static_cast<std::uint32_t>(body.PointCount());

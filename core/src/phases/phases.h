@@ -22,8 +22,8 @@ namespace partiemc {
 
 /// The phases of a frame, kept warm from frame to frame.
 struct Phases {
-  std::vector<float> known;         ///< By label less one: the phase of the section.
-  std::vector<PhaseLabel> labels;   ///< By particle of the frame.
+  std::vector<float> known;        ///< By label less one: the phase of the section.
+  std::vector<PhaseLabel> labels;  ///< By particle of the frame.
   PhaseField field;
   PhaseMap map;
   BodyVertices vertices;
@@ -51,20 +51,31 @@ struct PhaseInput {
   const RingVertices& vertices;
 };
 
-/// Whether a section of a stream has a phase. The first such section has the label 1, and so on.
-bool HasPhases(const ReconstructionParameters& parameters);
+/// The sections of a stream that have a phase. The first one has the label 1, and so on.
+std::uint64_t CountPhases(const ReconstructionParameters& parameters);
+inline bool HasPhases(const ReconstructionParameters& parameters) {
+  return CountPhases(parameters) > 0;
+}
 
-/// Labels the particles of a frame by their phases. Sets `others` to the attributes without that of
-/// the phases. Errors: INVALID_ARGUMENT if the frame has particles, but no such attribute of one
-/// component.
+/// Labels the particles of a frame by their phases. Sets `others` to the other attributes.
+/// Errors: INVALID_ARGUMENT if a frame with particles lacks the attribute, or if the attribute has
+/// several components.
 absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters,
                         Phases& phases, std::vector<Attribute>& others);
+
+/// Labels the nodes of the body by phase. Requires: TakePhases.
+void MapPhases(const PhaseInput& input, Phases& phases);
+
+/// Points of all interfaces.
+inline std::uint64_t InterfacePointsOf(const Phases& phases) {
+  return phases.map.edges.size() + phases.map.cells.size();
+}
 
 /// Divides the body among the phases. Vertices of `body` where interfaces end move along its rings
 /// (MoveJunctions), and those that the repair needs return to their roots; the rings are then
 /// measured again. Returns false if the repair failed, which is a bug.
-/// Requires: TakePhases; the default placement. Deterministic. Cost: for each phase, linear in tiles; the rest
-/// linear in the points and particles near interfaces.
+/// Requires: MapPhases; the default placement. Deterministic. Cost: for each phase, linear in
+/// tiles; the rest linear in the points and particles near interfaces.
 [[nodiscard]] bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed,
                                Phases& phases, Rings& body);
 

@@ -379,6 +379,44 @@ static void try_attributes(const char* address) {
   partiemc_close(stream);
 }
 
+/* Two phases share a body and its area. */
+static void try_phases(const char* address) {
+  static float type[kCount];
+  for (size_t k = 0; k < kCount; ++k) type[k] = xyz[k][0] < kSide / 3.0 ? 1 : 4;
+  const int32_t phases[] = {4, 1};
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.spacing = 1;
+  options.phases = phases;
+  options.phase_count = 2;
+  options.phase_attribute = "type";
+  partiemc_stream* stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
+  partiemc_particles particles = plain();
+  const partiemc_attribute carried[] = {
+      {"type", {type, sizeof(float), PARTIEMC_FLOAT32}, {0}, {0}}};
+  particles.attributes = carried;
+  particles.attribute_count = 1;
+  partiemc_event event, section;
+  partiemc_event_init(&event, sizeof event);
+  partiemc_event_init(&section, sizeof section);
+  EXPECT(partiemc_reconstruct(stream, &particles, 0, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_RESULT && event.section_count == 2 && event.attribute_count == 0);
+  double area = 0;
+  for (size_t k = 0; k < 2; ++k) {
+    EXPECT(partiemc_event_section(stream, k, &section) == PARTIEMC_OK && section.ring_count == 1);
+    area += section.area;
+    size_t count = 0;
+    for (size_t i = 0; i < kCount; ++i) count += type[i] == (float)phases[k];
+    EXPECT(fabs(section.area / (double)count - 1) < .01);
+  }
+  EXPECT(fabs(area - event.area) < 1e-9 * area);
+  particles.attribute_count = 0;
+  EXPECT(partiemc_reconstruct(stream, &particles, 1, &event) == PARTIEMC_OK);
+  EXPECT(event.kind == PARTIEMC_REFUSAL && strcmp(event.reason, "NO_SUCH_ATTRIBUTE") == 0);
+  partiemc_close(stream);
+}
+
 /* The default mesh is finer than one with the tolerance 1, if an attribute is not linear. */
 static void try_attribute_tolerance(const char* address) {
   static float hill[kCount];
@@ -489,6 +527,7 @@ int main(int argc, char** argv) {
   try_refusals(address);
   try_latest(address);
   try_attributes(address);
+  try_phases(address);
   try_attribute_tolerance(address);
   try_slice(address);
   try_parts(address);

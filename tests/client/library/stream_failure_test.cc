@@ -285,6 +285,9 @@ TEST(StreamFailure, ServersThatIgnoreAParameterAreRefused) {
       "noise filters");
   ExpectRefused(
       {.sizes = Sizes::kOwn}, [](Message& m) { m.clear_sizes(); }, "own sizes");
+  ExpectRefused(
+      {.sections = {{.phase = 1}}}, [](Message& m) { m.mutable_sections(0)->clear_phase(); },
+      "phases");
 }
 
 }  // namespace

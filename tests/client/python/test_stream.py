@@ -66,6 +66,24 @@ class Streams(unittest.TestCase):
                                  [digests(each) for each in expected.sections])
                 self.assertEqual(len(result.sections), 2)
 
+    def test_phases_are_those_of_this_process(self):
+        parameters = {"spacing": 1, "phase_attribute": "type", "sections": [{"phase": 7}, {"phase": 2}]}
+        here = partiemc.Reconstructor(**parameters)
+        with partiemc.connect(self.address, **parameters) as stream:
+            for k in range(3):
+                positions = block(0.3 * k)
+                attributes = {"type": numpy.where(positions[:, 0] < 10, 2, 7)}
+                result = stream.reconstruct(positions, attributes=attributes)
+                expected = here.reconstruct(positions, attributes=attributes)
+                self.assertEqual(digests(result), digests(expected))
+                self.assertEqual([digests(each) for each in result.sections],
+                                 [digests(each) for each in expected.sections])
+                self.assertEqual(result.attributes, {})
+                self.assertAlmostEqual(sum(each.area for each in result.sections), result.area, 6)
+            with self.assertRaises(partiemc.Error) as caught:
+                stream.reconstruct(block())
+            self.assertEqual(caught.exception.reason, "NO_SUCH_ATTRIBUTE")
+
     def test_two_threads_get_the_same(self):
         frames = [numpy.asfortranarray(block(0.3 * k)) for k in range(20)]
         with partiemc.connect(self.address, spacing=1, normals=True) as stream:

@@ -140,6 +140,11 @@ typedef struct partiemc_options {
                         outline that reaches its own image is cut at the faces. NULL: no box. */
   int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
   const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume). NULL: equal. */
+  /* Outlines of these phases, after `sections`: they divide the outline of all particles and share
+   * the points of their interfaces. At most 16 with the sections. */
+  const int32_t* phases;
+  size_t phase_count;
+  const char* phase_attribute; /* The attribute with the phase of each particle. NULL: "phase". */
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -325,7 +330,7 @@ typedef struct partiemc_event {
   size_t attribute_count; /* Attributes of the options, in that order. */
   const partiemc_values* attributes;
 
-  size_t section_count; /* Results: sections of the options. */
+  size_t section_count; /* Results: sections and phases of the options. */
 
   /* Results of streams with the output "surface"; otherwise NULL and 0. Such results have no rings
    * and no mesh. */

@@ -12,6 +12,8 @@ export interface Outline {
   plane: SectionPlane | null;
   /** Of the density; null: the outline of the body. */
   isovalue: number | null;
+  /** Of these particles; absent: of all. */
+  phase?: number;
   /** The surface in space of a stream of surfaces. */
   isSurface?: boolean;
 }
@@ -19,8 +21,9 @@ export interface Outline {
 const AXES = ['x', 'y', 'z'];
 
 /** Name of an outline for the user: `z = 0.5, isovalue 0.3`. */
-export function outlineName({ plane, isovalue, isSurface }: Outline): string {
+export function outlineName({ plane, isovalue, isSurface, phase }: Outline): string {
   if (isSurface) return 'Surface';
+  if (phase !== undefined) return `Phase ${phase}`;
   const parts = [plane ? planeName(plane) : '', isovalue === null ? '' : `isovalue ${isovalue}`];
   return parts.filter(Boolean).join(', ') || 'Outline';
 }
@@ -35,8 +38,8 @@ function planeName({ origin, normal }: SectionPlane): string {
 export function outlinesOf(parameters: ReconstructionParameters | null): Outline[] {
   const own: Outline = { plane: planeOf(parameters?.slice) ?? null, isovalue: parameters?.isovalue ?? null };
   if (parameters?.output === Output.SURFACE) own.isSurface = true;
-  return [own, ...(parameters?.sections ?? []).map(({ slice, isovalue }) =>
-    ({ plane: planeOf(slice) ?? own.plane, isovalue: isovalue ?? null }))];
+  return [own, ...(parameters?.sections ?? []).map(({ slice, isovalue, phase }) =>
+    ({ plane: planeOf(slice) ?? own.plane, isovalue: isovalue ?? null, ...(phase === undefined ? {} : { phase }) }))];
 }
 
 function planeOf(slice: SlicePlane | undefined): SectionPlane | undefined {

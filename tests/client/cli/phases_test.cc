@@ -1,0 +1,67 @@
+// `partiemc replay --phases` as a program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A square of 20 x 20 particles of type 1, with a strip of type 2.
+void WritePhases(const std::string& path) {
+  std::ofstream file(path);
+  file << "x,y,type\n";
+  for (int j = 0; j < 20; ++j) {
+    for (int i = 0; i < 20; ++i) file << i << "," << j << "," << (i + j / 4 < 12 ? 1 : 2) << "\n";
+  }
+}
+
+TEST(PhasesReplay, EachPhaseIsASectionWithItsArea) {
+  const support::TemporaryFolder folder;
+  WritePhases(folder.Path("frame.csv"));
+  std::vector<std::vector<std::string>> digests;
+  ServerProgram server;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local"}, {"--server", server.address()}}) {
+    std::vector<std::string> arguments = {
+        "replay",  folder.Path("frame.csv"), "--spacing", "1", "--phases", "type=1,2", "--check",
+        "--stats", folder.Path("s.csv")};
+    arguments.insert(arguments.end(), where.begin(), where.end());
+    const Ran ran = RunPartiemc(arguments);
+    ASSERT_EQ(ran.exit_code, 0) << ran.error;
+    const std::string stats = Content(folder.Path("s.csv"));
+    digests.push_back(Column(stats, "rings_digest"));
+    const auto areas = Column(stats, "area");
+    ASSERT_EQ(areas.size(), 3u);
+    EXPECT_NEAR(std::stod(areas[1]) + std::stod(areas[2]), std::stod(areas[0]), 1e-6);
+    EXPECT_NEAR(std::stod(areas[1]), 200, 1);
+  }
+  EXPECT_EQ(digests[0], digests[1]);
+}
+
+TEST(PhasesReplay, WrongPhasesAreRefused) {
+  const support::TemporaryFolder folder;
+  WritePhases(folder.Path("frame.csv"));
+  const auto refusal = [&](const std::vector<std::string>& flags, int exit_code) {
+    std::vector<std::string> all = {"replay", folder.Path("frame.csv"), "--local", "--spacing",
+                                    "1"};
+    all.insert(all.end(), flags.begin(), flags.end());
+    const Ran ran = RunPartiemc(all);
+    EXPECT_EQ(ran.exit_code, exit_code) << ran.error;
+    return ran.error;
+  };
+  EXPECT_THAT(refusal({"--phases", "1,2"}, 2), HasSubstr("type=1,2"));
+  EXPECT_THAT(refusal({"--phases", "type=1.5"}, 2), HasSubstr("type=1,2"));
+  EXPECT_THAT(refusal({"--phases", "type=1,1"}, 2), HasSubstr("--phases"));
+  EXPECT_THAT(refusal({"--phases", "kind=1"}, 3), HasSubstr("kind"));
+  EXPECT_THAT(refusal({"--phases", "type=1", "--placement", "qef"}, 2), HasSubstr("--phases"));
+}
+
+}  // namespace
+}  // namespace partiemc::client
