@@ -95,7 +95,7 @@ absl::StatusOr<Reconstructor> CreateVariant(const ReconstructionParameters& para
 /// Returns `variant` without the steps that `parameters` rule out. A slice has no known area, its
 /// rings do not show how the body bends across the plane, and the outermost layer leans there. The
 /// steps area, curvature and support are therefore off. For an isovalue, smoothing is off, too, so
-/// that the vertices stay on the isoline.
+/// that the vertices stay on the isoline. With grains, only the roots and `edge_vertices` remain.
 VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
                                VirtualPlaneVariant variant);
 

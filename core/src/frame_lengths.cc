@@ -10,13 +10,15 @@
 #include "absl/strings/str_cat.h"
 #include "bins/resolution.h"
 #include "bins/spacing_doubt.h"
+#include "frame/calibration.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
 namespace {
 
 // With SpacingRule::kEveryFrame, the estimate of a later frame is clamped to these limits, in cells
-// of the existing lattice, so that a kernel spans a sensible number of cells.
+// of the existing lattice (with grains, in double cells), so that a kernel spans a sensible number
+// of cells.
 constexpr double kMinSpacingInCells = 0.25;
 constexpr double kMaxSpacingInCells = 4;
 
@@ -43,13 +45,29 @@ double SpacingOfSizes(std::span<const float> volumes) {
   return std::sqrt(sum / static_cast<double>(volumes.size()));
 }
 
+// The spacing for grains: the smallest diameter, unless the largest would be too many cells wide.
+// Requires: the frame has volumes.
+double SpacingOfGrains(const ReconstructionParameters& parameters, std::span<const float> volumes) {
+  const auto [least, most] = std::ranges::minmax_element(volumes);
+  constexpr double kLargest = ReconstructionParameters::kLargestGrain;
+  static_assert(kLargest * kGrainKernelRadius <= kTileSize, "kernels reach neighbouring tiles");
+  return std::max(
+      std::sqrt(double{*least}),
+      std::sqrt(double{*most}) / (kLargest * CellUnit(parameters) * parameters.cell_size));
+}
+
 // The spacing that the particles of a frame show; empty if there is no estimate. If the particles
 // do not agree on a spacing, the volumes give a better estimate than the distances.
 absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(
     const ReconstructionParameters& parameters, const Frame& frame, SpacingScratch& scratch) {
   std::optional<SpacingEstimate> own;
   if (parameters.sizes == Sizes::kOwn) {
-    if (!frame.volumes.empty()) own = SpacingEstimate{SpacingOfSizes(frame.volumes), true};
+    if (!frame.volumes.empty()) {
+      own = SpacingEstimate{parameters.boundary == Boundary::kGrains
+                                ? SpacingOfGrains(parameters, frame.volumes)
+                                : SpacingOfSizes(frame.volumes),
+                            true};
+    }
   } else {
     own = EstimateSpacing(frame, parameters.plane, scratch);
     if ((!own || !own->is_agreed) && !frame.volumes.empty()) {
@@ -86,10 +104,11 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
     }
   }
   if (!spacing) return std::nullopt;
-  const double cell_size = state.cell_size.value_or(parameters.cell_size * *spacing);
-  return Lengths{
-      std::clamp(*spacing, kMinSpacingInCells * cell_size, kMaxSpacingInCells * cell_size),
-      cell_size, is_provisional};
+  const double unit = CellUnit(parameters);
+  const double cell_size = state.cell_size.value_or(unit * parameters.cell_size * *spacing);
+  const double cell = cell_size / unit;
+  return Lengths{std::clamp(*spacing, kMinSpacingInCells * cell, kMaxSpacingInCells * cell),
+                 cell_size, is_provisional};
 }
 
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts) {
@@ -115,7 +134,8 @@ absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& 
   return lightest;
 }
 
-absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
+absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
+                                       const ReconstructionParameters& parameters,
                                        const Lengths& lengths) {
   if (frame.volumes.empty()) return SizeRange{};
   const auto [least, most] = std::ranges::minmax_element(frame.volumes);
@@ -124,10 +144,14 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
   constexpr double kRatio = ReconstructionParameters::kMostSizeRatio;
   // A kernel reaches at most the tiles beside the tile of its particle.
   const double largest =
-      std::min(kRatio, kTileSize * lengths.cell_size / (kernel_radius * spacing));
+      std::min(kRatio, kTileSize * lengths.cell_size / (parameters.kernel_radius * spacing));
+  const double smallest =
+      parameters.boundary == Boundary::kGrains
+          ? std::max(1 / kRatio, parameters.kSmallestGrain * lengths.cell_size / spacing)
+          : 1 / kRatio;
   // Volumes are rounded to float.
-  constexpr double kSmallest = (1 - 1e-6) / kRatio, kRounded = 1 + 1e-6;
-  if (sizes.smallest >= kSmallest && sizes.largest <= largest * kRounded) return sizes;
+  constexpr double kBelow = 1 - 1e-6, kRounded = 1 + 1e-6;
+  if (sizes.smallest >= kBelow * smallest && sizes.largest <= largest * kRounded) return sizes;
   // Names the smallest or the largest size. If both are wrong, the side with fewer particles is
   // named.
   const auto count = [&](auto is_beyond) {
@@ -135,14 +159,15 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
   };
   const auto above =
       count([&](float v) { return std::sqrt(double{v}) > largest * kRounded * spacing; });
-  const auto below = count([&](float v) { return std::sqrt(double{v}) < kSmallest * spacing; });
+  const auto below =
+      count([&](float v) { return std::sqrt(double{v}) < kBelow * smallest * spacing; });
   const bool is_large = above > 0 && (below == 0 || above <= below);
   const auto worst = is_large ? most : least;
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
       {std::string(kReasonOutOfRange), absl::StrCat("volumes[", worst - frame.volumes.begin(), "]"),
        ShortestNumber(*worst),
-       absl::StrCat("must have a square root, the size, of ", ShortestNumber(1 / kRatio), " to ",
+       absl::StrCat("must have a square root, the size, of ", ShortestNumber(smallest), " to ",
                     ShortestNumber(largest), " spacings of ", ShortestNumber(spacing))});
 }
 
@@ -154,7 +179,8 @@ absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& length
     doubts.Add(Doubt::kSpacingProvisional);
     return absl::OkStatus();
   }
-  if (!scale.is_slice && ContradictsSpacing(bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
+  if (!scale.is_slice && !scale.has_grains && ContradictsSpacing(bins, scale))
+    doubts.Add(Doubt::kSpacingContradicted);
   return fine;
 }
 

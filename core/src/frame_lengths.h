@@ -23,8 +23,10 @@ struct Lengths {
 
 /// Returns the lengths of a checked frame. They come from the parameters, else from the state, else
 /// from the particles. With own sizes, the spacing is then their root mean square, and the lattice
-/// has as many nodes per particle as with equal sizes. Empty if the particles give no estimate.
-/// Errors: INVALID_ARGUMENT if the spacing on which the particles agree is out of range.
+/// has as many nodes per particle as with equal sizes; for grains see
+/// ReconstructionParameters::boundary. Empty if the particles give
+/// no estimate. Errors: INVALID_ARGUMENT if the spacing on which the particles agree is out of
+/// range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
@@ -35,13 +37,16 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
 /// Returns the range of the sizes of a frame with own sizes. Errors: INVALID_ARGUMENT for the size
-/// that is farthest from the spacing, if it is out of range (ReconstructionParameters::sizes).
-absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame, double kernel_radius,
+/// that is farthest from the spacing, if it is out of range (ReconstructionParameters::sizes and
+/// boundary).
+absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
+                                       const ReconstructionParameters& parameters,
                                        const Lengths& lengths);
 
-/// Adds the doubts about spacing and resolution. A slab gets no doubt about the spacing, because
-/// its particles, seen from above the plane, do not show the spacing. Errors: as CheckResolution
-/// (resolution.h), except if lengths are provisional.
+/// Adds the doubts about spacing and resolution. Grains get no doubt about the spacing, because
+/// they need not touch. A slab gets no doubt about the spacing, because its particles, seen from
+/// above the plane, do not show the spacing. Errors: as CheckResolution (resolution.h), except if
+/// lengths are provisional.
 absl::Status JudgeLengths(const Frame& frame, Plane plane, const Lengths& lengths,
                           const Scale& scale, const ParticleBins& bins, Doubts& doubts);
 

@@ -14,6 +14,7 @@
 #include "frame/placement_traits.h"
 #include "frame_lengths.h"
 #include "mesh/touched_cells.h"
+#include "normals/grain_crossings.h"
 #include "workspace_bytes.h"
 
 namespace partiemc {
@@ -95,7 +96,7 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   const double usual = parameters.slice ? spacing * spacing * spacing : spacing * spacing;
   absl::Status status;
   if (parameters.sizes == Sizes::kOwn) {
-    const auto sizes = RangeOfSizes(frame, parameters.kernel_radius, *lengths);
+    const auto sizes = RangeOfSizes(frame, parameters, *lengths);
     if (!sizes.ok()) return sizes.status();
     scale = MakeScale(parameters, spacing, lengths->cell_size, usual, *sizes);
   } else {
@@ -209,6 +210,9 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     const PlacementTraits& traits = TraitsOf(parameters.placement);
     b.sampler.Build(b.bins, b.crossings, scale, traits.Reach(scale.kernel_radius),
                     traits.takes_particles);
+    if (scale.has_grains) {
+      FindGrainCrossings(b.bins.tiles, b.level_set, b.crossings, b.sampler, b.topology);
+    }
     // In a periodic box, a body may have changed its image since the last frame.
     const bool is_lifted = task.prepared != nullptr && task.prepared->is_lifted;
     const auto known =

@@ -35,9 +35,9 @@ constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Lists each member by name. If a member is added, this statement does not compile until the
   // author also hashes the new member.
-  const auto& [output, placement, fill, spacing, spacing_rule, sizes, kernel_radius, cell_size,
-               reference_radius, surface_offset, attribute_tolerance, normal_memory, clean,
-               min_component_area, min_component_particles, plane, slice, isovalue, sections,
+  const auto& [output, placement, fill, spacing, spacing_rule, sizes, boundary, kernel_radius,
+               cell_size, reference_radius, surface_offset, attribute_tolerance, normal_memory,
+               clean, min_component_area, min_component_particles, plane, slice, isovalue, sections,
                phase_attribute, surface, box, noise_filter] = parameters;
   const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
@@ -111,6 +111,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   if (sizes != Sizes::kEqual) {
     put_small('s');
     put_small(sizes);
+  }
+  if (boundary != Boundary::kBulk) {
+    put_small('b');
+    put_small(boundary);
   }
   return ChecksumOf(bytes);
 }

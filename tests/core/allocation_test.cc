@@ -39,8 +39,12 @@ struct AllocationCase {
   bool volumes, ids;
   bool estimates_spacing = false;  // In each frame.
   Sizes sizes = Sizes::kEqual;
+  Boundary boundary = Boundary::kBulk;
   bool has_phases = false;
 };
+
+// A lattice that is fine enough for the smallest of VaryingVolumes as grains.
+constexpr double kCellOfGrains = .8;
 
 // Phases of particles: stripes of both, then spray of the second one.
 std::vector<float> StripedPhases(const Particles& particles) {
@@ -62,7 +66,8 @@ void PrintTo(const AllocationCase& tested, std::ostream* out) {
   *out << Name(tested.placement) << ", " << Name(tested.fill) << ", " << tested.threads
        << " threads" << (tested.volumes ? ", volumes" : "") << (tested.ids ? ", ids" : "")
        << (tested.estimates_spacing ? ", spacing estimated" : "") << ", sizes "
-       << Name(tested.sizes) << (tested.has_phases ? ", phases" : "");
+       << Name(tested.sizes) << ", boundary " << Name(tested.boundary)
+       << (tested.has_phases ? ", phases" : "");
 }
 
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
@@ -74,7 +79,9 @@ TEST_P(WarmFrame, AllocatesNothing) {
   ReconstructionParameters parameters{.placement = tested.placement,
                                       .fill = tested.fill,
                                       .sizes = tested.sizes,
+                                      .boundary = tested.boundary,
                                       .min_component_particles = 3};
+  if (tested.boundary == Boundary::kGrains) parameters.cell_size = kCellOfGrains;
   if (tested.estimates_spacing) {
     parameters.spacing_rule = SpacingRule::kEveryFrame;
   } else {
@@ -262,8 +269,11 @@ std::vector<AllocationCase> Cases() {
     cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, false, false, true});
     cases.push_back(
         {Placement::kVirtualPlane, Fill::kGreedy, threads, true, threads == 2, false, Sizes::kOwn});
-    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, threads == 1, threads == 2,
-                     false, Sizes::kEqual, true});
+    cases.push_back(cases.back());
+    cases.back().boundary = Boundary::kGrains;
+    cases.push_back(
+        {Placement::kVirtualPlane, Fill::kGreedy, threads, threads == 1, threads == 2});
+    cases.back().has_phases = true;
   }
   return cases;
 }
@@ -276,6 +286,7 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                                   std::to_string(tested.param.threads) +
                                   (tested.param.estimates_spacing ? "_spacing" : "") +
                                   (tested.param.sizes == Sizes::kOwn ? "_sizes" : "") +
+                                  (tested.param.boundary == Boundary::kGrains ? "_grains" : "") +
                                   (tested.param.has_phases ? "_phases" : "");
                          });
 struct MemoryCase {
@@ -330,6 +341,10 @@ std::vector<MemoryCase> MemoryCases() {
   const std::vector<Section> phases = {{.phase = 1}, {.phase = 2}};
   add("body of two phases", phased(support::Disc(300)), {.sections = phases});
   add("drops of two phases", phased(spread(150, 5)), {.sections = phases});
+  const ReconstructionParameters grains{
+      .sizes = Sizes::kOwn, .boundary = Boundary::kGrains, .cell_size = kCellOfGrains};
+  add("body of grains", sized(support::Disc(150)), grains);
+  add("drops of grains", sized(spread(100, 5)), grains);
   add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
   add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});

@@ -148,7 +148,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(19, BlobParameters());
+  std::vector<ReconstructionParameters> others(20, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -168,6 +168,8 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[16].box = PeriodicBox{.axes = {PeriodicAxis{0, 1e3}}, .wraps = true};
   others[17].sections = {{.phase = 1}};
   others[18].sections = {{.phase = 2}};
+  others[19].sizes = Sizes::kOwn;
+  others[19].boundary = Boundary::kGrains;
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

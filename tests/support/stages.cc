@@ -33,10 +33,10 @@ void Stages::SetScale(const ReconstructionParameters& wanted) {
   if (!particles.volumes.empty()) {
     lightest = *std::min_element(particles.volumes.begin(), particles.volumes.end());
   }
-  const double cell_size = parameters.cell_size * spacing;
+  const double cell_size = CellUnit(parameters) * parameters.cell_size * spacing;
   if (parameters.sizes == Sizes::kOwn) {
-    const auto sizes = RangeOfSizes(particles.AsFrame(), parameters.kernel_radius,
-                                    {.spacing = spacing, .cell_size = cell_size});
+    const auto sizes =
+        RangeOfSizes(particles.AsFrame(), parameters, {.spacing = spacing, .cell_size = cell_size});
     ASSERT_TRUE(sizes.ok()) << sizes.status();
     scale = MakeScale(parameters, spacing, cell_size, spacing * spacing, *sizes);
     return;

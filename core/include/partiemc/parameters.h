@@ -52,6 +52,13 @@ enum class Sizes : std::uint8_t {
   kOwn,    ///< h_i = sqrt(v_i) with the particle's volume v_i (core/SIZES.md).
 };
 
+/// What the outline runs around.
+enum class Boundary : std::uint8_t {
+  kBulk,    ///< The body that the particles fill: the outline smooths over single particles.
+  kGrains,  ///< Particles are discs of the diameter h_i, and the outline follows their surfaces
+            ///< (core/SIZES.md, "Grains").
+};
+
 /// The plane in which the particles lie, by the two coordinates that span it.
 enum class Plane : std::uint8_t { kXy, kXz, kYz };
 
@@ -158,6 +165,15 @@ struct ReconstructionParameters {
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 
+  /// With grains, no outline cuts notably into a disc, voids without room for another grain are
+  /// inside, and a lone disc is a component. Requires Sizes::kOwn; excludes isovalues.
+  /// `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half spacings. An absent
+  /// spacing is the smallest diameter, or a tenth of the largest if this is larger. A diameter must
+  /// be at least `kSmallestGrain` cells, so that no grain falls between the nodes of the lattice,
+  /// and at most `kLargestGrain` cells, because kernels reach neighbouring tiles only.
+  static constexpr double kSmallestGrain = 1.42, kLargestGrain = 20;
+  Boundary boundary = Boundary::kBulk;
+
   /// Kernel radius R in spacings, in [1.5, 8]. With a larger radius the outline is smoother, and
   /// the cost grows with the square of R; with a smaller radius the outline follows single
   /// particles.
@@ -252,8 +268,8 @@ absl::Status Validate(const ReconstructionParameters& parameters);
 /// Checks a box. `spacing`: 0 if it is not known yet. Errors: as above.
 absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spacing);
 
-/// Fills in `reference_radius` and `clean` if they are absent.
-/// Requires: Validate(parameters).ok().
+/// Fills in `reference_radius` and `clean` if they are absent. With grains, sets `kernel_radius`
+/// and `reference_radius`. Requires: Validate(parameters).ok().
 ReconstructionParameters Resolve(ReconstructionParameters parameters);
 
 /// Whether results of this placement have all guarantees of result.h: rings are simple and nested,
@@ -267,6 +283,7 @@ std::string_view Name(Placement placement);
 std::string_view Name(Fill fill);
 std::string_view Name(SpacingRule rule);
 std::string_view Name(Sizes sizes);
+std::string_view Name(Boundary boundary);
 std::string_view Name(Plane plane);
 std::span<const Placement> AllPlacements();
 std::span<const Fill> AllFills();

@@ -1,6 +1,7 @@
 #include "field/field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <span>
@@ -93,12 +94,34 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
+// Lowers F at the requested nodes to the distance from the nearest grain. Returns `inside` and the
+// nodes that are inside now.
+BitRows JoinGrains(const NodeBlocks& blocks, const GrainDistances& distances, BitRows inside,
+                   float* values) {
+  for (int b = 0; b < blocks.count; ++b) {
+    const NodeBlock& block = blocks[b];
+    for (std::uint32_t asked = block.asked; asked != 0; asked &= asked - 1) {
+      const int node = std::countr_zero(asked);
+      const int i = block.column + node % NodeBlock::kSide;
+      const int j = block.row + node / NodeBlock::kSide;
+      float& value = values[j * kTileSize + i];
+      value = std::min(value, distances.blocks[b][node]);
+      inside[j] |= static_cast<std::uint32_t>(value < 0) << i;
+    }
+  }
+  return inside;
+}
+
 // Computes F at the given nodes of a tile from their moments. Returns the nodes that are inside.
 BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                     const AskedNodes& asked, LevelSet& level_set) {
   const NodeBlocks blocks = BlocksOf(asked.rows);
   MomentSums sums;
   std::fill_n(sums.begin(), blocks.count, BlockSums{});
+  GrainDistances distances;
+  if (scale.has_grains) {
+    for (int b = 0; b < blocks.count; ++b) distances.blocks[b].fill(kTileSize);
+  }
   CellMask mask = MaskOf(asked.rows);
   const int reach = static_cast<int>(std::ceil(scale.reach));
   const bool masked = reach < kMaskMargin;
@@ -109,9 +132,11 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   MaskedParticles(bins, tile, masked ? &mask : nullptr)
       .ForEachBlock([&](const ParticleBlock& near) {
         AddNearMoments(near, SizesOf(bins), radius, blocks, asked.has_kernel_sums, sums);
+        if (scale.has_grains) AddNearGrains(near, SizesOf(bins), scale, blocks, distances);
       });
-  return EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale,
-                       level_set.tiles[tile].data());
+  float* const values = level_set.tiles[tile].data();
+  const BitRows inside = EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale, values);
+  return scale.has_grains ? JoinGrains(blocks, distances, inside, values) : inside;
 }
 
 // Second pass. Computes F at the nodes whose side the density does not decide at once, while the

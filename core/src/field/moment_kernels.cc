@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "field/tile_kernels.h"
 
@@ -109,14 +110,32 @@ HWY_INLINE void AddMoments(const float* x, const float* y, [[maybe_unused]] cons
   }
 }
 
-template <bool kSized>
-void AddNearMomentsOf(const ParticleBlock& near, [[maybe_unused]] const float* size, float radius,
-                      const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+// Lowers the distances of a block; x and y are relative to its first node.
+HWY_INLINE void AddGrains(const float* x, const float* y, const float* size, int count,
+                          float spacing, BlockSums::Channel& distances) {
+  const Lanes d;
+  for (int part = 0; part < NodeBlock::kNodes; part += kLanes) {
+    const Vector column = hn::Load(d, kColumns + part), row = hn::Load(d, kRows + part);
+    Vector least = hn::Load(d, distances.data() + part);
+    for (int e = 0; e < count; ++e) {
+      const Vector dx = hn::Sub(hn::Set(d, x[e]), column);
+      const Vector dy = hn::Sub(hn::Set(d, y[e]), row);
+      const Vector square = hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy));
+      const Vector radius = hn::Set(d, size[e] * spacing * 0.5f);
+      least = hn::Min(least, hn::Sub(hn::Sqrt(square), radius));
+    }
+    hn::Store(least, d, distances.data() + part);
+  }
+}
+
+// Calls add(b, chosen) for each block with the particles whose kernels may reach it.
+template <bool kSized, typename Add>
+HWY_INLINE void ForEachReached(const ParticleBlock& near, [[maybe_unused]] const float* size,
+                               float radius, const NodeBlocks& blocks, Add add) {
   alignas(64) ParticleBlock::PerParticle<float> sizes;
   if constexpr (kSized) {
     for (int k = 0; k < near.count; ++k) sizes[k] = size[near.particle[k]];
   }
-  const float inverse_square = 1 / (radius * radius);
   Chosen of_rows, of_block;
   int row = -1;
   for (int b = 0; b < blocks.count; ++b) {
@@ -127,10 +146,29 @@ void AddNearMomentsOf(const ParticleBlock& near, [[maybe_unused]] const float* s
     }
     Choose<kSized>(of_rows.across.data(), of_rows.along.data(), of_rows.size.data(), of_rows.count,
                    block.column, radius, of_block);
-    const auto add = has_kernel_sums ? AddMoments<false, kSized> : AddMoments<true, kSized>;
-    add(of_block.along.data(), of_block.across.data(), of_block.size.data(), of_block.count,
-        inverse_square, sums[b]);
+    add(b, std::as_const(of_block));
   }
+}
+
+template <bool kSized>
+void AddNearMomentsOf(const ParticleBlock& near, const float* size, float radius,
+                      const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+  const float inverse_square = 1 / (radius * radius);
+  const auto add = has_kernel_sums ? AddMoments<false, kSized> : AddMoments<true, kSized>;
+  ForEachReached<kSized>(near, size, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
+    add(chosen.along.data(), chosen.across.data(), chosen.size.data(), chosen.count, inverse_square,
+        sums[b]);
+  });
+}
+
+void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
+                   const NodeBlocks& blocks, GrainDistances& distances) {
+  const auto spacing = static_cast<float>(scale.spacing);
+  const auto radius = static_cast<float>(scale.kernel_radius);
+  ForEachReached<true>(near, size, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
+    AddGrains(chosen.along.data(), chosen.across.data(), chosen.size.data(), chosen.count, spacing,
+              distances.blocks[b]);
+  });
 }
 
 void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
@@ -146,7 +184,13 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace partiemc {
 
+HWY_EXPORT(AddNearGrains);
 HWY_EXPORT(AddNearMoments);
+
+void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
+                   const NodeBlocks& blocks, GrainDistances& distances) {
+  HWY_DYNAMIC_DISPATCH(AddNearGrains)(near, size, scale, blocks, distances);
+}
 
 void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {

@@ -69,6 +69,11 @@ struct alignas(64) BlockSums {
 };
 using MomentSums = std::array<BlockSums, NodeBlocks::kMost>;
 
+/// By block and node: the distance to the nearest surface of a grain, in cells; negative inside.
+struct alignas(64) GrainDistances {
+  std::array<BlockSums::Channel, NodeBlocks::kMost> blocks;
+};
+
 /// The nodes of a tile that need moments.
 struct AskedNodes {
   BitRows rows;
@@ -102,6 +107,11 @@ void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float
 /// null if sizes are equal. `has_kernel_sums`: sum k is known, so it is not added.
 void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums);
+
+/// Lowers `distances` to the distances from grains. Grains whose kernels do not reach a node may be
+/// left out.
+void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
+                   const NodeBlocks& blocks, GrainDistances& distances);
 
 /// Classifies the nodes of a tile by the density f = weight * sum. Sets `inside`, and `open` for
 /// undecided nodes. Replaces the sums of decided nodes by the term of F that decides, or by F

@@ -9,6 +9,13 @@ namespace partiemc {
 /// (core/METHOD.md, "Calibration") times the factor of the placement. `kernel_radius` in spacings.
 double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 
+/// The kernel radius and the reference radius for Boundary::kGrains, in diameters (core/SIZES.md,
+/// "Grains"). With the largest kernel radius that lets a lattice of half the smallest diameter
+/// reach grains of ten times this diameter. phi decides only between grains, whose surfaces have
+/// their own term: with a larger reference radius, the outline has shallower dimples and smaller
+/// voids.
+inline constexpr double kGrainKernelRadius = 1.6, kGrainReferenceRadius = 0.3;
+
 /// The reference radius of slices, for every placement. The lattice value needs no factor, as tests
 /// with balls and tori cut at many heights show (core/METHOD.md, "Slices").
 double CalibratedSliceRadius(double kernel_radius);

@@ -192,6 +192,18 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
+// Checks what only grains require.
+absl::Status CheckBoundary(const ReconstructionParameters& p) {
+  if (p.boundary == Boundary::kBulk) return absl::OkStatus();
+  const bool is_isoline = p.isovalue || std::ranges::any_of(p.sections, [](const Section& s) {
+                            return s.isovalue.has_value();
+                          });
+  if (p.sizes == Sizes::kOwn && !is_isoline) return absl::OkStatus();
+  return Refused(
+      "boundary", std::string(Name(p.boundary)),
+      is_isoline ? "must be bulk with an isovalue" : "must be bulk unless sizes are own");
+}
+
 // Checks what only surfaces require.
 absl::Status CheckSurface(const ReconstructionParameters& p) {
   const auto check = [](const char* field, double value, const char* rule) {
@@ -262,6 +274,7 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   if (absl::Status status = CheckBox(p); !status.ok()) return status;
   if (absl::Status status = CheckSizes(p); !status.ok()) return status;
+  if (absl::Status status = CheckBoundary(p); !status.ok()) return status;
   return CheckOutlines(p);
 }
 
@@ -295,6 +308,10 @@ absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spaci
 }
 
 ReconstructionParameters Resolve(ReconstructionParameters parameters) {
+  if (parameters.boundary == Boundary::kGrains) {
+    parameters.kernel_radius = kGrainKernelRadius;
+    parameters.reference_radius = kGrainReferenceRadius;
+  }
   if (!parameters.reference_radius) {
     const double kernel_radius = parameters.kernel_radius;
     parameters.reference_radius =
@@ -321,6 +338,8 @@ std::string_view Name(SpacingRule rule) {
 }
 
 std::string_view Name(Sizes sizes) { return sizes == Sizes::kEqual ? "equal" : "own"; }
+
+std::string_view Name(Boundary boundary) { return boundary == Boundary::kBulk ? "bulk" : "grains"; }
 
 std::string_view Name(Plane plane) { return NameOf(kPlaneNames, plane); }
 

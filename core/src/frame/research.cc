@@ -35,6 +35,11 @@ VirtualPlaneVariant VariantFor(const ReconstructionParameters& parameters,
     steps.curvature = steps.support = steps.area = false;
   }
   if (parameters.isovalue) steps.smoothing = false;
+  if (parameters.boundary == Boundary::kGrains) {
+    const bool has_edge_vertices = steps.edge_vertices;
+    steps = VirtualPlaneSteps::None();
+    steps.edge_vertices = has_edge_vertices;
+  }
   return variant;
 }
 

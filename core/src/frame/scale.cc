@@ -35,7 +35,21 @@ constexpr double kBoundarySlope = 1.164;
 // In space, this slope is the integral of the normalised kernel over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
+// With grains, cells of size 1 are half as wide as the smallest grain.
+constexpr double kGrainCell = 0.5;
+// With grains, voids of up to five touching grains are inside: there f is 0.92 or more, in the void
+// of six 0.68.
+constexpr double kGrainSaturation = 0.9;
+// With grains, the gap term begins below the spread in the void of six touching grains, 0.195, in
+// which another grain has room. In the middle between two grains, the spread has this value if
+// their gap is 0.32 diameters.
+constexpr double kGrainGapSpread = 0.17;
+
 }  // namespace
+
+double CellUnit(const ReconstructionParameters& parameters) {
+  return parameters.boundary == Boundary::kGrains ? kGrainCell : 1;
+}
 
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
                 double lightest_volume, const SizeRange& sizes) {
@@ -67,6 +81,12 @@ Scale MakeScale(const ReconstructionParameters& parameters, double spacing, doub
   const double reference = scale.reference_radius / scale.kernel_radius;
   scale.gap_spread = std::max(kGapSpread, kGapSpreadPerReference * reference * reference);
   scale.gap_slope = scale.kernel_radius / kSpreadSlope;
+  scale.has_grains = parameters.boundary == Boundary::kGrains;
+  if (scale.has_grains) {
+    scale.guard = 0;
+    scale.saturation = kGrainSaturation;
+    scale.gap_spread = kGrainGapSpread;
+  }
   return scale;
 }
 

@@ -16,6 +16,7 @@ struct Scale {
   double cell_size = 0;          ///< World units.
   bool is_slice = false;         ///< Particles fill space; volumes are cubic.
   bool has_own_sizes = false;    ///< Sizes::kOwn: particle i has the kernel radius beta h_i.
+  bool has_grains = false;       ///< Boundary::kGrains: particles are discs.
   SizeRange sizes;               ///< Both 1 for equal sizes.
   double spacing = 0;            ///< h.
   double kernel_radius = 0;      ///< R = beta h.
@@ -30,6 +31,9 @@ struct Scale {
   double gap_spread = 0;         ///< sigma_0: points with a larger spread are in a gap.
   double gap_slope = 0;          ///< R / 0.45: converts spread to a length.
 };
+
+/// The unit of ReconstructionParameters::cell_size, in spacings.
+double CellUnit(const ReconstructionParameters& parameters);
 
 /// Arguments in world units. `lightest_volume`: the smallest volume of a particle; an area (h^2
 /// without volumes), but for a slice a volume in space. Requires: resolved parameters; for

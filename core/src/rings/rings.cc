@@ -16,6 +16,9 @@ namespace {
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
+// The same with grains. The hole in a void with room for a grain of the smallest size is larger.
+constexpr double kMinGrainHole = 0.5;
+
 // Minimum number of segments per task.
 constexpr std::size_t kSegmentGrain = 512;
 
@@ -186,7 +189,8 @@ void Clean(const ParticleBins& bins, const Scale& scale, Crossings& crossings, R
            RingTopology& rings) {
   DropEmptyComponents(scratch, crossings, rings);
   if (rings.dropped_components > 0) KeepSurvivors(bins.tiles, crossings, scratch, rings);
-  const double min_area = kMinHoleParticles * scale.spacing * scale.spacing;
+  const double particles = scale.has_grains ? kMinGrainHole : kMinHoleParticles;
+  const double min_area = particles * scale.spacing * scale.spacing;
   for (std::size_t ring = 0; ring + 1 < rings.offsets.size(); ++ring) {
     const double area = scratch.area[ring];
     if (area < 0 && -area < min_area) {

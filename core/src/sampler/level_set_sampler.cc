@@ -250,6 +250,22 @@ FieldSample LevelSetSampler::SampleSlice(std::uint32_t tile, double x, double y)
   return sample;
 }
 
+// Replaces F by the distance to the nearest surface of a grain if this is smaller.
+void LevelSetSampler::JoinGrains(std::uint32_t tile, const Point& point,
+                                 LevelSetSample& sample) const {
+  const double largest = scale_.spacing * scale_.sizes.largest / 2;
+  const double range =
+      std::min(largest + std::max(sample.value, 0.0), scale_.reach - NeighbourGrid::kStep);
+  ForEachNear(tile, point.x, point.y, range, [&](double x, double y, std::uint32_t particle) {
+    const double to_x = point.x - x, to_y = point.y - y;
+    const double length = std::sqrt(to_x * to_x + to_y * to_y);
+    const double distance = length - scale_.spacing * size_[particle] / 2;
+    if (distance >= sample.value) return;
+    const double inverse = length > 0 ? 1 / length : 0;
+    sample = {distance, to_x * inverse, to_y * inverse, size_[particle]};
+  });
+}
+
 FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) const {
   if (scale_.is_slice) return SampleSlice(tile, x, y);
   const Point point{x, y};
@@ -258,6 +274,9 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
   FindNear(tile, query.points, KernelRange(), query.near);
   PointSamples samples;
   SampleAtPoints(scale_, {&query, 1}, samples);
+  LevelSetSample at{samples.value[0], samples.gradient_x[0], samples.gradient_y[0],
+                    samples.size[0]};
+  if (scale_.has_grains) JoinGrains(tile, point, at);
   return {.density = samples.density[0],
           .mean_x = samples.mean_x[0],
           .mean_y = samples.mean_y[0],
@@ -265,10 +284,10 @@ FieldSample LevelSetSampler::Sample(std::uint32_t tile, double x, double y) cons
           .phi_x = samples.phi_x[0],
           .phi_y = samples.phi_y[0],
           .spread = samples.spread[0],
-          .value = samples.value[0],
-          .gradient_x = samples.gradient_x[0],
-          .gradient_y = samples.gradient_y[0],
-          .size = samples.size[0],
+          .value = at.value,
+          .gradient_x = at.gradient_x,
+          .gradient_y = at.gradient_y,
+          .size = at.size,
           .has_support = samples.kernel[0] > 0};
 }
 
@@ -295,6 +314,7 @@ void LevelSetSampler::Sample(std::span<const FieldPoints> groups,
   for (std::size_t q = 0; q < groups.size(); ++q) {
     for (std::size_t k = 0; k < groups[q].count; ++k, ++point) {
       samples[q][k] = {at.value[point], at.gradient_x[point], at.gradient_y[point], at.size[point]};
+      if (scale_.has_grains) JoinGrains(groups[q].tile, groups[q].points[k], samples[q][k]);
     }
   }
 }

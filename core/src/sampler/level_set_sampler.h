@@ -146,6 +146,7 @@ class LevelSetSampler {
   template <typename Visit>
   void ForEachInSpace(std::uint32_t tile, double x, double y, Visit visit) const;
   FieldSample SampleSlice(std::uint32_t tile, double x, double y) const;
+  void JoinGrains(std::uint32_t tile, const Point& point, LevelSetSample& sample) const;
   SliceSums SliceSumsAt(std::uint32_t tile, double x, double y) const;
 
   Scale scale_;

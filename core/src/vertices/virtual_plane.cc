@@ -56,6 +56,24 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
+// With grains: repeats the Newton step of a cell vertex, because the gradient changes within a
+// cell. The vertex may leave its cell, because a grain may reach into a cell without a node in it.
+void ApproachGrain(const VertexInput& input, const CellPlane& plane, std::size_t i,
+                   RingVertices& v) {
+  constexpr int kSteps = 3;
+  const double max_step = input.variant.constants.newton_step;
+  v.point[i] = VirtualPlaneVertex(plane, max_step);
+  for (int step = 1; step < kSteps; ++step) {
+    const FieldPoint at = Locate(input, plane.cell, v.point[i]);
+    if (at.tile == kNoTile) return;
+    const FieldSample sample = input.field.Sample(at.tile, at.x, at.y);
+    const Point gradient{sample.gradient_x, sample.gradient_y};
+    if (Dot(gradient, gradient) < kWeakGradientSquare) return;
+    v.normal[i] = UnitOf(gradient);
+    v.point[i] = NewtonStep(v.point[i], sample.value, gradient, max_step);
+  }
+}
+
 // Step 1 for a segment: moves both vertices to the level set by one Newton step each. Near the
 // surface F behaves like a distance, so a short step along the gradient does not change the
 // gradient. The normal is therefore taken at the starting point unless the step exceeds
@@ -86,6 +104,7 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   };
   set_normal(edge, plane.entry, {plane.entry_gradient_x, plane.entry_gradient_y});
   set_normal(inner, plane.point, {plane.gradient_x, plane.gradient_y});
+  if (input.scale.has_grains) ApproachGrain(input, plane, inner, v);
   if (v.size.empty()) return;
   v.size[edge] = plane.entry_size;
   v.size[inner] = plane.size;
