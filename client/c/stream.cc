@@ -118,6 +118,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   if (options.fill != nullptr) named.Update(SetByName(options.fill, parameters.fill));
   if (options.plane != nullptr) named.Update(SetByName(options.plane, parameters.plane));
   if (options.sizes != nullptr) named.Update(SetByName(options.sizes, parameters.sizes));
+  if (options.boundary != nullptr) named.Update(SetByName(options.boundary, parameters.boundary));
   if (!named.ok()) return named;
   return parameters;
 }

@@ -41,6 +41,9 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
                           &Section::phase)) {
     return absl::UnimplementedError("the server does not support phases: use a newer one");
   }
+  if (parameters->boundary != requested.boundary) {
+    return absl::UnimplementedError("the server does not support grains: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

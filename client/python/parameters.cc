@@ -177,6 +177,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeNamed(arguments, "plane", parameters.plane);
   TakeNamed(arguments, "spacing_rule", parameters.spacing_rule);
   TakeNamed(arguments, "sizes", parameters.sizes);
+  TakeNamed(arguments, "boundary", parameters.boundary);
   TakeInto(arguments, "spacing", parameters.spacing);
   TakeInto(arguments, "kernel_radius", parameters.kernel_radius);
   TakeInto(arguments, "cell_size", parameters.cell_size);
@@ -305,7 +306,8 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "wrap"_a = parameters.box && parameters.box->wraps,
                 "noise_filter"_a = parameters.noise_filter,
                 "phase_attribute"_a = parameters.phase_attribute,
-                "sizes"_a = named(parameters.sizes));
+                "sizes"_a = named(parameters.sizes),
+                "boundary"_a = named(parameters.boundary));
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

@@ -112,6 +112,19 @@ std::optional<Sizes> FromWire(v1::Sizes sizes) {
   }
 }
 
+std::optional<Boundary> FromWire(v1::Boundary boundary) {
+  switch (boundary) {
+    case v1::BOUNDARY_UNSPECIFIED:
+      return ReconstructionParameters{}.boundary;
+    case v1::BOUNDARY_BULK:
+      return Boundary::kBulk;
+    case v1::BOUNDARY_GRAINS:
+      return Boundary::kGrains;
+    default:
+      return std::nullopt;
+  }
+}
+
 std::optional<Plane> FromWire(v1::Plane plane) {
   switch (plane) {
     case v1::PLANE_UNSPECIFIED:
@@ -377,6 +390,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (!spacing_rule) return UnknownEnum("parameters.spacing_rule", message.spacing_rule());
   const auto sizes = FromWire(message.sizes());
   if (!sizes) return UnknownEnum("parameters.sizes", message.sizes());
+  const auto boundary = FromWire(message.boundary());
+  if (!boundary) return UnknownEnum("parameters.boundary", message.boundary());
   const auto plane = FromWire(message.plane());
   if (!plane) return UnknownEnum("parameters.plane", message.plane());
 
@@ -386,6 +401,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   parameters.fill = *fill;
   parameters.spacing_rule = *spacing_rule;
   parameters.sizes = *sizes;
+  parameters.boundary = *boundary;
   parameters.plane = *plane;
   if (message.has_spacing()) parameters.spacing = message.spacing();
   if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
@@ -453,6 +469,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.box) *message.mutable_box() = ToWire(*parameters.box);
   if (parameters.noise_filter) message.set_noise_filter(*parameters.noise_filter);
   if (parameters.sizes == Sizes::kOwn) message.set_sizes(v1::SIZES_OWN);
+  if (parameters.boundary == Boundary::kGrains) message.set_boundary(v1::BOUNDARY_GRAINS);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

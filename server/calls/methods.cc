@@ -231,6 +231,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("attributes");
   response.add_capabilities("attribute-meshes");
   if (context_.limits.max_parts > 0) response.add_capabilities("parts");
+  response.add_capabilities("grains");
   response.add_capabilities("particle-sizes");
   response.add_capabilities("phases");
   response.add_capabilities("periodic-boxes");

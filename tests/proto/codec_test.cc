@@ -81,6 +81,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
       .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
   parameters.noise_filter = 0.375;
   parameters.sizes = Sizes::kOwn;
+  parameters.boundary = Boundary::kGrains;
   v1::ReconstructionParameters message;
   EncodeParameters(parameters, message);
   const auto decoded = DecodeParameters(message);

@@ -80,6 +80,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
         weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.
     sizes: "equal" (the default), or "own": each particle has the size sqrt(volume).
+    boundary: "bulk" (the default), or "grains", with own sizes: particles are discs of the diameter
+        sqrt(volume), and the outline follows their surfaces.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:
         see core/include/partiemc/parameters.h.
 

@@ -207,6 +207,12 @@ static void try_wrong_surfaces(const char* address) {
     EXPECT(strcmp(partiemc_last_error()->field, "parameters.sizes") == 0);
   }
   options.sizes = NULL;
+  for (int k = 0; k < 2; ++k) {
+    options.boundary = k == 0 ? "smooth" : "grains"; /* Grains have own sizes. */
+    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
+    EXPECT(strcmp(partiemc_last_error()->field, "parameters.boundary") == 0);
+  }
+  options.boundary = NULL;
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_OK);
   partiemc_event event;
   partiemc_event_init(&event, sizeof event);

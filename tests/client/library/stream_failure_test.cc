@@ -288,6 +288,9 @@ TEST(StreamFailure, ServersThatIgnoreAParameterAreRefused) {
   ExpectRefused(
       {.sections = {{.phase = 1}}}, [](Message& m) { m.mutable_sections(0)->clear_phase(); },
       "phases");
+  ExpectRefused(
+      {.sizes = Sizes::kOwn, .boundary = Boundary::kGrains}, [](Message& m) { m.clear_boundary(); },
+      "grains");
 }
 
 }  // namespace

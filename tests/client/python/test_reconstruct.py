@@ -180,6 +180,14 @@ class Layouts(unittest.TestCase):
         equal = partiemc.reconstruct(3 * block(), spacing=3)
         self.assertAlmostEqual(result.area / equal.area, 1, places=3)
 
+    def test_grains_are_lone_components(self):
+        sequence = partiemc.Reconstructor(sizes="own", boundary="grains")
+        grains = numpy.array([[0, 0], [5, 0], [5, 5]])
+        result = sequence.reconstruct(grains, volumes=numpy.array([1, 4, 9]))
+        self.assertEqual(sequence.parameters["boundary"], "grains")
+        self.assertEqual(len(result.rings), 3)
+        self.assertAlmostEqual(result.area / (numpy.pi / 4 * 14), 1, delta=0.05)
+
 
 class Results(unittest.TestCase):
     def setUp(self):
@@ -510,6 +518,7 @@ class Errors(unittest.TestCase):
         self.assert_refused("COUNT", "volumes", volumes=numpy.ones((count, 1)))
         self.assert_refused("COUNT", "volumes", sizes="own")
         self.assert_refused("UNSUPPORTED", "parameters.sizes", sizes="large")
+        self.assert_refused("OUT_OF_RANGE", "parameters.boundary", boundary="grains")
         self.assert_refused("COUNT", "ids", ids=numpy.arange(count + 1))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count, numpy.int16))

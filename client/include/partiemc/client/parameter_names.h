@@ -67,6 +67,10 @@ inline absl::Status SetByName(std::string_view name, Sizes& sizes) {
   static constexpr std::array kAll = {Sizes::kEqual, Sizes::kOwn};
   return SetByName("parameters.sizes", name, std::span<const Sizes>(kAll), sizes);
 }
+inline absl::Status SetByName(std::string_view name, Boundary& boundary) {
+  static constexpr std::array kAll = {Boundary::kBulk, Boundary::kGrains};
+  return SetByName("parameters.boundary", name, std::span<const Boundary>(kAll), boundary);
+}
 inline absl::Status SetByName(std::string_view name, Coordinates& coordinates) {
   static constexpr std::array kAll = {Coordinates::kFloat64, Coordinates::kRelativeFloat32,
                                       Coordinates::kCompact};

@@ -141,6 +141,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     spacing: base?.spacing ?? (spacing || undefined),
     spacingRule: base?.spacingRule,
     sizes: base?.sizes,
+    boundary: base?.boundary,
     noiseFilter: base?.noiseFilter,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
