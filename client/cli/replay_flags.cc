@@ -195,6 +195,15 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->each([&flags](const std::string& sizes) { flags.sequence.needs_sizes = sizes == "own"; })
       ->capture_default_str()
       ->group(kGroup);
+  app.add_option("--boundary", flags.boundary,
+                 "What the outline runs around: bulk, or grains, discs of the column diameter or "
+                 "radius, else of the area in the column volume; grains have own sizes")
+      ->type_name("WHICH")
+      ->each([&flags](const std::string& boundary) {
+        flags.sequence.needs_diameters = boundary == "grains";
+      })
+      ->capture_default_str()
+      ->group(kGroup);
   AddSurfaceFlags(app, flags, kGroup);
   CLI::Option* const periodic =
       app.add_option(

@@ -45,6 +45,7 @@ struct ReplayFlags {
   std::optional<double> noise_filter;
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   std::string sizes = "equal";
+  std::string boundary = "bulk";
   double kernel_radius = 3;
   double cell_size = 1;
   std::optional<double> reference_radius;

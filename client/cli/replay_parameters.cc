@@ -188,6 +188,12 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   } else if (flags.sizes != Name(Sizes::kEqual)) {
     return WrongFlag("--sizes", flags.sizes, "equal or own");
   }
+  if (flags.boundary == Name(Boundary::kGrains)) {
+    parameters.sizes = Sizes::kOwn;
+    parameters.boundary = Boundary::kGrains;
+  } else if (flags.boundary != Name(Boundary::kBulk)) {
+    return WrongFlag("--boundary", flags.boundary, "bulk or grains");
+  }
 
   if (flags.spacing == "first-frame" || flags.spacing == "every-frame") {
     // In space, the spacing of the first frame is given.

@@ -57,6 +57,7 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --spacing every-frame");
   }
   AddFlag(flags, "--sizes", Name(parameters.sizes), Name(defaults.sizes));
+  AddFlag(flags, "--boundary", Name(parameters.boundary), Name(defaults.boundary));
   AddFlag(flags, "--kernel-radius", parameters.kernel_radius, defaults.kernel_radius);
   AddFlag(flags, "--cell-size", parameters.cell_size, defaults.cell_size);
   if (parameters.reference_radius) {

@@ -70,6 +70,10 @@ struct SequenceOptions {
   /// r)^2.
   bool needs_sizes = false;
 
+  /// Read volumes for grains, which are squared diameters: from a column of diameters or radii,
+  /// else from a column of volumes, which are areas A of discs: 4 A / pi.
+  bool needs_diameters = false;
+
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
   bool in_space = false;
 

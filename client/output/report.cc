@@ -223,6 +223,7 @@ std::string Text(const SlicePlane& slice) {
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters) {
   const auto spacings = [](double value) { return Concat(ShortestNumber(value), " spacings"); };
+  const bool has_grains = parameters.boundary == Boundary::kGrains;
   const auto yes_no = [](bool value) { return std::string(value ? "on" : "off"); };
   std::vector<std::pair<std::string, std::string>> lines = {
       {"placement", std::string(Name(parameters.placement))},
@@ -230,13 +231,16 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
       {"spacing", parameters.spacing ? ShortestNumber(*parameters.spacing)
                                      : Concat("estimated, ", Name(parameters.spacing_rule))},
       {"kernel radius", spacings(parameters.kernel_radius)},
-      {"cell size", spacings(parameters.cell_size)},
+      {"cell size",
+       Concat(ShortestNumber(parameters.cell_size), has_grains ? " half spacings" : " spacings")},
       {"reference radius", parameters.reference_radius ? spacings(*parameters.reference_radius)
                                                        : std::string("calibrated")},
   };
   if (parameters.placement == Placement::kFarthestParticle) {
     lines.emplace_back("surface offset", spacings(parameters.surface_offset));
   }
+  if (parameters.sizes == Sizes::kOwn) lines.emplace_back("sizes", Name(parameters.sizes));
+  if (has_grains) lines.emplace_back("boundary", Name(parameters.boundary));
   if (parameters.slice) lines.emplace_back("slice", Text(*parameters.slice));
   if (parameters.isovalue) lines.emplace_back("isovalue", ShortestNumber(*parameters.isovalue));
   for (std::size_t k = 0; k < parameters.sections.size(); ++k) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -235,13 +236,16 @@ bool AllNumbers(const Names& columns) {
                      [](const std::string& column) { return ParseCount(column).has_value(); });
 }
 
-// Uses a column of diameters or radii for volumes.
+// Uses a column of diameters or radii for volumes, if there is one.
 void PlanSizes(const Names& canonical, ColumnPlan& plan) {
-  plan.volume = FindFirst(canonical, {"diameter", "diameters", "particlediameter"});
-  plan.size_of_length = 1;
-  if (plan.volume) return;
-  plan.volume = FindFirst(canonical, {"radius", "radii", "particleradius"});
-  plan.size_of_length = 2;
+  const auto use = [&](std::optional<std::size_t> column, double size_of_length) {
+    if (!column) return false;
+    plan.volume = column;
+    plan.size_of_length = size_of_length;
+    return true;
+  };
+  if (use(FindFirst(canonical, {"diameter", "diameters", "particlediameter"}), 1)) return;
+  use(FindFirst(canonical, {"radius", "radii", "particleradius"}), 2);
 }
 
 }  // namespace
@@ -290,7 +294,8 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
   if (!plan.id && request.tag_is_id) plan.id = FindFirst(canonical, {"tag"});
   plan.volume = FindFirst(canonical, {"volume", "volumes", "vol", "area", "areas", "particlevolume",
                                       "particlearea", "volumetricmeasure"});
-  if (request.needs_sizes && !plan.volume) PlanSizes(canonical, plan);
+  if (request.needs_diameters) plan.per_volume = 4 / std::numbers::pi;
+  if (request.needs_diameters || (request.needs_sizes && !plan.volume)) PlanSizes(canonical, plan);
   const absl::Status positions = request.columns.empty()
                                      ? PlanRecognisedPositions(names, canonical, plan)
                                      : PlanAskedPositions(names, canonical, request, plan);

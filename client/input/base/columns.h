@@ -35,6 +35,7 @@ struct ColumnRequest {
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
   bool tag_is_id = true;                 ///< Whether a column "tag" can hold the ids.
   bool needs_sizes = false;              ///< SequenceOptions::needs_sizes.
+  bool needs_diameters = false;          ///< SequenceOptions::needs_diameters.
 };
 
 /// Parses the options --select and --columns. kInvalidArgument if an expression is not
@@ -57,6 +58,7 @@ struct ColumnPlan {
   /// If not 0, the column of volumes holds lengths: a volume is the square of the length times
   /// this.
   double size_of_length = 0;
+  double per_volume = 1;  ///< Factor of a column of volumes.
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
   /// Columns ix iy iz of LAMMPS (image flags): how often the particle has crossed the periodic box
@@ -68,7 +70,7 @@ struct ColumnPlan {
 
   /// The volume that a value of the column of volumes stands for.
   double VolumeOf(double value) const {
-    if (size_of_length == 0) return value;
+    if (size_of_length == 0) return per_volume * value;
     // A negative length is no size.
     return value > 0 ? size_of_length * value * (size_of_length * value) : value;
   }

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,7 @@ using ::testing::HasSubstr;
 // diameters times `factor`, to the power of `power`.
 void WriteZones(const std::string& path, const std::string& column, double factor, int power) {
   std::ofstream file(path);
+  file.precision(12);
   file << "x,y," << column << "\n";
   const auto add = [&](double x, double y, double size) {
     const double length = factor * size;
@@ -55,6 +58,23 @@ TEST(SizedReplay, VolumesDiametersAndRadiiGiveTheSame) {
             digest);
 }
 
+TEST(SizedReplay, GrainsComeFromDiametersRadiiOrAreasOfDiscs) {
+  const support::TemporaryFolder input;
+  std::vector<std::string> flags = {"--local", "--boundary", "grains", "--check"};
+  WriteZones(input.Path("diameters.csv"), "diameter", 1, 1);
+  const std::string digest = DigestOf(input.Path("diameters.csv"), flags);
+  WriteZones(input.Path("radii.csv"), "radius", .5, 1);
+  EXPECT_EQ(DigestOf(input.Path("radii.csv"), flags), digest);
+  // Areas of discs, with more digits than floats have.
+  WriteZones(input.Path("areas.csv"), "volume", std::sqrt(std::numbers::pi) / 2, 2);
+  EXPECT_EQ(DigestOf(input.Path("areas.csv"), flags), digest);
+  EXPECT_NE(DigestOf(input.Path("diameters.csv"), {"--local", "--sizes", "own"}), digest);
+  ServerProgram server;
+  EXPECT_EQ(
+      DigestOf(input.Path("radii.csv"), {"--server", server.address(), "--boundary", "grains"}),
+      digest);
+}
+
 TEST(SizedReplay, WrongSizesAreRefused) {
   const support::TemporaryFolder input;
   WriteZones(input.Path("zones.csv"), "pressure", 1, 1);
@@ -67,6 +87,8 @@ TEST(SizedReplay, WrongSizesAreRefused) {
   };
   EXPECT_THAT(refusal({"--sizes", "own"}, 3), HasSubstr("volumes"));
   EXPECT_THAT(refusal({"--sizes", "large"}, 2), HasSubstr("equal or own"));
+  EXPECT_THAT(refusal({"--boundary", "grains"}, 3), HasSubstr("volumes"));
+  EXPECT_THAT(refusal({"--boundary", "smooth"}, 2), HasSubstr("bulk or grains"));
   EXPECT_THAT(refusal({"--sizes", "own", "--placement", "farthest-particle"}, 2),
               HasSubstr("--sizes"));
 }

@@ -1,5 +1,7 @@
 #include "client/input/base/columns.h"
 
+#include <numbers>
+
 #include "client/input/fixtures.h"
 
 namespace partiemc::client::input {
@@ -78,6 +80,19 @@ TEST(Columns, SizesComeFromVolumesElseDiametersElseRadii) {
   EXPECT_EQ(plan({"x", "y", "radius", "volume"}).volume, 3u);
   EXPECT_EQ(plan({"x", "y", "radius", "volume"}).VolumeOf(3), 3);
   EXPECT_LT(plan({"x", "y", "radius"}).VolumeOf(-3), 0);
+}
+
+TEST(Columns, DiametersOfGrainsComeFromDiametersElseRadiiElseAreas) {
+  const auto plan = [](const std::vector<std::string>& names) {
+    ColumnRequest request;
+    request.needs_diameters = true;
+    return *PlanNamedColumns(names, request);
+  };
+  EXPECT_EQ(plan({"x", "y", "volume", "radius", "diameter"}).VolumeOf(3), 9);
+  EXPECT_EQ(plan({"x", "y", "volume", "radius"}).volume, 3u);
+  EXPECT_EQ(plan({"x", "y", "volume", "radius"}).VolumeOf(3), 36);
+  EXPECT_DOUBLE_EQ(plan({"x", "y", "volume"}).VolumeOf(std::numbers::pi), 4);
+  EXPECT_FALSE(plan({"x", "y"}).volume.has_value());
 }
 
 TEST(Columns, WhatIsMissingIsNamedWithWhatIsThere) {
