@@ -306,8 +306,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "wrap"_a = parameters.box && parameters.box->wraps,
                 "noise_filter"_a = parameters.noise_filter,
                 "phase_attribute"_a = parameters.phase_attribute,
-                "sizes"_a = named(parameters.sizes),
-                "boundary"_a = named(parameters.boundary));
+                "sizes"_a = named(parameters.sizes), "boundary"_a = named(parameters.boundary));
   if (parameters.output == Output::kSurface) {
     dict["thinning_distance"] = parameters.surface.thinning_distance;
     dict["max_drop_particles"] = parameters.surface.max_drop_particles;

@@ -271,8 +271,8 @@ std::vector<AllocationCase> Cases() {
         {Placement::kVirtualPlane, Fill::kGreedy, threads, true, threads == 2, false, Sizes::kOwn});
     cases.push_back(cases.back());
     cases.back().boundary = Boundary::kGrains;
-    cases.push_back(
-        {Placement::kVirtualPlane, Fill::kGreedy, threads, threads == 1, threads == 2});
+    cases.back().ids = false;
+    cases.push_back({Placement::kVirtualPlane, Fill::kGreedy, threads, threads == 1, threads == 2});
     cases.back().has_phases = true;
   }
   return cases;
@@ -343,8 +343,8 @@ std::vector<MemoryCase> MemoryCases() {
   add("drops of two phases", phased(spread(150, 5)), {.sections = phases});
   const ReconstructionParameters grains{
       .sizes = Sizes::kOwn, .boundary = Boundary::kGrains, .cell_size = kCellOfGrains};
-  add("body of grains", sized(support::Disc(150)), grains);
-  add("drops of grains", sized(spread(100, 5)), grains);
+  add("body of grains", sized(support::Disc(60)), grains);
+  add("drops of grains", sized(spread(40, 5)), grains);
   add("body in a periodic box", support::Disc(120), {.box = boxed(300)});
   add("drops in a periodic box", spread(150, 7), {.box = boxed(3000)});
   add("percolating layer", support::Lattice(1000, 60, -499.7), {.box = boxed(1000)});

@@ -207,7 +207,7 @@ struct Grading {
   DrawDiameter draw;
 };
 
-// The gradings of the packings, which set no constant.
+// The seeds of the packings are others than those by which constants were set.
 std::vector<Grading> AllGradings() {
   const auto uniform = [](double most) {
     return [=](Random& random) { return random.Uniform(1, most); };
@@ -219,7 +219,7 @@ std::vector<Grading> AllGradings() {
           {"1:1.5 uniform", uniform(1.5)},
           {"1:3 uniform", uniform(3)},
           {"1:3, one of five", of_two(3, .2)},
-          {"1:10, by volume", [](Random& random) { return std::pow(10, random.Unit()); }},
+          {"1:10 log-uniform", [](Random& random) { return std::pow(10, random.Unit()); }},
           {"1:10, one of fifty", of_two(10, .02)}};
 }
 

@@ -288,6 +288,11 @@ TEST(Phases, RefusesWhatHasNoPhases) {
             }),
             "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.placement = Placement::kQef; }), "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) {
+              p.sizes = Sizes::kOwn;
+              p.boundary = Boundary::kGrains;
+            }),
+            "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.sections[1].phase = 1; }), "parameters.sections[1].phase=1");
   EXPECT_EQ(with([](P& p) { p.sections[1].isovalue = .5; }), "parameters.sections[1].phase=2");
   EXPECT_EQ(with([](P& p) { p.sections.push_back({.isovalue = .5}); }), "");

@@ -85,9 +85,9 @@ struct Section {
   std::optional<SlicePlane> slice = std::nullopt;
   std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
   /// The outline of the particles of this phase (`phase_attribute`, core/PHASES.md). Sections with
-  /// phases divide the outline of the stream: two phases share the points of their interface. Phases
-  /// that no section has are one more phase. Requires Placement::kVirtualPlane; excludes surfaces,
-  /// a slice, an isovalue and `box`. Distinct.
+  /// phases divide the outline of the stream: two phases share the points of their interface.
+  /// Phases that no section has are one more phase. Requires Placement::kVirtualPlane; excludes
+  /// surfaces, a slice, an isovalue, Boundary::kGrains and `box`. Distinct.
   std::optional<std::int32_t> phase = std::nullopt;
 
   friend bool operator==(const Section&, const Section&) = default;
@@ -236,8 +236,9 @@ struct ReconstructionParameters {
   /// another frame, except that the input is checked only once.
   std::vector<Section> sections = {};
 
-  /// The attribute of the particles (Frame::attributes) that holds their phases, such as a type: one
-  /// whole number each. Frames of a stream with Section::phase must have it. It is not interpolated.
+  /// The attribute of the particles (Frame::attributes) that holds their phases, such as a type:
+  /// one whole number each. Frames of a stream with Section::phase must have it. It is not
+  /// interpolated.
   std::string phase_attribute = "phase";
 
   SurfaceOptions surface = {};

@@ -9,8 +9,8 @@
 namespace partiemc {
 
 /// Replaces the linear crossings of RingTopology::entry_points by roots of F on their edges, to
-/// 1e-4 cells. Across a grain of two cells, F bends so much that linear crossings are up to a
-/// quarter of a cell off. Deterministic. Parallel over segments. Cost: about three field samples
+/// 1e-4 cells. At grains of two cells, linear crossings have errors of up to a quarter of a cell.
+/// Deterministic. Parallel over segments. Cost: about three field samples
 /// for each segment.
 void FindGrainCrossings(const TileDirectory& directory, const LevelSet& level_set,
                         const Crossings& crossings, const LevelSetSampler& field,

@@ -61,6 +61,7 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
 void ApproachGrain(const VertexInput& input, const CellPlane& plane, std::size_t i,
                    RingVertices& v) {
   constexpr int kSteps = 3;
+  constexpr double kTolerance = 1e-4;  // Of F, in cells.
   const double max_step = input.variant.constants.newton_step;
   v.point[i] = VirtualPlaneVertex(plane, max_step);
   for (int step = 1; step < kSteps; ++step) {
@@ -70,6 +71,7 @@ void ApproachGrain(const VertexInput& input, const CellPlane& plane, std::size_t
     const Point gradient{sample.gradient_x, sample.gradient_y};
     if (Dot(gradient, gradient) < kWeakGradientSquare) return;
     v.normal[i] = UnitOf(gradient);
+    if (std::abs(sample.value) < kTolerance) return;
     v.point[i] = NewtonStep(v.point[i], sample.value, gradient, max_step);
   }
 }
