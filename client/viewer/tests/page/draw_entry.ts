@@ -83,6 +83,7 @@ function polygon(corners: [number, number][]): Frame {
       perimeter: Float64Array.of(perimeter),
       particles: Float64Array.of(1),
       parents: [[]],
+      cuts: new Uint32Array(0),
       normals: null,
       attributes: new Map(),
     },

@@ -2,7 +2,7 @@ import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
 import type { Look } from '../look';
 import { fillTones } from '../look_colours';
-import { type AttributeStyle, type Camera, Program } from './program';
+import { type AttributeStyle, type Camera, Programs } from './program';
 import { BAND_TINT, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT } from '../style';
 
 const VERTEX = `
@@ -11,9 +11,7 @@ uniform usampler2D triangles;
 uniform usampler2D classes;
 uniform usampler2D tints;
 uniform sampler2D numbers;
-uniform bool byAttribute;
 uniform vec2 range;       // Smallest number, and 1 / (largest - smallest).
-uniform bool tinted, edged;
 uniform vec4 ground, band, interior, edge;
 uniform vec3 tintShares;  // Band, interior, edges.
 flat out vec4 inside;
@@ -54,7 +52,6 @@ void main() {
 `;
 
 const FRAGMENT = `
-uniform bool edged;
 uniform float halfWidth;  // Device pixels.
 flat in vec4 inside;
 flat in vec4 edgeColour;
@@ -77,17 +74,20 @@ void main() {
  * common edge, by the distance to it.
  */
 export class FillPass {
-  private readonly program: Program;
+  private readonly programs: Programs;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.program = new Program(gl, VERTEX, FRAGMENT);
+    this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
   draw(
     textures: FrameTextures, camera: Camera, look: Look, attribute: AttributeStyle | null,
     ratio: number,
   ): void {
-    const { program } = this;
+    const style = textures.isMeshColoured ? attribute : null;
+    const program = this.programs.for({
+      byAttribute: style !== null, tinted: look.colour === 'identity', edged: look.edges,
+    });
     const colours = theme(look.dark);
     const { band, interior } = fillTones(look);
     const opacity = look.fill ? 1 : 0;
@@ -96,11 +96,8 @@ export class FillPass {
     program.texture('triangles', textures.triangles);
     program.texture('classes', textures.classes);
     program.texture('tints', textures.tints);
-    program.attribute(
-      textures.isMeshColoured ? attribute : null, textures.attribute, textures.ramp);
-    program.integer('tinted', look.colour === 'identity' ? 1 : 0);
+    program.attribute(style, textures.attribute, textures.ramp);
     program.vector3('tintShares', [BAND_TINT, INTERIOR_TINT, EDGE_TINT]);
-    program.integer('edged', look.edges ? 1 : 0);
     program.colour('ground', colours.background);
     program.colour('band', look.fill ? band : [0, 0, 0], opacity);
     program.colour('interior', look.fill ? interior : [0, 0, 0], opacity);
@@ -110,6 +107,6 @@ export class FillPass {
   }
 
   destroy(): void {
-    this.program.destroy();
+    this.programs.destroy();
   }
 }

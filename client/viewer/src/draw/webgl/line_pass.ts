@@ -1,13 +1,12 @@
 import type { Rgb } from '../colours';
 import type { FrameTextures, RingTextures } from './frame_textures';
-import { type AttributeStyle, type Camera, Program } from './program';
+import { type AttributeStyle, type Camera, Programs } from './program';
 
 const VERTEX = `
 uniform sampler2D points;
 uniform usampler2D ringOf;
 uniform usampler2D rings;     // First vertex, end vertex, colour, unused.
 uniform sampler2D numbers;
-uniform bool byAttribute;
 uniform vec2 range;           // Smallest number, and 1 / (largest - smallest).
 uniform vec4 single;          // One colour for all, if its alpha is 1.
 uniform float halfWidth;      // Device pixels.
@@ -109,10 +108,10 @@ export interface LineStyle {
  * lines are smooth without multisampling, at any width and on any screen.
  */
 export class LinePass {
-  private readonly program: Program;
+  private readonly programs: Programs;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.program = new Program(gl, VERTEX, FRAGMENT);
+    this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
   /** Draws the segments that begin at the vertices [first, end) of the rings. */
@@ -120,13 +119,13 @@ export class LinePass {
     rings: RingTextures, textures: FrameTextures, camera: Camera, style: LineStyle,
     [first, end]: readonly [number, number] = [0, rings.count],
   ): void {
-    const { program } = this;
+    const attribute = textures.hasOutlineColours ? style.attribute : null;
+    const program = this.programs.for({ byAttribute: attribute !== null });
     program.use(camera);
     program.texture('points', rings.points);
     program.texture('ringOf', rings.ringOf);
     program.texture('rings', rings.rings);
-    program.attribute(
-      textures.hasOutlineColours ? style.attribute : null, textures.attribute, textures.ramp);
+    program.attribute(attribute, textures.attribute, textures.ramp);
     program.colour('single', style.colour ?? [0, 0, 0], style.colour ? 1 : 0);
     program.number('opacity', style.opacity);
     program.number('halfWidth', style.width / 2);
@@ -134,6 +133,6 @@ export class LinePass {
   }
 
   destroy(): void {
-    this.program.destroy();
+    this.programs.destroy();
   }
 }

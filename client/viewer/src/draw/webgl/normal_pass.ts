@@ -1,6 +1,6 @@
 import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
-import { type Camera, Program } from './program';
+import { type Camera, Programs } from './program';
 import { NORMAL_WIDTH, normalLength, normalStride } from '../style';
 
 const VERTEX = `
@@ -43,10 +43,10 @@ void main() {
 
 /** Normals as short lines from the vertices; every n-th if vertices are dense. */
 export class NormalPass {
-  private readonly program: Program;
+  private readonly programs: Programs;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.program = new Program(gl, VERTEX, FRAGMENT);
+    this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
   /** Draws `count` normals. `spacing` of particles and `gap` between vertices in CSS pixels. */
@@ -54,7 +54,7 @@ export class NormalPass {
     textures: FrameTextures, camera: Camera, count: number, spacing: number, gap: number,
     dark: boolean, ratio: number,
   ): void {
-    const { program } = this;
+    const program = this.programs.for({});
     const stride = normalStride(gap, count);
     program.use(camera);
     program.texture('points', textures.outline.points);
@@ -67,6 +67,6 @@ export class NormalPass {
   }
 
   destroy(): void {
-    this.program.destroy();
+    this.programs.destroy();
   }
 }

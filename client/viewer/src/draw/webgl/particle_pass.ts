@@ -1,13 +1,12 @@
 import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
-import { type AttributeStyle, type Camera, Program } from './program';
+import { type AttributeStyle, type Camera, Programs } from './program';
 import { PARTICLE_ALPHA } from '../style';
 
 const VERTEX = `
 uniform sampler2D particles;
 uniform float diameter;  // Device pixels.
 uniform sampler2D numbers;
-uniform bool byAttribute;
 uniform vec2 range;      // Smallest number, and 1 / (largest - smallest).
 flat out float value;
 
@@ -39,10 +38,10 @@ void main() {
 
 /** Particles as round dots, in one colour or in those of an attribute. */
 export class ParticlePass {
-  private readonly program: Program;
+  private readonly programs: Programs;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.program = new Program(gl, VERTEX, FRAGMENT);
+    this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
   /** `diameter` in device pixels. */
@@ -50,11 +49,11 @@ export class ParticlePass {
     textures: FrameTextures, camera: Camera, count: number, diameter: number, dark: boolean,
     attribute: AttributeStyle | null,
   ): void {
-    const { program } = this;
+    const style = textures.hasParticleColours ? attribute : null;
+    const program = this.programs.for({ byAttribute: style !== null });
     program.use(camera);
     program.texture('particles', textures.particles);
-    program.attribute(
-      textures.hasParticleColours ? attribute : null, textures.particleNumbers, textures.ramp);
+    program.attribute(style, textures.particleNumbers, textures.ramp);
     program.number('diameter', diameter);
     program.colour('ground', theme(dark).background);
     program.colour('ink', theme(dark).particle, PARTICLE_ALPHA);
@@ -62,6 +61,6 @@ export class ParticlePass {
   }
 
   destroy(): void {
-    this.program.destroy();
+    this.programs.destroy();
   }
 }

@@ -1,8 +1,8 @@
 import type { Rgb } from '../colours';
 import type { DataTexture } from './data_texture';
 
-/** Common part of all shaders. */
-const COMMON = `#version 300 es
+/** Common part of all shaders, after their version and their switches. */
+const COMMON = `
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -33,7 +33,6 @@ vec4 unpacked(uint colour) {
 
 /** The attribute's colour in fragment shaders; see `Program.attribute`. */
 const COMMON_FRAGMENT = `${COMMON}
-uniform bool byAttribute;
 uniform sampler2D ramp;
 uniform vec4 missing;
 
@@ -58,24 +57,52 @@ export interface Camera {
   height: number;
 }
 
+/** Names of constants of the shaders, and whether they are true. */
+export type Switches = Readonly<Record<string, boolean>>;
+
+/**
+ * Programs of one vertex and one fragment shader, one for each set of switches, compiled when it is first used. Switches
+ * are constants, because software rendering executes both branches of an `if` on a uniform.
+ */
+export class Programs {
+  private readonly compiled = new Map<string, Program>();
+
+  constructor(private readonly gl: WebGL2RenderingContext, private readonly vertex: string,
+              private readonly fragment: string) {}
+
+  /** `switches`: the same names in each call. Throws as the constructor of Program. */
+  for(switches: Switches): Program {
+    const lines = Object.entries(switches).map(([name, isOn]) => `const bool ${name} = ${isOn};`).join('\n');
+    const known = this.compiled.get(lines);
+    if (known) return known;
+    const program = new Program(this.gl, this.vertex, this.fragment, lines);
+    this.compiled.set(lines, program);
+    return program;
+  }
+
+  destroy(): void {
+    for (const program of this.compiled.values()) program.destroy();
+  }
+}
+
 /** A vertex and a fragment shader with their uniforms. Caches uniform locations. */
 export class Program {
   private readonly program: WebGLProgram;
   private readonly locations = new Map<string, WebGLUniformLocation | null>();
   private readonly units = new Map<string, number>();
 
-  /** Throws if a shader does not compile: an internal error, or a lost context. */
+  /** `constants`: lines before both shaders. Throws if a shader does not compile: an internal error. */
   constructor(
-    private readonly gl: WebGL2RenderingContext, vertex: string, fragment: string,
+    private readonly gl: WebGL2RenderingContext, vertex: string, fragment: string, constants = '',
   ) {
     this.program = gl.createProgram();
     const shaders = [
-      this.attach(gl.VERTEX_SHADER, COMMON_VERTEX + vertex),
-      this.attach(gl.FRAGMENT_SHADER, COMMON_FRAGMENT + fragment),
+      this.attach(gl.VERTEX_SHADER, `#version 300 es\n${constants}${COMMON_VERTEX}${vertex}`),
+      this.attach(gl.FRAGMENT_SHADER, `#version 300 es\n${constants}${COMMON_FRAGMENT}${fragment}`),
     ];
     gl.linkProgram(this.program);
-    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
-      const logs = shaders.map((shader) => gl.getShaderInfoLog(shader) ?? '');
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const logs = shaders.map((shader) => (shader && gl.getShaderInfoLog(shader)) ?? '');
       throw new Error(`shader: ${gl.getProgramInfoLog(this.program) ?? ''} ${logs.join(' ')}`);
     }
     for (const shader of shaders) gl.deleteShader(shader);
@@ -120,14 +147,13 @@ export class Program {
     texture.bind(unit);
   }
 
-  /** Sets `numbers`, `range` and the colours of an attribute; null switches it off. */
+  /** Sets `numbers`, `range` and the colours of an attribute, for shaders with the switch `byAttribute`. */
   attribute(
     style: AttributeStyle | null, numbers: Pick<DataTexture, 'bind'>, ramp: Pick<DataTexture, 'bind'>,
   ): void {
+    if (!style) return;
     this.texture('numbers', numbers);
     this.texture('ramp', ramp);
-    this.integer('byAttribute', style ? 1 : 0);
-    if (!style) return;
     const { min, max, missing } = style;
     this.vector2('range', [min, max > min ? 1 / (max - min) : 0]);
     this.colour('missing', missing);
@@ -137,9 +163,10 @@ export class Program {
     this.gl.deleteProgram(this.program);
   }
 
-  private attach(type: GLenum, source: string): WebGLShader {
+  /** Null: the context is lost. */
+  private attach(type: GLenum, source: string): WebGLShader | null {
     const shader = this.gl.createShader(type);
-    if (!shader) throw new Error('the graphics context is lost');
+    if (!shader) return null;
     this.gl.shaderSource(shader, source);
     this.gl.compileShader(shader);
     this.gl.attachShader(this.program, shader);

@@ -1,6 +1,6 @@
 import type { Rgb } from '../colours';
 import type { RingTextures } from './frame_textures';
-import { type Camera, Program } from './program';
+import { type Camera, Programs } from './program';
 
 const FAN_VERTEX = `
 uniform sampler2D points;
@@ -34,16 +34,18 @@ void main() { colour = tone; }
  * stencil, which is then set at pixels inside an odd number of rings. These pixels get the colour.
  */
 export class RingFillPass {
-  private readonly fans: Program;
-  private readonly cover: Program;
+  private readonly fans: Programs;
+  private readonly cover: Programs;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.fans = new Program(gl, FAN_VERTEX, FRAGMENT);
-    this.cover = new Program(gl, COVER_VERTEX, FRAGMENT);
+    this.fans = new Programs(gl, FAN_VERTEX, FRAGMENT);
+    this.cover = new Programs(gl, COVER_VERTEX, FRAGMENT);
   }
 
   draw(rings: RingTextures, camera: Camera, tone: Rgb): void {
-    const { gl, fans, cover } = this;
+    const { gl } = this;
+    const fans = this.fans.for({});
+    const cover = this.cover.for({});
     gl.enable(gl.STENCIL_TEST);
     gl.clear(gl.STENCIL_BUFFER_BIT);
     gl.colorMask(false, false, false, false);
