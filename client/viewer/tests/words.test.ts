@@ -93,18 +93,32 @@ test('pauses grow to a limit and reset after a success', () => {
   assert.equal(backoff.take(), 200);
 });
 
-/** Frames in flight after `frames` of this size, from the server's view. */
-function inFlight(bytes: number, frames: number): number {
+/** Fewest and most frames in flight, from the server's view, and messages, for 128 frames of this size after the first 100. */
+function inFlight(bytes: number): { fewest: number; most: number; messages: number } {
   const credit = new Credit();
   let allowed = FIRST_CREDITS;
-  for (let k = 0; k < frames; ++k) allowed += credit.taken(bytes) - 1;
-  return allowed;
+  const seen: number[] = [];
+  let messages = 0;
+  for (let k = 0; k < 228; ++k) {
+    const more = credit.taken(bytes);
+    allowed += more - 1;
+    if (k < 100) continue;
+    seen.push(allowed);
+    if (more > 0) ++messages;
+  }
+  return { fewest: Math.min(...seen), most: Math.max(...seen), messages };
 }
 
 test('small frames get more credit than large ones', () => {
-  assert.equal(inFlight(1000, 100), 64);
-  assert.equal(inFlight(1 << 20, 100), 8);
-  assert.equal(inFlight(50 << 20, 100), 4);
+  assert.equal(inFlight(1000).most, 64);
+  assert.equal(inFlight(1 << 20).most, 8);
+  assert.equal(inFlight(50 << 20).most, 4);
+});
+
+test('credits come in batches of a quarter of the frames in flight', () => {
+  assert.deepEqual(inFlight(1000), { fewest: 49, most: 64, messages: 8 });
+  assert.deepEqual(inFlight(1 << 20), { fewest: 7, most: 8, messages: 64 });
+  assert.deepEqual(inFlight(50 << 20), { fewest: 4, most: 4, messages: 128 });
 });
 
 test('numbers are short and digests have sixteen digits', () => {
