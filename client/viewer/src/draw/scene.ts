@@ -42,6 +42,8 @@ export function legendOf(look: Look, range: Range | null, channels: readonly str
  */
 export class Scene {
   view: View = { x: 0, y: 0, scale: 1 };
+  /** The canvas in CSS pixels at the last `resize`. Reading it from the page in each drawing would cost a layout. */
+  size: Size = { width: 0, height: 0 };
   /** Ring under the pointer. */
   hovered: number | null = null;
   /** Called after each drawing, in the same task. */
@@ -64,11 +66,6 @@ export class Scene {
     canvas.addEventListener('webglcontextlost', this.onLost);
     canvas.addEventListener('webglcontextrestored', this.onRestored);
     this.resize();
-  }
-
-  /** The canvas in CSS pixels. */
-  get size(): Size {
-    return { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
   }
 
   get hasWebgl(): boolean { return !(this.drawing instanceof SvgDrawing); }
@@ -119,6 +116,7 @@ export class Scene {
    * `draw`.
    */
   resize(): void {
+    this.size = { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
     const width = Math.max(1, Math.round(this.size.width * devicePixelRatio));
     const height = Math.max(1, Math.round(this.size.height * devicePixelRatio));
     if (this.canvas.width !== width) this.canvas.width = width;

@@ -12,6 +12,7 @@ import { LookPanel, type Switch } from '../ui/look_panel';
 import { downloadCurves } from '../ui/export_panel';
 import { Pane } from '../ui/pane';
 import { StatusLine } from '../ui/status_line';
+import { TextPace } from '../ui/text_pace';
 import { Theme } from '../ui/theme';
 import { TimePanel } from '../ui/time_panel';
 import { reportOutlines } from './outlines';
@@ -48,6 +49,7 @@ class Report {
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
   private readonly status = new StatusLine();
+  private readonly pace = new TextPace();
   private ownAddress = '';
   /** False until the address has been read, which must not be overwritten before. */
   private isReady = false;
@@ -58,7 +60,10 @@ class Report {
     }, null);
     this.pane.setIndex(0, 1, true);
     byId('stage', HTMLElement).append(this.pane.element);
-    this.time = new TimePanel(() => this.track, () => this.writeAddress());
+    this.time = new TimePanel(() => this.track, () => {
+      this.pane.numbers.write();
+      this.writeAddress();
+    });
     this.curves = new CurvesPanel(RESULT_CURVES, true, (sequence) => {
       this.track.player.seek(sequence);
       this.writeAddress();
@@ -154,10 +159,11 @@ class Report {
 
   private refresh(now: number): void {
     const { player } = this.track;
+    this.pace.begin(now);
     player.tick(now);
-    this.pane.refresh(now);
-    this.time.refresh();
-    this.curves.refresh(this.track, null, this.pane.summary, this.pane.isStreamed, now);
+    this.pane.refresh(this.pace);
+    this.time.refresh(this.pace);
+    this.curves.refresh(this.track, null, this.pane.summary, this.pane.isStreamed, this.pace);
     this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl);
     this.look.setOutlines(this.track.outlines);
     this.look.setLegend(this.pane.scene.legend());

@@ -21,6 +21,7 @@ import { SpacePanel } from './space_panel';
 import { Stage } from './stage';
 import { StatusLine } from './status_line';
 import { StreamsPanel } from './streams_panel';
+import { TextPace } from './text_pace';
 import { Theme } from './theme';
 import { TimeLink } from './time_link';
 import { TimePanel } from './time_panel';
@@ -35,6 +36,7 @@ export class App {
   private readonly layout = new Layout();
   private readonly status = new StatusLine();
   private readonly link = new TimeLink();
+  private readonly pace = new TextPace();
   private readonly gauges = new Gauges();
   private readonly look: LookPanel;
   private readonly space: SpacePanel;
@@ -73,6 +75,7 @@ export class App {
       (cells) => this.cellSizeFor(cells));
     this.time = new TimePanel(() => this.track, () => {
       this.linkedFrame = null;
+      for (const { numbers } of this.stage.panes) numbers.write();
       this.writeAddress();
     });
     this.curves = new CurvesPanel([...RESULT_CURVES, ...STREAM_CURVES], false, (sequence) => this.goTo(sequence));
@@ -379,6 +382,7 @@ export class App {
   }
 
   private refresh(now: number): void {
+    this.pace.begin(now);
     const { tracks } = this.stage;
     const modes = tracks.map(({ player }) => player.mode);
     for (const track of tracks) {
@@ -388,7 +392,7 @@ export class App {
     this.link.refresh(this.track, tracks);
     if (tracks.some(({ player }, k) => player.mode !== modes[k])) this.writeAddress();
     this.followLink();
-    for (const pane of this.stage.panes) pane.refresh(now);
+    for (const pane of this.stage.panes) pane.refresh(this.pace);
     this.refreshPanels(now);
     requestAnimationFrame((next) => this.refresh(next));
   }
@@ -407,11 +411,11 @@ export class App {
     this.curves.setKind(pane?.hasSurfaces ? 'space' : 'plane');
     this.look.setOutlines(pane?.outlines ?? []);
     this.look.setLegend(pane?.legend ?? null);
-    this.time.refresh();
+    this.time.refresh(this.pace);
     const end = performance.now() + GAUGES_MS;
     this.gauges.measure(this.curves.shownEntries, () => performance.now() > end);
     this.curves.refresh(pane?.curves ?? null, isVariant ? this.track : null, pane?.summary ?? null,
-      pane?.isStreamed ?? true, now);
+      pane?.isStreamed ?? true, this.pace);
     this.status.refresh(this.stage.panes.map((one) => one.state), pane ? this.stage.panes.indexOf(pane) : 0,
       this.track, now);
   }

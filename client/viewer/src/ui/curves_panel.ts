@@ -5,6 +5,7 @@ import type { CurveSource } from '../stream/track';
 import { curvePoints, entriesOf } from './curve_data';
 import { byId, make } from './dom';
 import { count, number } from './format';
+import type { TextPace } from './text_pace';
 import { tickDigits, ticks } from './ticks';
 
 /** `text`: the value as under the picture. */
@@ -64,6 +65,8 @@ const COLOURS = {
   dark: ['#6bb5ff', '#fb923c', '#4ade80', '#c084fc', '#facc15', '#f472b6', '#2dd4bf', '#aab4c4', '#a3e635'],
 };
 const REFRESH_MS = 300;
+/** Plots drawn in one refresh of the screen. Drawing all of them takes longer than a refresh. */
+const PLOTS_PER_REFRESH = 1;
 /** Width of a digit on an axis. */
 const LABEL_PIXELS = 6;
 
@@ -91,13 +94,22 @@ function topOf(values: (number | null | undefined)[]): number {
   return sorted.length > 10 && peak > 2 * usual ? usual : 1.05 * peak;
 }
 
-interface Item { curve: Curve; figure: HTMLElement; caption: HTMLElement; holder: HTMLElement; plot: uPlot }
+interface Item {
+  curve: Curve; figure: HTMLElement; caption: HTMLElement; holder: HTMLElement; plot: uPlot;
+  /** Whether a part of the plot is on the screen. */
+  isSeen: boolean;
+  /** Whether the plot lacks the data of the last refresh. */
+  isStale: boolean;
+}
 
 /** Curves over the frames of a track. A click goes to a frame. */
 export class CurvesPanel {
   private items: Item[] = [];
   private readonly panel = byId('curves', HTMLElement);
   private entries: readonly (Entry | null)[] = [];
+  private labels: number[] = [];
+  /** Frames of the dashed lines. */
+  private others: readonly (Entry | null)[] = [];
   private track: CurveSource | null = null;
   /** Whether the dashed lines have data. */
   private isCompared = false;
@@ -111,18 +123,28 @@ export class CurvesPanel {
   private hovered: number | null = null;
   private colours = COLOURS.light;
   private kind: 'plane' | 'space' = 'plane';
+  private readonly seen = new IntersectionObserver((changes) => {
+    for (const { target, isIntersecting } of changes) {
+      const item = this.items.find(({ figure }) => figure === target);
+      if (item) item.isSeen = isIntersecting;
+    }
+  });
 
   /** `isDetailed`: captions have the value of every band. */
   constructor(private readonly curves: readonly Curve[], private readonly isDetailed: boolean,
               private readonly goTo: (sequence: number) => void) {
     this.items = curves.map((curve) => this.makeItem(curve));
     new ResizeObserver(() => this.resize()).observe(this.panel);
+    addEventListener('beforeprint', () => {
+      for (const item of this.items) this.draw(item);
+    });
   }
 
   /** Shows these curves, and no others, before the ones that are always there. */
   setFirst(first: readonly Curve[]): void {
     for (const { figure, plot } of this.items.splice(0, this.items.length - this.curves.length)) {
       plot.destroy();
+      this.seen.unobserve(figure);
       figure.remove();
     }
     const items = first.map((curve) => this.makeItem(curve));
@@ -158,26 +180,43 @@ export class CurvesPanel {
    * `isStreamed`: whether they are points of the curves.
    */
   refresh(track: CurveSource | null, other: CurveSource | null, shown: Summary | null, isStreamed: boolean,
-          now: number): void {
+          pace: TextPace): void {
+    const { now } = pace;
     if (track !== this.track || (other !== null) !== this.isCompared) this.lastRefresh = -Infinity;
     this.isCompared = other !== null;
-    const frame = JSON.stringify([shown, isStreamed, this.isCompared]);
-    if (frame !== this.captioned && this.hovered === null) {
-      this.captioned = frame;
-      this.shown = shown;
-      this.note = !isStreamed ? ' (line: as streamed)' : this.isCompared ? ' (dashed: as streamed)' : '';
-      this.showCaptions();
-    }
-    if (now - this.lastRefresh < REFRESH_MS) return;
+    if (this.hovered === null && (!track || pace.isDueFor(track))) this.setCaptions(shown, isStreamed);
+    // Under the pointer, captions and lines must have the same frames.
+    const isWhole = this.lastRefresh === -Infinity || this.hovered !== null;
+    if (now - this.lastRefresh >= REFRESH_MS) this.takeFrames(track, other, now);
+    const stale = this.items.filter(({ isSeen, isStale }) => isSeen && isStale);
+    for (const item of isWhole ? stale : stale.slice(0, PLOTS_PER_REFRESH)) this.draw(item);
+  }
+
+  /** Takes the frames for all plots. */
+  private takeFrames(track: CurveSource | null, other: CurveSource | null, now: number): void {
     this.lastRefresh = now;
     this.track = track;
     this.position = track?.player.sequence ?? NaN;
     const { x, entries } = track ? curvePoints(track) : { x: [], entries: [] };
+    this.labels = x;
     this.entries = entries;
-    const others = other ? entriesOf(other, entries) : entries.map(() => null);
-    for (const { curve, plot } of this.items) {
-      plot.setData([x, ...valuesOf(curve, entries), ...curve.total ? [] : valuesOf(curve, others)]);
-    }
+    this.others = other ? entriesOf(other, entries) : entries.map(() => null);
+    for (const item of this.items) item.isStale = true;
+    this.showCaptions();
+  }
+
+  private draw(item: Item): void {
+    const { curve, plot } = item;
+    item.isStale = false;
+    plot.setData([this.labels, ...valuesOf(curve, this.entries), ...curve.total ? [] : valuesOf(curve, this.others)]);
+  }
+
+  private setCaptions(shown: Summary | null, isStreamed: boolean): void {
+    const frame = JSON.stringify([shown, isStreamed, this.isCompared]);
+    if (frame === this.captioned) return;
+    this.captioned = frame;
+    this.shown = shown;
+    this.note = !isStreamed ? ' (line: as streamed)' : this.isCompared ? ' (dashed: as streamed)' : '';
     this.showCaptions();
   }
 
@@ -204,7 +243,8 @@ export class CurvesPanel {
     const figure = make('figure', { class: curve.isWide ? 'curve wide' : 'curve', 'aria-label': curve.title }, caption, holder);
     figure.hidden = curve.of !== undefined && curve.of !== this.kind;
     this.panel.append(figure);
-    return { curve, figure, caption, holder, plot: this.makePlot(curve, holder) };
+    this.seen.observe(figure);
+    return { curve, figure, caption, holder, plot: this.makePlot(curve, holder), isSeen: false, isStale: true };
   }
 
   private makePlot(curve: Curve, holder: HTMLElement): uPlot {

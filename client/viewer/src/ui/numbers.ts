@@ -60,6 +60,8 @@ const ROWS: Row[] = [
 
 /** The figures of a pane's frame. */
 export class Numbers {
+  /** The figures to write; null if they are written. */
+  private shown: Shown | null = null;
   readonly element = make('dl', { class: 'numbers', tabindex: '0' });
   private readonly values = ROWS.map((row) => {
     const value = make('dd', { 'data-key': row.key }, '–');
@@ -72,21 +74,32 @@ export class Numbers {
 
   /** Shows dashes. */
   clear(): void {
+    this.shown = null;
     for (const value of this.values) {
       setText(value, '–');
       value.title = '';
     }
   }
 
+  /** Sets the frame for the next call of `write`. */
   show(frame: Frame, label: string, method: Method | null): void {
-    const shown = { frame, label, method, statistics: frame.statistics };
+    this.shown = { frame, label, method, statistics: frame.statistics };
+  }
+
+  /** Writes the figures of the frame. Returns false if they are written already. */
+  write(): boolean {
+    const { shown } = this;
+    if (!shown) return false;
+    this.shown = null;
+    const isSpace = shown.frame.surface !== undefined;
     ROWS.forEach((row, k) => {
-      const isOther = row.of !== undefined && (row.of === 'space') !== (frame.surface !== undefined);
+      const isOther = row.of !== undefined && (row.of === 'space') !== isSpace;
       const text = isOther ? '' : row.text(shown);
       const value = this.values[k];
       value.parentElement?.toggleAttribute('hidden', text === '');
       setText(value, text);
       if (value.title !== text) value.title = text;
     });
+    return true;
   }
 }

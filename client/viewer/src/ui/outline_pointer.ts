@@ -24,6 +24,9 @@ export class OutlinePointer {
   private place: [number, number] | null = null;
   private picked: Picked | null = null;
   private selected: bigint | null = null;
+  /** Whether the readout is of an earlier drawing, and whether the pointer or the selection has changed since then. */
+  private isStale = false;
+  private isMoved = false;
 
   /** `shown`: the frame in the picture. */
   constructor(private readonly scene: Scene, private readonly canvas: HTMLCanvasElement,
@@ -31,6 +34,7 @@ export class OutlinePointer {
     canvas.addEventListener('pointermove', (event) => this.move(event.offsetX, event.offsetY));
     canvas.addEventListener('pointerleave', () => {
       this.place = null;
+      this.isMoved = true;
       events.changed();
     });
     canvas.addEventListener('click', (event) => {
@@ -53,6 +57,7 @@ export class OutlinePointer {
   select(identity: bigint | null): void {
     this.selected = identity || null;
     this.scene.select(identity);
+    this.isMoved = true;
     this.events.changed();
   }
 
@@ -60,9 +65,13 @@ export class OutlinePointer {
   pick(): void {
     this.picked = this.place && this.shown() ? this.scene.pick(...this.place) : null;
     this.scene.hovered = this.picked?.ring ?? null;
+    this.isStale = true;
   }
 
-  updateReadout(): void {
+  /** Writes the readout of the last drawing, if `isDue` or the user has moved the pointer. */
+  updateReadout(isDue: boolean): void {
+    if (!this.isStale || !(isDue || this.isMoved)) return;
+    this.isStale = this.isMoved = false;
     const lines: string[] = [];
     if (this.picked) {
       const { x, y, ring } = this.picked;
@@ -81,6 +90,7 @@ export class OutlinePointer {
 
   private move(x: number, y: number): void {
     this.place = [x, y];
+    this.isMoved = true;
     this.events.changed();
   }
 
@@ -112,13 +122,14 @@ export class OutlinePointer {
 
   /** Puts the readout beside the pointer, within the picture. Without a pointer it is in the corner. */
   private placeReadout(): void {
-    const { style, classList, offsetWidth, offsetHeight } = this.readout;
+    const { style, classList } = this.readout;
     const { width, height } = this.scene.size;
     classList.toggle('at-pointer', this.place !== null);
     if (!this.place) {
-      style.left = style.top = '';
+      if (style.left !== '') style.left = style.top = '';
       return;
     }
+    const { offsetWidth, offsetHeight } = this.readout;
     const [x, y] = this.place;
     const beside = (at: number, length: number, room: number) =>
       (at + POINTER_GAP + length <= room ? at + POINTER_GAP : Math.max(0, at - POINTER_GAP - length));

@@ -14,8 +14,14 @@ function element(name: string, attributes: Record<string, string | number>, text
 /** Axes and measurements over the picture. */
 export class Overlay {
   readonly element = element('svg', { class: 'overlay', 'aria-hidden': 'true' });
+  /** What is drawn, as text. */
+  private drawn = '';
 
   draw(view: View, size: Size, hasAxes: boolean, measurement: Measurement, text: string): void {
+    const { points } = measurement;
+    const drawn = hasAxes || points.length > 0 ? JSON.stringify([view, size, hasAxes, points, text]) : '';
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     this.element.replaceChildren(...hasAxes ? axes(view, size) : [], ...measured(view, size, measurement, text));
   }
 }

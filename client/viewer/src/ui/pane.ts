@@ -24,6 +24,7 @@ import { Overlay } from './overlay';
 import { PaneNotice } from './pane_notice';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
+import type { TextPace } from './text_pace';
 
 export interface PaneEvents {
   /** The user chose the pane: settings and time apply to it. */
@@ -45,6 +46,7 @@ export interface Variants {
 export class Pane {
   readonly element: HTMLElement;
   readonly scene: Scene;
+  readonly numbers = new Numbers();
   frame: Frame | null = null;
   /** A notice of the page over the picture, or empty. */
   note = '';
@@ -61,7 +63,6 @@ export class Pane {
   /** Why the frame of the track is refused, or empty. */
   private refusal = '';
   private readonly closeButton = make('button', { type: 'button', class: 'icon', title: 'Closes this picture.' }, '✕');
-  private readonly numbers = new Numbers();
   private readonly scaleBar = new ScaleBar();
   private readonly overlay = new Overlay();
   private readonly pointer: OutlinePointer;
@@ -279,24 +280,24 @@ export class Pane {
   }
 
   /** Shows the current frame, and draws if anything has changed. */
-  refresh(now: number): void {
+  refresh(pace: TextPace): void {
     const sequence = this.track.player.sequence;
     // A new run or new settings empty the history. The pane then clears its frame.
     const isStreamed = this.shown !== null && 'summary' in this.shown;
-    if (this.stream && !this.stream.isValid) this.resetVariant();
+    if (this.stream?.isValid === false) this.resetVariant();
     if (this.frame && isStreamed && this.curves.history.size === 0 && !this.isPending) this.clear();
-    if (sequence !== null) this.update(sequence, now);
-    setText(this.name, this.track.title);
-    setText(this.subtitle, this.frame ? this.shownText : '');
+    if (sequence !== null) this.update(sequence, pace.now);
     this.showState();
-    if (this.isSpace) return this.refreshSpace(now);
-    if (!this.dirty) return;
-    this.dirty = false;
-    this.pointer.pick();
-    this.scene.draw();
-    this.scaleBar.show(this.scene.view);
-    this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.pointer.measurement, this.pointer.measuredText);
-    this.pointer.updateReadout();
+    if (pace.isDueFor(this.track) && this.numbers.write()) pace.written();
+    if (this.isSpace) return this.refreshSpace(pace.now);
+    if (this.dirty) {
+      this.dirty = false;
+      this.pointer.pick();
+      this.scene.draw();
+      this.scaleBar.show(this.scene.view);
+      this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.pointer.measurement, this.pointer.measuredText);
+    }
+    this.pointer.updateReadout(pace.isDueFor(this.track));
   }
 
   private refreshSpace(now: number): void {
@@ -330,6 +331,8 @@ export class Pane {
 
   private showState(): void {
     const { state } = this;
+    setText(this.name, this.track.title);
+    setText(this.subtitle, this.frame ? this.shownText : '');
     this.badge.dataset.state = state.kind;
     setText(this.badge, stateName(state, this.track));
     if (this.badge.title !== state.text) this.badge.title = state.text;
@@ -337,10 +340,9 @@ export class Pane {
   }
 
   private get isVariant(): boolean {
-    if (this.hasSurfaces) return false;
     const isOther = this.track.kind === 'watch' ||
       settingsText(this.settings) !== settingsText(this.track.settings ?? this.settings);
-    return isOther && !isAsStreamed(this.settings);
+    return !this.hasSurfaces && isOther && !isAsStreamed(this.settings);
   }
 
   /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
@@ -382,8 +384,8 @@ export class Pane {
       if (!this.isSpace) this.countDrawn(entry, now);
       return;
     }
-    const isFailed = this.track.state.kind === 'failed';
-    if (!this.variant || this.track.kind === 'watch' || isFailed || !this.track.parameters) return;
+    const { kind, state, parameters } = this.track;
+    if (!this.variant || kind === 'watch' || state.kind === 'failed' || !parameters) return;
     this.variant.request(this.track, sequence, this.settings);
     const { result, problem } = this.variant;
     if (problem && this.frame) this.clear();

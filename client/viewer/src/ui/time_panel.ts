@@ -1,11 +1,19 @@
 import type { Track } from '../stream/track';
 import { button, byId, input, select, setText } from './dom';
 import { number } from './format';
+import type { TextPace } from './text_pace';
+
+/** Least move of the slider, as a share of its length, that the user can see. */
+const SLIDER_STEP = 0.001;
 
 /** Time controls of the chosen pane: follow, pause, step, scrub, speed. */
 export class TimePanel {
   private readonly scrub = input('scrub');
+  private readonly position = byId('position', HTMLElement);
   private scrubbing = false;
+  /** Frame, and place of the slider as a share of its length, when they were written last. */
+  private shown: number | null = null;
+  private shownShare = NaN;
 
   /** `track`: of the chosen pane; `moved`: called after the user changed the position. */
   constructor(private readonly track: () => Track | null, private readonly moved: () => void) {
@@ -59,8 +67,8 @@ export class TimePanel {
     });
   }
 
-  /** Updates the controls. */
-  refresh(): void {
+  /** Updates the controls. Without `pace` at once, else the numbers of frames at this pace. */
+  refresh(pace: TextPace | null = null): void {
     const track = this.track();
     const range = track?.range() ?? null;
     const player = track?.player;
@@ -73,16 +81,26 @@ export class TimePanel {
     for (const name of ['live', 'play', 'back', 'forward']) button(name).disabled = !track;
     this.scrub.disabled = !range;
     if (!range || !player) {
-      setText(byId('position', HTMLElement), '–');
+      setText(this.position, '–');
       return;
     }
-    if (!this.scrubbing) {
-      this.setScrub(range.first, range.last, at ?? range.last);
-    }
-    select('speed').value = String(player.speed);
+    const speed = String(player.speed);
+    if (select('speed').value !== speed) select('speed').value = speed;
     input('loop').checked = player.loop;
+    const isDue = !pace || pace.isDue || (player.mode === 'paused' && at !== this.shown);
+    const share = ((at ?? range.last) - range.first) / Math.max(1, range.last - range.first);
+    const isMoved = player.mode === 'playing' && !(Math.abs(share - this.shownShare) < SLIDER_STEP);
+    if (!this.scrubbing && (isDue || isMoved)) {
+      this.setScrub(range.first, range.last, at ?? range.last);
+      this.shownShare = share;
+    }
+    if (!isDue) return;
+    this.shown = at;
     const label = (sequence: number) => track?.labelOf(sequence) ?? '';
-    setText(byId('position', HTMLElement), `${at === null ? '–' : label(at)} of ${label(range.last)}`);
+    const text = `${at === null ? '–' : label(at)} of ${label(range.last)}`;
+    if (this.position.textContent === text) return;
+    this.position.textContent = text;
+    pace?.written();
   }
 
   private visible(track: Track): number | null {
