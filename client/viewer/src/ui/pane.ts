@@ -289,7 +289,7 @@ export class Pane {
     if (sequence !== null) this.update(sequence, pace.now);
     this.showState();
     if (pace.isDueFor(this.track) && this.numbers.write()) pace.written();
-    if (this.isSpace) return this.refreshSpace(pace.now);
+    if (this.isSpace) return this.refreshSpace();
     if (this.dirty) {
       this.dirty = false;
       this.pointer.pick();
@@ -300,10 +300,10 @@ export class Pane {
     this.pointer.updateReadout(pace.isDueFor(this.track));
   }
 
-  private refreshSpace(now: number): void {
+  private refreshSpace(): void {
     const drawn = this.space?.refresh() ?? null;
     const entry = drawn && this.track.history.get(Number(drawn.sequence));
-    if (entry) this.countDrawn(entry, now);
+    if (entry) this.countDrawn(entry);
   }
 
   destroy(): void {
@@ -359,7 +359,7 @@ export class Pane {
     const isLate = this.track.player.mode === 'paused' && entry?.sequence !== stream.frameAt(sequence);
     this.isPending = !entry || isLate;
     if (!entry || isLate || entry === this.shown) return;
-    stream.drawn(entry, now);
+    stream.drawn(entry, performance.now());
     this.show(entry, entry.frame());
   }
 
@@ -381,7 +381,7 @@ export class Pane {
       this.refusal = '';
       if (entry === this.shown) return;
       this.show(entry, entry.frame());
-      if (!this.isSpace) this.countDrawn(entry, now);
+      if (!this.isSpace) this.countDrawn(entry);
       return;
     }
     const { kind, state, parameters } = this.track;
@@ -394,10 +394,10 @@ export class Pane {
     this.show(result, result);
   }
 
-  /** Counts a frame when it is drawn for the first time. A surface is drawn once it is decoded, and space.js loaded. */
-  private countDrawn({ summary, receivedAt }: Entry, now: number): void {
+  /** Counts a frame at its first drawing. A surface is drawn once it is decoded, and space.js loaded. */
+  private countDrawn({ summary, receivedAt }: Entry): void {
     if (!Number.isNaN(summary.latency)) return;
-    summary.latency = now - receivedAt;
+    summary.latency = performance.now() - receivedAt;
     this.track.counts.drawn++;
   }
 
