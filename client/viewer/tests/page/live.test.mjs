@@ -100,6 +100,24 @@ function watchFrames() {
   }));
 }
 
+test('numbers follow ten times a second, and at once in a pause', async () => {
+  await open();
+  await viewer.shows(20);
+  const { changes, shown, place } = await viewer.page.evaluate(async () => {
+    const cell = document.querySelector('[data-key="frame"]');
+    let changes = 0;
+    const observer = new MutationObserver(() => { ++changes; });
+    observer.observe(cell, { childList: true, characterData: true, subtree: true });
+    await new Promise((over) => { setTimeout(over, 2000); });
+    observer.disconnect();
+    document.querySelector('#play').click();
+    return { changes, shown: cell.textContent, place: document.querySelector('#position').textContent };
+  });
+  assert.ok(changes > 0 && changes <= 21, `${changes} changes in 2 s`);
+  assert.equal(place.split(' of ')[0], shown);
+  assert.equal(await viewer.value('frame'), shown);
+});
+
 test('buttons and keys step by one frame', async () => {
   await open();
   await viewer.shows(20);
