@@ -267,6 +267,18 @@ TEST(Phases, RefusesFramesWithoutPhases) {
   const auto few = RefusalOf(WithPhases(2), particles);
   ASSERT_TRUE(few);
   EXPECT_EQ(few->field, "attributes[phase]");
+  particles.phases.assign(25, 1);
+  Frame frame = particles.AsFrame();
+  const std::vector<Attribute> twice(2, frame.attributes[0]);
+  frame.attributes = twice;
+  State before;
+  Workspace workspace;
+  Result result;
+  const absl::Status status =
+      Reconstructor::Create(WithPhases(2))->Reconstruct(frame, before, workspace, result);
+  ASSERT_TRUE(FindViolation(status));
+  EXPECT_EQ(FindViolation(status)->reason, kReasonDuplicate);
+  EXPECT_EQ(before, State());
 }
 
 TEST(Phases, RefusesWhatHasNoPhases) {

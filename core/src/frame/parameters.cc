@@ -20,6 +20,8 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
+// Limit of the names of attributes.
+constexpr std::size_t kMostNameBytes = 64;
 // Limits of slice planes: squares and products stay finite.
 constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
 
@@ -271,6 +273,10 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   if (p.noise_filter && !(*p.noise_filter > 0 && *p.noise_filter <= 1)) {
     return OutOfRange("noise_filter", *p.noise_filter,
                       "must be in (0, 1]: the weight of given positions");
+  }
+  if (p.phase_attribute.size() > kMostNameBytes) {
+    return Refused("phase_attribute", absl::StrCat(p.phase_attribute.size(), " bytes"),
+                   absl::StrCat("must be at most ", kMostNameBytes));
   }
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   if (absl::Status status = CheckBox(p); !status.ok()) return status;

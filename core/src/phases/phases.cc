@@ -5,6 +5,7 @@
 #include <numeric>
 #include <string>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
@@ -84,6 +85,11 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
       others.push_back(attribute);
       continue;
     }
+    if (!p.labels.empty()) {
+      return InvalidFrame(kReasonDuplicate, "attributes",
+                          absl::CHexEscape(parameters.phase_attribute),
+                          "must be there once: the phases of the particles");
+    }
     if (attribute.components != 1 || attribute.values.size() != count) {
       return InvalidFrame(kReasonCount, "attributes[" + std::string(attribute.name) + "]",
                           absl::StrCat(attribute.values.size(), " values"),
@@ -96,7 +102,8 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
     }
   }
   if (is_found) return absl::OkStatus();
-  return InvalidFrame(kReasonNoSuchAttribute, "attributes", parameters.phase_attribute,
+  return InvalidFrame(kReasonNoSuchAttribute, "attributes",
+                      absl::CHexEscape(parameters.phase_attribute),
                       "must be an attribute of the frame: the phases of its particles");
 }
 
