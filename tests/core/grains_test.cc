@@ -177,8 +177,8 @@ TEST(Grains, LargerUnitsScaleTheOutline) {
   }
 }
 
-// Bounds: the figures to reach are .12 and .8 to 1.05, better .05 and .9 to 1.02.
-constexpr double kMostCut = .05, kLeastArea = .9, kMostArea = 1.02;
+// Bounds. Without exact crossings of lattice edges, the worst cut is above its bound.
+constexpr double kMostCut = .04, kLeastArea = .9, kMostArea = 1.02;
 
 TEST(Grains, LoneGrainsKeepTheirArea) {
   double least = 1e300, most = 0, cut = 0;
