@@ -45,15 +45,15 @@ double SpacingOfSizes(std::span<const float> volumes) {
   return std::sqrt(sum / static_cast<double>(volumes.size()));
 }
 
-// The spacing for grains: the smallest diameter, unless the largest would be too many cells wide.
-// Requires: the frame has volumes.
+// The spacing for grains: the smallest diameter, unless the largest would be too large for this
+// spacing or its lattice. Requires: the frame has volumes.
 double SpacingOfGrains(const ReconstructionParameters& parameters, std::span<const float> volumes) {
   const auto [least, most] = std::ranges::minmax_element(volumes);
   constexpr double kLargest = ReconstructionParameters::kLargestGrain;
   static_assert(kLargest * kGrainKernelRadius <= kTileSize, "kernels reach neighbouring tiles");
-  return std::max(
-      std::sqrt(double{*least}),
-      std::sqrt(double{*most}) / (kLargest * CellUnit(parameters) * parameters.cell_size));
+  const double ratio =
+      std::min(parameters.kMostSizeRatio, kLargest * CellUnit(parameters) * parameters.cell_size);
+  return std::max(std::sqrt(double{*least}), std::sqrt(double{*most}) / ratio);
 }
 
 // The spacing that the particles of a frame show; empty if there is no estimate. If the particles

@@ -353,6 +353,7 @@ TEST(Grains, SpacingIsTheSmallestDiameterOrATenthOfTheLargest) {
   EXPECT_EQ(spacing(2, 9, 1), 2);
   EXPECT_NEAR(spacing(1, 12, 1), 1.2, 1e-6);
   EXPECT_NEAR(spacing(1, 12, .5), 2.4, 1e-6);
+  EXPECT_NEAR(spacing(1, 12, 1.1), 1.2, 1e-6);
 }
 
 TEST(Grains, GrainsTooFineOrTooCoarseForTheLatticeAreNamed) {
