@@ -87,15 +87,13 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   if (parameters.noise_filter) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
-  std::string isovalues, phases;
+  std::string isovalues;  // A recording has no phases, so it gives the outline of all particles.
   for (const Section& section : parameters.sections) {
-    if (section.phase) AppendAll(phases, phases.empty() ? "" : ",", *section.phase);
     // Every slice has the same isolines.
     if (!section.isovalue || section.slice != parameters.sections.front().slice) continue;
     AppendAll(isovalues, isovalues.empty() ? "" : ",", ShortestNumber(*section.isovalue));
   }
   if (!isovalues.empty()) AppendAll(flags, " --isolines ", isovalues);
-  if (!phases.empty()) AppendAll(flags, " --phases ", parameters.phase_attribute, "=", phases);
   return flags;
 }
 

@@ -31,6 +31,7 @@ constexpr std::chrono::milliseconds kPollInterval(100);
 constexpr int kSearchPause = 2;
 
 FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
+                     std::span<const float> particle_areas,
                      std::span<const std::size_t> sections_in_plane) {
   // No output shows particles in space.
   const std::span<const double> particles =
@@ -40,7 +41,7 @@ FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
           .result = frame.frame.result,
           .surface = is_surface ? &frame.frame.result.surface : nullptr,
           .particles = particles,
-          .particle_areas = frame.particle_volumes,
+          .particle_areas = particle_areas,
           .stages_ms = frame.frame.times.stages_ms,
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,
@@ -125,7 +126,8 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
       progress.Note(Concat("partiemc: ", OneLine(frame.rejoined), "; missed: at most ",
                            Plural(frame.gap, "frame")));
     }
-    absl::Status status = outputs.Write(RecordOf(frame, is_surface, sections_in_plane));
+    const std::vector<float> areas = AreasOf(frame.particle_volumes, parameters.boundary);
+    absl::Status status = outputs.Write(RecordOf(frame, is_surface, areas, sections_in_plane));
     if (status.ok() && recorder) status = recorder->Add(frame);
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, is_surface, ended.dropped));

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -79,6 +80,15 @@ inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
           .rings_digest = digests.rings,
           .mesh_digest = digests.mesh,
           .section = k + 1};
+}
+
+/// The areas of particles with these volumes. The volume of a grain is its squared diameter.
+inline std::vector<float> AreasOf(std::span<const float> volumes, Boundary boundary) {
+  std::vector<float> areas(volumes.begin(), volumes.end());
+  if (boundary == Boundary::kGrains) {
+    for (float& area : areas) area *= std::numbers::pi_v<float> / 4;
+  }
+  return areas;
 }
 
 /// Indices of the sections that lie in the plane of the stream's own outline. These sections are

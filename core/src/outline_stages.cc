@@ -285,12 +285,14 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   Scale scale;
   next.is_kept = false;
   b.last.lengths.reset();
+  b.last.doubts = {};
   absl::Status status = InStage(observer, Stage::kBins, [&] {
     absl::Status checked = task.is_first
                                ? CheckFrame(task.frame, parameters, task.limits, b.distinct_ids)
                                : absl::OkStatus();
     return checked.ok() ? SortParticles(task, b, seen, lengths, scale, result.statistics) : checked;
   });
+  b.last.doubts = result.statistics.doubts;
   if (!status.ok() || !lengths) return status;
   status = memory.ReserveOutline({.particles = seen.ParticleCount(),
                                   .tiles = b.bins.tiles.size(),
@@ -305,7 +307,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   status = FillOutline(task, seen, scale, memory, b, result);
   if (!status.ok()) return status;
   Summarise(b, result);
-  b.last = {seen, lengths, scale};
+  b.last = {seen, lengths, scale, result.statistics.doubts};
   next.state.area_offset = b.next_area_offset;
   std::swap(next.state.normals, b.next_normals);
   KeepState(*lengths, b, next, result);
@@ -316,7 +318,9 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
                               Workspace::Buffers& b, NextState& next, Result& result) {
   next.is_kept = false;
   const LastOutline& last = b.last;
-  result.statistics.particles = task.frame.ParticleCount();
+  result.statistics.particles =
+      static_cast<std::uint64_t>(std::ranges::count(b.phases.labels, label));
+  result.statistics.doubts = last.doubts;
   if (!last.lengths) return absl::OkStatus();
   const PhaseRings& phase = b.phases.rings[label - 1u];
   absl::Status status = memory.ReserveOutline({.segments = phase.points.size(),
@@ -325,8 +329,16 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
   if (!status.ok()) return status;
   WritePhaseRings(b.phases, label, b.placed_phase, result.rings);
   InStage(task.observer, Stage::kIdentities, [&] {
-    ContinueRings({last.frame, task.parameters.plane, b.bins, phase.crossings, phase.topology,
-                   b.placed_phase, last.scale.cell_size},
+    ContinueRings({last.frame,
+                   task.parameters.plane,
+                   b.bins,
+                   phase.crossings,
+                   phase.topology,
+                   b.placed_phase,
+                   last.scale.cell_size,
+                   {},
+                   nullptr,
+                   {b.phases.labels, label}},
                   task.previous.history, b.identity_scratch, b.next_history, result.rings);
   });
   status = FillRings({task,
@@ -339,12 +351,14 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
                      b, result);
   if (!status.ok()) return status;
   FrameStatistics& statistics = result.statistics;
-  statistics.particles = std::ranges::count(b.phases.labels, label);
   statistics.tiles = b.bins.tiles.size();
   statistics.active_cells = phase.crossings.cells.size();
   statistics.spacing = last.lengths->spacing;
   statistics.cell_size = last.lengths->cell_size;
   SumMeasures(result.rings, statistics);
+  // Phases have no normals to remember and no offset.
+  next.state.normals.clear();
+  next.state.area_offset.reset();
   KeepState(*last.lengths, b, next, result);
   return absl::OkStatus();
 }

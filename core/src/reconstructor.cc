@@ -201,6 +201,8 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   const State unseen;
   Frame frame = given;
   if (HasPhases(parameters_)) {
+    status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
+    if (!status.ok()) return status;
     status = TakePhases(given, parameters_, b.phases, b.attributes);
     if (!status.ok()) return status;
     frame.attributes = b.attributes;
@@ -216,7 +218,8 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   }
   const auto task_of = [&](const ReconstructionParameters& parameters, const State& previous,
                            std::size_t outline) {
-    const bool is_first = outline == (is_surface ? 1 : 0) && !is_prepared;
+    const bool is_first =
+        outline == (is_surface ? 1 : 0) && !is_prepared && !HasPhases(parameters_);
     return OutlineTask{
         parameters, VariantFor(parameters, *variant_), limits_, frame, previous, control.observer,
         is_first,   is_prepared ? &prepared : nullptr};

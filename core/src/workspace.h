@@ -42,6 +42,7 @@ struct LastOutline {
   Frame frame;                     // Its particles.
   std::optional<Lengths> lengths;  // Empty if it has no rings.
   Scale scale;
+  Doubts doubts;
 };
 
 struct Workspace::Buffers {

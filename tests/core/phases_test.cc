@@ -139,6 +139,96 @@ TEST(Phases, DivideTheBodyInRandomFrames) {
   EXPECT_GT(interfaces, 20 * tries);
 }
 
+// A kernel may reach 32 cells, and by rounding a little more.
+TEST(Phases, KernelsReachWholeTiles) {
+  ReconstructionParameters parameters = WithPhases(2);
+  parameters.sizes = Sizes::kOwn;
+  parameters.kernel_radius = 8;
+  Random random(2);
+  for (int k = 0; k < 20; ++k) {
+    const double shift = random.Uniform(-40, 40);
+    Particles particles = support::Shifted(support::Lattice(40, 40), shift, shift / 2);
+    particles.volumes.assign(particles.size(), 1);
+    particles.volumes[random.Below(particles.size())] = std::nextafterf(16, 17);
+    DrawPhases(random, 2, particles);
+    ExpectDivided(ReconstructOnce(parameters, particles), parameters.fill);
+  }
+}
+
+// Everything that changes where phases meet.
+TEST(Phases, DivideTheBodyWithAnyParameters) {
+  const auto tries = support::Tries<std::uint64_t>(300);
+  for (std::uint64_t seed = 1; seed <= tries; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    Random random(seed);
+    const int count = 1 + static_cast<int>(random.Below(16));
+    ReconstructionParameters parameters = WithPhases(count);
+    parameters.kernel_radius = random.Uniform(1.5, 8);
+    parameters.cell_size = std::array{.3, .5, 1.0, 2.0, 4.0}[random.Below(5)];
+    Particles particles = RandomPhases(seed, count + static_cast<int>(random.Below(2)));
+    if (random.Chance(.5)) parameters.clean = random.Chance(.5);
+    if (random.Chance(.3)) parameters.min_component_particles = 5;
+    if (random.Chance(.3)) parameters.min_component_area = random.Uniform(0, 20);
+    if (random.Chance(.3)) {
+      parameters.sizes = Sizes::kOwn;
+      parameters.kernel_radius = 3;
+      particles.volumes.clear();
+      for (std::size_t k = 0; k < particles.size(); ++k) {
+        particles.volumes.push_back(random.Chance(.2) ? 4 : 1);
+      }
+    }
+    if (random.Chance(.2)) parameters.sections.resize(1 + parameters.sections.size() / 2);
+    if (parameters.sections.size() == static_cast<std::size_t>(count)) {
+      parameters.sections.back() = {.phase = -7};  // No particle has it.
+    }
+    const Result result = ReconstructOnce(parameters, particles);
+    for (const Result& phase : result.sections) {
+      const absl::Status status = Validate(phase, parameters.fill);
+      EXPECT_TRUE(status.ok()) << status;
+    }
+    EXPECT_TRUE(Validate(result, parameters.fill).ok());
+  }
+}
+
+// A region without particles changes no other one.
+TEST(Phases, EmptyRegionsLeaveOthersInPlace) {
+  Random random(9);
+  Particles particles = support::Lattice(30, 30);
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    particles.phases.push_back(particles.x(k) < 15 ? 1 : 2);
+  }
+  // Two particles that are not in the body's lattice of phases: lone ones of a third phase.
+  for (const double x : {7.5, 22.5}) {
+    particles.Add(x, 10.5);
+    particles.phases.push_back(3);
+  }
+  const Result result = ReconstructOnce(WithPhases(2), particles);
+  EXPECT_NEAR(result.sections[0].statistics.area, 450, 3);
+  EXPECT_NEAR(result.sections[1].statistics.area, 450, 3);
+}
+
+// The state of a stream does not depend on the streams that used the workspace before.
+TEST(Phases, StatesDoNotDependOnTheWorkspace) {
+  const Particles particles = RandomPhases(7, 2);
+  ReconstructionParameters others = WithPhases(2);
+  others.sections = {{}, {}};
+  const auto state_of = [&](Workspace& workspace) {
+    State state;
+    Result result;
+    const auto reconstructor = Reconstructor::Create(WithPhases(2));
+    EXPECT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), state, workspace, result).ok());
+    return Serialize(state);
+  };
+  Workspace fresh, used;
+  State state;
+  Result result;
+  const auto other = Reconstructor::Create(others);
+  for (int k = 0; k < 2; ++k) {
+    ASSERT_TRUE(other->Reconstruct(particles.AsFrame(), state, used, result).ok());
+  }
+  EXPECT_EQ(state_of(used), state_of(fresh));
+}
+
 TEST(Phases, AnyNumberOfThreadsGivesTheSameBits) {
   const Particles particles = RandomPhases(7, 3);
   std::vector<std::uint64_t> digests;
@@ -263,22 +353,31 @@ TEST(Phases, RefusesFramesWithoutPhases) {
   EXPECT_EQ(violation->value, "phase");
   EXPECT_EQ(ReconstructOnce(WithPhases(2), Particles()).sections[1].rings.RingCount(), 0u);
   Particles particles = support::Lattice(5, 5);
-  particles.phases.assign(24, 1);
-  const auto few = RefusalOf(WithPhases(2), particles);
-  ASSERT_TRUE(few);
-  EXPECT_EQ(few->field, "attributes[phase]");
+  // The reason and the field of a refused frame with these attributes.
   particles.phases.assign(25, 1);
-  Frame frame = particles.AsFrame();
-  const std::vector<Attribute> twice(2, frame.attributes[0]);
-  frame.attributes = twice;
-  State before;
-  Workspace workspace;
-  Result result;
-  const absl::Status status =
-      Reconstructor::Create(WithPhases(2))->Reconstruct(frame, before, workspace, result);
-  ASSERT_TRUE(FindViolation(status));
-  EXPECT_EQ(FindViolation(status)->reason, kReasonDuplicate);
-  EXPECT_EQ(before, State());
+  const auto refusal = [&](std::vector<Attribute> attributes) {
+    Frame frame = particles.AsFrame();
+    frame.attributes = attributes;
+    State state;
+    Workspace workspace;
+    Result result;
+    const absl::Status status =
+        Reconstructor::Create(WithPhases(2))->Reconstruct(frame, state, workspace, result);
+    EXPECT_EQ(state, State());
+    const auto broken = FindViolation(status);
+    return broken ? broken->reason + " " + broken->field : "";
+  };
+  const std::vector<float> half(25, .5f), not_a_number(25, std::nanf("")), two(50, 1);
+  EXPECT_EQ(refusal({{.name = "phase", .values = std::span(half).first(24)}}),
+            "COUNT attributes[0].values");
+  EXPECT_EQ(refusal({{.name = "phase", .values = half}}), "OUT_OF_RANGE attributes[phase][0]");
+  EXPECT_EQ(refusal({{.name = "phase", .values = not_a_number}}),
+            "NOT_FINITE attributes[0].values[0]");
+  EXPECT_EQ(refusal({{.name = "phase", .components = 2, .values = two}}),
+            "OUT_OF_RANGE attributes[phase]");
+  EXPECT_EQ(refusal({{.name = "phase", .values = particles.phases},
+                     {.name = "phase", .values = particles.phases}}),
+            "DUPLICATE attributes[1].name");
 }
 
 TEST(Phases, RefusesWhatHasNoPhases) {
@@ -309,6 +408,12 @@ TEST(Phases, RefusesWhatHasNoPhases) {
   EXPECT_EQ(with([](P& p) { p.sections[1].isovalue = .5; }), "parameters.sections[1].phase=2");
   EXPECT_EQ(with([](P& p) { p.sections.push_back({.isovalue = .5}); }), "");
   EXPECT_EQ(with([](P& p) { p.phase_attribute = ""; }), "parameters.phase_attribute=empty");
+  EXPECT_EQ(with([](P& p) { p.phase_attribute = "a\n"; }),
+            "parameters.phase_attribute=not printable");
+  EXPECT_EQ(with([](P& p) { p.phase_attribute = std::string(65, 'a'); }),
+            "parameters.phase_attribute=65 bytes");
+  EXPECT_EQ(with([](P& p) { p.sections[0].phase = (1 << 24) + 1; }),
+            "parameters.sections[0].phase=16777217");
 }
 
 }  // namespace

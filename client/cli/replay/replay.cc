@@ -169,7 +169,7 @@ class Receiver {
       }
       return areas;
     }
-    return frame.volumes;
+    return AreasOf(frame.volumes, stream_.info().parameters.boundary);
   }
 
   /// The attribute of --color-by at the particles, for the report; empty without one.

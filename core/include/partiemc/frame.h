@@ -44,8 +44,8 @@ struct Frame {
   /// has no velocities.
   std::span<const float> velocities = {};
 
-  /// Quantities to interpolate to the vertices (Result::attributes). Attributes change no ring,
-  /// only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
+  /// Quantities to interpolate to the vertices (Result::attributes), and the phases. Quantities
+  /// change only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
   /// Simulation time. Velocities are used only if the time increases from frame to frame.

@@ -165,8 +165,8 @@ struct ReconstructionParameters {
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 
-  /// With grains, no outline cuts notably into a disc, voids without room for another grain are
-  /// inside, and a lone disc is a component. Requires Sizes::kOwn; excludes isovalues.
+  /// With grains, outlines follow discs, voids without room for another grain are inside, and a
+  /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues.
   /// `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half spacings. An absent
   /// spacing is the smallest diameter, or a tenth of the largest if this is larger. A diameter must
   /// be at least `kSmallestGrain` cells, so that no grain falls between the nodes of the lattice,
@@ -202,12 +202,12 @@ struct ReconstructionParameters {
   /// alone. Used by `farthest-particle` and `qef` only.
   bool normal_memory = true;
 
-  /// Closes holes with an area below 2 squared spacings, with everything inside them, and drops
+  /// Closes holes below 2 squared spacings (grains: half), with everything inside them, and drops
   /// components without particles. Absent: on for `virtual-plane` without an isovalue, else off.
   std::optional<bool> clean = std::nullopt;
 
   /// Spray: drops components that enclose less area than `min_component_area`, in squared spacings
-  /// (a lone particle has about 2), or fewer particles than `min_component_particles`, with
+  /// (a lone particle: about 2, grain: .5), or fewer particles than `min_component_particles`, with
   /// everything inside them. FrameStatistics::dropped_spray counts them. At least 0; 0 keeps all.
   double min_component_area = 0;
   std::uint64_t min_component_particles = 0;
@@ -232,12 +232,12 @@ struct ReconstructionParameters {
 
   static constexpr std::size_t kMaxSections = 16;
 
-  /// Further outlines of each frame (Result::sections), at most 16. Each section costs as much as
-  /// another frame, except that the input is checked only once.
+  /// Further outlines of each frame (Result::sections), at most 16. Each costs as much as another
+  /// frame, except that the input is checked only once. Phases: see core/PHASES.md.
   std::vector<Section> sections = {};
 
-  /// The attribute of the particles (Frame::attributes) that holds their phases, such as a type:
-  /// one whole number each. Frames of a stream with Section::phase must have it. It is not
+  /// The attribute (Frame::attributes) with the phases of the particles, such as a type: one whole
+  /// number each. At most 64 bytes. Frames of a stream with Section::phase must have it. It is not
   /// interpolated.
   std::string phase_attribute = "phase";
 

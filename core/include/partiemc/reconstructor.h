@@ -42,8 +42,8 @@ class MemoryGuard {
   virtual ~MemoryGuard() = default;
 
   /// Returns whether workspace and result may grow to `bytes` in total. Reconstruct calls this on
-  /// its caller's thread twice per outline, before it allocates the memory: first with a lower
-  /// bound from the number of tiles, then, when the outline is known, with the full estimate.
+  /// its caller's thread at least once per outline, before it allocates the memory: first with a
+  /// lower bound from the number of tiles, then with what is known about the outline.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
@@ -71,7 +71,7 @@ class Reconstructor {
   /// in the points of the rings.
   /// Errors with a Violation:
   ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, no ids with a
-  ///   noise filter, particles outside one plane, a state of another kind of stream.
+  ///   noise filter, no phases, particles outside one plane, a state of another kind of stream.
   ///   RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory` refused the memory.
   ///   OUT_OF_RANGE: float32 too coarse for the spacing.
   /// Errors without a Violation: CANCELLED, if `control.cancelled` was set; INTERNAL, a bug.

@@ -119,7 +119,7 @@ struct Result {
   std::vector<AttributeValues> attributes;  ///< In the order of Frame::attributes.
   FrameStatistics statistics;
   /// The results of ReconstructionParameters::sections. Each is the same as if its outline were the
-  /// only one.
+  /// only one, except that phases divide the outline of the stream (Section::phase).
   std::vector<Result> sections;
 
   /// Empties everything. The elements of `attributes` and `sections` remain, without contents.

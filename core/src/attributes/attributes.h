@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bins/bins.h"
+#include "frame/particle_subset.h"
 #include "frame/scale.h"
 #include "partiemc/frame.h"
 #include "partiemc/result.h"
@@ -28,16 +29,6 @@ struct AttributeScratch {
   std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.
   std::vector<CarryingParticle> particles;
-};
-
-/// Particles with one label.
-struct ParticleSubset {
-  std::span<const std::uint8_t> labels;  ///< By particle of the frame; empty: all particles.
-  std::uint8_t label = 0;
-
-  bool Contains(std::uint32_t particle) const {
-    return labels.empty() || labels[particle] == label;
-  }
 };
 
 /// Interpolates the attributes of the particles of a subset to `vertices`, interleaved, in world

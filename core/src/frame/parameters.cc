@@ -81,6 +81,7 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
 
 // Checks that nothing excludes the phase of a section.
 absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) {
+  constexpr std::int64_t kMostPhase = 1 << 24;
   const Section& of = p.sections[section];
   const auto refused = [&](const std::string& rule) {
     return Refused(absl::StrCat("sections[", section, "].phase"), absl::StrCat(*of.phase), rule);
@@ -93,8 +94,15 @@ absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) 
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
   }
-  if (p.phase_attribute.empty()) {
-    return Refused("phase_attribute", "empty", "must name an attribute: a section has a phase");
+  if (std::abs(std::int64_t{*of.phase}) > kMostPhase) {
+    return refused("must be at most 2^24 in magnitude, because attributes are floats");
+  }
+  const bool is_name =
+      !p.phase_attribute.empty() &&
+      std::ranges::all_of(p.phase_attribute, [](char c) { return c >= ' ' && c <= '~'; });
+  if (!is_name) {
+    return Refused("phase_attribute", p.phase_attribute.empty() ? "empty" : "not printable",
+                   "must be the name of an attribute, of printable ASCII: a section has a phase");
   }
   for (std::size_t k = 0; k < section; ++k) {
     if (p.sections[k].phase == of.phase) {
@@ -201,7 +209,12 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
   const bool is_isoline = p.isovalue || std::ranges::any_of(p.sections, [](const Section& s) {
                             return s.isovalue.has_value();
                           });
-  if (p.sizes == Sizes::kOwn && !is_isoline) return absl::OkStatus();
+  if (p.sizes == Sizes::kOwn && !is_isoline) {
+    // An absent spacing is the smallest diameter.
+    if (p.spacing || p.cell_size * p.kSmallestGrain <= 2) return absl::OkStatus();
+    return OutOfRange("cell_size", p.cell_size,
+                      "must be at most 1.408 half spacings for grains without a spacing");
+  }
   return Refused(
       "boundary", std::string(Name(p.boundary)),
       is_isoline ? "must be bulk with an isovalue" : "must be bulk unless sizes are own");

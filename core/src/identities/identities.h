@@ -49,6 +49,7 @@ struct IdentityInput {
   double cell_size;
   LatticePeriods periods = {};
   const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
+  ParticleSubset subset = {};                ///< The particles that count.
 };
 
 /// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the

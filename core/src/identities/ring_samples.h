@@ -7,6 +7,7 @@
 
 #include "bins/bins.h"
 #include "crossings/crossings.h"
+#include "frame/particle_subset.h"
 #include "identities/run_overlaps.h"
 #include "partiemc/state.h"
 #include "rings/components.h"
@@ -45,10 +46,12 @@ struct SampleInput {
   std::span<const std::uint32_t> ring_of_component;  ///< By component: its outer ring, or kNoRing.
   std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
   const Percolation* percolation = nullptr;          ///< Null unless bodies will be cut.
+  ParticleSubset subset = {};
 
-  /// Whether a particle counts: copies of particles of bodies that will be cut do not. `source`:
-  /// its index in the frame.
+  /// Whether a particle counts: copies of particles of bodies that will be cut do not, nor do
+  /// particles of other phases. `source`: its index in the frame.
   bool Counts(std::uint32_t source, std::uint32_t component) const {
+    if (!subset.Contains(source)) return false;
     return percolation == nullptr || percolation->Counts(source, component);
   }
 };

@@ -27,8 +27,10 @@ double RootBetween(End low, End high, Sample sample) {
   int kept = 0;  // The end that stayed last: -1 low, 1 high.
   for (int k = 0; k < kMostSamples; ++k) {
     const double share = low.value / (low.value - high.value);
-    place = low.place + std::clamp(share, 0.0, 1.0) * (high.place - low.place);
-    place = std::clamp(place, kEdgeMargin, 1 - kEdgeMargin);
+    const double last = place;
+    place = std::clamp(low.place + std::clamp(share, 0.0, 1.0) * (high.place - low.place),
+                       kEdgeMargin, 1 - kEdgeMargin);
+    if (place == last) break;  // The root is next to a node.
     const double value = sample(place);
     if (std::abs(value) < kTolerance) break;
     const bool is_low = (value < 0) == (low.value < 0);

@@ -12,7 +12,7 @@ namespace {
 constexpr double kNearest = 1.5, kFarthest = 4.5;
 // Weight of a junction's place against lines that hardly determine it.
 constexpr double kOwnWeight = 1e-3;
-// A junction moves by at most this number of cells.
+// A junction moves by at most this number of spacings.
 constexpr double kLongestMove = 1.5;
 // Shares of the ring's segments by which a vertex may move: if the next vertex stays, or may move,
 // too.
@@ -113,7 +113,7 @@ void Straighten(const ArcFrom& arc, const Point& before, const Point& junction, 
 }
 
 // The point nearest to lines, near `from`.
-Point MeetingPoint(std::span<const Line> lines, const Point& from) {
+Point MeetingPoint(std::span<const Line> lines, const Point& from, double h) {
   double xx = kOwnWeight, xy = 0, yy = kOwnWeight, bx = 0, by = 0;
   for (const Line& line : lines) {
     const Point normal{-line.along.y, line.along.x};
@@ -128,7 +128,7 @@ Point MeetingPoint(std::span<const Line> lines, const Point& from) {
   const double determinant = xx * yy - xy * xy;
   Point move{(yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant};
   const double length = Length(move);
-  const double share = length > kLongestMove ? kLongestMove / length : 1;
+  const double share = length > kLongestMove * h ? kLongestMove * h / length : 1;
   return {from.x + share * move.x, from.y + share * move.y};
 }
 
@@ -197,7 +197,7 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
     const std::span<const Line> known(lines.data(), count);
     const bool is_body = junction < body.PointCount();
     const Point now = is_body      ? PlaceOnRing(known, junction, body, scratch, points)
-                      : count >= 2 ? MeetingPoint(known, before)
+                      : count >= 2 ? MeetingPoint(known, before, h)
                                    : before;
     points.position[junction] = now;
     for (std::size_t k = first; k < last; ++k) {

@@ -97,6 +97,13 @@ void SetWanted(Areas& a) {
   }
 }
 
+// Sets the values of the lowest region of each body to 0.
+void Ground(const Areas& a, std::span<double> values) {
+  for (std::uint32_t region = 0; region < values.size(); ++region) {
+    if (a.s.body[region] == region) values[region] = 0;
+  }
+}
+
 // product = the matrix of the heights times `vector`.
 void Multiply(const Areas& a, std::span<const double> vector, std::span<double> product) {
   std::ranges::fill(product, 0);
@@ -106,19 +113,23 @@ void Multiply(const Areas& a, std::span<const double> vector, std::span<double> 
     product[a.LeftOf(arc)] += flow;
     product[a.RightOf(arc)] -= flow;
   }
+  Ground(a, product);
 }
 
 double Dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
+// Only differences of heights matter, so the lowest region of each body has the height 0. Without
+// it, the matrix would be singular, and rounding would leave the solver without a solution.
 void SolveHeights(Areas& a) {
   PhaseAreaScratch& s = a.s;
   const std::size_t count = s.wanted.size();
   s.offset.assign(count, 0);
   s.product.assign(count, 0);
   s.residual = s.wanted;
-  s.direction = s.wanted;
+  Ground(a, s.residual);
+  s.direction = s.residual;
   double square = Dot(s.residual, s.residual);
   const double enough = square * kTolerance * kTolerance;
   for (int step = 0; step < kMostSteps && square > enough; ++step) {

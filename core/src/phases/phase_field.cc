@@ -24,7 +24,8 @@ void PhaseField::Build(const ParticleBins& bins, const Scale& scale,
                        std::span<const PhaseLabel> labels) {
   tiles_ = &bins.tiles;
   kernel_radius_ = scale.kernel_radius;
-  reach_ = scale.reach;
+  // Rounding may exceed the limit of a kernel.
+  reach_ = std::min<double>(scale.reach, kTileSize);
   spacing_ = scale.spacing;
   beta_ = scale.kernel_radius / scale.spacing;
   const std::size_t count = bins.tiles.size();
@@ -124,12 +125,14 @@ void PhaseField::PhasesAroundCells(std::uint32_t tile,
 // from the point to the particle, in cells; t = 1 - squared distance / squared kernel radius.
 template <typename Visit>
 void PhaseField::ForEachNear(std::uint32_t tile, double x, double y, Visit visit) const {
-  // A point on the side of its tile may reach the first cell of the tile after the next, which no
-  // kernel enters.
-  constexpr int kLast = 2 * kTileSize - 1;
-  const auto cell_of = [](double at) { return static_cast<int>(std::floor(at)); };
-  const int left = cell_of(x - reach_), right = std::min(cell_of(x + reach_), kLast);
-  const int low = cell_of(y - reach_), high = std::min(cell_of(y + reach_), kLast);
+  // A point on a side of its tile may reach a cell of the tile after the next, which no kernel
+  // enters.
+  static constexpr int kFirst = -kTileSize, kLast = 2 * kTileSize - 1;
+  const auto cell_of = [](double at) {
+    return std::clamp(static_cast<int>(std::floor(at)), kFirst, kLast);
+  };
+  const int left = cell_of(x - reach_), right = cell_of(x + reach_);
+  const int low = cell_of(y - reach_), high = cell_of(y + reach_);
   for (int j = low; j <= high; ++j) {
     for (int i = left; i <= right;) {
       // The cells of this row in one tile are consecutive.

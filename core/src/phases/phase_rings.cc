@@ -145,14 +145,13 @@ int BodyVertices::ExitOf(std::uint32_t at) const {
   return body_->crossings.segments[body_->topology.segments[at]].exit;
 }
 
-void TracePhase(const ParticleBins& bins, const Scale& scale,
-                const ReconstructionParameters& parameters, const PhaseMap& map,
+void TracePhase(const ParticleBins& bins, const Scale& scale, const PhaseMap& map,
                 const BodyOutline& body, const BodyVertices& vertices, const PointNumbers& numbers,
                 PhaseLabel label, PhaseTraceScratch& scratch, PhaseRings& rings) {
   MarkInside(map, label, scratch.level_set);
   FindCrossings(bins.tiles, scratch.level_set, rings.crossings);
   JoinSaddles(bins.tiles, map, body, label, rings.crossings);
-  ReconstructionParameters traced = parameters;
+  ReconstructionParameters traced;  // Small regions stay: only the body is cleaned.
   traced.clean = false;
   TraceRings(bins, scratch.level_set, scale, traced, rings.crossings, scratch.rings, rings.topology,
              true);

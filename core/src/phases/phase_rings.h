@@ -90,8 +90,7 @@ struct PhaseTraceScratch {
 
 /// Traces the outline of one phase. Deterministic. Cost: linear in tiles, nodes near phases,
 /// segments and particles.
-void TracePhase(const ParticleBins& bins, const Scale& scale,
-                const ReconstructionParameters& parameters, const PhaseMap& map,
+void TracePhase(const ParticleBins& bins, const Scale& scale, const PhaseMap& map,
                 const BodyOutline& body, const BodyVertices& vertices, const PointNumbers& numbers,
                 PhaseLabel label, PhaseTraceScratch& scratch, PhaseRings& rings);
 

@@ -5,7 +5,6 @@
 #include <numeric>
 #include <string>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
@@ -53,6 +52,18 @@ void ToWorld(const PlacedVertices& placed, const Rings& body, double cell_size, 
   convert(p.points.anchor, placed.roots, p.world_roots);
 }
 
+// Gives each ring the number of particles of its own phase; TraceRings has counted all particles.
+void CountParticles(Phases& p) {
+  for (std::size_t k = 0; k < p.rings.size(); ++k) {
+    RingTopology& topology = p.rings[k].topology;
+    for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+      const std::uint32_t region = p.areas.first_region[k] + topology.component_of_ring[ring];
+      const bool is_hole = topology.outer_of[ring] != kNoRing;
+      topology.particle_count[ring] = is_hole ? 0 : p.areas.count[region];
+    }
+  }
+}
+
 // The direction to the right of the chord from the point before to the point after.
 VertexNormal ChordNormal(std::span<const double> world, std::span<const std::uint32_t> ring,
                          std::size_t k) {
@@ -78,32 +89,30 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
   }
   others.clear();
   p.labels.clear();
-  const std::size_t count = frame.ParticleCount();
-  bool is_found = count == 0;
+  bool is_found = frame.ParticleCount() == 0;
   for (const Attribute& attribute : frame.attributes) {
     if (attribute.name != parameters.phase_attribute) {
       others.push_back(attribute);
       continue;
     }
-    if (!p.labels.empty()) {
-      return InvalidFrame(kReasonDuplicate, "attributes",
-                          absl::CHexEscape(parameters.phase_attribute),
-                          "must be there once: the phases of the particles");
-    }
-    if (attribute.components != 1 || attribute.values.size() != count) {
-      return InvalidFrame(kReasonCount, "attributes[" + std::string(attribute.name) + "]",
-                          absl::StrCat(attribute.values.size(), " values"),
-                          absl::StrCat("must be one per particle (", count, "): its phase"));
-    }
     is_found = true;
+    const std::string field = "attributes[" + parameters.phase_attribute + "]";
+    if (attribute.components != 1) {
+      return InvalidFrame(kReasonOutOfRange, field,
+                          absl::StrCat(attribute.components, " components"),
+                          "must be one number per particle: its phase");
+    }
     for (const float value : attribute.values) {
+      if (value != std::floor(value)) {
+        return InvalidFrame(kReasonOutOfRange, absl::StrCat(field, "[", p.labels.size(), "]"),
+                            ShortestNumber(value), "must be a whole number: a phase");
+      }
       const auto at = std::ranges::find(p.known, value);
       p.labels.push_back(static_cast<PhaseLabel>(at - p.known.begin() + 1));
     }
   }
   if (is_found) return absl::OkStatus();
-  return InvalidFrame(kReasonNoSuchAttribute, "attributes",
-                      absl::CHexEscape(parameters.phase_attribute),
+  return InvalidFrame(kReasonNoSuchAttribute, "attributes", parameters.phase_attribute,
                       "must be an attribute of the frame: the phases of its particles");
 }
 
@@ -120,7 +129,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   p.numbers.cells = p.numbers.edges + static_cast<std::uint32_t>(p.map.edges.size());
   p.rings.resize(p.known.size() + 1);  // The last one: phases that no section has.
   for (std::size_t k = 0; k < p.rings.size(); ++k) {
-    TracePhase(input.bins, input.scale, input.parameters, p.map, outline, p.vertices, p.numbers,
+    TracePhase(input.bins, input.scale, p.map, outline, p.vertices, p.numbers,
                static_cast<PhaseLabel>(k + 1), p.trace, p.rings[k]);
   }
   TakeBody(placed, body, input.scale.cell_size, p.points);
@@ -129,6 +138,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
   MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
   SumRegions(input.bins, input.scale, p.field, p.labels, p.map, p.rings, p.areas);
+  CountParticles(p);
   if (input.parameters.spacing.has_value() || !input.frame.volumes.empty()) {
     MatchPhaseAreas(p.rings, p.interfaces, kAreaLimit * input.scale.spacing, p.areas, p.points);
     MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
@@ -171,10 +181,7 @@ void WritePhaseRings(const Phases& p, PhaseLabel label, PlacedVertices& placed, 
   }
   MeasureRings(rings);
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-    if (rings.outer_of[ring] != kNoRing) continue;
-    const std::uint32_t region =
-        p.areas.first_region[label - 1u] + phase.topology.component_of_ring[ring];
-    rings.measures[ring].particle_count = p.areas.count[region];
+    rings.measures[ring].particle_count = phase.topology.particle_count[ring];
   }
   placed.point_of_segment = phase.point_of_segment;
   placed.kept_as.resize(phase.RingCount());

@@ -58,8 +58,8 @@ inline bool HasPhases(const ReconstructionParameters& parameters) {
 }
 
 /// Labels the particles of a frame by their phases. Sets `others` to the other attributes.
-/// Errors: INVALID_ARGUMENT if a frame with particles lacks the attribute, or if the attribute has
-/// several components.
+/// Errors: INVALID_ARGUMENT if a frame with particles lacks the attribute, or if it does not hold
+/// one whole number per particle. Requires: CheckFrame has passed the frame.
 absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters,
                         Phases& phases, std::vector<Attribute>& others);
 

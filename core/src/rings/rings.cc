@@ -16,7 +16,8 @@ namespace {
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
-// The same with grains. The hole in a void with room for a grain of the smallest size is larger.
+// The same with grains: the void of six equal grains has a smaller hole, that of seven a larger one
+// (core/SIZES.md, "Grains").
 constexpr double kMinGrainHole = 0.5;
 
 // Minimum number of segments per task.

@@ -329,7 +329,7 @@ typedef struct partiemc_event {
   double milliseconds;                /* Computation time. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
 
-  size_t attribute_count; /* Attributes of the options, in that order. */
+  size_t attribute_count; /* Attributes of the options, in that order; not the phases. */
   const partiemc_values* attributes;
 
   size_t section_count; /* Results: sections and phases of the options. */
