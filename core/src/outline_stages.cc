@@ -50,6 +50,16 @@ std::uint64_t AttributeValuesOf(const Frame& frame) {
   return values;
 }
 
+// Sets the sizes of the mesh inside of rings.
+void AddMesh(const ReconstructionParameters& parameters, const std::vector<BitRows>& interior,
+             FrameSize& size) {
+  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(interior);
+  if (HasBlocks(parameters) && size.attribute_values > 0) {
+    size.block_cells = CountCells(interior);
+    size.block_tiles = interior.size() - std::ranges::count_if(interior, IsEmpty);
+  }
+}
+
 // Requires: segments are known.
 FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  const Workspace::Buffers& b) {
@@ -58,12 +68,7 @@ FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  .segments = b.topology.segments.size(),
                  .attribute_values = AttributeValuesOf(frame),
                  .phases = CountPhases(parameters)};
-  if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(b.crossings.interior);
-  if (HasBlocks(parameters) && size.attribute_values > 0) {
-    size.block_cells = CountCells(b.crossings.interior);
-    size.block_tiles =
-        b.crossings.interior.size() - std::ranges::count_if(b.crossings.interior, IsEmpty);
-  }
+  AddMesh(parameters, b.crossings.interior, size);
   return size;
 }
 
@@ -323,9 +328,10 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
   result.statistics.doubts = last.doubts;
   if (!last.lengths) return absl::OkStatus();
   const PhaseRings& phase = b.phases.rings[label - 1u];
-  absl::Status status = memory.ReserveOutline({.segments = phase.points.size(),
-                                               .grid_cells = CountCells(phase.crossings.interior),
-                                               .attribute_values = AttributeValuesOf(last.frame)});
+  FrameSize size{.segments = phase.points.size(),
+                 .attribute_values = AttributeValuesOf(last.frame)};
+  AddMesh(task.parameters, phase.crossings.interior, size);
+  absl::Status status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
   WritePhaseRings(b.phases, label, b.placed_phase, result.rings);
   InStage(task.observer, Stage::kIdentities, [&] {
