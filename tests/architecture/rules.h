@@ -31,7 +31,7 @@ Violations NoFolderIsTooFull(const SourceTree& tree);
 Violations GrpcStaysInItsRooms(const SourceTree& tree);
 
 /// Each stage has a header and a source. A stage reaches only the headers of earlier stages. Only
-/// reconstructor.cc reaches all of them.
+/// outline_stages.cc, and reconstructor.cc through it, reach all of them.
 Violations StagesKeepTheirOrder(const SourceTree& tree);
 
 /// The sources of partiemc_server_session and their headers reach neither gRPC nor Protobuf, so

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "base/parallel.h"
 
@@ -74,10 +73,9 @@ void PhaseField::Build(const ParticleBins& bins, const Scale& scale,
     for (std::uint32_t k = begin; k < end; ++k) {
       const BinnedParticle& particle = bins.particles[k];
       const bool has_sizes = !bins.size.empty();
-      // With own sizes, weights do not contain volumes.
-      const double weight = has_sizes             ? 4 / (std::numbers::pi * beta_ * beta_)
-                            : bins.weight.empty() ? scale.uniform_weight
-                                                  : double{bins.weight[k]};
+      // With own sizes, f does not contain volumes.
+      const bool has_volumes = !bins.weight.empty() && !has_sizes;
+      const double weight = has_volumes ? double{bins.weight[k]} : scale.uniform_weight;
       particles_[next[cell_of(particle)]++] = {particle.x, particle.y, static_cast<float>(weight),
                                                has_sizes ? bins.size[k] : 1.0F,
                                                labels[particle.source]};

@@ -96,15 +96,15 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
       continue;
     }
     is_found = true;
-    const std::string field = "attributes[" + parameters.phase_attribute + "]";
+    const auto field = [&] { return "attributes[" + parameters.phase_attribute + "]"; };
     if (attribute.components != 1) {
-      return InvalidFrame(kReasonOutOfRange, field,
+      return InvalidFrame(kReasonOutOfRange, field(),
                           absl::StrCat(attribute.components, " components"),
                           "must be one number per particle: its phase");
     }
     for (const float value : attribute.values) {
       if (value != std::floor(value)) {
-        return InvalidFrame(kReasonOutOfRange, absl::StrCat(field, "[", p.labels.size(), "]"),
+        return InvalidFrame(kReasonOutOfRange, absl::StrCat(field(), "[", p.labels.size(), "]"),
                             ShortestNumber(value), "must be a whole number: a phase");
       }
       const auto at = std::ranges::find(p.known, value);

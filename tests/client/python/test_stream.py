@@ -73,15 +73,17 @@ class Streams(unittest.TestCase):
             for k in range(3):
                 positions = block(0.3 * k)
                 attributes = {"type": numpy.where(positions[:, 0] < 10, 2, 7)}
-                result = stream.reconstruct(positions, attributes=attributes)
+                stream.send(positions, attributes=attributes)
+                result = stream.receive()
                 expected = here.reconstruct(positions, attributes=attributes)
                 self.assertEqual(digests(result), digests(expected))
                 self.assertEqual([digests(each) for each in result.sections],
                                  [digests(each) for each in expected.sections])
                 self.assertEqual(result.attributes, {})
                 self.assertAlmostEqual(sum(each.area for each in result.sections), result.area, 6)
+            stream.send(block())
             with self.assertRaises(partiemc.Error) as caught:
-                stream.reconstruct(block())
+                stream.receive()
             self.assertEqual(caught.exception.reason, "NO_SUCH_ATTRIBUTE")
 
     def test_two_threads_get_the_same(self):
