@@ -71,6 +71,9 @@ void RequireGuarantees(const ReconstructionParameters& parameters, const Result&
   RequireOk(Validate(result, parameters.fill),
             absl::StrCat("every guarantee holds (", std::string(Name(parameters.placement)), ", ",
                          std::string(Name(parameters.fill)), ")"));
+  for (const Result& section : result.sections) {
+    RequireOk(Validate(section, parameters.fill), "every guarantee holds for each phase");
+  }
   Require(result.statistics.self_intersections == 0, "no crossings are told");
   Require(result.statistics.folded_triangles == 0, "no folds are told");
 }
@@ -82,7 +85,9 @@ void RequireNoTrace(const absl::Status& status, const Result& result, const Stat
               status.code() == absl::StatusCode::kResourceExhausted,
           absl::StrCat("a frame is refused for what it is: ", status.ToString()));
   RequireViolation(status);
-  Require(result == Result{}, "the result of a refused frame is empty");
+  Result empty;
+  empty.sections.resize(result.sections.size());
+  Require(result == empty || result == Result{}, "the result of a refused frame is empty");
   Require(Serialize(before) == Serialize(after), "a refused frame leaves no trace");
 }
 
@@ -114,6 +119,16 @@ HostileFrame::HostileFrame(Choices& choices, double spacing, int reach) {
   if ((shape & 64) && !doubles_.empty()) doubles_.pop_back();  // An incomplete particle.
   if (choices.Below(16) == 5 && !ids_.empty()) ids_.pop_back();
   time_ = choices.Flip() ? choices.Take<std::int8_t>() : choices.Take<double>();
+  if (const auto pattern = choices.Take<std::uint8_t>(); pattern % 2 == 1) {
+    // Stripes, single particles of another phase, or nearly one phase.
+    for (std::size_t k = 0; k < doubles_.size() / components_; ++k) {
+      phases_.push_back(static_cast<float>(k * pattern / 16 % 4));
+    }
+    if (!phases_.empty() && choices.Below(8) == 1) {
+      phases_[choices.Below(phases_.size())] = choices.Take<float>();
+    }
+    attributes_.push_back({.name = "phase", .values = phases_});
+  }
   if (!is_float_) return;
   for (const double value : doubles_) {
     // Outside of float's range the conversion is undefined.
@@ -128,6 +143,7 @@ Frame HostileFrame::AsFrame() const {
               .volumes = volumes_,
               .ids = ids_,
               .velocities = velocities_,
+              .attributes = attributes_,
               .time = time_};
   if (is_float_) frame.positions = std::span<const float>(floats_);
   return frame;
@@ -166,6 +182,14 @@ ReconstructionParameters HostileParameters(Choices& choices) {
   if (!parameters.box && !parameters.noise_filter && choices.Below(4) == 1) {
     parameters.sizes = Sizes::kOwn;
     if (choices.Below(2) == 1) parameters.boundary = Boundary::kGrains;
+  }
+  const bool may_have_phases = !parameters.box && parameters.boundary == Boundary::kBulk &&
+                               parameters.placement == Placement::kVirtualPlane;
+  if (may_have_phases && choices.Below(2) == 1) {
+    const auto last = static_cast<std::int32_t>(choices.Below(3));
+    for (std::int32_t phase = 0; phase <= last; ++phase) {
+      parameters.sections.push_back({.phase = phase});
+    }
   }
   return parameters;
 }

@@ -31,6 +31,8 @@ class HostileFrame {
   std::vector<float> volumes_;
   std::vector<std::uint64_t> ids_;
   std::vector<float> velocities_;
+  std::vector<float> phases_;
+  std::vector<Attribute> attributes_;  ///< The phases, or none.
   double time_ = 0;
 };
 
