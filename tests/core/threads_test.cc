@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <ostream>
 #include <string>
@@ -42,6 +43,7 @@ std::vector<Stream> Streams() {
     add("Filled_" + std::string(Name(fill)), {.fill = fill, .spacing = 1});
   }
   add("EstimatingTheSpacing", {.spacing_rule = SpacingRule::kEveryFrame});
+  add("DividedAmongPhases", {.spacing = 1, .sections = {{.phase = 1}, {.phase = 2}}});
   add("OfAWideKernel", {.spacing = 1, .kernel_radius = 5, .cell_size = 2});
   streams.push_back({"WithEverythingKnown", {.spacing = 1}, /*brings_everything=*/true});
   return streams;
@@ -58,6 +60,11 @@ Particles SceneAt(const Stream& stream, int frame) {
   }
   Particles particles = scene;
   if (stream.brings_everything) particles.volumes.assign(particles.size(), 0.9f);
+  if (!stream.parameters.sections.empty()) {
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      particles.phases.push_back(std::sin(particles.x(k) / 9) < .3 ? 1 : 2);
+    }
+  }
   return particles;
 }
 
