@@ -86,6 +86,33 @@ class Streams(unittest.TestCase):
                 stream.receive()
             self.assertEqual(caught.exception.reason, "NO_SUCH_ATTRIBUTE")
 
+    def test_phases_and_grains_come_in_parts(self):
+        particles = block()
+        types, diameters = numpy.where(particles[:, 0] < 10, 2, 7), numpy.ones(len(particles))
+        cases = {"phases": ({"sections": [{"phase": 2}, {"phase": 7}]}, {"attributes": {"phase": types}}),
+                 "grains": ({"sizes": "own", "boundary": "grains"}, {"volumes": diameters ** 2})}
+        for name, (parameters, arrays) in cases.items():
+            received = [None, None]
+
+            def send_part(part):
+                half = slice(0, len(particles) // 2) if part == 0 else slice(len(particles) // 2, None)
+                share = {key: value[half] if key == "volumes" else {"phase": types[half]}
+                         for key, value in arrays.items()}
+                with partiemc.connect(self.address, spacing=1, name=f"parts-of-{name}", part=part, parts=2,
+                                      parts_token="of this job", part_timeout=20, **parameters) as stream:
+                    stream.send(particles[half], **share)
+                    received[part] = stream.receive()
+
+            ranks = [threading.Thread(target=send_part, args=(part,)) for part in (1, 0)]
+            for rank in ranks:
+                rank.start()
+            for rank in ranks:
+                rank.join()
+            expected = partiemc.reconstruct(particles, spacing=1, **parameters, **arrays)
+            self.assertEqual(digests(received[0]), digests(expected), name)
+            self.assertEqual([digests(each) for each in received[0].sections],
+                             [digests(each) for each in expected.sections])
+
     def test_two_threads_get_the_same(self):
         frames = [numpy.asfortranarray(block(0.3 * k)) for k in range(20)]
         with partiemc.connect(self.address, spacing=1, normals=True) as stream:
