@@ -22,11 +22,10 @@ struct Lengths {
 };
 
 /// Returns the lengths of a checked frame. They come from the parameters, else from the state, else
-/// from the particles. With own sizes, the spacing is then their root mean square, and the lattice
-/// has as many nodes per particle as with equal sizes; for grains see
-/// ReconstructionParameters::boundary. Empty if the particles give
-/// no estimate. Errors: INVALID_ARGUMENT if the spacing on which the particles agree is out of
-/// range.
+/// from the particles. The spacing of own sizes is then their root mean square, so the lattice
+/// keeps its number of nodes per particle. For grains see ReconstructionParameters::boundary. Empty
+/// if the particles give no estimate. Errors: INVALID_ARGUMENT if the spacing on which the
+/// particles agree is out of range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);

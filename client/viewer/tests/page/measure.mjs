@@ -161,7 +161,8 @@ async function measureThroughput() {
       say('received from 2 s after the first frame on', `${received.toFixed(0)} frames/s`, '200');
       say('drawn', `${drawn.toFixed(0)} frames/s, p99 ${p99.toFixed(0)} ms between two refreshes`, '60 frames/s, 17 ms');
     });
-    await until('the watch is logged', () => /watch closed/.test(world.log.join('')));
+    const logged = (event) => world.log.join('').match(new RegExp(`watch ${event}`, 'g'))?.length ?? 0;
+    await until('all watches are logged', () => logged('closed') > 0 && logged('closed') === logged('opened'));
     const watches = world.log.join('').match(/watch closed.*/g)
       .map((line) => /frames=(\d+) dropped=(\d+).* seconds=([\d.]+).* reason=(\S+)/.exec(line))
       .map(([, frames, dropped, seconds, reason]) => ({ frames, dropped, seconds, reason }));
