@@ -75,6 +75,25 @@ TEST(SizedReplay, GrainsComeFromDiametersRadiiOrAreasOfDiscs) {
       digest);
 }
 
+// A square packing of touching grains fills pi / 4 of a box, whichever column has their sizes.
+TEST(SizedReplay, PackingOfGrainsCountsTheAreasOfDiscs) {
+  const support::TemporaryFolder folder;
+  for (const auto& [column, size] :
+       {std::pair("diameter", 1.0), std::pair("radius", .5), std::pair("volume", .785398163)}) {
+    std::ofstream file(folder.Path("grains.csv"));
+    file << "x,y," << column << "\n";
+    for (int k = 0; k < 400; ++k) file << k % 20 + .5 << "," << k / 20 + .5 << "," << size << "\n";
+    file.close();
+    const Ran ran =
+        RunPartiemc({"replay", folder.Path("grains.csv"), "--local", "--boundary", "grains",
+                     "--gauge", "p=packing:5,5,15,15", "--stats", folder.Path("s.csv")});
+    ASSERT_EQ(ran.exit_code, 0) << ran.error;
+    const auto fractions = Column(Content(folder.Path("s.csv")), "p_fraction");
+    ASSERT_EQ(fractions.size(), 1u) << Content(folder.Path("s.csv"));
+    EXPECT_NEAR(std::stod(fractions[0]), std::numbers::pi / 4, 1e-3) << column;
+  }
+}
+
 TEST(SizedReplay, WrongSizesAreRefused) {
   const support::TemporaryFolder input;
   WriteZones(input.Path("zones.csv"), "pressure", 1, 1);
