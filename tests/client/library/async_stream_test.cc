@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr ReconstructionParameters kParameters{.spacing = 1.0};
+const ReconstructionParameters kParameters{.spacing = 1.0};
 
 std::vector<double> Lattice(int side) {
   std::vector<double> positions;

@@ -25,7 +25,7 @@ std::vector<double> Lattice(int side, double shift) {
   return positions;
 }
 
-constexpr ReconstructionParameters kParameters{.spacing = 1.0};
+const ReconstructionParameters kParameters{.spacing = 1.0};
 
 TEST(LocalStream, AnswersAreThoseOfTheReconstructorFrameByFrame) {
   const auto stream = LocalStream::Open({.parameters = kParameters, .threads = 2});

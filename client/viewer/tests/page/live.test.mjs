@@ -123,6 +123,7 @@ test('buttons and keys step by one frame', async () => {
   await viewer.shows(20);
   await viewer.button('Pause').click();
   const at = await viewer.frame();
+  await viewer.reaches(at - 1);
   await viewer.button('Previous frame').click();
   await until('one back', async () => await viewer.frame() === at - 1);
   await viewer.button('Next frame').click();

@@ -266,8 +266,16 @@ export class Viewer {
     });
   }
 
+  /** Waits until the slider's range holds a frame. The page fetches the past after its first picture. */
+  async reaches(sequence) {
+    const slider = this.page.getByLabel('Frame', { exact: true });
+    await until(`the slider reaches frame ${sequence}`, () => slider.evaluate(
+      ({ min, max }, at) => Number(min) <= at && at <= Number(max), sequence));
+  }
+
   /** `number`: of the frame for the user. Files count from 0, as the command line does. */
   async scrubTo(sequence, number = sequence) {
+    await this.reaches(sequence);
     await this.page.getByLabel('Frame', { exact: true }).evaluate((slider, value) => {
       slider.value = String(value);
       slider.dispatchEvent(new Event('input', { bubbles: true }));
