@@ -114,6 +114,17 @@ struct PeriodicBox {
   friend bool operator==(const PeriodicBox&, const PeriodicBox&) = default;
 };
 
+/// A fixed wall in the plane of the particles: straight lines between consecutive points, with the
+/// fluid on their left. Two points: the endless line through them. More points: a closed polygon, a
+/// tank if it is counter-clockwise, an obstacle if it is clockwise.
+struct Wall {
+  /// x0, y0, x1, y1, ... in world units. Consecutive points differ; a polygon does not touch
+  /// itself.
+  std::vector<double> points;
+
+  friend bool operator==(const Wall&, const Wall&) = default;
+};
+
 /// Used only by Output::kSurface.
 struct SurfaceOptions {
   /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
@@ -258,6 +269,15 @@ struct ReconstructionParameters {
   /// must have ids. A new particle has its given position. The given positions are filtered only
   /// once the stream has a spacing.
   std::optional<double> noise_filter = std::nullopt;
+
+  static constexpr std::size_t kMaxWallPoints = 1024;
+
+  /// Walls, of at most 1024 points together, at which the outline is cut (core/WALLS.md). The fluid
+  /// is where all walls have it. Outlines within half a spacing of a wall run along it, bit for bit
+  /// on its lines, except where the repair had to move a point. Obstacles narrower than a cell may
+  /// be missed. Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, own sizes,
+  /// phases and `box`.
+  std::vector<Wall> walls = {};
 
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;

@@ -48,6 +48,13 @@ struct Rings {
   /// Points, ascending, whose segment to the next point of the ring lies on a face of the periodic
   /// box, where a body was cut (ReconstructionParameters::box).
   std::vector<std::uint32_t> cuts;
+  /// Points, ascending, whose segment to the next point of the ring lies on a wall
+  /// (ReconstructionParameters::walls).
+  std::vector<std::uint32_t> wetted;
+  /// Points, ascending, where an outline meets a wall, and the angle of the fluid there, between
+  /// the wall and the outline: in radians, in (0, pi).
+  std::vector<std::uint32_t> contacts;
+  std::vector<float> contact_angles;
 
   std::size_t RingCount() const { return outer_of.size(); }
   std::size_t PointCount() const { return points.size() / 2; }

@@ -11,6 +11,9 @@ void Rings::Clear() {
   parents.clear();
   parent_offsets.assign(1, 0);
   cuts.clear();
+  wetted.clear();
+  contacts.clear();
+  contact_angles.clear();
 }
 
 void Mesh::Clear() {
