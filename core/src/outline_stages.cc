@@ -20,6 +20,8 @@
 namespace partiemc {
 namespace {
 
+bool HasWalls(const ReconstructionParameters& parameters) { return !parameters.walls.empty(); }
+
 void SumMeasures(const Rings& rings, FrameStatistics& statistics) {
   for (const RingMeasures& measures : rings.measures) {
     statistics.area += measures.area;
@@ -125,6 +127,7 @@ void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& 
   InStage(observer, Stage::kField, [&] {
     scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
                    : SampleField(b.bins, scale, b.level_set);
+    if (HasWalls(task.parameters)) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
   });
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
@@ -244,7 +247,8 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
     return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
-                          parameters, task.variant, scale, percolates ? &percolation : nullptr},
+                          parameters, task.variant, scale, percolates ? &percolation : nullptr,
+                          HasWalls(parameters) ? &b.walls : nullptr},
                          b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
@@ -299,6 +303,9 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   });
   b.last.doubts = result.statistics.doubts;
   if (!status.ok() || !lengths) return status;
+  if (HasWalls(parameters)) {
+    b.walls.FindTiles(parameters.walls, scale.cell_size, b.bins.tiles);
+  }
   status = memory.ReserveOutline({.particles = seen.ParticleCount(),
                                   .tiles = b.bins.tiles.size(),
                                   .attribute_values = AttributeValuesOf(seen),

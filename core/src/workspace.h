@@ -28,6 +28,7 @@
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
+#include "walls/wall_field.h"
 
 namespace partiemc {
 
@@ -55,6 +56,7 @@ struct Workspace::Buffers {
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;
+  WallField walls;  // Empty without walls.
   Crossings crossings;
   RingScratch ring_scratch;
   RingTopology topology;

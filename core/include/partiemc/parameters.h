@@ -273,10 +273,9 @@ struct ReconstructionParameters {
   static constexpr std::size_t kMaxWallPoints = 1024;
 
   /// Walls, of at most 1024 points together, at which the outline is cut (core/WALLS.md). The fluid
-  /// is where all walls have it. Outlines within half a spacing of a wall run along it, bit for bit
-  /// on its lines, except where the repair had to move a point. Obstacles narrower than a cell may
-  /// be missed. Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, own sizes,
-  /// phases and `box`.
+  /// is where all walls have it. An outline nearer than half a spacing to a wall runs along it.
+  /// Obstacles narrower than a cell may be missed. Requires Placement::kVirtualPlane; excludes
+  /// surfaces, slices, isovalues, sections, own sizes and `box`.
   std::vector<Wall> walls = {};
 
   friend bool operator==(const ReconstructionParameters&,

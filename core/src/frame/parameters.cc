@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "frame/calibration.h"
 #include "frame/placement_traits.h"
+#include "frame/wall_rules.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -295,6 +296,7 @@ absl::Status Validate(const ReconstructionParameters& parameters) {
   if (absl::Status status = CheckBox(p); !status.ok()) return status;
   if (absl::Status status = CheckSizes(p); !status.ok()) return status;
   if (absl::Status status = CheckBoundary(p); !status.ok()) return status;
+  if (absl::Status status = CheckWalls(p); !status.ok()) return status;
   return CheckOutlines(p);
 }
 

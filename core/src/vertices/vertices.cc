@@ -1,5 +1,6 @@
 #include "vertices/vertices.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -7,6 +8,7 @@
 #include "base/parallel.h"
 #include "frame/placement_traits.h"
 #include "normals/farthest_particle.h"
+#include "vertices/contacts.h"
 #include "vertices/intersections.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
@@ -134,7 +136,11 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
-  scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
+  const bool has_walls =
+      input.walls != nullptr &&
+      std::ranges::any_of(vertices.meets_wall, [](std::uint8_t meets) { return meets != 0; });
+  scratch.sizes.resize(input.scale.has_own_sizes || has_walls ? count : 0);
+  if (has_walls) scratch.walls.Resize(count);
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
@@ -147,12 +153,22 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
       rings.normals[2 * point] = vertices.normal[i].x;
       rings.normals[2 * point + 1] = vertices.normal[i].y;
       if (!vertices.size.empty()) scratch.sizes[point] = vertices.size[i];
+      if (has_walls) {
+        scratch.walls.Copy(vertices.walls, i, point);
+        scratch.sizes[point] = vertices.walls.kind[i] == VertexKind::kFree ? 1.0F : 0.0F;
+      }
       ++point;
     }
   });
   rings.outer_of = topology.outer_of;
   std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
+  if (has_walls) FitContacts(input, scratch.walls, rings);
   CorrectVolume(input, scratch.sizes, scratch.offset_points, area_offset, rings);
+  if (has_walls) {
+    FitContacts(input, scratch.walls, rings);
+    PinToWalls(input, scratch.walls, rings);
+    ListContacts(scratch.walls, rings);
+  }
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   return RepairRings(placed.roots, scratch.repair, rings);

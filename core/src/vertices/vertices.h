@@ -14,6 +14,8 @@
 #include "sampler/level_set_sampler.h"
 #include "vertices/periodic_ring.h"
 #include "vertices/repair.h"
+#include "vertices/wall_vertices.h"
+#include "walls/wall_field.h"
 
 namespace partiemc {
 
@@ -42,6 +44,14 @@ struct VertexNormal {
   float x = 0, y = 0;
 };
 
+/// A point of a free stretch between walls.
+struct StretchPoint {
+  Point point;
+  VertexNormal normal;
+  std::size_t vertex;  ///< kNoVertex beyond a wall.
+};
+inline constexpr std::size_t kNoVertex = ~std::size_t{0};
+
 /// Vertices of `virtual-plane`, ring by ring. Vertex 2 k is the edge vertex of segment k of the
 /// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Positions are in cells from the
 /// origin of the world.
@@ -52,6 +62,10 @@ struct RingVertices {
   std::vector<float> size;            ///< The local size, in spacings; empty for equal sizes.
   std::vector<std::uint8_t> is_kept;  ///< 0 if thinning dropped the vertex.
   PeriodicRings periodic_rings;       ///< Scratch of the steps.
+  WallVertices walls;
+  std::vector<std::uint8_t> meets_wall;  ///< By ring.
+  std::vector<StretchPoint> stretch;     ///< Scratch of the stretches between walls.
+  std::vector<Point> stretch_path;       ///< The same.
 
   /// The local size at a vertex, in spacings.
   double SizeOf(std::size_t vertex) const { return size.empty() ? 1.0 : double{size[vertex]}; }
@@ -69,7 +83,8 @@ struct RingVertices {
 struct VertexScratch {
   std::vector<double> points;         ///< One or two points for each segment, in world units.
   RingVertices vertices;              ///< `virtual-plane` only.
-  std::vector<float> sizes;           ///< By point: the local size; empty for equal sizes.
+  WallVertices walls;                 ///< Of the points of the rings.
+  std::vector<float> sizes;           ///< By point: the factor of its offset (CorrectVolume).
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
 };
@@ -87,6 +102,7 @@ struct VertexInput {
   const VirtualPlaneVariant& variant;
   const Scale& scale;
   const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
+  const WallField* walls = nullptr;          ///< Null without walls.
 };
 
 /// Places the vertices of every ring and measures the rings.

@@ -13,6 +13,7 @@
 #include "vertices/placement.h"
 #include "vertices/plane_support.h"
 #include "vertices/ring_filters.h"
+#include "vertices/stretches.h"
 
 namespace partiemc {
 namespace {
@@ -112,6 +113,38 @@ void FindRoots(const VertexInput& input, std::size_t segment, RingVertices& v) {
   v.size[inner] = plane.size;
 }
 
+// All vertices of a ring.
+struct ClosedRun {
+  const RingVertices& v;
+  std::size_t first;  // Even.
+  std::ptrdiff_t count;
+
+  static constexpr bool kHasOnlyVertices = true;
+  std::size_t VertexAt(std::ptrdiff_t k) const { return first + static_cast<std::size_t>(k); }
+  const Point& PointAt(std::ptrdiff_t k) const { return v.point[VertexAt(k)]; }
+  const VertexNormal& NormalAt(std::ptrdiff_t k) const { return v.normal[VertexAt(k)]; }
+  // The length of the run before it repeats itself backward.
+  std::ptrdiff_t OwnCount() const { return count; }
+  bool HasVertex(std::ptrdiff_t) const { return true; }
+};
+
+// A free stretch between walls and its continuations beyond them, as the ring that runs along it
+// and back.
+struct OpenRun {
+  std::span<const StretchPoint> points;
+
+  static constexpr bool kHasOnlyVertices = false;
+  const StretchPoint& Of(std::ptrdiff_t k) const {
+    const auto at = static_cast<std::size_t>(k);
+    return points[at < points.size() ? at : 2 * points.size() - 2 - at];
+  }
+  std::size_t VertexAt(std::ptrdiff_t k) const { return Of(k).vertex; }
+  const Point& PointAt(std::ptrdiff_t k) const { return Of(k).point; }
+  const VertexNormal& NormalAt(std::ptrdiff_t k) const { return Of(k).normal; }
+  std::ptrdiff_t OwnCount() const { return static_cast<std::ptrdiff_t>(points.size()); }
+  bool HasVertex(std::ptrdiff_t k) const { return Of(k).vertex != kNoVertex; }
+};
+
 // The local sizes of the vertices of a ring; empty for equal sizes.
 std::span<const float> SizesOf(const RingVertices& v, std::size_t first, std::size_t count) {
   return v.size.empty() ? std::span<const float>() : std::span(v.size).subspan(first, count);
@@ -139,30 +172,46 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   return size;
 }
 
+// The local size at a vertex of a run; walls exclude own sizes.
+template <typename Run>
+double SizeAt(const RingVertices& v, const Run& run, std::ptrdiff_t k) {
+  return Run::kHasOnlyVertices ? v.SizeOf(run.VertexAt(k)) : 1.0;
+}
+
+double LengthOf(std::span<const Point> path) {
+  double length = 0;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    const Point chord{path[k].x - path[k - 1].x, path[k].y - path[k - 1].y};
+    length += std::sqrt(Dot(chord, chord));
+  }
+  return length;
+}
+
 // Copies coordinates and normals into `ring`, and computes arc lengths and weights.
-void CopyRing(const RingVertices& v, std::size_t first, const PeriodicRing& ring) {
+template <typename Run>
+void CopyRing(std::span<const float> sizes, const Run& run, const PeriodicRing& ring) {
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    ring.x[k] = RingUnits(v.point[first + k].x);
-    ring.y[k] = RingUnits(v.point[first + k].y);
-    ring.normal_x[k] = v.normal[first + k].x;
-    ring.normal_y[k] = v.normal[first + k].y;
+    ring.x[k] = RingUnits(run.PointAt(k).x);
+    ring.y[k] = RingUnits(run.PointAt(k).y);
+    ring.normal_x[k] = run.NormalAt(k).x;
+    ring.normal_y[k] = run.NormalAt(k).y;
   }
   for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
   for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
-  MeasureArc(ring, SizesOf(v, first, static_cast<std::size_t>(ring.count)));
+  MeasureArc(ring, sizes);
 }
 
-// Calls body(begin, end) for stretches of a ring, in parallel if the ring is long.
+// Calls body(begin, end) for ranges of a ring of `count` vertices, in parallel if it is long.
 template <typename Body>
-void ForEachStretch(const PeriodicRing& ring, Body body) {
-  constexpr std::ptrdiff_t kStretch = 512;
-  if (ring.count <= kStretch) {
-    body(0, ring.count);
+void ForEachRange(std::ptrdiff_t count, Body body) {
+  constexpr std::ptrdiff_t kRange = 512;
+  if (count <= kRange) {
+    body(0, count);
     return;
   }
-  ParallelFor((ring.count + kStretch - 1) / kStretch, [&](std::ptrdiff_t stretch) {
-    const std::ptrdiff_t begin = stretch * kStretch;
-    body(begin, std::min(begin + kStretch, ring.count));
+  ParallelFor((count + kRange - 1) / kRange, [&](std::ptrdiff_t range) {
+    const std::ptrdiff_t begin = range * kRange;
+    body(begin, std::min(begin + kRange, count));
   });
 }
 
@@ -171,7 +220,7 @@ void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   const VirtualPlaneConstants& c = input.variant.constants;
   for (const bool by_angle : {false, true}) {
     const double reach = (by_angle ? c.bilateral_reach : c.normal_reach) * input.scale.spacing;
-    ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    ForEachRange(ring.count, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
       MeanNormals(ring, begin, end, reach, by_angle);
       ring.Repeat(ring.next_x, begin, end);
       ring.Repeat(ring.next_y, begin, end);
@@ -181,10 +230,12 @@ void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   }
 }
 
-// Mean of values along a ring, weighted by length.
-double MeanOf(const PeriodicRing& ring, const float* values) {
+// Mean of values at the vertices of a run, weighted by length.
+template <typename Run>
+double MeanOf(const Run& run, const PeriodicRing& ring, const float* values) {
   double sum = 0, weight = 0;
   for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+    if (!run.HasVertex(k)) continue;
     sum += double{ring.weight[k]} * values[k];
     weight += ring.weight[k];
   }
@@ -219,7 +270,8 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 // estimates along the ring is subtracted: it depends on the arrangement of the particles, not on
 // the shape. A larger variance of the supporting particles reduces the weight of the estimates.
 // Estimates and their mean are in units of the local size.
-void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRing& ring,
+template <typename Run>
+void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
                  const RingVertices& v) {
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.variant.steps;
@@ -235,8 +287,7 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
   // The kernel moves a boundary of curvature kappa inward by R^2 kappa / 18.
   const double rounding = c.rounding * input.scale.kernel_radius * input.scale.kernel_radius / 9;
   float* scatter = ring.next_x;
-  const std::size_t first = 2 * first_segment;
-  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+  ForEachRange(run.OwnCount(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     MeanCurvature(ring, begin, end, c.curvature_reach * h);
     auto planes = CollectPoints<BentPlane>([&](std::span<const PointGroup<BentPlane>> groups) {
       std::array<QuerySupports, kQueriesAtOnce> sums;
@@ -246,43 +297,48 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
           const std::size_t i = groups[q].vertices[of];
           const auto [offset, variance] = EstimateOf(sums[q][of], support);
           ring.shift[i] =
-              static_cast<float>(offset) - static_cast<float>(ring.base[i] / v.SizeOf(first + i));
+              static_cast<float>(offset) - static_cast<float>(ring.base[i] / SizeAt(v, run, i));
           scatter[i] = static_cast<float>(variance);
         }
       }
     });
-    // Each segment has two vertices.
-    for (std::ptrdiff_t k = begin; k < end; k += 2) {
-      if (BeginsGroup(k / 2)) planes.Part();
-      const ActiveCell& cell = input.planes[first_segment + k / 2].cell;
-      for (std::ptrdiff_t i = k; i < k + 2; ++i) {
-        // A radius of curvature below one spacing is noise.
-        const double size = v.SizeOf(first + i);
-        const double sharpest = 1 / (h * size);
-        const double curvature = std::clamp<double>(ring.shift[i], -sharpest, sharpest);
-        ring.base[i] = steps.curvature ? static_cast<float>(rounding * size * size * curvature) : 0;
-        // Stays so if no particle supports the plane.
-        ring.shift[i] = static_cast<float>(-ring.base[i] / size);
-        scatter[i] = 0;
-        if (!steps.support) continue;
-        const FieldPoint at = Locate(input, cell, v.point[first + i]);
-        if (at.tile == kNoTile) continue;
-        planes.Add(i, at.tile,
-                   {.x = at.x,
-                    .y = at.y,
-                    .normal_x = ring.normal_x[i],
-                    .normal_y = ring.normal_y[i],
-                    .curvature = curvature,
-                    .size = size});
-      }
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      // Each segment has two vertices.
+      if (k % 2 == 0 && BeginsGroup(static_cast<std::size_t>(k / 2))) planes.Part();
+      // A radius of curvature below one spacing is noise.
+      const double size = SizeAt(v, run, k);
+      const double sharpest = 1 / (h * size);
+      const double curvature = std::clamp<double>(ring.shift[k], -sharpest, sharpest);
+      ring.base[k] = steps.curvature ? static_cast<float>(rounding * size * size * curvature) : 0;
+      // Stays so if no particle supports the plane.
+      ring.shift[k] = static_cast<float>(-ring.base[k] / size);
+      scatter[k] = 0;
+      if (!steps.support || !run.HasVertex(k)) continue;
+      const std::size_t i = run.VertexAt(k);
+      const FieldPoint at = Locate(input, input.planes[i / 2].cell, run.PointAt(k));
+      if (at.tile == kNoTile) continue;
+      planes.Add(static_cast<std::size_t>(k), at.tile,
+                 {.x = at.x,
+                  .y = at.y,
+                  .normal_x = ring.normal_x[k],
+                  .normal_y = ring.normal_y[k],
+                  .curvature = curvature,
+                  .size = size});
     }
     planes.Finish();
   });
+  for (std::ptrdiff_t k = run.OwnCount(); k < ring.count; ++k) {
+    const std::ptrdiff_t own = 2 * run.OwnCount() - 2 - k;
+    ring.base[k] = ring.base[own];
+    ring.shift[k] = ring.shift[own];
+    scatter[k] = scatter[own];
+  }
   if (steps.support) {
-    const double mean = MeanOf(ring, ring.shift);
-    const double trust = c.support_scatter / (c.support_scatter + MeanOf(ring, scatter));
+    const double mean = MeanOf(run, ring, ring.shift);
+    const double trust = c.support_scatter / (c.support_scatter + MeanOf(run, ring, scatter));
     for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean) * v.SizeOf(first + k));
+      if (!run.HasVertex(k)) continue;
+      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean) * SizeAt(v, run, k));
     }
   }
   ring.Repeat(ring.base, 0, ring.count);
@@ -291,31 +347,64 @@ void ShiftPlanes(const VertexInput& input, std::size_t first_segment, PeriodicRi
 // End of step 3: moves every vertex along its normal to the weighted mean of its neighbours'
 // planes. A circle does not change, since the mean normal of two of its points is perpendicular to
 // their chord.
-void SmoothPositions(const VertexInput& input, std::size_t first, const PeriodicRing& ring,
+template <typename Run>
+void SmoothPositions(const VertexInput& input, const Run& run, const PeriodicRing& ring,
                      RingVertices& v) {
   const double reach = input.variant.constants.smoothing_reach * input.scale.spacing;
-  ForEachStretch(ring, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+  ForEachRange(run.OwnCount(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     if (input.variant.steps.smoothing) {
       MeanShift(ring, begin, end, reach);
     } else {
       std::copy(ring.base + begin, ring.base + end, ring.shift + begin);
     }
     for (std::ptrdiff_t k = begin; k < end; ++k) {
-      v.normal[first + k] = {ring.normal_x[k], ring.normal_y[k]};
-      Point& point = v.point[first + k];
+      if (!run.HasVertex(k)) continue;
+      v.normal[run.VertexAt(k)] = {ring.normal_x[k], ring.normal_y[k]};
+      Point& point = v.point[run.VertexAt(k)];
       point.x += double{ring.shift[k]} * ring.normal_x[k];
       point.y += double{ring.shift[k]} * ring.normal_y[k];
     }
   });
 }
 
-// Steps 2 and 3 for a ring.
-void RefineRing(const VertexInput& input, std::size_t r, PeriodicRing ring, RingVertices& v) {
-  const std::size_t first_segment = input.topology.offsets[r];
-  CopyRing(v, 2 * first_segment, ring);
+// Steps 2 and 3 for a ring, or for a free stretch of one.
+template <typename Run>
+void RefineRun(const VertexInput& input, std::span<const float> sizes, const Run& run,
+               PeriodicRing ring, RingVertices& v) {
+  CopyRing(sizes, run, ring);
   if (input.variant.steps.normals) SmoothNormals(input, ring);
-  ShiftPlanes(input, first_segment, ring, v);
-  SmoothPositions(input, 2 * first_segment, ring, v);
+  ShiftPlanes(input, run, ring, v);
+  SmoothPositions(input, run, ring, v);
+}
+
+void RefineRing(const VertexInput& input, std::size_t r, const PeriodicRing& ring,
+                RingVertices& v) {
+  const std::size_t first = 2 * std::size_t{input.topology.offsets[r]};
+  RefineRun(input, SizesOf(v, first, static_cast<std::size_t>(ring.count)),
+            ClosedRun{v, first, ring.count}, ring, v);
+}
+
+// Steps 2 and 3 for the free stretches of rings that meet walls. Stretches that are too short for
+// windows stay at their roots.
+void RefineStretches(const VertexInput& input, RingVertices& v) {
+  const double min_length = input.variant.constants.ShortestRing() * input.scale.spacing;
+  PeriodicRings& memory = v.periodic_rings;
+  for (std::size_t ring = 0; ring < input.topology.RingCount(); ++ring) {
+    if (v.meets_wall[ring] == 0) continue;
+    ForEachStretch(input, ring, min_length / 2, v, [&] {
+      std::vector<Point>& path = v.stretch_path;
+      path.clear();
+      for (std::size_t k = 0; k < 2 * v.stretch.size() - 2; ++k) {
+        path.push_back(OpenRun{v.stretch}.PointAt(static_cast<std::ptrdiff_t>(k)));
+      }
+      if (LengthOf(path) < min_length) return;
+      PeriodicRings::Size size = SizeForWindows(path, {}, min_length / 2);
+      size.margin += kWindowPadding;
+      memory.sizes().assign(1, size);
+      memory.Allocate();
+      RefineRun(input, {}, OpenRun{v.stretch}, memory[0], v);
+    });
+  }
 }
 
 // Drops edge vertices that lie nearly on the chord of the neighbouring cell vertices.
@@ -359,11 +448,19 @@ Point VirtualPlaneVertex(const CellPlane& plane, double max_step) {
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
   const RingTopology& topology = input.topology;
   vertices.Resize(2 * topology.segments.size(), input.scale.has_own_sizes);
+  if (input.walls != nullptr) {
+    vertices.walls.Resize(vertices.point.size());
+    vertices.meets_wall.assign(topology.RingCount(), 0);
+  }
   PeriodicRings& periodic = vertices.periodic_rings;
   periodic.sizes().assign(topology.RingCount(), {});
   // A task computes all steps of a short ring, so that its data stay in the cache.
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     FindRingRoots(input, ring, vertices);
+    if (input.walls != nullptr && FindWallVertices(input, ring, vertices)) {
+      vertices.meets_wall[ring] = 1;
+      return;
+    }
     const PeriodicRings::Size size = SizeOf(input, ring, vertices);
     if (size.count > 0 && !ShortRing::Holds(size)) {
       periodic.sizes()[ring] = size;
@@ -381,6 +478,11 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
     RefineRing(input, ring, periodic[ring], vertices);
     Thin(input, ring, vertices);
   });
+  if (input.walls == nullptr) return;
+  RefineStretches(input, vertices);
+  for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
+    if (vertices.meets_wall[ring] != 0) Thin(input, ring, vertices);
+  }
 }
 
 }  // namespace partiemc

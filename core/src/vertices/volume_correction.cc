@@ -78,8 +78,9 @@ std::optional<double> TargetOf(const VertexInput& input, std::span<const float> 
   MeasureRings(rings);
   double volume = 0, area = 0, perimeter = 0;
   const auto length_in_sizes = [&](std::size_t ring) {
-    return sizes.empty() ? rings.measures[ring].perimeter
-                         : LengthInLocalSizes(rings.RingPoints(ring), SizesOf(rings, ring, sizes));
+    return !input.scale.has_own_sizes
+               ? rings.measures[ring].perimeter
+               : LengthInLocalSizes(rings.RingPoints(ring), SizesOf(rings, ring, sizes));
   };
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     const bool is_outer = rings.outer_of[ring] == kNoRing;

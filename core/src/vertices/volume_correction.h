@@ -23,8 +23,8 @@ void OffsetRing(std::span<const double> points, std::span<const float> sizes, do
 /// VirtualPlaneConstants::ShortestRing() long. Does nothing if volumes are unknown: neither given
 /// nor implied by a given spacing.
 ///
-/// `sizes`: the local size at each point of the rings, in spacings; empty for equal sizes. A point
-/// moves by the offset times its local size.
+/// `sizes`: the factor of the offset of each point: its local size, in spacings; with walls, 0 for
+/// points on them and 1 for others; empty if all are 1.
 ///
 /// `offset`, in spacings, is the offset of the last frame, if there is one, and becomes the offset
 /// of this frame. The size of the offset is limited, since volumes have errors of a few percent.

@@ -1,0 +1,98 @@
+#include "frame/wall_rules.h"
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "absl/strings/str_cat.h"
+#include "base/point.h"
+#include "base/predicates.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+// Limits of coordinates: squares and products of lengths in cells stay finite.
+constexpr double kLeast = 1e-60, kMost = 1e60;
+
+absl::Status Refused(const std::string& field, const std::string& value, std::string_view rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), "parameters." + field, value, std::string(rule)});
+}
+
+// Whether the line b c leads back over the line a b.
+bool FoldsBack(const Point& a, const Point& b, const Point& c) {
+  return Orientation(a, b, c) == 0 &&
+         ((c.x - b.x) * (b.x - a.x) < 0 || (c.y - b.y) * (b.y - a.y) < 0);
+}
+
+absl::Status CheckPolygon(const std::string& field, std::span<const double> points) {
+  const std::size_t count = points.size() / 2;
+  const auto at = [&](std::size_t k) { return PointAt(points, k % count); };
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto refused = [&](std::size_t other) {
+      return Refused(field, absl::StrCat("lines ", k, " and ", other),
+                     "must be a polygon that does not touch itself");
+    };
+    if (FoldsBack(at(k), at(k + 1), at(k + 2))) return refused((k + 1) % count);
+    // Neighbouring lines share a point.
+    for (std::size_t other = k + 2; other < count && other + 1 < k + count; ++other) {
+      if (SegmentsTouch(at(k), at(k + 1), at(other), at(other + 1))) return refused(other);
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPoints(const std::string& field, std::span<const double> points) {
+  if (points.size() % 2 != 0 || points.size() < 4) {
+    return Refused(field, absl::StrCat(points.size(), " coordinates"),
+                   "must be two coordinates of at least two points");
+  }
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double magnitude = std::abs(points[k]);
+    if (magnitude == 0 || (magnitude >= kLeast && magnitude <= kMost)) continue;
+    return Refused(absl::StrCat(field, "[", k, "]"), ShortestNumber(points[k]),
+                   "must be 0 or in [1e-60, 1e60] in magnitude");
+  }
+  const std::size_t count = points.size() / 2;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t next = (k + 1) % count;
+    if (PointAt(points, k) != PointAt(points, next)) continue;
+    return Refused(field, absl::StrCat("points ", k, " and ", next), "must differ");
+  }
+  return count == 2 ? absl::OkStatus() : CheckPolygon(field, points);
+}
+
+}  // namespace
+
+absl::Status CheckWalls(const ReconstructionParameters& p) {
+  if (p.walls.empty()) return absl::OkStatus();
+  std::size_t points = 0;
+  for (const Wall& wall : p.walls) points += wall.points.size() / 2;
+  if (points > p.kMaxWallPoints) {
+    return Refused("walls", absl::StrCat(points, " points"),
+                   absl::StrCat("must have at most ", p.kMaxWallPoints));
+  }
+  const auto refused = [&](std::string_view rule) {
+    return Refused("walls", absl::StrCat(p.walls.size()), rule);
+  };
+  if (p.output == Output::kSurface) return refused("must be absent for a surface");
+  if (p.slice) return refused("must be absent with a slice");
+  if (p.isovalue) return refused("must be absent with an isovalue");
+  if (!p.sections.empty()) return refused("must be absent with sections");
+  if (p.box) return refused("must be absent with a periodic box");
+  if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
+  if (p.placement != Placement::kVirtualPlane) {
+    return refused("must be absent unless the placement is virtual-plane");
+  }
+  for (std::size_t k = 0; k < p.walls.size(); ++k) {
+    const std::string field = absl::StrCat("walls[", k, "].points");
+    if (absl::Status status = CheckPoints(field, p.walls[k].points); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc

@@ -1,0 +1,220 @@
+#include "vertices/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "vertices/contact_curve.h"
+#include "vertices/vertices.h"
+
+namespace partiemc {
+namespace {
+
+// Sharp corners turn by more than 30 degrees: 1 - cos.
+constexpr double kSharp = .134;
+// Least distance of free vertices from walls, and of vertices that a contact passes, in spacings.
+constexpr double kClearance = .02;
+// A contact keeps at least this share of the wet stretch to the next one.
+constexpr double kMostShare = .45;
+
+double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
+double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
+Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+
+// Fits one contact. Lengths are in cells.
+class ContactFitter {
+ public:
+  ContactFitter(const VertexInput& input, WallVertices& points, Rings& rings)
+      : lines_(input.walls->lines()),
+        h_(input.scale.spacing),
+        cell_size_(input.scale.cell_size),
+        p_(points),
+        rings_(rings) {}
+
+  void Fit(std::size_t ring, std::size_t contact) {
+    first_ = rings_.offsets[ring];
+    count_ = rings_.offsets[ring + 1] - first_;
+    contact_ = contact;
+    is_wet_after_ = p_.is_wet[contact] != 0;
+    const WallPlace& place = p_.place[contact];
+    const WallEdge& edge = lines_.edges()[place.edge];
+    wall_ = edge.wall;
+    start_ = lines_.Along(place);
+    const std::optional<ContactCurve> curve =
+        ContactCurve::Fit(lines_, place, h_, [&](std::size_t k) -> std::optional<Point> {
+          if (k >= count_ || p_.kind[Free(k)] != VertexKind::kFree) return std::nullopt;
+          return PointOf(Free(k));
+        });
+    bool is_free = false;  // Whether the contact moves as far as the curve says.
+    if (curve) {
+      is_free = MoveContact(curve->foot());
+      MoveStretch(*curve, is_free);
+    }
+    SetAngle(is_free ? curve->DirectionAt(curve->s_foot()) : ChordOfStretch());
+  }
+
+ private:
+  // The k-th point from the contact, along the free stretch or along the wall.
+  std::size_t Free(std::size_t k) const { return Step(k, !is_wet_after_); }
+  std::size_t Wet(std::size_t k) const { return Step(k, is_wet_after_); }
+  std::size_t Step(std::size_t k, bool forward) const {
+    const std::size_t at = contact_ - first_;
+    return first_ + (forward ? at + k : at + count_ - k) % count_;
+  }
+  Point PointOf(std::size_t point) const {
+    const Point at = PointAt(rings_.points, point);
+    return {at.x / cell_size_, at.y / cell_size_};
+  }
+  void Set(std::size_t point, const Point& at) {
+    rings_.points[2 * point] = at.x * cell_size_;
+    rings_.points[2 * point + 1] = at.y * cell_size_;
+  }
+  void SetPlace(std::size_t point, const WallPlace& place) {
+    p_.place[point] = place;
+    const Point at = lines_.InWorld(place);
+    rings_.points[2 * point] = at.x;
+    rings_.points[2 * point + 1] = at.y;
+  }
+  Point At() const { return lines_.At(p_.place[contact_]); }
+  // The wet side along the direction of the wall: a ring runs along its wall in its direction.
+  double WetSign() const { return is_wet_after_ ? 1 : -1; }
+  // The length along the wall from the contact.
+  double From(double along) const { return lines_.Between(wall_, start_, along); }
+
+  // Moves the contact to its foot. Returns false if something holds it back.
+  bool MoveContact(const WallPlace& foot) {
+    const double wanted = From(lines_.Along(foot));
+    double move = wanted;
+    for (const WallEdge& edge : lines_.EdgesOf(wall_)) {
+      if (edge.is_endless || !IsSharpAt(edge)) continue;
+      const double corner = From(edge.start);
+      if (move > 0 ? corner > 0 && corner < move : corner < 0 && corner > move) move = corner;
+    }
+    move = PassWetPoints(move);
+    const bool is_free = move == wanted;
+    SetPlace(contact_, is_free ? foot : lines_.PlaceAt(wall_, start_ + move));
+    return is_free;
+  }
+
+  // Whether the wall has a sharp corner at the beginning of a line.
+  bool IsSharpAt(const WallEdge& edge) const {
+    const auto of = lines_.EdgesOf(wall_);
+    const WallEdge& before = &edge == of.data() ? of.back() : *(&edge - 1);
+    return 1 - Dot(before.unit, edge.unit) > kSharp;
+  }
+
+  // Moves the points on the wall that the contact passes ahead of it. Returns the move of the
+  // contact, which ends before the next contact and before another wall.
+  double PassWetPoints(double move) {
+    const double sign = WetSign();
+    if (sign * move <= 0) return move;
+    std::size_t passed = 0;
+    double ahead = 0;
+    const auto along = [&](std::size_t k) { return sign * From(lines_.Along(p_.place[Wet(k)])); };
+    std::size_t end = 1;
+    while (end < count_ && p_.kind[Wet(end)] == VertexKind::kWall &&
+           lines_.edges()[p_.place[Wet(end)].edge].wall == wall_ &&
+           along(end) <= sign * move + kClearance * h_) {
+      ++end;
+    }
+    passed = end - 1;
+    const WallPlace& next = p_.place[Wet(end)];
+    const bool is_same = lines_.edges()[next.edge].wall == wall_;
+    ahead = is_same ? along(end) : (passed > 0 ? along(passed) : 0);
+    const bool is_blocked = p_.kind[Wet(end)] != VertexKind::kWall || !is_same;
+    if (is_blocked || ahead < sign * move + kClearance * h_) {
+      move = sign * std::min(sign * move, std::max(0.0, kMostShare * ahead));
+    }
+    for (std::size_t k = 1; k <= passed; ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(passed + 1);
+      const double at = sign * move + (ahead - sign * move) * share;
+      SetPlace(Wet(k), lines_.PlaceAt(wall_, start_ + sign * at));
+    }
+    return move;
+  }
+
+  // Moves the points between the contact and the fitted stretch.
+  void MoveStretch(const ContactCurve& curve, bool is_free) {
+    const std::size_t count = curve.first_point();
+    const Point foot = At(), end = curve.At(0);
+    for (std::size_t k = 1; k < count; ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(count);
+      Set(Free(k),
+          is_free ? curve.At(curve.s_foot() * (1 - share))
+                  : Point{foot.x + (end.x - foot.x) * share, foot.y + (end.y - foot.y) * share});
+    }
+  }
+
+  // From the contact to a point two spacings away, or to the end of a shorter stretch.
+  Point ChordOfStretch() const {
+    Point chord = Minus(PointOf(Free(1)), At());
+    for (std::size_t k = 2; k < count_ && p_.kind[Free(k)] == VertexKind::kFree; ++k) {
+      if (Dot(chord, chord) >= 4 * h_ * h_) break;
+      chord = Minus(PointOf(Free(k)), At());
+    }
+    return chord;
+  }
+
+  void SetAngle(const Point& direction) {
+    const Point& unit = lines_.edges()[p_.place[contact_].edge].unit;
+    const double turn = std::abs(Cross(unit, direction));
+    p_.angle[contact_] = static_cast<float>(std::atan2(turn, WetSign() * Dot(unit, direction)));
+  }
+
+  const WallLines& lines_;
+  const double h_, cell_size_;
+  WallVertices& p_;
+  Rings& rings_;
+  std::size_t first_ = 0, count_ = 0, contact_ = 0;
+  bool is_wet_after_ = false;
+  std::size_t wall_ = 0;
+  double start_ = 0;
+};
+
+}  // namespace
+
+void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings) {
+  ContactFitter fitter(input, points, rings);
+  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
+      if (points.kind[k] == VertexKind::kContact) fitter.Fit(ring, k);
+    }
+  }
+}
+
+void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rings) {
+  const WallField& walls = *input.walls;
+  const double cell_size = input.scale.cell_size, clearance = kClearance * input.scale.spacing;
+  for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+    double* const target = &rings.points[2 * k];
+    if (points.kind[k] != VertexKind::kFree) {
+      const Point at = walls.lines().InWorld(points.place[k]);
+      target[0] = at.x;
+      target[1] = at.y;
+      continue;
+    }
+    if (points.tile[k] == kNoTile) continue;
+    for (std::size_t wall = 0; wall < walls.lines().WallCount(); ++wall) {
+      const NearestWall nearest =
+          walls.lines().NearestOfWall(wall, {target[0] / cell_size, target[1] / cell_size});
+      if (!(nearest.height < clearance)) continue;
+      const Point on = walls.lines().At(nearest.place);
+      const Point up = walls.lines().edges()[nearest.place.edge].Left();
+      target[0] = (on.x + clearance * up.x) * cell_size;
+      target[1] = (on.y + clearance * up.y) * cell_size;
+    }
+  }
+}
+
+void ListContacts(const WallVertices& points, Rings& rings) {
+  for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+    const auto point = static_cast<std::uint32_t>(k);
+    if (points.is_wet[k] != 0) rings.wetted.push_back(point);
+    if (points.kind[k] != VertexKind::kContact) continue;
+    rings.contacts.push_back(point);
+    rings.contact_angles.push_back(points.angle[k]);
+  }
+}
+
+}  // namespace partiemc

@@ -1,0 +1,210 @@
+#include "vertices/wall_vertices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <ranges>
+#include <utility>
+
+#include "vertices/placement.h"
+#include "vertices/vertices.h"
+
+namespace partiemc {
+namespace {
+
+// A corner counts as part of a cell if it is at most this far outside, in cells.
+constexpr double kCornerTolerance = 1e-9;
+
+double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
+Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+
+// A crossed lattice edge, from its node in the fluid to the other one.
+struct CrossedEdge {
+  TilePlace inside, outside;
+  Point from, to;
+};
+
+class WallVertexFinder {
+ public:
+  WallVertexFinder(const VertexInput& input, RingVertices& vertices)
+      : input_(input), walls_(*input.walls), lines_(walls_.lines()), v_(vertices) {}
+
+  bool Find(std::size_t ring) {
+    const std::size_t first = input_.topology.offsets[ring];
+    const std::size_t last = input_.topology.offsets[ring + 1];
+    bool meets_wall = false;
+    for (std::size_t k = first; k < last; ++k) {
+      FindEdge(k);
+      meets_wall |= v_.walls.kind[2 * k] == VertexKind::kWall;
+    }
+    for (std::size_t k = first; k < last; ++k) FindCell(k, k + 1 < last ? k + 1 : first);
+    return meets_wall;
+  }
+
+ private:
+  const ActiveCell& CellOf(std::size_t segment) const { return input_.planes[segment].cell; }
+
+  CrossedEdge EdgeOf(std::size_t segment) const {
+    const ActiveCell& cell = CellOf(segment);
+    const int edge = input_.crossings.segments[input_.topology.segments[segment]].entry;
+    const int i = cell.i + (edge == 1), j = cell.j + (edge == 2);
+    const int along_x = ~edge & 1, along_y = edge & 1;
+    const TileDirectory& directory = input_.bins.tiles;
+    CrossedEdge crossed{Normalise(directory, cell.tile, i, j),
+                        Normalise(directory, cell.tile, i + along_x, j + along_y),
+                        {},
+                        {}};
+    const Point origin = CellOrigin(directory, cell);
+    crossed.from = {origin.x + (edge == 1), origin.y + (edge == 2)};
+    crossed.to = {crossed.from.x + along_x, crossed.from.y + along_y};
+    if (!IsInside(input_.crossings, crossed.inside)) {
+      std::swap(crossed.inside, crossed.outside);
+      std::swap(crossed.from, crossed.to);
+    }
+    return crossed;
+  }
+
+  // Whether the way along a crossed edge meets a wall before it leaves the fluid.
+  bool MeetsWall(const CrossedEdge& edge) const {
+    const double above = walls_.HeightAt(edge.inside), below = walls_.HeightAt(edge.outside);
+    if (above <= 0 || below > 0) return false;
+    const double in = walls_.FluidAt(input_.level_set, edge.inside);
+    const double out = walls_.FluidAt(input_.level_set, edge.outside);
+    return out < 0 || in >= 0 || above / (above - below) <= in / (in - out);
+  }
+
+  // Where the way from one node to the other first meets a wall.
+  WallPlace PlaceOn(std::uint32_t tile, const CrossedEdge& edge) const {
+    const Point way = Minus(edge.to, edge.from);
+    std::optional<WallPlace> place;
+    double first = 2;
+    for (const std::uint32_t k : walls_.EdgesNear(tile)) {
+      const WallEdge& line = lines_.edges()[k];
+      const Point along = Minus(line.to, line.from), to = Minus(line.from, edge.from);
+      const double divisor = Cross(way, along);
+      if (divisor == 0) continue;
+      const double at = Cross(to, along) / divisor, share = Cross(to, way) / divisor;
+      if (!(at >= 0 && at <= 1 && at < first)) continue;
+      if (!line.is_endless && !(share >= 0 && share <= 1)) continue;
+      first = at;
+      place = WallPlace{k, share};
+    }
+    return place ? *place : walls_.Nearest(tile, edge.to).place;
+  }
+
+  void SetWall(std::size_t vertex, const WallPlace& place, VertexKind kind) {
+    v_.walls.kind[vertex] = kind;
+    v_.walls.place[vertex] = place;
+    v_.point[vertex] = lines_.At(place);
+    const Point up = lines_.edges()[place.edge].Left();
+    v_.normal[vertex] = {static_cast<float>(-up.x), static_cast<float>(-up.y)};
+  }
+
+  void FindEdge(std::size_t segment) {
+    const std::size_t vertex = 2 * segment;
+    const CrossedEdge edge = EdgeOf(segment);
+    const ActiveCell& cell = CellOf(segment);
+    const bool is_near = walls_.HeightAt({cell.tile, cell.i, cell.j}) < WallField::kMostHeight;
+    v_.walls.tile[vertex] = is_near ? cell.tile : kNoTile;
+    v_.walls.kind[vertex] = VertexKind::kFree;
+    v_.walls.is_wet[vertex] = is_near && MeetsWall(edge);
+    if (!v_.walls.is_wet[vertex]) return;
+    SetWall(vertex, PlaceOn(cell.tile, edge), VertexKind::kWall);
+    // The anchor stays on the lattice edge, away from its nodes.
+    const Point &a = edge.from, &b = edge.to, &at = v_.point[vertex];
+    const double share = std::clamp((at.x - a.x) * (b.x - a.x) + (at.y - a.y) * (b.y - a.y),
+                                    kEdgeMargin, 1 - kEdgeMargin);
+    v_.root[vertex] = {a.x + share * (b.x - a.x), a.y + share * (b.y - a.y)};
+  }
+
+  void FindCell(std::size_t segment, std::size_t next) {
+    const std::size_t vertex = 2 * segment + 1;
+    const ActiveCell& cell = CellOf(segment);
+    const bool from_wall = v_.walls.is_wet[2 * segment] != 0;
+    const bool to_wall = v_.walls.is_wet[2 * next] != 0;
+    v_.walls.tile[vertex] = v_.walls.tile[2 * segment];
+    v_.walls.is_wet[vertex] = to_wall;
+    v_.walls.kind[vertex] = VertexKind::kFree;
+    if (!from_wall && !to_wall) return;
+    const Point &a = v_.point[2 * segment], &b = v_.point[2 * next];
+    const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
+    if (from_wall && to_wall) {
+      SetWall(vertex, PlaceInCell(cell, middle), VertexKind::kWall);
+    } else {
+      SetWall(vertex, walls_.Nearest(cell.tile, middle).place, VertexKind::kContact);
+    }
+    v_.root[vertex] =
+        ClampToCell(input_.bins.tiles, cell,
+                    input_.crossings.segments[input_.topology.segments[segment]], v_.point[vertex]);
+  }
+
+  // The sharpest corner of the walls in a cell; without one, the place nearest to `middle`.
+  WallPlace PlaceInCell(const ActiveCell& cell, const Point& middle) const {
+    const Point origin = CellOrigin(input_.bins.tiles, cell);
+    const auto edges = walls_.EdgesNear(cell.tile);
+    WallPlace best = walls_.Nearest(cell.tile, middle).place;
+    double sharpest = 0;
+    const auto consider = [&](const WallPlace& place, const WallEdge& a, const WallEdge& b) {
+      const Point at = lines_.At(place);
+      const double x = at.x - origin.x, y = at.y - origin.y;
+      const auto is_in = [](double c) {
+        return c >= -kCornerTolerance && c <= 1 + kCornerTolerance;
+      };
+      if (!is_in(x) || !is_in(y)) return;
+      const double turn =
+          1 - a.unit.x * b.unit.x - a.unit.y * b.unit.y;  // 1 - cos: grows with the angle.
+      if (turn <= sharpest || IsBehindWall(at)) return;
+      sharpest = turn;
+      best = place;
+    };
+    for (std::size_t n = 0; n < edges.size(); ++n) {
+      const WallEdge& a = lines_.edges()[edges[n]];
+      if (!a.is_endless) {
+        const auto of = lines_.EdgesOf(a.wall);
+        const WallEdge& next = &a + 1 == of.data() + of.size() ? of.front() : *(&a + 1);
+        consider({edges[n], 1}, a, next);
+      }
+      for (std::size_t m = n + 1; m < edges.size(); ++m) {
+        const WallEdge& b = lines_.edges()[edges[m]];
+        if (b.wall != a.wall) ConsiderCrossing(edges[n], a, b, consider);
+      }
+    }
+    return best;
+  }
+
+  template <typename Consider>
+  void ConsiderCrossing(std::uint32_t edge, const WallEdge& a, const WallEdge& b,
+                        Consider consider) const {
+    const Point along_a = Minus(a.to, a.from), along_b = Minus(b.to, b.from);
+    const double divisor = Cross(along_a, along_b);
+    if (divisor == 0) return;
+    const Point to = Minus(b.from, a.from);
+    const double on_a = Cross(to, along_b) / divisor, on_b = Cross(to, along_a) / divisor;
+    const auto is_on = [](const WallEdge& e, double at) {
+      return e.is_endless || (at >= 0 && at <= 1);
+    };
+    if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{edge, on_a}, a, b);
+  }
+
+  // Whether a point is in the solid of a wall, by more than rounding.
+  bool IsBehindWall(const Point& point) const {
+    return std::ranges::any_of(
+        std::views::iota(std::size_t{0}, lines_.WallCount()), [&](std::size_t wall) {
+          return lines_.IsSolid(wall, point) &&
+                 lines_.NearestOfWall(wall, point).height < -10 * kCornerTolerance;
+        });
+  }
+
+  const VertexInput& input_;
+  const WallField& walls_;
+  const WallLines& lines_;
+  RingVertices& v_;
+};
+
+}  // namespace
+
+bool FindWallVertices(const VertexInput& input, std::size_t ring, RingVertices& vertices) {
+  return WallVertexFinder(input, vertices).Find(ring);
+}
+
+}  // namespace partiemc

@@ -1,0 +1,259 @@
+// Outlines at walls: guarantees, exact lines and corners, refusals.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "partiemc/partiemc.h"
+#include "partiemc/status.h"
+#include "partiemc/validate.h"
+#include "support/instruction_sets.h"
+#include "support/particles.h"
+#include "support/reconstruct.h"
+#include "support/ring_stream.h"
+#include "support/tries.h"
+#include "support/wall_scenes.h"
+
+namespace partiemc {
+namespace {
+
+using support::HeightAbove;
+using support::Particles;
+using support::PolygonWall;
+using support::Random;
+using support::ReconstructOnce;
+
+double Height(const std::vector<Wall>& walls, double x, double y) {
+  double height = 1e300;
+  for (const Wall& wall : walls) height = std::min(height, HeightAbove(wall, x, y));
+  return height;
+}
+
+double X(const Rings& rings, std::size_t point) { return rings.points[2 * point]; }
+double Y(const Rings& rings, std::size_t point) { return rings.points[2 * point + 1]; }
+
+bool HasPoint(const Rings& rings, double x, double y) {
+  for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+    if (X(rings, k) == x && Y(rings, k) == y) return true;
+  }
+  return false;
+}
+
+std::size_t NextOf(const Rings& rings, std::size_t point) {
+  const auto after = std::ranges::upper_bound(rings.offsets, point);
+  return point + 1 < *after ? point + 1 : *(after - 1);
+}
+
+const ReconstructionParameters kTank{.spacing = 1.0, .walls = {{{0, 30, 0, 0, 20, 0, 20, 30}}}};
+
+// Particles half a spacing from the walls of kTank.
+Particles Column() { return support::Lattice(20, 12, .5, .5); }
+
+TEST(Walls, AColumnInATankIsARectangle) {
+  const Result result = ReconstructOnce(kTank, Column());
+  const Rings& rings = result.rings;
+  ASSERT_EQ(rings.RingCount(), 1u);
+  EXPECT_TRUE(HasPoint(rings, 0, 0));
+  EXPECT_TRUE(HasPoint(rings, 20, 0));
+  ASSERT_EQ(rings.contacts.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::size_t contact = rings.contacts[k];
+    EXPECT_TRUE(X(rings, contact) == 0 || X(rings, contact) == 20) << X(rings, contact);
+    EXPECT_NEAR(Y(rings, contact), 12, .02);
+    EXPECT_NEAR(rings.contact_angles[k], std::numbers::pi / 2, .02);
+  }
+  // Every wetted segment is on a wall, bit for bit, and they cover the walls up to the contacts.
+  double wetted = 0;
+  for (const std::uint32_t k : rings.wetted) {
+    const std::size_t next = NextOf(rings, k);
+    EXPECT_TRUE((X(rings, k) == X(rings, next) && (X(rings, k) == 0 || X(rings, k) == 20)) ||
+                (Y(rings, k) == Y(rings, next) && Y(rings, k) == 0));
+    wetted += std::hypot(X(rings, next) - X(rings, k), Y(rings, next) - Y(rings, k));
+  }
+  EXPECT_NEAR(wetted, 44, .05);
+  EXPECT_NEAR(result.statistics.area, 240, .1);
+  EXPECT_NEAR(result.statistics.perimeter, 64, .1);
+}
+
+TEST(Walls, AFullTankHasTheOutlineOfItsWalls) {
+  const Wall tank{{0, 12, 0, 0, 20, 0, 20, 12}};
+  const Result result = ReconstructOnce({.spacing = 1.0, .walls = {tank}}, Column());
+  ASSERT_EQ(result.rings.RingCount(), 1u);
+  EXPECT_EQ(result.rings.wetted.size(), result.rings.PointCount());
+  EXPECT_TRUE(result.rings.contacts.empty());
+  EXPECT_EQ(result.statistics.area, 240);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_TRUE(HasPoint(result.rings, tank.points[2 * k], tank.points[2 * k + 1])) << k;
+  }
+}
+
+TEST(Walls, AnObstacleLeavesItsOwnHole) {
+  const Wall square{{7.3, 4.1, 7.3, 8.2, 12.6, 8.2, 12.6, 4.1}};
+  ReconstructionParameters parameters = kTank;
+  parameters.walls.push_back(square);
+  Particles particles;
+  const Particles column = Column();
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    if (HeightAbove(square, column.x(k), column.y(k)) > 0) {
+      particles.Add(column.x(k), column.y(k));
+    }
+  }
+  const Result result = ReconstructOnce(parameters, particles);
+  const Rings& rings = result.rings;
+  ASSERT_EQ(rings.RingCount(), 2u);
+  const std::size_t hole = rings.outer_of[0] == kNoRing ? 1 : 0;
+  EXPECT_NEAR(rings.measures[hole].area, -5.3 * 4.1, 1e-12);
+  EXPECT_NEAR(rings.measures[hole].perimeter, 18.8, 1e-12);
+}
+
+// The lines of a tank need not be one wall.
+TEST(Walls, CornersBetweenWallsAreSharp) {
+  ReconstructionParameters parameters = kTank;
+  parameters.walls = {{{0, 30, 0, 0}}, {{-7, 0, 50, 0}}, {{20, 1, 20, 2}}};
+  const Rings rings = ReconstructOnce(parameters, Column()).rings;
+  const Rings others = ReconstructOnce(kTank, Column()).rings;
+  EXPECT_EQ(rings.points, others.points);
+  EXPECT_EQ(rings.wetted, others.wetted);
+}
+
+TEST(Walls, FluidAboveAWallDoesNotTouchIt) {
+  ReconstructionParameters parameters{.spacing = 1.0};
+  const Particles disc = support::Disc(8);
+  const Rings free = ReconstructOnce(parameters, disc).rings;
+  parameters.walls = {{{-10, -9.3, 10, -9.3}}};
+  const Rings rings = ReconstructOnce(parameters, disc).rings;
+  EXPECT_EQ(rings.points, free.points);
+  EXPECT_TRUE(rings.wetted.empty());
+  EXPECT_TRUE(rings.contacts.empty());
+}
+
+TEST(Walls, ResultsKeepTheGuaranteesInRandomFrames) {
+  std::size_t wetted = 0, off = 0, contacts = 0, beyond = 0, points = 0;
+  double farthest = 0, deepest = 0;
+  for (std::uint64_t seed = 1; seed <= support::Tries(2'000u); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    Random random(seed);
+    const Particles particles = support::RandomScene(seed);
+    ReconstructionParameters parameters{.fill = AllFills()[seed % AllFills().size()],
+                                        .spacing = 1.0,
+                                        .walls = support::RandomWalls(random, particles)};
+    if (random.Chance(.2)) parameters.cell_size = random.Uniform(.4, 1.5);
+    if (random.Chance(.2)) parameters.clean = false;
+    const Result result = ReconstructOnce(parameters, particles);
+    const absl::Status status = Validate(result, parameters.fill);
+    ASSERT_TRUE(status.ok()) << status;
+    const Rings& rings = result.rings;
+    ASSERT_EQ(rings.contacts.size(), rings.contact_angles.size());
+    for (const float angle : rings.contact_angles) {
+      EXPECT_GE(angle, 0);
+      EXPECT_LE(angle, std::numbers::pi_v<float>);
+    }
+    wetted += rings.wetted.size();
+    contacts += rings.contacts.size();
+    points += rings.PointCount();
+    for (const std::uint32_t k : rings.wetted) {
+      for (const std::size_t end : {std::size_t{k}, NextOf(rings, k)}) {
+        const double height = Height(parameters.walls, X(rings, end), Y(rings, end));
+        off += std::abs(height) > 1e-6;
+        farthest = std::max(farthest, std::abs(height));
+      }
+    }
+    for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+      const double height = Height(parameters.walls, X(rings, k), Y(rings, k));
+      beyond += height < -1e-6;
+      deepest = std::max(deepest, -height);
+    }
+  }
+  std::printf(
+      "%zu points, %zu wetted, %zu ends up to %.2f off their wall, %zu points up to %.2f beyond, "
+      "%zu contacts\n",
+      points, wetted, off, farthest, beyond, deepest, contacts);
+  EXPECT_GT(contacts, support::Tries(1'000u));
+}
+
+TEST(Walls, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
+  for (const std::uint64_t seed : {3u, 8u, 21u}) {
+    Random random(seed);
+    const Particles particles = support::Blob(random, 40);
+    ReconstructionParameters parameters{.spacing = 1.0,
+                                        .walls = support::RandomWalls(random, particles)};
+    const Result expected = ReconstructOnce(parameters, particles);
+    ASSERT_FALSE(expected.rings.wetted.empty());
+    for (const std::size_t threads : {1u, 2u, 7u}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      EXPECT_EQ(ReconstructOnce(parameters, particles), expected);
+    }
+    support::ForEachInstructionSet(
+        [&] { EXPECT_EQ(ReconstructOnce(parameters, particles), expected); });
+  }
+}
+
+TEST(Walls, AFrameInTheSolidHasNoOutline) {
+  const Wall wall{{-100, -100, -100, 100, 100, 100, 100, -100}};
+  const Result result = ReconstructOnce({.spacing = 1.0, .walls = {wall}}, Column());
+  EXPECT_EQ(result.rings.RingCount(), 0u);
+}
+
+TEST(Walls, BrokenRulesAreNamed) {
+  struct Case {
+    ReconstructionParameters parameters;
+    std::string field, rule;
+  };
+  const Wall floor{{0, 0, 1, 0}};
+  const double nan = std::nan("");
+  const auto with = [](Wall wall) {
+    return ReconstructionParameters{.spacing = 1.0, .walls = {std::move(wall)}};
+  };
+  std::vector<Case> cases = {
+      {with({{}}), "walls[0].points", "two coordinates of at least two points"},
+      {with({{0, 0, 1}}), "walls[0].points", "two coordinates of at least two points"},
+      {with({{0, 0, 1, nan}}), "walls[0].points[3]", "in magnitude"},
+      {with({{0, 0, 1e61, 0}}), "walls[0].points[2]", "in magnitude"},
+      {with({{0, 0, 1e-61, 0}}), "walls[0].points[2]", "in magnitude"},
+      {with({{1, 1, 1, 1}}), "walls[0].points", "must differ"},
+      {with({{0, 0, 1, 1, 0, 0}}), "walls[0].points", "must differ"},
+      {with({{0, 0, 2, 0, 1, 0}}), "walls[0].points", "does not touch itself"},
+      {with({{0, 0, 2, 2, 2, 0, 0, 2}}), "walls[0].points", "does not touch itself"},
+      {with({std::vector<double>(2 * 1025, 1.0)}), "walls", "at most 1024"},
+  };
+  ReconstructionParameters of = with(floor);
+  of.placement = Placement::kQef;
+  cases.push_back({of, "walls", "placement is virtual-plane"});
+  of = with(floor);
+  of.sizes = Sizes::kOwn;
+  cases.push_back({of, "walls", "sizes are equal"});
+  of = with(floor);
+  of.isovalue = .5;
+  cases.push_back({of, "walls", "isovalue"});
+  of = with(floor);
+  of.sections = {{.phase = 1}};
+  cases.push_back({of, "walls", "sections"});
+  of = with(floor);
+  of.slice = SlicePlane{};
+  cases.push_back({of, "walls", "slice"});
+  of = with(floor);
+  of.output = Output::kSurface;
+  cases.push_back({of, "walls", "surface"});
+  of = with(floor);
+  of.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+  cases.push_back({of, "walls", "periodic box"});
+  for (const Case& broken : cases) {
+    SCOPED_TRACE(broken.field + ", " + broken.rule);
+    const absl::Status status = Validate(broken.parameters);
+    ASSERT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    const auto violation = FindViolation(status);
+    ASSERT_TRUE(violation.has_value());
+    EXPECT_EQ(violation->field, "parameters." + broken.field);
+    EXPECT_NE(violation->rule.find(broken.rule), std::string::npos) << violation->rule;
+  }
+}
+
+}  // namespace
+}  // namespace partiemc
