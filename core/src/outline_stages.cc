@@ -20,7 +20,10 @@
 namespace partiemc {
 namespace {
 
-bool HasWalls(const ReconstructionParameters& parameters) { return !parameters.walls.empty(); }
+bool HasWalls(const OutlineTask& task) {
+  return !task.parameters.walls.empty() ||
+         (task.wall_outlines != nullptr && task.wall_outlines->RingCount() > 0);
+}
 
 void SumMeasures(const Rings& rings, FrameStatistics& statistics) {
   for (const RingMeasures& measures : rings.measures) {
@@ -127,7 +130,7 @@ void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& 
   InStage(observer, Stage::kField, [&] {
     scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
                    : SampleField(b.bins, scale, b.level_set);
-    if (HasWalls(task.parameters)) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
+    if (HasWalls(task)) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
   });
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
@@ -248,7 +251,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     b.next_area_offset = previous.area_offset;
     return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
                           parameters, task.variant, scale, percolates ? &percolation : nullptr,
-                          HasWalls(parameters) ? &b.walls : nullptr},
+                          HasWalls(task) ? &b.walls : nullptr},
                          b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
@@ -303,17 +306,19 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   });
   b.last.doubts = result.statistics.doubts;
   if (!status.ok() || !lengths) return status;
-  if (HasWalls(parameters)) {
-    b.walls.FindTiles(parameters.walls, scale.cell_size, b.bins.tiles);
+  if (HasWalls(task)) {
+    b.walls.FindTiles(parameters.walls, task.wall_outlines, scale.cell_size, b.bins.tiles);
   }
   status = memory.ReserveOutline({.particles = seen.ParticleCount(),
                                   .tiles = b.bins.tiles.size(),
                                   .attribute_values = AttributeValuesOf(seen),
-                                  .phases = CountPhases(parameters)});
+                                  .phases = CountPhases(parameters),
+                                  .wall_tiles = HasWalls(task) ? b.walls.TileCount() : 0});
   if (!status.ok()) return status;
   FindRings(task, scale, b);
   FrameSize size = SizeOf(parameters, seen, b);
   if (task.HasCopies()) size.cut_segments = size.segments;
+  if (HasWalls(task)) size.wall_tiles = b.walls.TileCount();
   status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
   status = FillOutline(task, seen, scale, memory, b, result);

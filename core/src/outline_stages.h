@@ -23,8 +23,9 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;             ///< The first outline checks the frame.
-  const Prepared* prepared;  ///< Null for a frame as given.
+  bool is_first;                         ///< The first outline checks the frame.
+  const Prepared* prepared;              ///< Null for a frame as given.
+  const Rings* wall_outlines = nullptr;  ///< Outlines of wall particles; null without.
 
   bool HasCopies() const { return prepared != nullptr && prepared->HasCopies(); }
 };

@@ -66,6 +66,16 @@ ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const
   return parameters;
 }
 
+// The parameters of the outline of wall particles, resolved.
+ReconstructionParameters WallParametersOf(const ReconstructionParameters& parameters) {
+  ReconstructionParameters of = parameters;
+  of.walls.clear();
+  of.fill = Fill::kNone;
+  of.min_component_area = 0;
+  of.min_component_particles = 0;
+  return of;
+}
+
 // Commits the new state of one outline. Buffers are swapped, so that both states keep their memory.
 void CommitState(NextState& next, State& state) {
   if (!next.is_kept) return;
@@ -149,6 +159,9 @@ Reconstructor::Reconstructor(const ReconstructionParameters& parameters, const F
   for (const Section& section : parameters.sections) {
     sections_.push_back(Resolve(ParametersOf(parameters, section)));
   }
+  if (!parameters.wall_phases.empty()) {
+    walls_ = std::make_shared<const ReconstructionParameters>(WallParametersOf(parameters_));
+  }
   if (parameters.output == Output::kSurface) {
     // Validate has accepted the parameters.
     surface_ = std::make_shared<const SurfaceReconstructor>(
@@ -207,6 +220,22 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     if (!status.ok()) return status;
     frame.attributes = b.attributes;
   }
+  const Rings* wall_outlines = nullptr;
+  if (!parameters_.wall_phases.empty()) {
+    status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
+    if (!status.ok()) return status;
+    status = b.wall_particles.Take(given, parameters_);
+    if (!status.ok()) return status;
+    b.wall_result.Clear();
+    status =
+        ReconstructOutline({*walls_, VariantFor(*walls_, *variant_), limits_,
+                            b.wall_particles.walls(), unseen, control.observer, false, nullptr},
+                           memory, b, b.wall_state, b.wall_result);
+    if (!status.ok()) return status;
+    memory.Done();
+    frame = b.wall_particles.fluid();
+    wall_outlines = &b.wall_result.rings;
+  }
   Prepare(frame.attributes, parameters_, result);
   Prepared prepared;
   if (is_prepared) {
@@ -218,11 +247,13 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   }
   const auto task_of = [&](const ReconstructionParameters& parameters, const State& previous,
                            std::size_t outline) {
-    const bool is_first =
-        outline == (is_surface ? 1 : 0) && !is_prepared && !HasPhases(parameters_);
-    return OutlineTask{
-        parameters, VariantFor(parameters, *variant_), limits_, frame, previous, control.observer,
-        is_first,   is_prepared ? &prepared : nullptr};
+    const bool is_first = outline == (is_surface ? 1 : 0) && !is_prepared &&
+                          !HasPhases(parameters_) && wall_outlines == nullptr;
+    return OutlineTask{parameters,   VariantFor(parameters, *variant_),
+                       limits_,      frame,
+                       previous,     control.observer,
+                       is_first,     is_prepared ? &prepared : nullptr,
+                       wall_outlines};
   };
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {

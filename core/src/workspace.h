@@ -15,11 +15,13 @@
 #include "frame/scale.h"
 #include "frame/slab.h"
 #include "frame/spacing.h"
+#include "frame/wall_particles.h"
 #include "frame_lengths.h"
 #include "identities/identities.h"
 #include "mesh/mesh.h"
 #include "normals/normals.h"
 #include "partiemc/reconstructor.h"
+#include "partiemc/result.h"
 #include "partiemc/state.h"
 #include "partiemc/surface_reconstructor.h"
 #include "periodic/lift.h"
@@ -56,7 +58,10 @@ struct Workspace::Buffers {
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;
-  WallField walls;  // Empty without walls.
+  WallField walls;               // Empty without walls.
+  WallParticles wall_particles;  // Empty unless particles of some phases are walls.
+  NextState wall_state;          // The same. Nothing is kept.
+  Result wall_result;
   Crossings crossings;
   RingScratch ring_scratch;
   RingTopology topology;

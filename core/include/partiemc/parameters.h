@@ -278,6 +278,14 @@ struct ReconstructionParameters {
   /// surfaces, slices, isovalues, sections, own sizes and `box`.
   std::vector<Wall> walls = {};
 
+  static constexpr std::size_t kMaxWallPhases = 16;
+
+  /// The phases (`phase_attribute`) of the particles of walls, at most 16, distinct. Their outline
+  /// is a further wall, half a spacing outside of their outermost layers, anew in each frame; they
+  /// are no fluid. Two layers or more are a wall; excludes what `walls` exclude, and
+  /// `noise_filter`.
+  std::vector<std::int32_t> wall_phases = {};
+
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;
 };

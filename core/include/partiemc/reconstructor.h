@@ -99,6 +99,8 @@ class Reconstructor {
   FrameLimits limits_;
   std::shared_ptr<const VirtualPlaneVariant> variant_;
   std::shared_ptr<const SurfaceReconstructor> surface_;  // Null for Output::kOutline.
+  // Of the outline of wall particles; null without wall phases.
+  std::shared_ptr<const ReconstructionParameters> walls_;
 };
 
 }  // namespace partiemc

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "frame/calibration.h"
+#include "frame/phase_rules.h"
 #include "frame/placement_traits.h"
 #include "frame/wall_rules.h"
 #include "partiemc/status.h"
@@ -82,7 +83,6 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
 
 // Checks that nothing excludes the phase of a section.
 absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) {
-  constexpr std::int64_t kMostPhase = 1 << 24;
   const Section& of = p.sections[section];
   const auto refused = [&](const std::string& rule) {
     return Refused(absl::StrCat("sections[", section, "].phase"), absl::StrCat(*of.phase), rule);
@@ -95,15 +95,10 @@ absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) 
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
   }
-  if (std::abs(std::int64_t{*of.phase}) > kMostPhase) {
-    return refused("must be at most 2^24 in magnitude, because attributes are floats");
-  }
-  const bool is_name =
-      !p.phase_attribute.empty() &&
-      std::ranges::all_of(p.phase_attribute, [](char c) { return c >= ' ' && c <= '~'; });
-  if (!is_name) {
-    return Refused("phase_attribute", p.phase_attribute.empty() ? "empty" : "not printable",
-                   "must be the name of an attribute, of printable ASCII: a section has a phase");
+  const std::string field = absl::StrCat("sections[", section, "].phase");
+  if (auto status = CheckPhaseNumber(field, *of.phase); !status.ok()) return status;
+  if (auto status = CheckPhaseAttribute(p.phase_attribute, "a section has a phase"); !status.ok()) {
+    return status;
   }
   for (std::size_t k = 0; k < section; ++k) {
     if (p.sections[k].phase == of.phase) {

@@ -50,50 +50,28 @@ void Slab::Choose(std::span<const Real> positions, const PlaneBasis& basis, doub
 }
 
 void Slab::Take(const Frame& frame, const SlicePlane& plane, double reach) {
-  time_ = frame.time;
   sources_.clear();
   heights_.clear();
   positions_.clear();
   const PlaneBasis basis = BasisOf(plane);
   std::visit([&](auto positions) { Choose(positions, basis, reach); }, frame.positions);
 
-  volumes_.clear();
-  ids_.clear();
   velocities_.clear();
   for (const std::uint32_t k : sources_) {
-    if (!frame.volumes.empty()) volumes_.push_back(frame.volumes[k]);
-    if (!frame.ids.empty()) ids_.push_back(frame.ids[k]);
     if (frame.velocities.empty()) continue;
     const float* const from = frame.velocities.data() + 3 * std::size_t{k};
     const Vector velocity{from[0], from[1], from[2]};
     velocities_.push_back(static_cast<float>(Dot(velocity, basis.first)));
     velocities_.push_back(static_cast<float>(Dot(velocity, basis.second)));
   }
-
-  attributes_.clear();
-  if (values_.size() < frame.attributes.size()) values_.resize(frame.attributes.size());
-  for (std::size_t a = 0; a < frame.attributes.size(); ++a) {
-    const Attribute& attribute = frame.attributes[a];
-    std::vector<float>& values = values_[a];
-    values.clear();
-    for (const std::uint32_t k : sources_) {
-      const auto of_particle =
-          attribute.values.subspan(k * static_cast<std::size_t>(attribute.components),
-                                   static_cast<std::size_t>(attribute.components));
-      values.insert(values.end(), of_particle.begin(), of_particle.end());
-    }
-    attributes_.push_back({attribute.name, attribute.components, values});
-  }
+  copy_.Take(frame, sources_);
 }
 
 Frame Slab::AsFrame() const {
-  return {.positions = std::span<const double>(positions_),
-          .components = 2,
-          .volumes = volumes_,
-          .ids = ids_,
-          .velocities = velocities_,
-          .attributes = attributes_,
-          .time = time_};
+  Frame frame{
+      .positions = std::span<const double>(positions_), .components = 2, .velocities = velocities_};
+  copy_.View(frame);
+  return frame;
 }
 
 }  // namespace partiemc

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "frame/particle_copy.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
@@ -42,13 +43,10 @@ class Slab {
   template <typename Real>
   void Choose(std::span<const Real> positions, const PlaneBasis& basis, double reach);
 
-  double time_ = 0;
   std::vector<std::uint32_t> sources_;
   std::vector<double> positions_, heights_;
-  std::vector<float> volumes_, velocities_;
-  std::vector<std::uint64_t> ids_;
-  std::vector<std::vector<float>> values_;  // By attribute; buffers are kept.
-  std::vector<Attribute> attributes_;
+  std::vector<float> velocities_;
+  ParticleCopy copy_;
 };
 
 }  // namespace partiemc

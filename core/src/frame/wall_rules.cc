@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "base/point.h"
 #include "base/predicates.h"
+#include "frame/phase_rules.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -66,18 +67,11 @@ absl::Status CheckPoints(const std::string& field, std::span<const double> point
   return count == 2 ? absl::OkStatus() : CheckPolygon(field, points);
 }
 
-}  // namespace
-
-absl::Status CheckWalls(const ReconstructionParameters& p) {
-  if (p.walls.empty()) return absl::OkStatus();
-  std::size_t points = 0;
-  for (const Wall& wall : p.walls) points += wall.points.size() / 2;
-  if (points > p.kMaxWallPoints) {
-    return Refused("walls", absl::StrCat(points, " points"),
-                   absl::StrCat("must have at most ", p.kMaxWallPoints));
-  }
+// Checks that nothing excludes walls. `field`: the parameter that asks for them.
+absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& field,
+                         std::size_t count) {
   const auto refused = [&](std::string_view rule) {
-    return Refused("walls", absl::StrCat(p.walls.size()), rule);
+    return Refused(field, absl::StrCat(count), rule);
   };
   if (p.output == Output::kSurface) return refused("must be absent for a surface");
   if (p.slice) return refused("must be absent with a slice");
@@ -88,6 +82,47 @@ absl::Status CheckWalls(const ReconstructionParameters& p) {
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
   }
+  return absl::OkStatus();
+}
+
+absl::Status CheckWallPhases(const ReconstructionParameters& p) {
+  const auto& phases = p.wall_phases;
+  if (phases.empty()) return absl::OkStatus();
+  if (phases.size() > p.kMaxWallPhases) {
+    return Refused("wall_phases", absl::StrCat(phases.size()),
+                   absl::StrCat("must be at most ", p.kMaxWallPhases));
+  }
+  if (absl::Status status = CheckOthers(p, "wall_phases", phases.size()); !status.ok()) {
+    return status;
+  }
+  if (p.noise_filter) {
+    return Refused("wall_phases", absl::StrCat(phases.size()),
+                   "must be absent with a noise filter");
+  }
+  for (std::size_t k = 0; k < phases.size(); ++k) {
+    const std::string field = absl::StrCat("wall_phases[", k, "]");
+    if (absl::Status status = CheckPhaseNumber(field, phases[k]); !status.ok()) return status;
+    for (std::size_t other = 0; other < k; ++other) {
+      if (phases[other] != phases[k]) continue;
+      return Refused(field, absl::StrCat(phases[k]),
+                     absl::StrCat("must differ from wall_phases[", other, "]"));
+    }
+  }
+  return CheckPhaseAttribute(p.phase_attribute, "particles of some phases are walls");
+}
+
+}  // namespace
+
+absl::Status CheckWalls(const ReconstructionParameters& p) {
+  if (absl::Status status = CheckWallPhases(p); !status.ok()) return status;
+  if (p.walls.empty()) return absl::OkStatus();
+  std::size_t points = 0;
+  for (const Wall& wall : p.walls) points += wall.points.size() / 2;
+  if (points > p.kMaxWallPoints) {
+    return Refused("walls", absl::StrCat(points, " points"),
+                   absl::StrCat("must have at most ", p.kMaxWallPoints));
+  }
+  if (absl::Status status = CheckOthers(p, "walls", p.walls.size()); !status.ok()) return status;
   for (std::size_t k = 0; k < p.walls.size(); ++k) {
     const std::string field = absl::StrCat("walls[", k, "].points");
     if (absl::Status status = CheckPoints(field, p.walls[k].points); !status.ok()) return status;

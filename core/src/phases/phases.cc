@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <string>
 
-#include "absl/strings/str_cat.h"
 #include "core/internal/research.h"
-#include "frame/frame_view.h"
-#include "partiemc/status.h"
+#include "frame/phase_values.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 
@@ -87,33 +84,14 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
   for (const Section& section : parameters.sections) {
     if (section.phase) p.known.push_back(static_cast<float>(*section.phase));
   }
-  others.clear();
+  std::span<const float> phases;
+  absl::Status status = TakePhaseValues(frame, parameters.phase_attribute, phases, others);
   p.labels.clear();
-  bool is_found = frame.ParticleCount() == 0;
-  for (const Attribute& attribute : frame.attributes) {
-    if (attribute.name != parameters.phase_attribute) {
-      others.push_back(attribute);
-      continue;
-    }
-    is_found = true;
-    const auto field = [&] { return "attributes[" + parameters.phase_attribute + "]"; };
-    if (attribute.components != 1) {
-      return InvalidFrame(kReasonOutOfRange, field(),
-                          absl::StrCat(attribute.components, " components"),
-                          "must be one number per particle: its phase");
-    }
-    for (const float value : attribute.values) {
-      if (value != std::floor(value)) {
-        return InvalidFrame(kReasonOutOfRange, absl::StrCat(field(), "[", p.labels.size(), "]"),
-                            ShortestNumber(value), "must be a whole number: a phase");
-      }
-      const auto at = std::ranges::find(p.known, value);
-      p.labels.push_back(static_cast<PhaseLabel>(at - p.known.begin() + 1));
-    }
+  for (const float phase : phases) {
+    const auto at = std::ranges::find(p.known, phase);
+    p.labels.push_back(static_cast<PhaseLabel>(at - p.known.begin() + 1));
   }
-  if (is_found) return absl::OkStatus();
-  return InvalidFrame(kReasonNoSuchAttribute, "attributes", parameters.phase_attribute,
-                      "must be an attribute of the frame: the phases of its particles");
+  return status;
 }
 
 void MapPhases(const PhaseInput& input, Phases& p) {

@@ -110,20 +110,20 @@ std::optional<ContactCurve> ContactCurve::Fit(const WallLines& lines, const Wall
     fit.Add(Dot(curve.axis_, from), Cross(curve.axis_, from), Length(Minus(after, before)));
   }
   if (!fit.Solve(stretch.length < kParabolaLength * spacing ? 2 : 3, curve.c_)) return std::nullopt;
-  if (!curve.FindFoot(lines, edge.wall, spacing)) return std::nullopt;
+  if (!curve.FindFoot(lines, edge.loop, spacing)) return std::nullopt;
   const double move =
-      lines.Between(edge.wall, lines.Along(contact), lines.Along(curve.foot_place_));
+      lines.Between(edge.loop, lines.Along(contact), lines.Along(curve.foot_place_));
   if (std::abs(move) > kFarthestMove * spacing) return std::nullopt;
   const Point foot = lines.At(curve.foot_place_);
-  for (std::size_t wall = 0; wall < lines.WallCount(); ++wall) {
-    if (wall != edge.wall && lines.IsSolid(wall, foot)) return std::nullopt;
+  for (std::size_t solid = 0; solid < lines.SolidCount(); ++solid) {
+    if (solid != edge.solid && lines.IsSolid(solid, foot)) return std::nullopt;
   }
   return curve;
 }
 
-bool ContactCurve::FindFoot(const WallLines& lines, std::size_t wall, double spacing) {
+bool ContactCurve::FindFoot(const WallLines& lines, std::size_t loop, double spacing) {
   for (int step = 0; step < 6; ++step) {
-    const NearestWall nearest = lines.NearestOfWall(wall, At(foot_));
+    const NearestWall nearest = lines.NearestOfLoop(loop, At(foot_));
     foot_place_ = nearest.place;
     const Point direction = DirectionAt(foot_);
     const double sine = Dot(direction, lines.edges()[foot_place_.edge].Left()) / Length(direction);
@@ -131,7 +131,7 @@ bool ContactCurve::FindFoot(const WallLines& lines, std::size_t wall, double spa
     foot_ -= nearest.height / (sine * Length(direction));
     if (!(foot_ < 0 && foot_ > -kFarthest * spacing)) return false;
   }
-  foot_place_ = lines.NearestOfWall(wall, At(foot_)).place;
+  foot_place_ = lines.NearestOfLoop(loop, At(foot_)).place;
   return true;
 }
 

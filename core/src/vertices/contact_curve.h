@@ -43,7 +43,7 @@ class ContactCurve {
                                          double spacing, StretchPoint point);
 
  private:
-  bool FindFoot(const WallLines& lines, std::size_t wall, double spacing);
+  bool FindFoot(const WallLines& lines, std::size_t loop, double spacing);
 
   Point origin_, axis_;
   std::array<double, 3> c_{};

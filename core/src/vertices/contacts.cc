@@ -39,7 +39,7 @@ class ContactFitter {
     is_wet_after_ = p_.is_wet[contact] != 0;
     const WallPlace& place = p_.place[contact];
     const WallEdge& edge = lines_.edges()[place.edge];
-    wall_ = edge.wall;
+    loop_ = edge.loop;
     start_ = lines_.Along(place);
     const std::optional<ContactCurve> curve =
         ContactCurve::Fit(lines_, place, h_, [&](std::size_t k) -> std::optional<Point> {
@@ -80,26 +80,26 @@ class ContactFitter {
   // The wet side along the direction of the wall: a ring runs along its wall in its direction.
   double WetSign() const { return is_wet_after_ ? 1 : -1; }
   // The length along the wall from the contact.
-  double From(double along) const { return lines_.Between(wall_, start_, along); }
+  double From(double along) const { return lines_.Between(loop_, start_, along); }
 
   // Moves the contact to its foot. Returns false if something holds it back.
   bool MoveContact(const WallPlace& foot) {
     const double wanted = From(lines_.Along(foot));
     double move = wanted;
-    for (const WallEdge& edge : lines_.EdgesOf(wall_)) {
+    for (const WallEdge& edge : lines_.EdgesOfLoop(loop_)) {
       if (edge.is_endless || !IsSharpAt(edge)) continue;
       const double corner = From(edge.start);
       if (move > 0 ? corner > 0 && corner < move : corner < 0 && corner > move) move = corner;
     }
     move = PassWetPoints(move);
     const bool is_free = move == wanted;
-    SetPlace(contact_, is_free ? foot : lines_.PlaceAt(wall_, start_ + move));
+    SetPlace(contact_, is_free ? foot : lines_.PlaceAt(loop_, start_ + move));
     return is_free;
   }
 
   // Whether the wall has a sharp corner at the beginning of a line.
   bool IsSharpAt(const WallEdge& edge) const {
-    const auto of = lines_.EdgesOf(wall_);
+    const auto of = lines_.EdgesOfLoop(loop_);
     const WallEdge& before = &edge == of.data() ? of.back() : *(&edge - 1);
     return 1 - Dot(before.unit, edge.unit) > kSharp;
   }
@@ -114,13 +114,13 @@ class ContactFitter {
     const auto along = [&](std::size_t k) { return sign * From(lines_.Along(p_.place[Wet(k)])); };
     std::size_t end = 1;
     while (end < count_ && p_.kind[Wet(end)] == VertexKind::kWall &&
-           lines_.edges()[p_.place[Wet(end)].edge].wall == wall_ &&
+           lines_.edges()[p_.place[Wet(end)].edge].loop == loop_ &&
            along(end) <= sign * move + kClearance * h_) {
       ++end;
     }
     passed = end - 1;
     const WallPlace& next = p_.place[Wet(end)];
-    const bool is_same = lines_.edges()[next.edge].wall == wall_;
+    const bool is_same = lines_.edges()[next.edge].loop == loop_;
     ahead = is_same ? along(end) : (passed > 0 ? along(passed) : 0);
     const bool is_blocked = p_.kind[Wet(end)] != VertexKind::kWall || !is_same;
     if (is_blocked || ahead < sign * move + kClearance * h_) {
@@ -129,7 +129,7 @@ class ContactFitter {
     for (std::size_t k = 1; k <= passed; ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(passed + 1);
       const double at = sign * move + (ahead - sign * move) * share;
-      SetPlace(Wet(k), lines_.PlaceAt(wall_, start_ + sign * at));
+      SetPlace(Wet(k), lines_.PlaceAt(loop_, start_ + sign * at));
     }
     return move;
   }
@@ -168,7 +168,7 @@ class ContactFitter {
   Rings& rings_;
   std::size_t first_ = 0, count_ = 0, contact_ = 0;
   bool is_wet_after_ = false;
-  std::size_t wall_ = 0;
+  std::size_t loop_ = 0;
   double start_ = 0;
 };
 
@@ -195,9 +195,9 @@ void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rin
       continue;
     }
     if (points.tile[k] == kNoTile) continue;
-    for (std::size_t wall = 0; wall < walls.lines().WallCount(); ++wall) {
-      const NearestWall nearest =
-          walls.lines().NearestOfWall(wall, {target[0] / cell_size, target[1] / cell_size});
+    for (std::size_t solid = 0; solid < walls.lines().SolidCount(); ++solid) {
+      const NearestWall nearest = walls.NearestOfSolid(
+          points.tile[k], solid, {target[0] / cell_size, target[1] / cell_size});
       if (!(nearest.height < clearance)) continue;
       const Point on = walls.lines().At(nearest.place);
       const Point up = walls.lines().edges()[nearest.place.edge].Left();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <ranges>
 #include <utility>
 
 #include "vertices/placement.h"
@@ -153,20 +152,20 @@ class WallVertexFinder {
       if (!is_in(x) || !is_in(y)) return;
       const double turn =
           1 - a.unit.x * b.unit.x - a.unit.y * b.unit.y;  // 1 - cos: grows with the angle.
-      if (turn <= sharpest || IsBehindWall(at)) return;
+      if (turn <= sharpest || IsBehindWall(cell.tile, at)) return;
       sharpest = turn;
       best = place;
     };
     for (std::size_t n = 0; n < edges.size(); ++n) {
       const WallEdge& a = lines_.edges()[edges[n]];
       if (!a.is_endless) {
-        const auto of = lines_.EdgesOf(a.wall);
+        const auto of = lines_.EdgesOfLoop(a.loop);
         const WallEdge& next = &a + 1 == of.data() + of.size() ? of.front() : *(&a + 1);
         consider({edges[n], 1}, a, next);
       }
       for (std::size_t m = n + 1; m < edges.size(); ++m) {
         const WallEdge& b = lines_.edges()[edges[m]];
-        if (b.wall != a.wall) ConsiderCrossing(edges[n], a, b, consider);
+        if (b.solid != a.solid) ConsiderCrossing(edges[n], a, b, consider);
       }
     }
     return best;
@@ -186,13 +185,14 @@ class WallVertexFinder {
     if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{edge, on_a}, a, b);
   }
 
-  // Whether a point is in the solid of a wall, by more than rounding.
-  bool IsBehindWall(const Point& point) const {
-    return std::ranges::any_of(
-        std::views::iota(std::size_t{0}, lines_.WallCount()), [&](std::size_t wall) {
-          return lines_.IsSolid(wall, point) &&
-                 lines_.NearestOfWall(wall, point).height < -10 * kCornerTolerance;
-        });
+  // Whether a point is in a solid, by more than rounding.
+  bool IsBehindWall(std::uint32_t tile, const Point& point) const {
+    for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
+      if (!lines_.IsSolid(solid, point)) continue;
+      const NearestWall nearest = walls_.NearestOfSolid(tile, solid, point);
+      if (nearest.height < -10 * kCornerTolerance) return true;
+    }
+    return false;
   }
 
   const VertexInput& input_;

@@ -12,6 +12,8 @@ namespace {
 // Nodes deeper in the solid than this, in cells, need no value of the fluid: no lattice edge joins
 // them to the outside of a wall.
 constexpr float kMostDepth = 1.5F;
+// Limit of the coordinates of tiles.
+constexpr double kMostTiles = 1 << 30;
 
 Point OriginOf(const TileDirectory& directory, std::uint32_t tile) {
   return {static_cast<double>(std::int64_t{directory[tile].x} << kTileShift),
@@ -40,18 +42,18 @@ std::uint32_t BitsBelow(double end) {
   return end >= kTileSize ? ~std::uint32_t{0} : (std::uint32_t{1} << static_cast<int>(end)) - 1;
 }
 
-// The nodes of a tile in the solid of a wall. As WallLines::IsSolid, for all nodes at once.
-BitRows SolidNodes(const WallLines& lines, std::size_t wall, const Point& origin) {
+// The nodes of a tile in a solid. As WallLines::IsSolid, for all nodes at once.
+BitRows SolidNodes(const WallLines& lines, std::size_t solid, const Point& origin) {
   BitRows rows{};
-  const auto edges = lines.EdgesOf(wall);
+  const auto edges = lines.EdgesOfSolid(solid);
   if (edges.front().is_endless) {
     for (int node = 0; node < kTileNodes; ++node) {
       const Point at{origin.x + node % kTileSize, origin.y + node / kTileSize};
-      rows[node / kTileSize] |= std::uint32_t{lines.IsSolid(wall, at)} << node % kTileSize;
+      rows[node / kTileSize] |= std::uint32_t{lines.IsSolid(solid, at)} << node % kTileSize;
     }
     return rows;
   }
-  if (lines.IsTank(wall)) rows.fill(~std::uint32_t{0});
+  if (!lines.IsSolidInside(solid)) rows.fill(~std::uint32_t{0});
   for (const WallEdge& edge : edges) {
     const double low = std::min(edge.from.y, edge.to.y) - origin.y;
     const double high = std::max(edge.from.y, edge.to.y) - origin.y;
@@ -90,51 +92,93 @@ void MeasureDistances(const WallLines& lines, std::uint32_t edge, const Point& o
 
 }  // namespace
 
-void WallField::FindTiles(const std::vector<Wall>& walls, double cell_size,
-                          const TileDirectory& directory) {
-  // Half the diagonal of a tile.
-  constexpr double kRadius = kTileSize * .7072;
-  lines_.Build(walls, cell_size);
+// Pairs each line with the tiles that it is near to.
+void WallField::ListLines(const TileDirectory& directory) {
+  constexpr double kRadius = kTileSize * .7072;  // Half the diagonal of a tile.
+  constexpr double kMargin = kRadius + kMostHeight;
+  pairs_.clear();
+  const auto add_if_near = [&](std::uint32_t tile, std::uint32_t line) {
+    const Point origin = OriginOf(directory, tile);
+    const Point middle{origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
+    if (std::abs(lines_.NearestOn(line, middle).height) <= kMargin) pairs_.emplace_back(tile, line);
+  };
+  for (std::uint32_t line = 0; line < lines_.edges().size(); ++line) {
+    const WallEdge& edge = lines_.edges()[line];
+    const auto tile_of = [](double at) { return std::floor(at / kTileSize); };
+    const double left = tile_of(std::min(edge.from.x, edge.to.x) - kMostHeight);
+    const double right = tile_of(std::max(edge.from.x, edge.to.x) + kMostHeight);
+    const double low = tile_of(std::min(edge.from.y, edge.to.y) - kMostHeight);
+    const double high = tile_of(std::max(edge.from.y, edge.to.y) + kMostHeight);
+    // Long lines meet most tiles.
+    if (edge.is_endless ||
+        (right - left + 1) * (high - low + 1) >= static_cast<double>(directory.size())) {
+      for (std::uint32_t tile = 0; tile < directory.size(); ++tile) add_if_near(tile, line);
+      continue;
+    }
+    for (double y = low; y <= high; ++y) {
+      for (double x = left; x <= right; ++x) {
+        if (!(std::max(std::abs(x), std::abs(y)) < kMostTiles)) continue;
+        const std::uint32_t tile =
+            directory.Find({static_cast<std::int32_t>(y), static_cast<std::int32_t>(x)});
+        if (tile != kNoTile) add_if_near(tile, line);
+      }
+    }
+  }
+  std::ranges::sort(pairs_);
+}
+
+// Whether a tile without lines is solid: as the tile left of it, if that one has no lines either.
+bool WallField::IsSolidTile(const TileDirectory& directory, std::uint32_t tile) const {
+  const std::uint32_t left = directory.neighbours(tile)[3];
+  if (left < tile && (near_of_tile_[left] == kFluid || near_of_tile_[left] == kSolid)) {
+    return near_of_tile_[left] == kSolid;
+  }
+  const Point origin = OriginOf(directory, tile);
+  const Point middle{origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
+  for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
+    if (lines_.IsSolid(solid, middle)) return true;
+  }
+  return false;
+}
+
+void WallField::FindTiles(const std::vector<Wall>& walls, const Rings* particle_walls,
+                          double cell_size, const TileDirectory& directory) {
+  lines_.Build(walls, particle_walls, cell_size);
   near_of_tile_.assign(directory.size(), kFluid);
   near_.clear();
   edges_.clear();
-  const auto count = static_cast<std::uint32_t>(lines_.edges().size());
+  ListLines(directory);
+  std::size_t pair = 0;
   for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
-    const Point origin = OriginOf(directory, tile);
-    const Point middle{origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
-    const auto first = static_cast<std::uint32_t>(edges_.size());
-    for (std::uint32_t edge = 0; edge < count; ++edge) {
-      const double distance = std::abs(lines_.NearestOn(edge, middle).height);
-      if (distance <= kRadius + kMostHeight) edges_.push_back(edge);
-    }
-    if (edges_.size() > first) {
-      near_of_tile_[tile] = static_cast<std::uint32_t>(near_.size());
-      NearTile& near = near_.emplace_back();
-      near.tile = tile;
-      near.first = first;
-      near.last = static_cast<std::uint32_t>(edges_.size());
+    if (pair == pairs_.size() || pairs_[pair].first != tile) {
+      if (IsSolidTile(directory, tile)) near_of_tile_[tile] = kSolid;
       continue;
     }
-    for (std::size_t wall = 0; wall < lines_.WallCount(); ++wall) {
-      if (lines_.IsSolid(wall, middle)) near_of_tile_[tile] = kSolid;
+    near_of_tile_[tile] = static_cast<std::uint32_t>(near_.size());
+    NearTile& near = near_.emplace_back();
+    near.tile = tile;
+    near.first = static_cast<std::uint32_t>(edges_.size());
+    for (; pair < pairs_.size() && pairs_[pair].first == tile; ++pair) {
+      edges_.push_back(pairs_[pair].second);
     }
+    near.last = static_cast<std::uint32_t>(edges_.size());
   }
 }
 
-// The heights above each wall, of which the lowest counts.
+// The heights above each solid, of which the lowest counts.
 void WallField::MeasureHeights(const TileDirectory& directory, NearTile& near) const {
   const Point origin = OriginOf(directory, near.tile);
   const auto edges = std::span(edges_).subspan(near.first, near.last - near.first);
   near.height.fill(kMostHeight);
-  for (std::uint32_t wall = 0; wall < lines_.WallCount(); ++wall) {
+  for (std::uint32_t solid = 0; solid < lines_.SolidCount(); ++solid) {
     std::array<float, kTileNodes> distance;
     distance.fill(kMostHeight);
     for (const std::uint32_t edge : edges) {
-      if (lines_.edges()[edge].wall == wall) MeasureDistances(lines_, edge, origin, distance);
+      if (lines_.edges()[edge].solid == solid) MeasureDistances(lines_, edge, origin, distance);
     }
-    const BitRows solid = SolidNodes(lines_, wall, origin);
+    const BitRows nodes = SolidNodes(lines_, solid, origin);
     for (int node = 0; node < kTileNodes; ++node) {
-      const bool is_solid = (solid[node / kTileSize] >> (node % kTileSize) & 1) != 0;
+      const bool is_solid = (nodes[node / kTileSize] >> (node % kTileSize) & 1) != 0;
       near.height[node] = std::min(near.height[node], is_solid ? -distance[node] : distance[node]);
     }
   }
@@ -213,6 +257,11 @@ std::span<const std::uint32_t> WallField::EdgesNear(std::uint32_t tile) const {
   const std::uint32_t of = near_of_tile_[tile];
   if (of == kFluid || of == kSolid) return {};
   return std::span(edges_).subspan(near_[of].first, near_[of].last - near_[of].first);
+}
+
+NearestWall WallField::NearestOfSolid(std::uint32_t tile, std::size_t solid,
+                                      const Point& point) const {
+  return lines_.Nearest(EdgesNear(tile), point, solid);
 }
 
 NearestWall WallField::Nearest(std::uint32_t tile, const Point& point) const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "bins/lattice.h"
@@ -26,8 +27,10 @@ class WallField {
   /// particles.
   static constexpr double kReach = .5;
 
-  /// Finds the tiles near walls. Cost: linear in tiles times lines.
-  void FindTiles(const std::vector<Wall>& walls, double cell_size, const TileDirectory& directory);
+  /// Reads the walls (WallLines::Build) and finds the tiles near them. Cost: linear in tiles and
+  /// lines; linear in the lines for each tile beside tiles with lines.
+  void FindTiles(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+                 const TileDirectory& directory);
   std::size_t TileCount() const { return near_.size(); }
 
   /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the tiles
@@ -44,6 +47,8 @@ class WallField {
   /// The wall nearest to a point of a tile, given in cells from the origin of the world. Far away
   /// if no wall is within kMostHeight of it.
   NearestWall Nearest(std::uint32_t tile, const Point& point) const;
+  /// The same for one solid.
+  NearestWall NearestOfSolid(std::uint32_t tile, std::size_t solid, const Point& point) const;
   /// The lines near a tile.
   std::span<const std::uint32_t> EdgesNear(std::uint32_t tile) const;
 
@@ -56,6 +61,8 @@ class WallField {
     std::array<float, kTileNodes> height, fluid;
   };
 
+  void ListLines(const TileDirectory& directory);
+  bool IsSolidTile(const TileDirectory& directory, std::uint32_t tile) const;
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
   void ExtendFluid(const TileDirectory& directory, const LevelSet& level_set, double reach,
                    NearTile& near) const;
@@ -63,7 +70,8 @@ class WallField {
   WallLines lines_;
   std::vector<std::uint32_t> near_of_tile_;  // Index in near_, kFluid or kSolid.
   std::vector<NearTile> near_;
-  std::vector<std::uint32_t> edges_;
+  std::vector<std::uint32_t> edges_;                            // By near tile.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Scratch: tile, line.
 };
 
 }  // namespace partiemc

@@ -37,34 +37,53 @@ class Choice {
 
 }  // namespace
 
-void WallLines::Build(const std::vector<Wall>& walls, double cell_size) {
+template <typename PointOf>
+double WallLines::AddLoop(std::size_t count, double cell_size, PointOf at) {
+  Loop loop{.first = static_cast<std::uint32_t>(edges_.size())};
+  double area = 0;
+  const Point origin = at(0);
+  for (std::size_t k = 0; k < (count == 2 ? 1 : count); ++k) {
+    const Point a = at(k), b = at(k + 1 < count ? k + 1 : 0);
+    WallEdge edge{.from = {a.x / cell_size, a.y / cell_size},
+                  .to = {b.x / cell_size, b.y / cell_size}};
+    const Point along = Minus(edge.to, edge.from);
+    edge.length = std::sqrt(Dot(along, along));
+    edge.unit = {along.x / edge.length, along.y / edge.length};
+    edge.start = loop.perimeter;
+    edge.loop = static_cast<std::uint32_t>(loops_.size());
+    edge.solid = static_cast<std::uint32_t>(solids_.size() - 1);
+    edge.is_endless = count == 2;
+    loop.perimeter += edge.length;
+    area += Cross(Minus(a, origin), Minus(b, origin));
+    edges_.push_back(edge);
+    world_.insert(world_.end(), {a, b});
+  }
+  loop.last = static_cast<std::uint32_t>(edges_.size());
+  if (count == 2) loop.perimeter = 0;
+  loops_.push_back(loop);
+  solids_.back().last = loop.last;
+  return area;
+}
+
+void WallLines::Build(const std::vector<Wall>& walls, const Rings* particle_walls,
+                      double cell_size) {
   edges_.clear();
   world_.clear();
-  walls_.clear();
+  loops_.clear();
+  solids_.clear();
   for (const Wall& wall : walls) {
-    const std::size_t count = wall.points.size() / 2;
-    Lines& lines = walls_.emplace_back();
-    lines.first = static_cast<std::uint32_t>(edges_.size());
-    double area = 0;
-    const Point origin = PointAt(wall.points, 0);
-    for (std::size_t k = 0; k < (count == 2 ? 1 : count); ++k) {
-      const Point a = PointAt(wall.points, k), b = PointAt(wall.points, k + 1 < count ? k + 1 : 0);
-      WallEdge edge{.from = {a.x / cell_size, a.y / cell_size},
-                    .to = {b.x / cell_size, b.y / cell_size}};
-      const Point along = Minus(edge.to, edge.from);
-      edge.length = std::sqrt(Dot(along, along));
-      edge.unit = {along.x / edge.length, along.y / edge.length};
-      edge.start = lines.perimeter;
-      edge.wall = static_cast<std::uint32_t>(walls_.size() - 1);
-      edge.is_endless = count == 2;
-      lines.perimeter += edge.length;
-      area += Cross(Minus(a, origin), Minus(b, origin));
-      edges_.push_back(edge);
-      world_.insert(world_.end(), {a, b});
-    }
-    lines.last = static_cast<std::uint32_t>(edges_.size());
-    lines.is_tank = area > 0;
-    if (count == 2) lines.perimeter = 0;
+    solids_.push_back({.first = static_cast<std::uint32_t>(edges_.size())});
+    const double area = AddLoop(wall.points.size() / 2, cell_size,
+                                [&](std::size_t k) { return PointAt(wall.points, k); });
+    solids_.back().is_inside = area < 0;
+  }
+  if (particle_walls == nullptr || particle_walls->RingCount() == 0) return;
+  solids_.push_back({.first = static_cast<std::uint32_t>(edges_.size()), .is_inside = true});
+  for (std::size_t ring = 0; ring < particle_walls->RingCount(); ++ring) {
+    // Rings have the solid on their left.
+    const std::span<const double> points = particle_walls->RingPoints(ring);
+    const std::size_t count = points.size() / 2;
+    AddLoop(count, cell_size, [&](std::size_t k) { return PointAt(points, count - 1 - k); });
   }
 }
 
@@ -80,19 +99,19 @@ Point WallLines::InWorld(const WallPlace& place) const {
   return {a.x + place.share * (b.x - a.x), a.y + place.share * (b.y - a.y)};
 }
 
-double WallLines::Between(std::size_t wall, double from, double to) const {
-  const double perimeter = walls_[wall].perimeter;
+double WallLines::Between(std::size_t loop, double from, double to) const {
+  const double perimeter = loops_[loop].perimeter;
   return perimeter > 0 ? std::remainder(to - from, perimeter) : to - from;
 }
 
-WallPlace WallLines::PlaceAt(std::size_t wall, double along) const {
-  const Lines& lines = walls_[wall];
-  if (lines.perimeter == 0) return {lines.first, along / edges_[lines.first].length};
-  along -= std::floor(along / lines.perimeter) * lines.perimeter;
-  const auto of = EdgesOf(wall);
+WallPlace WallLines::PlaceAt(std::size_t loop, double along) const {
+  const auto [first, last, perimeter] = loops_[loop];
+  if (perimeter == 0) return {first, along / edges_[first].length};
+  along -= std::floor(along / perimeter) * perimeter;
+  const auto of = EdgesOfLoop(loop);
   const auto after = std::ranges::upper_bound(of, along, {}, &WallEdge::start);
   const auto k = static_cast<std::uint32_t>(std::max<std::ptrdiff_t>(after - of.begin(), 1) - 1);
-  return {lines.first + k, std::clamp((along - of[k].start) / of[k].length, 0.0, 1.0)};
+  return {first + k, std::clamp((along - of[k].start) / of[k].length, 0.0, 1.0)};
 }
 
 NearestWall WallLines::NearestOn(std::uint32_t edge, const Point& point) const {
@@ -112,16 +131,25 @@ NearestWall WallLines::Nearest(std::span<const std::uint32_t> edges, const Point
   return choice.best();
 }
 
-NearestWall WallLines::NearestOfWall(std::size_t wall, const Point& point) const {
+NearestWall WallLines::Nearest(std::span<const std::uint32_t> edges, const Point& point,
+                               std::size_t solid) const {
   Choice choice(*this);
-  for (std::uint32_t edge = walls_[wall].first; edge < walls_[wall].last; ++edge) {
+  for (const std::uint32_t edge : edges) {
+    if (edges_[edge].solid == solid) choice.Consider(edge, point);
+  }
+  return choice.best();
+}
+
+NearestWall WallLines::NearestOfLoop(std::size_t loop, const Point& point) const {
+  Choice choice(*this);
+  for (std::uint32_t edge = loops_[loop].first; edge < loops_[loop].last; ++edge) {
     choice.Consider(edge, point);
   }
   return choice.best();
 }
 
-bool WallLines::IsSolid(std::size_t wall, const Point& point) const {
-  const auto of = EdgesOf(wall);
+bool WallLines::IsSolid(std::size_t solid, const Point& point) const {
+  const auto of = EdgesOfSolid(solid);
   if (of.front().is_endless) return Cross(of[0].unit, Minus(point, of[0].from)) <= 0;
   bool is_inside = false;
   for (const WallEdge& edge : of) {
@@ -130,7 +158,7 @@ bool WallLines::IsSolid(std::size_t wall, const Point& point) const {
     const double x = edge.from.x + share * (edge.to.x - edge.from.x);
     if (point.x < x) is_inside = !is_inside;
   }
-  return is_inside != walls_[wall].is_tank;
+  return is_inside == solids_[solid].is_inside;
 }
 
 }  // namespace partiemc

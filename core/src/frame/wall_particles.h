@@ -1,0 +1,40 @@
+// Divides a frame into the particles of the fluid and those of walls.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "frame/particle_copy.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+class WallParticles {
+ public:
+  /// Divides a frame by ReconstructionParameters::wall_phases. Errors: INVALID_ARGUMENT if a frame
+  /// with particles lacks the attribute of the phases, or if this is not one whole number per
+  /// particle. Requires: CheckFrame has passed the frame. Cost: linear.
+  absl::Status Take(const Frame& frame, const ReconstructionParameters& parameters);
+
+  /// Views of this object. Neither has the attribute of the phases.
+  const Frame& fluid() const { return fluid_.frame; }
+  const Frame& walls() const { return walls_.frame; }
+
+ private:
+  struct Part {
+    std::vector<std::uint32_t> sources;
+    std::vector<double> positions;
+    std::vector<float> velocities;
+    ParticleCopy copy;
+    Frame frame;
+
+    void Take(const Frame& frame);
+  };
+
+  Part fluid_, walls_;
+  std::vector<Attribute> attributes_;
+};
+
+}  // namespace partiemc
