@@ -23,6 +23,7 @@
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "prepared_frame.h"
+#include "walls/wall_corners.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 
@@ -233,6 +234,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
                            memory, b, b.wall_state, b.wall_result);
     if (!status.ok()) return status;
     memory.Done();
+    SharpenCorners(b.wall_result.statistics.spacing, b.wall_corners, b.wall_result.rings);
     frame = b.wall_particles.fluid();
     wall_outlines = &b.wall_result.rings;
   }

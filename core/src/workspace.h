@@ -30,6 +30,7 @@
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
+#include "walls/wall_corners.h"
 #include "walls/wall_field.h"
 
 namespace partiemc {
@@ -62,6 +63,7 @@ struct Workspace::Buffers {
   WallParticles wall_particles;  // Empty unless particles of some phases are walls.
   NextState wall_state;          // The same. Nothing is kept.
   Result wall_result;
+  WallCornerScratch wall_corners;
   Crossings crossings;
   RingScratch ring_scratch;
   RingTopology topology;

@@ -1,0 +1,185 @@
+#include "walls/wall_corners.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+namespace partiemc {
+namespace {
+
+// The arms, in spacings from the point: beginning, and distance of the samples.
+constexpr double kBegin = 1.5, kStep = .5;
+constexpr std::size_t kSamples = 7;
+constexpr double kLength = kBegin + kStep * (kSamples - 1);
+// Least turn between the arms, radians, and the largest share of it by which an arm may bend.
+constexpr double kLeastTurn = .52, kMostBend = 1.0 / 7;
+// Farthest corner from the outline, in spacings.
+constexpr double kFarthest = 1.5;
+
+double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
+double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
+Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+double AngleBetween(const Point& a, const Point& b) {
+  return std::abs(std::atan2(Cross(a, b), Dot(a, b)));
+}
+
+using Arm = std::array<Point, kSamples>;
+
+struct Line {
+  Point at, direction;
+};
+
+// The line of least squares through the samples, in their direction.
+Line LineOf(std::span<const Point> samples) {
+  Point mean;
+  for (const Point& sample : samples) {
+    mean.x += sample.x / static_cast<double>(samples.size());
+    mean.y += sample.y / static_cast<double>(samples.size());
+  }
+  double xx = 0, xy = 0, yy = 0;
+  for (const Point& sample : samples) {
+    const Point from = Minus(sample, mean);
+    xx += from.x * from.x;
+    xy += from.x * from.y;
+    yy += from.y * from.y;
+  }
+  const double angle = std::atan2(2 * xy, xx - yy) / 2;
+  Point direction{std::cos(angle), std::sin(angle)};
+  if (Dot(direction, Minus(samples.back(), samples.front())) < 0) {
+    direction = {-direction.x, -direction.y};
+  }
+  return {mean, direction};
+}
+
+// A ring with the lengths up to its points.
+class Ring {
+ public:
+  Ring(std::span<const double> points, std::vector<double>& lengths)
+      : points_(points), lengths_(lengths) {
+    lengths_.clear();
+    double length = 0;
+    for (std::size_t k = 0; k < count(); ++k) {
+      lengths_.push_back(length);
+      const Point step = Minus(At(k + 1), At(k));
+      length += std::sqrt(Dot(step, step));
+    }
+    perimeter_ = length;
+  }
+
+  std::size_t count() const { return points_.size() / 2; }
+  double perimeter() const { return perimeter_; }
+  Point At(std::size_t k) const { return PointAt(points_, k % count()); }
+  // The length from one point to another, by the nearer way around.
+  double Between(std::size_t from, std::size_t to) const {
+    return std::remainder(lengths_[to] - lengths_[from], perimeter_);
+  }
+
+  Point AtLength(double length) const {
+    length -= std::floor(length / perimeter_) * perimeter_;
+    const auto after = std::ranges::upper_bound(lengths_, length);
+    const auto k =
+        static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - lengths_.begin(), 1)) - 1;
+    const double end = k + 1 < count() ? lengths_[k + 1] : perimeter_;
+    const double share = end > lengths_[k] ? (length - lengths_[k]) / (end - lengths_[k]) : 0;
+    const Point a = At(k), b = At(k + 1);
+    return {a.x + share * (b.x - a.x), a.y + share * (b.y - a.y)};
+  }
+
+  Arm ArmOf(std::size_t point, double h, int sign) const {
+    Arm arm;
+    for (std::size_t k = 0; k < kSamples; ++k) {
+      arm[k] = AtLength(lengths_[point] + sign * h * (kBegin + kStep * static_cast<double>(k)));
+    }
+    return arm;
+  }
+
+ private:
+  const std::span<const double> points_;
+  std::vector<double>& lengths_;
+  double perimeter_ = 0;
+};
+
+// Whether an arm bends too much to be straight beside a turn.
+bool IsBent(const Arm& arm, double turn) {
+  constexpr std::size_t kHalf = (kSamples + 1) / 2;
+  const Line near = LineOf(std::span(arm).first(kHalf));
+  const Line far = LineOf(std::span(arm).last(kHalf));
+  return AngleBetween(near.direction, far.direction) > kMostBend * turn;
+}
+
+std::optional<WallCornerScratch::Corner> CornerAt(const Ring& ring, std::size_t point, double h) {
+  const Arm before = ring.ArmOf(point, h, -1), after = ring.ArmOf(point, h, 1);
+  const Line a = LineOf(before), b = LineOf(after);
+  // Both directions lead away from the point.
+  const double turn = AngleBetween({-a.direction.x, -a.direction.y}, b.direction);
+  if (turn < kLeastTurn || IsBent(before, turn) || IsBent(after, turn)) return std::nullopt;
+  const double divisor = Cross(a.direction, b.direction);
+  if (divisor == 0) return std::nullopt;
+  const double along = Cross(Minus(b.at, a.at), b.direction) / divisor;
+  const Point at{a.at.x + along * a.direction.x, a.at.y + along * a.direction.y};
+  const Point from = Minus(at, ring.At(point));
+  const double distance = std::sqrt(Dot(from, from));
+  if (!(distance < kFarthest * h)) return std::nullopt;
+  return WallCornerScratch::Corner{static_cast<std::uint32_t>(point), at, distance};
+}
+
+// Keeps of corners that are nearer than an arm only the one nearest to the outline.
+void KeepNearest(const Ring& ring, double h, std::vector<WallCornerScratch::Corner>& corners) {
+  std::ranges::sort(corners, [](const auto& a, const auto& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.point < b.point;
+  });
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const bool is_near = std::ranges::any_of(std::span(corners).first(kept), [&](const auto& of) {
+      return std::abs(ring.Between(of.point, corners[k].point)) < 2 * kBegin * h;
+    });
+    if (!is_near) corners[kept++] = corners[k];
+  }
+  corners.resize(kept);
+  std::ranges::sort(corners, {}, &WallCornerScratch::Corner::point);
+}
+
+// Appends a ring with its corners.
+void AddRing(const Ring& ring, double h, const std::vector<WallCornerScratch::Corner>& corners,
+             std::vector<double>& points) {
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < ring.count(); ++k) {
+    bool is_rounded = false;
+    for (const WallCornerScratch::Corner& corner : corners) {
+      is_rounded |= std::abs(ring.Between(corner.point, k)) < kBegin * h;
+    }
+    if (next < corners.size() && corners[next].point == k) {
+      points.insert(points.end(), {corners[next].at.x, corners[next].at.y});
+      ++next;
+    }
+    if (is_rounded) continue;
+    points.insert(points.end(), {ring.At(k).x, ring.At(k).y});
+  }
+}
+
+}  // namespace
+
+void SharpenCorners(double spacing, WallCornerScratch& s, Rings& rings) {
+  s.points.clear();
+  s.offsets.assign(1, 0);
+  for (std::size_t of = 0; of < rings.RingCount(); ++of) {
+    const Ring ring(rings.RingPoints(of), s.lengths);
+    s.corners.clear();
+    // The arms of a short ring would meet.
+    if (ring.perimeter() > 2 * kLength * spacing) {
+      for (std::size_t k = 0; k < ring.count(); ++k) {
+        if (const auto corner = CornerAt(ring, k, spacing)) s.corners.push_back(*corner);
+      }
+      KeepNearest(ring, spacing, s.corners);
+    }
+    AddRing(ring, spacing, s.corners, s.points);
+    s.offsets.push_back(static_cast<std::uint32_t>(s.points.size() / 2));
+  }
+  std::swap(rings.points, s.points);
+  std::swap(rings.offsets, s.offsets);
+}
+
+}  // namespace partiemc

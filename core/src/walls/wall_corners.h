@@ -1,0 +1,32 @@
+// Sharpens the corners of the outlines of wall particles.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/point.h"
+#include "partiemc/result.h"
+
+namespace partiemc {
+
+/// Warm buffers of SharpenCorners.
+struct WallCornerScratch {
+  struct Corner {
+    std::uint32_t point;  // Of the ring: the middle of the rounded part.
+    Point at;
+    double distance;  // Of `at` from the point.
+  };
+  std::vector<double> lengths;  // Along the ring up to each point.
+  std::vector<Corner> corners;
+  std::vector<double> points;
+  std::vector<std::uint32_t> offsets;
+};
+
+/// The field rounds corners by about .8 h. Where a ring has straight arms on both sides, from 1.5
+/// to 4.5 h away, that differ by more than 30 degrees, the point where their lines meet replaces
+/// the points between the arms. Arms that bend by more than a seventh of the turn are part of a
+/// curve, which stays. Changes only the points and offsets of `rings`. `spacing`: h in world units.
+/// Cost: linear in the points, and logarithmic in those of a ring.
+void SharpenCorners(double spacing, WallCornerScratch& scratch, Rings& rings);
+
+}  // namespace partiemc
