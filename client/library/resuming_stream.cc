@@ -44,6 +44,9 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->boundary != requested.boundary) {
     return absl::UnimplementedError("the server does not support grains: use a newer one");
   }
+  if (parameters->walls != requested.walls) {
+    return absl::UnimplementedError("the server does not support walls: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

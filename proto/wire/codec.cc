@@ -11,6 +11,7 @@
 #include "common/printable.h"
 #include "partiemc/status.h"
 #include "wire/bytes.h"
+#include "wire/wall_codec.h"
 
 namespace partiemc::wire {
 namespace {
@@ -394,6 +395,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (!boundary) return UnknownEnum("parameters.boundary", message.boundary());
   const auto plane = FromWire(message.plane());
   if (!plane) return UnknownEnum("parameters.plane", message.plane());
+  auto walls = DecodeWalls(message);
+  if (!walls.ok()) return walls.status();
 
   ReconstructionParameters parameters;
   parameters.output = *output;
@@ -403,6 +406,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   parameters.sizes = *sizes;
   parameters.boundary = *boundary;
   parameters.plane = *plane;
+  parameters.walls = *std::move(walls);
   if (message.has_spacing()) parameters.spacing = message.spacing();
   if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
   if (message.has_cell_size()) parameters.cell_size = message.cell_size();
@@ -470,6 +474,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.noise_filter) message.set_noise_filter(*parameters.noise_filter);
   if (parameters.sizes == Sizes::kOwn) message.set_sizes(v1::SIZES_OWN);
   if (parameters.boundary == Boundary::kGrains) message.set_boundary(v1::BOUNDARY_GRAINS);
+  EncodeWalls(parameters.walls, message);
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

@@ -66,7 +66,8 @@ v1::Fill ToWire(Fill fill);
 v1::Doubt ToWire(Doubt doubt);
 
 /// Decodes parameters and fills in defaults. The core's Validate checks the values.
-/// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value.
+/// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value, or for more points of walls
+/// than kMaxWallPoints.
 absl::StatusOr<ReconstructionParameters> DecodeParameters(
     const v1::ReconstructionParameters& message);
 void EncodeParameters(const ReconstructionParameters& parameters,

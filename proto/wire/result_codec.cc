@@ -1,6 +1,9 @@
 // Encodes and decodes rings, mesh and statistics.
 #include <algorithm>
+#include <cmath>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -42,6 +45,9 @@ absl::Status EncodeRings(const Result& result, bool with_normals, v1::Reconstruc
   AssignBytes(std::span<const std::uint32_t>(result.rings.offsets), *rings.mutable_offsets());
   AssignBytes(std::span<const std::uint32_t>(result.rings.outer_of), *rings.mutable_outer_of());
   AssignBytes(std::span<const std::uint32_t>(result.rings.cuts), *rings.mutable_cuts());
+  AssignBytes(std::span<const std::uint32_t>(result.rings.wetted), *rings.mutable_wetted());
+  AssignBytes(std::span<const std::uint32_t>(result.rings.contacts), *rings.mutable_contacts());
+  AssignBytes(std::span<const float>(result.rings.contact_angles), *rings.mutable_contact_angles());
   EncodeMeasures(result.rings, rings);
   if (with_normals) {
     AssignBytes(std::span<const float>(result.rings.normals), *rings.mutable_normals());
@@ -125,12 +131,30 @@ absl::Status CheckNesting(std::span<const std::uint32_t> outer_of) {
   return absl::OkStatus();
 }
 
-absl::Status CheckCuts(std::span<const std::uint32_t> cuts, std::size_t points) {
-  for (std::size_t k = 0; k < cuts.size(); ++k) {
-    if (cuts[k] < points && (k == 0 || cuts[k - 1] < cuts[k])) continue;
-    return Lost("rings.cuts", absl::StrCat("must be ascending numbers of the ", points, " points"));
+// Decodes an ascending array of numbers of points.
+absl::Status DecodeChosenPoints(absl::string_view field, const std::string& bytes,
+                                std::size_t points, std::vector<std::uint32_t>& chosen) {
+  if (bytes.size() % sizeof(std::uint32_t) != 0) return Lost(field, "is no array of uint32");
+  CopyBytes(bytes, chosen);
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    if (chosen[k] < points && (k == 0 || chosen[k - 1] < chosen[k])) continue;
+    return Lost(field, absl::StrCat("must be ascending numbers of the ", points, " points"));
   }
   return absl::OkStatus();
+}
+
+absl::Status DecodeContacts(const v1::Rings& message, Rings& rings) {
+  auto status =
+      DecodeChosenPoints("rings.contacts", message.contacts(), rings.PointCount(), rings.contacts);
+  if (!status.ok()) return status;
+  if (message.contact_angles().size() != rings.contacts.size() * sizeof(float)) {
+    return Lost("rings.contact_angles", absl::StrCat("must have a float for each of the ",
+                                                     rings.contacts.size(), " contacts"));
+  }
+  CopyBytes(message.contact_angles(), rings.contact_angles);
+  const auto is_finite = [](float angle) { return std::isfinite(angle); };
+  if (std::ranges::all_of(rings.contact_angles, is_finite)) return absl::OkStatus();
+  return Lost("rings.contact_angles", "must be finite");
 }
 
 // Checks the number of elements of every array against the numbers of rings and points.
@@ -157,9 +181,6 @@ absl::Status CheckRingCounts(const v1::Rings& message, std::size_t points) {
     return Lost("rings.normals",
                 absl::StrCat("must have two floats for each of the ", points, " points"));
   }
-  if (message.cuts().size() % sizeof(std::uint32_t) != 0) {
-    return Lost("rings.cuts", "is no array of uint32");
-  }
   return absl::OkStatus();
 }
 
@@ -176,8 +197,12 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
   CopyBytes(from.outer_of(), rings.outer_of);
   if (auto status = CheckNesting(rings.outer_of); !status.ok()) return status;
   CopyBytes(from.normals(), rings.normals);
-  CopyBytes(from.cuts(), rings.cuts);
-  if (auto status = CheckCuts(rings.cuts, rings.PointCount()); !status.ok()) return status;
+  const std::size_t points = rings.PointCount();
+  auto status = DecodeChosenPoints("rings.cuts", from.cuts(), points, rings.cuts);
+  if (!status.ok()) return status;
+  status = DecodeChosenPoints("rings.wetted", from.wetted(), points, rings.wetted);
+  if (!status.ok()) return status;
+  if (status = DecodeContacts(from, rings); !status.ok()) return status;
 
   const auto identities = ViewBytes<std::uint64_t>(from.identities());
   rings.measures.resize(rings.RingCount());

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -80,6 +81,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.box = PeriodicBox{
       .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
   parameters.noise_filter = 0.375;
+  parameters.walls = {{.points = {0, 0, 1, 0}}, {.points = {0.1, -2, 3, 4, 5, 6.5}}};
   parameters.sizes = Sizes::kOwn;
   parameters.boundary = Boundary::kGrains;
   v1::ReconstructionParameters message;
@@ -112,6 +114,51 @@ TEST(Parameters, AnEnumOfALaterVersionIsRefusedByItsNameAndNumber) {
   EXPECT_EQ(violation.reason, kReasonUnsupported);
   EXPECT_EQ(violation.field, "parameters.fill");
   EXPECT_EQ(violation.value, "77");
+}
+
+// The core checks the coordinates, also an odd number of them.
+TEST(Parameters, WallsAreCopiedAsTheyAre) {
+  v1::ReconstructionParameters message;
+  message.add_walls();
+  for (const double coordinate : {1.0, std::nan(""), 3.0}) {
+    message.mutable_walls(0)->add_points(coordinate);
+  }
+  message.add_walls();
+  const auto decoded = DecodeParameters(message);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  ASSERT_EQ(decoded->walls.size(), 2u);
+  ASSERT_EQ(decoded->walls[0].points.size(), 3u);
+  EXPECT_EQ(decoded->walls[0].points[2], 3);
+  EXPECT_TRUE(decoded->walls[1].points.empty());
+  // Encoding into the same message replaces its walls.
+  EncodeParameters({.walls = {{.points = {1, 2, 3, 4}}}}, message);
+  ASSERT_EQ(message.walls_size(), 1);
+  EXPECT_EQ(message.walls(0).points_size(), 4);
+}
+
+TEST(Parameters, TooManyPointsOfWallsAreRefused) {
+  constexpr int kMost = ReconstructionParameters::kMaxWallPoints;
+  const auto refused_value = [](int walls, int coordinates) -> std::string {
+    v1::ReconstructionParameters message;
+    for (int k = 0; k < walls; ++k) {
+      v1::Wall& wall = *message.add_walls();
+      for (int i = 0; i < coordinates; ++i) wall.add_points(i);
+    }
+    const auto decoded = DecodeParameters(message);
+    if (decoded.ok()) return "";
+    EXPECT_EQ(decoded.status().code(), absl::StatusCode::kInvalidArgument);
+    const Violation violation = ViolationOf(decoded.status());
+    EXPECT_EQ(violation.reason, kReasonOutOfRange);
+    EXPECT_EQ(violation.field, "parameters.walls");
+    EXPECT_THAT(violation.rule, HasSubstr("1024 points"));
+    return violation.value;
+  };
+  EXPECT_EQ(refused_value(1, 2 * kMost), "");
+  EXPECT_EQ(refused_value(1, 2 * kMost + 1), "1025 points");
+  EXPECT_EQ(refused_value(4, kMost / 2), "");
+  EXPECT_EQ(refused_value(4, kMost / 2 + 2), "1028 points");
+  EXPECT_EQ(refused_value(kMost / 2, 4), "");
+  EXPECT_EQ(refused_value(kMost / 2 + 1, 0), "513 walls");
 }
 
 TEST(FrameMessage, AttributesAreChosenByName) {

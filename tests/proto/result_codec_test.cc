@@ -35,6 +35,9 @@ Result SquareWithHole() {
   result.rings.parent_offsets = {0, 2, 2};
   for (int i = 0; i < 8; ++i) result.rings.normals.insert(result.rings.normals.end(), {0.6f, 0.8f});
   result.rings.cuts = {1, 3};
+  result.rings.wetted = {0, 2, 5};
+  result.rings.contacts = {4, 7};
+  result.rings.contact_angles = {.5f, 2.25f};
   result.mesh.points = result.rings.points;
   result.mesh.points.insert(result.mesh.points.end(), {0.5, 0.5});
   result.mesh.triangles = {0, 1, 8, 0, 8, 3};
@@ -270,6 +273,20 @@ std::vector<Hostile> HostileChanges() {
       {"rings.cuts", [](M& m) { m.mutable_rings()->mutable_cuts()->append("12"); }},
       {"rings.cuts", [](M& m) { Put(*m.mutable_rings()->mutable_cuts(), 1, 8u); }},
       {"rings.cuts", [](M& m) { Put(*m.mutable_rings()->mutable_cuts(), 1, 1u); }},
+      {"rings.wetted", [](M& m) { m.mutable_rings()->mutable_wetted()->append("1"); }},
+      {"rings.wetted", [](M& m) { Put(*m.mutable_rings()->mutable_wetted(), 2, 8u); }},
+      {"rings.wetted", [](M& m) { Put(*m.mutable_rings()->mutable_wetted(), 0, 2u); }},
+      {"rings.contacts", [](M& m) { m.mutable_rings()->mutable_contacts()->append("123"); }},
+      {"rings.contacts", [](M& m) { Put(*m.mutable_rings()->mutable_contacts(), 1, 8u); }},
+      {"rings.contacts", [](M& m) { Put(*m.mutable_rings()->mutable_contacts(), 1, 3u); }},
+      {"rings.contact_angles", [](M& m) { m.mutable_rings()->mutable_contacts()->resize(4); }},
+      {"rings.contact_angles", [](M& m) { m.mutable_rings()->clear_contact_angles(); }},
+      {"rings.contact_angles",
+       [](M& m) { m.mutable_rings()->mutable_contact_angles()->append("12"); }},
+      {"rings.contact_angles",
+       [=](M& m) {
+         Put(*m.mutable_rings()->mutable_contact_angles(), 1, static_cast<float>(kNan));
+       }},
       {"rings.identities", [](M& m) { m.mutable_rings()->mutable_identities()->resize(8); }},
       {"rings.measures", [](M& m) { m.mutable_rings()->mutable_measures()->RemoveLast(); }},
       {"rings.measures", [](M& m) { m.mutable_rings()->add_measures(); }},
@@ -305,11 +322,17 @@ TEST(HostileAnswer, RandomBytesInAnyArrayNeverReachPastAnother) {
   int accepted = 0;
   for (int round = 0; round < 20'000; ++round) {
     v1::ReconstructedFrame message = good;
-    std::string* const arrays[] = {
-        message.mutable_rings()->mutable_points(),   message.mutable_rings()->mutable_offsets(),
-        message.mutable_rings()->mutable_outer_of(), message.mutable_rings()->mutable_normals(),
-        message.mutable_mesh()->mutable_points(),    message.mutable_mesh()->mutable_triangles(),
-        message.mutable_mesh()->mutable_classes()};
+    std::string* const arrays[] = {message.mutable_rings()->mutable_points(),
+                                   message.mutable_rings()->mutable_offsets(),
+                                   message.mutable_rings()->mutable_outer_of(),
+                                   message.mutable_rings()->mutable_normals(),
+                                   message.mutable_mesh()->mutable_points(),
+                                   message.mutable_mesh()->mutable_triangles(),
+                                   message.mutable_mesh()->mutable_classes(),
+                                   message.mutable_rings()->mutable_cuts(),
+                                   message.mutable_rings()->mutable_wetted(),
+                                   message.mutable_rings()->mutable_contacts(),
+                                   message.mutable_rings()->mutable_contact_angles()};
     std::string& bytes = *arrays[random() % std::size(arrays)];
     if (random() % 2 == 0) {
       bytes.resize(random() % (2 * bytes.size() + 1));
@@ -324,6 +347,10 @@ TEST(HostileAnswer, RandomBytesInAnyArrayNeverReachPastAnother) {
       ASSERT_LE(rings.offsets[k + 1], rings.PointCount());
       ASSERT_GE(rings.RingPoints(k).size(), 6u);
     }
+    for (const auto* chosen : {&rings.cuts, &rings.wetted, &rings.contacts}) {
+      for (const std::uint32_t index : *chosen) ASSERT_LT(index, rings.PointCount());
+    }
+    ASSERT_EQ(rings.contact_angles.size(), rings.contacts.size());
     for (const std::uint32_t index : frame.result.mesh.triangles) {
       ASSERT_LT(index, frame.result.mesh.PointCount());
     }

@@ -42,7 +42,7 @@ void MemoryReplica::Open(const std::string& name, const std::string& token,
   const auto opened = registry_.Open(*stream.machine,
                                      {.name = name,
                                       .labels = {{"made", "here"}},
-                                      .parameters = {},
+                                      .parameters = {.walls = {{.points = {0, 0, 1, 0}}}},
                                       .broadcaster = stream.broadcaster,
                                       .next_sequence = next_sequence},
                                      token);

@@ -90,13 +90,16 @@ TEST_F(RelayTest, TheNewestComesAtOnceAndThenEveryOther) {
   ExpectAll(watcher->seen(), 5, 50);
 }
 
-TEST_F(RelayTest, BytesLabelsAndLineageAreThoseOfTheReplicaThatHasIt) {
+TEST_F(RelayTest, BytesLabelsParametersAndLineageAreThoseOfTheReplicaThatHasIt) {
   constexpr std::size_t kLarge = 900'000;  // More than one piece.
   has_.Publish("dam", 1, kLarge);
   const auto found = shows_.Find("dam");
   ASSERT_TRUE(found.ok()) << found.status();
   EXPECT_EQ(found->stream.lineage(), LineageOf(token_));
   EXPECT_EQ(found->stream.summary().labels().at("made"), "here");
+  const auto& walls = found->stream.summary().parameters().walls();
+  ASSERT_EQ(walls.size(), 1);
+  EXPECT_THAT(walls[0].points(), ElementsAre(0, 0, 1, 0));
   const Published newest = found->broadcaster->Newest();
   ASSERT_NE(newest.frame, nullptr);
   EXPECT_EQ(newest.sequence, 1u);

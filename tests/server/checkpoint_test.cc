@@ -148,7 +148,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(20, BlobParameters());
+  std::vector<ReconstructionParameters> others(23, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -170,6 +170,9 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[18].sections = {{.phase = 2}};
   others[19].sizes = Sizes::kOwn;
   others[19].boundary = Boundary::kGrains;
+  others[20].walls = {{.points = {0, -100, 1, -100}}};
+  others[21].walls = {{.points = {0, -100, 1, -100}}, {.points = {1, 100, 0, 100}}};
+  others[22].walls = {{.points = {-100, -100, 100, -100, 0, 100}}};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

@@ -116,6 +116,10 @@ TEST_F(CallRefused, OUT_OF_RANGE) {
   auto open = OpenRequest();
   open.mutable_open()->mutable_parameters()->set_kernel_radius(20);
   ExpectOfOpen(open, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
+  auto walls = OpenRequest();
+  v1::Wall& wall = *walls.mutable_open()->mutable_parameters()->add_walls();
+  for (int k = 0; k < 2050; ++k) wall.add_points(k);
+  ExpectOfOpen(walls, StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE");
   // These outputs require others that are off.
   auto normals = OpenRequest();
   normals.mutable_open()->mutable_outputs()->set_normals(true);

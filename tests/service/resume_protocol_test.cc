@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -13,10 +14,12 @@
 #include "service/captured_log.h"
 #include "service/service_testing.h"
 #include "support/temporary_folder.h"
+#include "wire/codec.h"
 
 namespace partiemc::server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr unsigned kSeed = 7;
@@ -171,6 +174,70 @@ TEST_P(ResumeProtocol, ANoiseFilterGoesOnAndGivesTheDigestsOfThisProcess) {
     checkpoint = answer.checkpoint();
   }
   ExpectMismatch(Resume(checkpoint, token), "other parameters");
+}
+
+// A column of particles in the corner of a tank; the right side moves.
+TEST_P(ResumeProtocol, WallsGoOnAndGiveTheDigestsOfThisProcess) {
+  ReconstructionParameters parameters = BlobParameters();
+  parameters.walls = {{.points = {0, 0, 2, 0, 2, 2, 0, 2}}};
+  const auto with_walls = [&](v1::ReconstructRequest open) {
+    wire::EncodeParameters(parameters, *open.mutable_open()->mutable_parameters());
+    return open;
+  };
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+  State state;
+  Workspace workspace;
+  Result result;
+  std::string token, checkpoint;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    std::vector<double> positions;
+    for (int i = 0; i < 400; ++i) {
+      const double stretch = 1 + .01 * static_cast<double>(k);
+      positions.push_back(kBlobSpacing * (i % 20 + .5) * stretch);
+      positions.push_back(kBlobSpacing * (static_cast<double>(i / 20) + .5) / stretch);
+    }
+    const Frame frame{.positions = std::span<const double>(positions)};
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, state, workspace, result).ok());
+    StreamClient client(channel_);
+    const auto opened = client.SendAndReceive(
+        with_walls(k == 0 ? OpenWithCheckpoints(1) : Resume(checkpoint, token)));
+    ASSERT_TRUE(opened.has_opened());
+    EXPECT_THAT(opened.opened().parameters().walls(0).points(),
+                ElementsAre(0, 0, 2, 0, 2, 2, 0, 2));
+    token = opened.opened().stream_token();
+    v1::ReconstructRequest request;
+    wire::EncodeFrame(frame, *request.mutable_frame());
+    request.mutable_frame()->set_sequence(k + 1);
+    const auto answer = client.SendAndReceive(request);
+    ASSERT_TRUE(answer.has_frame());
+    wire::ReconstructedFrame received;
+    ASSERT_TRUE(wire::DecodeResult(answer.frame(), received).ok());
+    EXPECT_EQ(received.rings_digest, DigestRings(result.rings));
+    EXPECT_FALSE(received.result.rings.wetted.empty());
+    EXPECT_EQ(received.result.rings.wetted, result.rings.wetted);
+    EXPECT_EQ(received.result.rings.contacts.size(), 2u);
+    EXPECT_EQ(received.result.rings.contacts, result.rings.contacts);
+    EXPECT_EQ(received.result.rings.contact_angles, result.rings.contact_angles);
+    checkpoint = answer.checkpoint();
+  }
+  parameters.walls[0].points[2] = 3;
+  ExpectMismatch(with_walls(Resume(checkpoint, token)), "other parameters");
+}
+
+TEST_P(ResumeProtocol, WrongWallsAreRefused) {
+  for (const std::vector<double>& points :
+       {std::vector<double>{}, {0, 0, 1}, {0, 0, 1, std::nan("")}, {0, 0, 1, 0, 1}}) {
+    auto open = OpenWithCheckpoints(1);
+    v1::Wall& wall = *open.mutable_open()->mutable_parameters()->add_walls();
+    wall.mutable_points()->Assign(points.begin(), points.end());
+    StreamClient client(channel_);
+    client.Send(open);
+    client.HalfClose();
+    const grpc::Status status = client.Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(status.error_message(), HasSubstr("parameters.walls[0].points"));
+  }
 }
 
 TEST_P(ResumeProtocol, SectionsGoOnToo) {

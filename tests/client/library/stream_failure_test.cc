@@ -291,6 +291,11 @@ TEST(StreamFailure, ServersThatIgnoreAParameterAreRefused) {
   ExpectRefused(
       {.sizes = Sizes::kOwn, .boundary = Boundary::kGrains}, [](Message& m) { m.clear_boundary(); },
       "grains");
+  const std::vector<Wall> walls = {{.points = {0, 0, 1, 0}}};
+  ExpectRefused(
+      {.walls = walls}, [](Message& m) { m.clear_walls(); }, "walls");
+  ExpectRefused(
+      {.walls = walls}, [](Message& m) { m.mutable_walls(0)->set_points(1, 2); }, "walls");
 }
 
 }  // namespace

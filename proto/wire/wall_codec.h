@@ -1,0 +1,21 @@
+// Encodes and decodes walls (v1::Wall).
+#pragma once
+
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "partiemc/parameters.h"
+#include "partiemc/v1/reconstruction.pb.h"
+
+namespace partiemc::wire {
+
+/// Copies the walls of a message. The core's Validate checks the coordinates. Counts the walls and
+/// their points before it copies any.
+/// Errors: INVALID_ARGUMENT with a Violation for more than kMaxWallPoints points together, or for
+/// more walls than these points can make.
+absl::StatusOr<std::vector<Wall>> DecodeWalls(const v1::ReconstructionParameters& message);
+
+/// Adds walls to `message`, which has none.
+void EncodeWalls(const std::vector<Wall>& walls, v1::ReconstructionParameters& message);
+
+}  // namespace partiemc::wire
