@@ -59,6 +59,8 @@ std::string AsFlag(const absl::Status& status) {
   // Removes the prefix "sections[K].": a user of --slice and --isolines does not know the index K.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   if (line.starts_with("surface.")) line.erase(0, line.find('.') + 1);
+  // "walls[K]" and its members: the K-th --wall.
+  if (line.starts_with("walls")) line.replace(0, std::min(line.find(':'), line.size()), "wall");
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
         std::pair("phase:", "phases:"), std::pair("min_component_volume:", "min-volume:")}) {

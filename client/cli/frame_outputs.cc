@@ -46,7 +46,8 @@ std::string_view FormatOf(const FrameOutputs::Places& places) {
 }
 
 StatisticsOf StatisticsFor(const FrameOutputs::Places& places) {
-  return places.surface ? StatisticsOf::kSurfaces : StatisticsOf::kOutlines;
+  if (places.surface) return StatisticsOf::kSurfaces;
+  return places.walls ? StatisticsOf::kOutlinesAtWalls : StatisticsOf::kOutlines;
 }
 
 absl::Status CheckSurfaces(const FrameOutputs::Places& places,
@@ -76,7 +77,8 @@ absl::Status FrameOutputs::Check(const Places& places) {
   if (places.compress_glb && std::ranges::count(formats, FrameFormat::kGlb) == 0) {
     return absl::InvalidArgumentError("--compress-glb: requires --output-dir and --format glb");
   }
-  if (auto gauges = ParseGauges(places.gauges); !gauges.ok()) return gauges.status();
+  const StatisticsOf what = StatisticsFor(places);
+  if (auto gauges = ParseGauges(places.gauges, what); !gauges.ok()) return gauges.status();
   if (!places.stats.empty()) {
     auto status = StatisticsWriter::CheckExtension(places.stats);
     if (!status.ok()) return status;
@@ -98,8 +100,9 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
     outputs.frames_ = *std::move(frames);
   }
   if (!places.stats.empty()) {
+    const StatisticsOf what = StatisticsFor(places);
     auto statistics =
-        StatisticsWriter::Create(places.stats, *ParseGauges(places.gauges), StatisticsFor(places));
+        StatisticsWriter::Create(places.stats, *ParseGauges(places.gauges, what), what);
     if (!statistics.ok()) return statistics.status();
     outputs.statistics_.emplace(*std::move(statistics));
   }

@@ -35,6 +35,7 @@ class FrameOutputs {
     std::string stats, color_by;
     bool compress_glb = false;
     bool surface = false;  ///< The frames are surfaces in space.
+    bool walls = false;    ///< The stream has walls.
     std::vector<std::string> gauges = {};
   };
 

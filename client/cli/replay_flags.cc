@@ -226,6 +226,15 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->type_name("W")
       ->group(kGroup);
   app.add_option(
+         "--wall", flags.walls,
+         "Wall at which the outline is cut, by its points in world units, with the fluid on "
+         "its left. Two points: an endless line; 0,0,1,0 is the floor y = 0. More points: a "
+         "closed polygon, a tank if counter-clockwise, an obstacle if clockwise. Repeat for "
+         "more walls")
+      ->type_name("X0,Y0,X1,Y1,...")
+      ->allow_extra_args(false)
+      ->group(kGroup);
+  app.add_option(
          "--slice", flags.slices,
          "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "
          "more planes")

@@ -122,6 +122,18 @@ absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& param
   return absl::OkStatus();
 }
 
+// Parses each --wall. The core's Validate checks what the points form.
+absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parameters) {
+  for (const std::string& text : flags.walls) {
+    const std::vector<double> points = Numbers(text);
+    if (points.size() < 4 || points.size() % 2 != 0) {
+      return WrongFlag("--wall", text, "X0,Y0,X1,Y1,...: two points or more");
+    }
+    parameters.walls.push_back({points});
+  }
+  return absl::OkStatus();
+}
+
 // Makes the first slice the stream's slice, unless the stream has a surface. Adds a section for the
 // outline of each other slice.
 // Adds sections for the isolines of every slice; without slices, for the isolines of the stream.
@@ -208,6 +220,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   }
   if (auto status = AddSections(flags, parameters); !status.ok()) return status;
   if (auto status = AddPhases(flags, parameters); !status.ok()) return status;
+  if (auto status = AddWalls(flags, parameters); !status.ok()) return status;
   if (auto status = SetBox(flags, box, parameters); !status.ok()) return status;
   if (flags.clean == "on" || flags.clean == "off") {
     parameters.clean = flags.clean == "on";

@@ -23,13 +23,7 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
 
 // The value of --slice.
 std::string TextOf(const SlicePlane& slice) {
-  std::string text;
-  for (const auto& vector : {slice.origin, slice.normal}) {
-    for (const double number : vector) {
-      AppendAll(text, text.empty() ? "" : ",", ShortestNumber(number));
-    }
-  }
-  return text;
+  return Concat(NumberList(slice.origin), ",", NumberList(slice.normal));
 }
 
 }  // namespace
@@ -87,6 +81,7 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   if (parameters.noise_filter) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
+  for (const Wall& wall : parameters.walls) AppendAll(flags, " --wall ", NumberList(wall.points));
   std::string isovalues;  // A recording has no phases, so it gives the outline of all particles.
   for (const Section& section : parameters.sections) {
     // Every slice has the same isolines.

@@ -330,6 +330,7 @@ int Watch(const WatchFlags& flags) {
     return ComplainOfServer(watcher.status());
   }
   places.surface = (*watcher)->stream().parameters.output == Output::kSurface;
+  places.walls = !(*watcher)->stream().parameters.walls.empty();
   auto outputs = FrameOutputs::Create(places);
   if (!outputs.ok()) {
     progress.reset();

@@ -27,7 +27,7 @@ enum class FrameFormat : std::uint8_t {
   /// unchanged.
   kGeoJson,
   /// A picture of mesh edges, outline and particles. The y axis points up. The longer side has 1000
-  /// units; coordinates are rounded to 0.001.
+  /// units; coordinates are rounded to 0.001. Dots mark the points where the outline meets a wall.
   kSvg,
   /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
   /// polylines). Indices begin at 1.
@@ -36,13 +36,16 @@ enum class FrameFormat : std::uint8_t {
   kObj,
   /// VTK XML PolyData, only in builds with VTK: rings as closed lines, triangles as polygons. Cell
   /// data: "class" (0 boundary and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for
-  /// triangles). Point data: the attributes. Field data: TimeValue.
+  /// triangles). Point data: the attributes; for an outline that touches a wall also `wetted` and
+  /// `contact_angle` (see kCsv; NaN where no outline meets a wall). Field data: TimeValue.
   /// A surface: triangles as polygons. Cell data: "shell" and "body". Point data also has the
   /// normals.
   kVtp,
   /// CSV with one row per vertex of the rings and the columns ring,index,x,y,nx,ny. Without normals
   /// nx and ny are empty. Then follows a column for each attribute, or NAME:0, NAME:1 and NAME:2
-  /// for a vector.
+  /// for a vector. An outline that touches a wall has two more columns: `wetted`, 1 if the segment
+  /// to the next vertex lies on a wall, and `contact_angle`, in degrees, empty where no outline
+  /// meets a wall.
   kCsv,
   /// Binary PLY: the mesh with its attributes (NAME_0, NAME_1 and NAME_2 for a vector). Without a
   /// mesh, the rings as edges.

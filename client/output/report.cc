@@ -252,6 +252,9 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     if (section.phase) AppendAll(text, "phase ", *section.phase);
     lines.emplace_back(Concat("section ", k + 1), std::move(text));
   }
+  for (std::size_t k = 0; k < parameters.walls.size(); ++k) {
+    lines.emplace_back(Concat("wall ", k + 1), NumberList(parameters.walls[k].points));
+  }
   if (parameters.attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     lines.emplace_back("attribute tolerance", ShortestNumber(parameters.attribute_tolerance));
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <set>
 #include <string>
 #include <utility>
@@ -29,7 +31,6 @@ constexpr std::array<std::string_view, 11> kAfterStages = {"perimeter",
                                                            "time",
                                                            "doubts",
                                                            "section"};
-constexpr std::size_t kColumnCount = kBeforeStages.size() + kStageCount + kAfterStages.size();
 
 constexpr std::array<std::string_view, 16> kOfSurfaces = {"frame",
                                                           "particles",
@@ -48,9 +49,15 @@ constexpr std::array<std::string_view, 16> kOfSurfaces = {"frame",
                                                           "time",
                                                           "doubts"};
 
+constexpr std::array<std::string_view, 3> kAtWalls = {"wetted_length", "contacts", "contact_angle"};
+
 // "vertices" is the name of a count and of a stage, so the columns of stages have the suffix "_ms".
 constexpr std::string_view kStageSuffix = "_ms";
 
+constexpr std::size_t kColumnCount =
+    kBeforeStages.size() + kStageCount + kAfterStages.size() + kAtWalls.size();
+
+// The columns of outlines at walls. Outlines without walls have the same without the last.
 const std::array<std::string_view, kColumnCount>& Columns() {
   static const std::array<std::string, kStageCount> stages = [] {
     std::array<std::string, kStageCount> names;
@@ -61,7 +68,8 @@ const std::array<std::string_view, kColumnCount>& Columns() {
     std::array<std::string_view, kColumnCount> all;
     auto next = std::copy(kBeforeStages.begin(), kBeforeStages.end(), all.begin());
     next = std::copy(stages.begin(), stages.end(), next);
-    std::copy(kAfterStages.begin(), kAfterStages.end(), next);
+    next = std::copy(kAfterStages.begin(), kAfterStages.end(), next);
+    std::copy(kAtWalls.begin(), kAtWalls.end(), next);
     return all;
   }();
   return columns;
@@ -75,6 +83,25 @@ void AppendColumns(const Gauge& gauge, std::vector<std::string>& columns) {
   }
 }
 
+double WettedLength(const Rings& rings) {
+  double length = 0;
+  std::size_t ring = 0;
+  for (const std::uint32_t point : rings.wetted) {
+    while (rings.offsets[ring + 1] <= point) ++ring;
+    const std::size_t next = point + 1 < rings.offsets[ring + 1] ? point + 1 : rings.offsets[ring];
+    length += std::hypot(rings.points[2 * next] - rings.points[2 * std::size_t{point}],
+                         rings.points[2 * next + 1] - rings.points[2 * std::size_t{point} + 1]);
+  }
+  return length;
+}
+
+// In degrees; NaN without contacts.
+double MeanContactAngle(const Rings& rings) {
+  double sum = 0;
+  for (const float angle : rings.contact_angles) sum += angle;
+  return sum / static_cast<double>(rings.contact_angles.size()) * (180 / std::numbers::pi);
+}
+
 /// A line of CSV.
 template <typename Values>
 std::string CsvLine(const Values& values) {
@@ -86,12 +113,15 @@ std::string CsvLine(const Values& values) {
 /// The values of a frame as text, in the order of the columns.
 class Row {
  public:
-  Row(const FrameRecord& frame, std::span<const Gauge> gauges, bool json) : json_(json) {
-    if (frame.surface) {
+  Row(const FrameRecord& frame, std::span<const Gauge> gauges, StatisticsOf what, bool json)
+      : json_(json) {
+    if (what == StatisticsOf::kSurfaces) {
       AddSurface(frame);
-    } else {
-      AddOutline(frame, gauges);
+      return;
     }
+    AddOutline(frame);
+    if (what == StatisticsOf::kOutlinesAtWalls) AddWalls(frame.result.rings);
+    AddGauges(frame, gauges);
   }
 
   std::string Csv() const { return CsvLine(values_); }
@@ -106,7 +136,7 @@ class Row {
   }
 
  private:
-  void AddOutline(const FrameRecord& frame, std::span<const Gauge> gauges) {
+  void AddOutline(const FrameRecord& frame) {
     const FrameStatistics& statistics = frame.result.statistics;
     Number(frame.index);
     Number(statistics.particles);
@@ -128,6 +158,15 @@ class Row {
     Number(frame.time);
     Words(DoubtsText(statistics.doubts));
     Number(frame.section);
+  }
+
+  void AddWalls(const Rings& rings) {
+    Number(WettedLength(rings));
+    Number(rings.contacts.size());
+    Number(MeanContactAngle(rings));
+  }
+
+  void AddGauges(const FrameRecord& frame, std::span<const Gauge> gauges) {
     const Discs discs{frame.particles, frame.particle_areas};
     for (const Gauge& gauge : gauges) {
       for (const double value : Measure(gauge, frame.result, discs)) Number(value);
@@ -182,12 +221,16 @@ std::string ExtensionOf(const std::filesystem::path& path) {
 
 std::span<const std::string_view> StatisticsColumns(StatisticsOf what) {
   if (what == StatisticsOf::kSurfaces) return kOfSurfaces;
-  return Columns();
+  const std::span<const std::string_view> columns = Columns();
+  return what == StatisticsOf::kOutlinesAtWalls ? columns
+                                                : columns.first(columns.size() - kAtWalls.size());
 }
 
-absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts) {
+absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts,
+                                               StatisticsOf what) {
   std::vector<Gauge> gauges;
-  std::set<std::string> used(Columns().begin(), Columns().end());
+  const std::span<const std::string_view> columns_of = StatisticsColumns(what);
+  std::set<std::string> used(columns_of.begin(), columns_of.end());
   for (const std::string& text : texts) {
     absl::StatusOr<Gauge> gauge = ParseGauge(text);
     if (!gauge.ok()) return gauge.status();
@@ -255,7 +298,7 @@ absl::Status StatisticsWriter::Add(const FrameRecord& frame) {
 }
 
 absl::Status StatisticsWriter::AddRow(const FrameRecord& frame) {
-  const Row row(frame, gauges_, json_);
+  const Row row(frame, gauges_, what_, json_);
   const bool first = std::exchange(empty_, false);
   return file_.Append(json_ ? Concat(first ? "\n" : ",\n", row.Json(columns_)) : row.Csv());
 }

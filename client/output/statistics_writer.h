@@ -18,7 +18,11 @@
 namespace partiemc::client {
 
 /// The kind of frames in a file.
-enum class StatisticsOf : std::uint8_t { kOutlines, kSurfaces };
+enum class StatisticsOf : std::uint8_t {
+  kOutlines,
+  kOutlinesAtWalls,  ///< Of a stream with ReconstructionParameters::walls.
+  kSurfaces
+};
 
 /// The columns of outlines in order: frame, particles, polylines, vertices, triangles_grid,
 /// triangles, area, milliseconds; one column of milliseconds per stage, "bins_ms" to
@@ -32,6 +36,10 @@ enum class StatisticsOf : std::uint8_t { kOutlines, kSurfaces };
 /// digits. Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts
 /// rings, `vertices` their vertices.
 ///
+/// Outlines at walls have these columns after `section`: wetted_length, the length of the outline
+/// that lies on walls; contacts, the number of points where the outline meets a wall; and
+/// contact_angle, the mean angle of the fluid at these points, in degrees ("nan" without contacts).
+///
 /// The columns of surfaces in order: frame, particles, bodies, cavities, points, triangles, genus,
 /// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, surface_digest,
 /// time, doubts. Sections of a surface have no rows.
@@ -41,9 +49,10 @@ enum class StatisticsOf : std::uint8_t { kOutlines, kSurfaces };
 /// cavities. `area` is the sum over bodies and cavities.
 std::span<const std::string_view> StatisticsColumns(StatisticsOf what = StatisticsOf::kOutlines);
 
-/// Parses gauges. Checks that their columns differ from each other and from the columns of
-/// outlines. Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
-absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts);
+/// Parses gauges. Checks that their columns differ from each other and from the columns of `what`.
+/// Errors: as ParseGauge; INVALID_ARGUMENT for a column that exists already.
+absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& texts,
+                                               StatisticsOf what = StatisticsOf::kOutlines);
 
 /// Writes CSV with a header line, or a JSON array with one object per row, in which non-finite
 /// numbers are null. Rows are written at once; the file appears with Finish.

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <concepts>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -17,6 +18,16 @@ requires(std::integral<Number> || std::floating_point<Number>) void AppendNumber
                                                                                  Number value) {
   char buffer[32];
   out.append(buffer, std::to_chars(buffer, buffer + sizeof(buffer), value).ptr);
+}
+
+/// "0,0.5,10": numbers by AppendNumber.
+inline std::string NumberList(std::span<const double> numbers) {
+  std::string out;
+  for (const double number : numbers) {
+    if (!out.empty()) out += ',';
+    AppendNumber(out, number);
+  }
+  return out;
 }
 
 /// Appends text and numbers, numbers by AppendNumber. (absl::StrCat rounds to six digits, and does

@@ -14,6 +14,7 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                       .color_by = flags.color_by,
                                       .compress_glb = flags.compress_glb,
                                       .surface = flags.surface,
+                                      .walls = !flags.walls.empty(),
                                       .gauges = flags.gauges});
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));

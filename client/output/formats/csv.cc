@@ -1,4 +1,7 @@
+#include <cmath>
+
 #include "client/output/formats/formats.h"
+#include "client/output/formats/wall_values.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {
@@ -28,6 +31,8 @@ std::string EncodeCsv(const FrameRecord& frame) {
   for (const AttributeValues& attribute : frame.result.attributes) {
     AppendAttributeNames(out, attribute);
   }
+  const WallValues walls = WallValuesOf(rings);
+  if (!walls.wetted.empty()) out += ",wetted,contact_angle";
   out += '\n';
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
@@ -44,6 +49,10 @@ std::string EncodeCsv(const FrameRecord& frame) {
         for (std::size_t c = 0; c < components; ++c) {
           AppendAll(out, ",", attribute.values[components * k + c]);
         }
+      }
+      if (!walls.wetted.empty()) {
+        AppendAll(out, walls.wetted[k] != 0 ? ",1," : ",0,");
+        if (std::isfinite(walls.contact_angles[k])) AppendNumber(out, walls.contact_angles[k]);
       }
       out += '\n';
     }

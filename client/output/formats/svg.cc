@@ -136,14 +136,26 @@ std::string EdgePath(const Mesh& mesh, const Picture& picture) {
   return path;
 }
 
-/// Returns a path of lines with length 0. Round line caps show them as dots.
-std::string DotPath(std::span<const double> particles, const Picture& picture) {
+// Appends a line of length 0, which round line caps show as a dot.
+void AppendDot(std::string& path, const double* point, const Picture& picture) {
+  path += 'M';
+  picture.AppendPoint(path, point);
+  path += "h0";
+}
+
+std::string ParticlePath(std::span<const double> particles, const Picture& picture) {
   std::string path;
   for (std::size_t k = 0; k + 1 < particles.size(); k += 2) {
     if (!std::isfinite(particles[k]) || !std::isfinite(particles[k + 1])) continue;
-    path += 'M';
-    picture.AppendPoint(path, &particles[k]);
-    path += "h0";
+    AppendDot(path, &particles[k], picture);
+  }
+  return path;
+}
+
+std::string ContactPath(const Rings& rings, const Picture& picture) {
+  std::string path;
+  for (const std::uint32_t point : rings.contacts) {
+    AppendDot(path, &rings.points[2 * std::size_t{point}], picture);
   }
   return path;
 }
@@ -287,10 +299,14 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
                                    : kDefaultDot;
     out += R"(<path class="particles" stroke-width=")";
     AppendNumber(out, std::round(dot * kSteps) / kSteps);
-    AppendAll(out, R"(" d=")", DotPath(frame.particles, picture), "\"/>\n");
+    AppendAll(out, R"(" d=")", ParticlePath(frame.particles, picture), "\"/>\n");
   }
   AppendAll(out, R"(<path class="outline" d=")", OutlinePath(frame.result.rings, picture),
             "\"/>\n");
+  if (!frame.result.rings.contacts.empty()) {
+    AppendAll(out, R"(<path class="contacts" fill="none" stroke="#a3470f" stroke-width="7" d=")",
+              ContactPath(frame.result.rings, picture), "\"/>\n");
+  }
   if (attribute != nullptr && !inside) {
     AppendBands(out, "lines", RingsByBand(frame.result.rings, values, range, picture));
   }

@@ -12,10 +12,12 @@
 #include <vtkXMLPolyDataWriter.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "client/output/formats/file_mesh.h"
 #include "client/output/formats/formats.h"
 #include "client/output/formats/stretches.h"
+#include "client/output/formats/wall_values.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {
@@ -99,6 +101,24 @@ void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) 
   data->GetCellData()->AddArray(ring_of);
 }
 
+// Adds point data if the rings touch walls. Points of the mesh alone have 0 and NaN.
+void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
+  const WallValues values = WallValuesOf(mesh.rings());
+  if (values.wetted.empty()) return;
+  vtkNew<vtkUnsignedCharArray> wetted;
+  wetted->SetName("wetted");
+  wetted->SetNumberOfTuples(static_cast<vtkIdType>(mesh.PointCount()));
+  wetted->Fill(0);
+  std::ranges::copy(values.wetted, wetted->GetPointer(mesh.first_of_rings()));
+  vtkNew<vtkFloatArray> angles;
+  angles->SetName("contact_angle");
+  angles->SetNumberOfTuples(static_cast<vtkIdType>(mesh.PointCount()));
+  angles->Fill(std::numeric_limits<float>::quiet_NaN());
+  std::ranges::copy(values.contact_angles, angles->GetPointer(mesh.first_of_rings()));
+  data->GetPointData()->AddArray(wetted);
+  data->GetPointData()->AddArray(angles);
+}
+
 // Adds the cell data of a surface.
 void AddShells(const Surface& surface, vtkPolyData* data) {
   vtkNew<vtkIntArray> shell_of, body_of;
@@ -122,6 +142,7 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   const FileMesh mesh(frame);
   vtkNew<vtkPolyData> data;
   AddPoints(mesh, data);
+  AddWalls(mesh, data);
   AddPolygons(mesh, data);
   if (mesh.surface()) {
     AddShells(*mesh.surface(), data);

@@ -206,6 +206,43 @@ TEST(Stretches, EndAtCuts) {
   EXPECT_THAT(stretches, ElementsAre("0: 0 1 2 closed", "1: 6 3 4"));
 }
 
+// A square whose bottom lies on a wall.
+Result SquareOnFloor() {
+  Result result;
+  AddRing(result.rings, {0, 0, 2, 0, 2, 2, 0, 2}, kNoRing);
+  result.rings.normals.clear();
+  result.rings.wetted = {0};
+  result.rings.contacts = {0, 1};
+  result.rings.contact_angles = {std::numbers::pi_v<float> / 2, std::numbers::pi_v<float> / 4};
+  return result;
+}
+
+TEST(Svg, DrawsADotAtEachContact) {
+  const Result result = SquareOnFloor();
+  const std::string svg = Encode(FrameFormat::kSvg, {.result = result});
+  const std::size_t begin = svg.find("class=\"contacts\"");
+  const std::string path = svg.substr(begin, svg.find("/>", begin) - begin);
+  EXPECT_EQ(CountOf(path, "h0"), 2u);
+  EXPECT_THAT(Encode(FrameFormat::kSvg, {.result = SquareWithHoleAndIsland()}),
+              Not(HasSubstr("contacts")));
+}
+
+TEST(Csv, HasColumnsOfWalls) {
+  EXPECT_EQ(Encode(FrameFormat::kCsv, {.result = SquareOnFloor()}),
+            "ring,index,x,y,nx,ny,wetted,contact_angle\n"
+            "0,0,0,0,,,1,90\n0,1,2,0,,,0,45\n0,2,2,2,,,0,\n0,3,0,2,,,0,\n");
+}
+
+TEST(Vtp, HasPointDataOfWalls) {
+  const auto formats = AllFrameFormats();
+  if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) return;
+  const std::string vtp = Encode(FrameFormat::kVtp, {.result = SquareOnFloor()});
+  EXPECT_THAT(vtp, HasSubstr("Name=\"wetted\""));
+  EXPECT_THAT(vtp, HasSubstr("Name=\"contact_angle\""));
+  EXPECT_THAT(Encode(FrameFormat::kVtp, {.result = SquareWithHoleAndIsland()}),
+              Not(HasSubstr("wetted")));
+}
+
 TEST(Svg, EveryMeshEdgeIsDrawnOnce) {
   const Result result = SquareWithHoleAndIsland();
   const std::string svg = Encode(FrameFormat::kSvg, {.result = result});

@@ -296,6 +296,13 @@ TEST(Report, DescribesSections) {
   EXPECT_THAT(lines, Contains(std::pair("section 2", "slice through (1, 2, 3), normal (1, 0, 0)")));
 }
 
+TEST(Report, DescribesWalls) {
+  const auto lines =
+      DescribeParameters({.walls = {{.points = {0, 0, 1, 0}}, {.points = {0.1, 2, 3, 4, 5, 6}}}});
+  EXPECT_THAT(lines, Contains(std::pair("wall 1", "0,0,1,0")));
+  EXPECT_THAT(lines, Contains(std::pair("wall 2", "0.1,2,3,4,5,6")));
+}
+
 TEST(Report, DescribesParameters) {
   const auto lines = DescribeParameters({.placement = Placement::kFarthestParticle,
                                          .fill = Fill::kGrid,

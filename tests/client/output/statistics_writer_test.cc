@@ -1,6 +1,7 @@
 #include "client/output/statistics_writer.h"
 
 #include <limits>
+#include <numbers>
 
 #include "client/output/fixtures.h"
 #include "client/output/surface_scene.h"
@@ -52,6 +53,38 @@ TEST(Statistics, CsvHasTheDocumentedColumns) {
             std::string(kHeader) +
                 "\n3,155,3,11,36,9,15.5,28.5,1,2,3,4,5,6,7,8,9,23.5,1,2,3,4,5,"
                 "0123456789abcdef,000000000000000f,0.1,,0\n");
+}
+
+TEST(Statistics, WallsAddColumns) {
+  support::TemporaryFolder directory;
+  Result result = SquareWithHoleAndIsland();
+  // The bottom of the square, 4 long, and the last side of the hole, 1 long.
+  result.rings.wetted = {0, 10};
+  result.rings.contacts = {0, 1};
+  result.rings.contact_angles = {std::numbers::pi_v<float> / 2, std::numbers::pi_v<float> / 6};
+  const auto written = [&](const char* name) {
+    const std::vector<Gauge> gauges =
+        ParseGauges({"level=height:0.5"}, StatisticsOf::kOutlinesAtWalls).value();
+    auto writer =
+        StatisticsWriter::Create(directory / name, gauges, StatisticsOf::kOutlinesAtWalls);
+    EXPECT_TRUE(writer.ok()) << writer.status();
+    EXPECT_TRUE(writer->Add(Record(result)).ok());
+    EXPECT_TRUE(writer->Add(Record(SquareWithHoleAndIsland())).ok());
+    EXPECT_TRUE(writer->Finish().ok());
+    return ReadFile(directory / name);
+  };
+  EXPECT_THAT(written("stats.csv"),
+              HasSubstr(",section,wetted_length,contacts,contact_angle,level_highest"));
+  const ordered_json rows = ordered_json::parse(written("stats.json"));
+  EXPECT_EQ(rows[0]["wetted_length"], 5);
+  EXPECT_EQ(rows[0]["contacts"], 2);
+  EXPECT_NEAR(rows[0]["contact_angle"], 60, 1e-4);
+  EXPECT_EQ(rows[1]["wetted_length"], 0);
+  EXPECT_TRUE(rows[1]["contact_angle"].is_null());
+  EXPECT_EQ(
+      ParseGauges({"contacts=wetted:0,2,9,2"}, StatisticsOf::kOutlinesAtWalls).status().code(),
+      absl::StatusCode::kInvalidArgument);
+  EXPECT_TRUE(ParseGauges({"contacts=wetted:0,2,9,2"}).ok());
 }
 
 TEST(Statistics, GaugesAddColumns) {

@@ -1,0 +1,34 @@
+// Values at the points of rings that touch walls (ReconstructionParameters::walls).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "partiemc/result.h"
+
+namespace partiemc::client {
+
+/// One value for each point of the rings. Empty if the rings touch no wall.
+struct WallValues {
+  /// 1: the segment to the next point of the ring lies on a wall.
+  std::vector<std::uint8_t> wetted;
+  std::vector<float> contact_angles;  ///< In degrees; NaN where no outline meets a wall.
+};
+
+inline WallValues WallValuesOf(const Rings& rings) {
+  if (rings.wetted.empty() && rings.contacts.empty()) return {};
+  WallValues values{.wetted = std::vector<std::uint8_t>(rings.PointCount()),
+                    .contact_angles = std::vector<float>(rings.PointCount(),
+                                                         std::numeric_limits<float>::quiet_NaN())};
+  for (const std::uint32_t point : rings.wetted) values.wetted[point] = 1;
+  for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+    values.contact_angles[rings.contacts[k]] =
+        rings.contact_angles[k] * (180 / std::numbers::pi_v<float>);
+  }
+  return values;
+}
+
+}  // namespace partiemc::client

@@ -1,0 +1,120 @@
+// `partiemc replay --wall` as a program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+
+namespace partiemc::client {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// A column of 20 x 15 particles in the left corner of a tank.
+constexpr const char* kTank = "0,0,40,0,40,30,0,30";
+
+void WriteColumn(const std::string& path) {
+  std::ofstream file(path);
+  file << "x,y\n";
+  for (int k = 0; k < 300; ++k) file << k % 20 + .5 << "," << k / 20 + .5 << "\n";
+}
+
+Ran Replayed(const std::string& input, std::vector<std::string> more) {
+  more.insert(more.begin(), {"replay", input, "--spacing", "1"});
+  return RunPartiemc(more);
+}
+
+TEST(WallsReplay, ColumnWetsTheTank) {
+  const support::TemporaryFolder folder;
+  WriteColumn(folder.Path("column.csv"));
+  ServerProgram server;
+  std::vector<std::string> digests, files;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local", "--check"}, {"--server", server.address()}}) {
+    const std::string out = folder.Path("out" + std::to_string(digests.size()));
+    std::vector<std::string> flags = {"--wall",   kTank,     "--stats",      folder.Path("s.csv"),
+                                      "--format", "csv,svg", "--output-dir", out};
+    flags.insert(flags.end(), where.begin(), where.end());
+    const Ran ran = Replayed(folder.Path("column.csv"), flags);
+    ASSERT_EQ(ran.exit_code, 0) << ran.error;
+    const std::string stats = Content(folder.Path("s.csv"));
+    digests.push_back(Column(stats, "rings_digest").at(0));
+    EXPECT_NEAR(std::stod(Column(stats, "wetted_length").at(0)), 35, 2);
+    EXPECT_EQ(Column(stats, "contacts").at(0), "2");
+    EXPECT_NEAR(std::stod(Column(stats, "contact_angle").at(0)), 90, 20);
+    files.push_back(Content(out + "/frame_000000.csv"));
+    EXPECT_THAT(Content(out + "/frame_000000.svg"), HasSubstr("class=\"contacts\""));
+  }
+  EXPECT_EQ(digests[0], digests[1]);
+  EXPECT_EQ(files[0], files[1]);
+  // Wetted points lie on the floor or on the left side, bit for bit.
+  const auto x = Column(files[0], "x"), y = Column(files[0], "y");
+  const auto wetted = Column(files[0], "wetted");
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < wetted.size(); ++k) {
+    if (wetted[k] != "1") continue;
+    ++count;
+    EXPECT_TRUE(std::stod(x[k]) == 0 || std::stod(y[k]) == 0) << x[k] << " " << y[k];
+  }
+  EXPECT_GT(count, 2u);
+}
+
+TEST(WallsReplay, WithoutWallsFilesAreAsBefore) {
+  const support::TemporaryFolder folder;
+  WriteColumn(folder.Path("column.csv"));
+  const Ran ran =
+      Replayed(folder.Path("column.csv"), {"--local", "--stats", folder.Path("s.csv"), "--format",
+                                           "csv,svg", "--output-dir", folder.Path("out")});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(Content(folder.Path("s.csv")), HasSubstr(",section\n"));
+  EXPECT_THAT(Content(folder.Path("out/frame_000000.csv")), HasSubstr("ring,index,x,y,nx,ny\n"));
+  EXPECT_THAT(Content(folder.Path("out/frame_000000.svg")), Not(HasSubstr("contacts")));
+}
+
+// Repeated flags, also with a negative first coordinate, are walls in their order.
+TEST(WallsReplay, ReportListsTheWalls) {
+  const support::TemporaryFolder folder;
+  WriteColumn(folder.Path("column.csv"));
+  const Ran ran = Replayed(folder.Path("column.csv"),
+                           {"--local", "--wall", "-1,0,1,0", "--wall", "28,4,28,8,32,8,32,4",
+                            "--report", folder.Path("report.html")});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  const std::string report = Content(folder.Path("report.html"));
+  EXPECT_THAT(report, HasSubstr("wall 1</th><td>-1,0,1,0</td>"));
+  EXPECT_THAT(report, HasSubstr("wall 2</th><td>28,4,28,8,32,8,32,4</td>"));
+}
+
+TEST(WallsReplay, WrongWallsAreRefused) {
+  const support::TemporaryFolder folder;
+  WriteColumn(folder.Path("column.csv"));
+  const auto refusal = [&](std::vector<std::string> flags) {
+    flags.push_back("--local");
+    const Ran ran = Replayed(folder.Path("column.csv"), flags);
+    EXPECT_EQ(ran.exit_code, 2) << ran.error;
+    return ran.error;
+  };
+  for (const std::string text : {"0,0", "0,0,1", "0,0,1,0,1", "0,0,1,x", "0,0,1,inf"}) {
+    EXPECT_THAT(refusal({"--wall", text}),
+                HasSubstr("--wall: '" + text + "'; must be X0,Y0,X1,Y1,...: two points or more"));
+  }
+  std::string many = "0,0";
+  for (int k = 1; k <= 1024; ++k) many += "," + std::to_string(k) + "," + std::to_string(k * k);
+  EXPECT_THAT(refusal({"--wall", many}), HasSubstr("partiemc: --wall: "));
+  // These break rules of the core.
+  EXPECT_THAT(refusal({"--wall", "1,2,1,2"}), HasSubstr("partiemc: --wall: "));
+  EXPECT_THAT(refusal({"--wall", "0,0,4,4,4,0,0,4"}), HasSubstr("partiemc: --wall: "));
+  for (const std::vector<std::string>& other : {std::vector<std::string>{"--placement", "qef"},
+                                                {"--isolines", ".5"},
+                                                {"--periodic", "x", "--box", "0,40,0,40"}}) {
+    std::vector<std::string> flags = {"--wall", kTank};
+    flags.insert(flags.end(), other.begin(), other.end());
+    EXPECT_THAT(refusal(flags), HasSubstr("partiemc: --")) << other[0];
+  }
+}
+
+}  // namespace
+}  // namespace partiemc::client
