@@ -79,6 +79,17 @@ std::optional<PeriodicBox> BoxOf(const double* numbers) {
   return box;
 }
 
+std::vector<Wall> WallsOf(const partiemc_options& options) {
+  std::vector<Wall> walls(options.wall_count);
+  const double* point = options.walls;
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    const std::size_t coordinates = 2 * std::size_t{options.wall_sizes[k]};
+    walls[k].points.assign(point, point + coordinates);
+    point += coordinates;
+  }
+  return walls;
+}
+
 absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
   ReconstructionParameters parameters;
   if (options.spacing != 0) parameters.spacing = options.spacing;
@@ -111,6 +122,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
     parameters.sections.push_back({.phase = options.phases[k]});
   }
   if (options.phase_attribute != nullptr) parameters.phase_attribute = options.phase_attribute;
+  parameters.walls = WallsOf(options);
   absl::Status named;
   if (options.output != nullptr) named.Update(SetByName(options.output, parameters.output));
   if (options.placement != nullptr)
@@ -264,6 +276,11 @@ void AddResult(const Result& result, const OutlineDigests& digests, bool shows_n
   event.cut_count = rings.cuts.size();
   event.cuts = rings.cuts.data();
   event.cut_bodies = statistics.cut_bodies;
+  event.wetted_count = rings.wetted.size();
+  event.wetted = rings.wetted.data();
+  event.contact_count = rings.contacts.size();
+  event.contacts = rings.contacts.data();
+  event.contact_angles = rings.contact_angles.data();
   AddAttributes(result.attributes, values, event);
 }
 

@@ -1,5 +1,6 @@
 #include "client/python/parameters.h"
 
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -159,6 +160,23 @@ void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   }
 }
 
+// Reads the points of each wall: x0, y0, x1, y1, ..., or an (n, 2) array.
+void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
+  using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+  const auto given = Take<std::vector<py::object>>(arguments, "walls");
+  if (!given) return;
+  for (std::size_t k = 0; k < given->size(); ++k) {
+    const Numbers points = Numbers::ensure((*given)[k]);  // Null for what is no array of numbers.
+    const bool is_flat = points && points.ndim() == 1;
+    if (!is_flat && !(points && points.ndim() == 2 && points.shape(1) == 2)) {
+      Raise(Invalid("UNSUPPORTED", "walls[" + std::to_string(k) + "]",
+                    py::repr((*given)[k]).cast<std::string>(),
+                    "must be the points of a wall: [x0, y0, x1, y1, ...] or an (n, 2) array"));
+    }
+    walls.push_back({.points = {points.data(), points.data() + points.size()}});
+  }
+}
+
 py::object ToPython(const std::optional<SlicePlane>& slice) {
   if (!slice) return py::none();
   const auto triple = [](const std::array<double, 3>& v) {
@@ -194,6 +212,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "phase_attribute", parameters.phase_attribute);
   TakeBox(arguments, parameters.box);
   TakeInto(arguments, "noise_filter", parameters.noise_filter);
+  TakeWalls(arguments, parameters.walls);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
@@ -289,6 +308,8 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
     if (section.phase) dict["phase"] = section.phase;
     sections.append(dict);
   }
+  py::list walls;
+  for (const Wall& wall : parameters.walls) walls.append(wall.points);
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
   py::dict dict("output"_a = named(parameters.output), "placement"_a = named(parameters.placement),
@@ -304,7 +325,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "slice"_a = ToPython(parameters.slice), "isovalue"_a = parameters.isovalue,
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
                 "wrap"_a = parameters.box && parameters.box->wraps,
-                "noise_filter"_a = parameters.noise_filter,
+                "noise_filter"_a = parameters.noise_filter, "walls"_a = walls,
                 "phase_attribute"_a = parameters.phase_attribute,
                 "sizes"_a = named(parameters.sizes), "boundary"_a = named(parameters.boundary));
   if (parameters.output == Output::kSurface) {

@@ -175,6 +175,17 @@ void DefineRings(py::module_& module) {
           "face "
           "of the periodic box, where a body was cut. `perimeter` does not count these segments.")
       .def_property_readonly(
+          "wetted", [](R r) { return View<std::uint32_t>(r.part.wetted, 1, r.owner); },
+          "(W,) uint32, ascending: points whose segment to the next point of the ring lies on a "
+          "wall.")
+      .def_property_readonly(
+          "contacts", [](R r) { return View<std::uint32_t>(r.part.contacts, 1, r.owner); },
+          "(K,) uint32, ascending: points where an outline meets a wall.")
+      .def_property_readonly(
+          "contact_angles", [](R r) { return View<float>(r.part.contact_angles, 1, r.owner); },
+          "(K,) float32, radians: the angle of the fluid at each contact, between the wall and the "
+          "outline.")
+      .def_property_readonly(
           "identities", [](R r) { return Column<std::uint64_t>(r, &RingMeasures::identity); },
           "(R,) uint64: constant from frame to frame; 0: not tracked.")
       .def_property_readonly(

@@ -79,6 +79,12 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
         weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.
+    walls: walls at which the outline is cut, with the fluid on their left: for each the coordinates
+        of its points, [x0, y0, x1, y1, ...] or an (n, 2) array. [0, 0, 1, 0] is the endless floor
+        y = 0. Three points or more are a closed polygon: a tank if they are counter-clockwise, an
+        obstacle if they are clockwise. `rings.wetted` are the points whose next segment lies on a
+        wall, `rings.contacts` the points where the outline meets a wall, `rings.contact_angles` the
+        angles of the fluid there, in radians.
     sizes: "equal" (the default), or "own": each particle has the size sqrt(volume).
     boundary: "bulk" (the default), or "grains", with own sizes: particles are discs of the diameter
         sqrt(volume), and the outline follows their surfaces.

@@ -1,6 +1,6 @@
 from os import PathLike
 from types import TracebackType
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Type, TypedDict, Union
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, TypedDict, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,6 +43,12 @@ class Rings:
     def particle_counts(self) -> NDArray[np.uint64]: ...
     @property
     def cuts(self) -> NDArray[np.uint32]: ...
+    @property
+    def wetted(self) -> NDArray[np.uint32]: ...
+    @property
+    def contacts(self) -> NDArray[np.uint32]: ...
+    @property
+    def contact_angles(self) -> NDArray[np.float32]: ...
     @property
     def identities(self) -> NDArray[np.uint64]: ...
     @property
@@ -167,6 +173,7 @@ class Reconstructor:
         box: Optional[Dict[str, Tuple[float, float]]] = ...,
         wrap: bool = ...,
         noise_filter: Optional[float] = ...,
+        walls: Optional[Sequence[ArrayLike]] = ...,
         sizes: Optional[str] = ...,
         boundary: Optional[str] = ...) -> None: ...
     def reconstruct(
@@ -245,6 +252,7 @@ def reconstruct(
     box: Optional[Dict[str, Tuple[float, float]]] = ...,
     wrap: bool = ...,
     noise_filter: Optional[float] = ...,
+    walls: Optional[Sequence[ArrayLike]] = ...,
     sizes: Optional[str] = ...,
     boundary: Optional[str] = ...) -> Result: ...
 def estimate_spacing(positions: Positions) -> Optional[float]: ...

@@ -533,6 +533,7 @@ int main(int argc, char** argv) {
   try_parts(address);
   try_sizes(address);
   try_surfaces(address);
+  try_walls(address);
   try_former_sizes(address);
   try_options(address);
   puts("all is as the header says");

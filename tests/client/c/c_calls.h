@@ -20,4 +20,7 @@
 /* Calls that return surfaces, with the server at `address` or, if it is NULL, in process. */
 void try_surfaces(const char* address);
 
+/* Calls of streams with walls. */
+void try_walls(const char* address);
+
 #endif /* PARTIEMC_C_CALLS_H_ */

@@ -134,6 +134,32 @@ class Layouts(unittest.TestCase):
         with self.assertRaisesRegex(partiemc.Error, "wrap"):
             partiemc.reconstruct(both, spacing=1.0, wrap=True)
 
+    def test_a_column_wets_the_walls_of_its_tank(self):
+        x, y = numpy.meshgrid(numpy.arange(20) + 0.5, numpy.arange(15) + 0.5)
+        column = numpy.column_stack([x.ravel(), y.ravel()])
+        tank = [0, 0, 40, 0, 40, 30, 0, 30]
+        sequence = partiemc.Reconstructor(spacing=1, walls=[tank])
+        self.assertEqual(sequence.parameters["walls"], [tank])
+        self.assertEqual(partiemc.Reconstructor().parameters["walls"], [])
+        result = sequence.reconstruct(column)
+        rings = result.rings
+        self.assertEqual((rings.wetted.dtype, rings.contacts.dtype), (numpy.uint32, numpy.uint32))
+        self.assertGreater(len(rings.wetted), 2)
+        wet = rings.points[rings.wetted]
+        self.assertTrue((wet.min(axis=1) == 0).all())  # On the floor or on the left side.
+        self.assertEqual(len(rings.contacts), 2)
+        self.assertEqual(rings.contact_angles.dtype, numpy.float32)
+        numpy.testing.assert_allclose(rings.contact_angles, numpy.pi / 2, atol=0.5)
+        kept = pickle.loads(pickle.dumps(result)).rings
+        for name in ("wetted", "contacts", "contact_angles"):
+            numpy.testing.assert_array_equal(getattr(kept, name), getattr(rings, name))
+        pairs = numpy.array(tank, dtype=numpy.float32).reshape(-1, 2)
+        for walls in ([pairs], numpy.array([tank]), ([(0, 0), (40, 0), (40, 30), (0, 30)],)):
+            again = partiemc.Reconstructor(spacing=1, walls=walls).reconstruct(column)
+            self.assertEqual(digests(again), digests(result))
+        dry = partiemc.reconstruct(column, spacing=1).rings
+        self.assertEqual((len(dry.wetted), len(dry.contacts), len(dry.contact_angles)), (0, 0, 0))
+
     def test_a_noise_filter_moves_particles_with_ids(self):
         random = numpy.random.default_rng(1)
         frames = [block() + random.normal(scale=0.1, size=block().shape) for _ in range(3)]
@@ -519,6 +545,13 @@ class Errors(unittest.TestCase):
         self.assert_refused("COUNT", "volumes", sizes="own")
         self.assert_refused("UNSUPPORTED", "parameters.sizes", sizes="large")
         self.assert_refused("OUT_OF_RANGE", "parameters.boundary", boundary="grains")
+        self.assert_refused("UNSUPPORTED", "walls[0]", walls=[0, 0, 1, 0])
+        self.assert_refused("UNSUPPORTED", "walls[1]", walls=[[0, 0, 1, 0], "floor"])
+        self.assert_refused("UNSUPPORTED", "walls[0]", walls=[numpy.zeros((2, 3))])
+        for wall in ([0, 0, 1], [0, 0], [0, 0, 0, 0], [0, 0, 1, numpy.inf]):
+            with self.assertRaises(partiemc.Error) as caught:
+                partiemc.Reconstructor(walls=[wall])
+            self.assertEqual(caught.exception.field, "parameters.walls[0].points")
         self.assert_refused("COUNT", "ids", ids=numpy.arange(count + 1))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count, numpy.int16))

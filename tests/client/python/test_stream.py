@@ -86,6 +86,23 @@ class Streams(unittest.TestCase):
                 stream.receive()
             self.assertEqual(caught.exception.reason, "NO_SUCH_ATTRIBUTE")
 
+    def test_walls_are_those_of_this_process(self):
+        x, y = numpy.meshgrid(numpy.arange(20) + 0.5, numpy.arange(15) + 0.5)
+        column = numpy.column_stack([x.ravel(), y.ravel()])
+        parameters = {"spacing": 1, "walls": [[0, 0, 40, 0, 40, 30, 0, 30], [1, 60, 0, 60]]}
+        here = partiemc.Reconstructor(**parameters)
+        with partiemc.connect(self.address, **parameters) as stream:
+            self.assertEqual(stream.parameters["walls"], parameters["walls"])
+            for k in range(3):
+                positions = column * (1 + 0.05 * k, 1 / (1 + 0.05 * k))
+                stream.send(positions)
+                result, expected = stream.receive(), here.reconstruct(positions)
+                self.assertEqual(digests(result), digests(expected))
+                self.assertGreater(len(result.rings.wetted), 2)
+                for name in ("wetted", "contacts", "contact_angles"):
+                    numpy.testing.assert_array_equal(getattr(result.rings, name),
+                                                     getattr(expected.rings, name))
+
     def test_phases_and_grains_come_in_parts(self):
         particles = block()
         types, diameters = numpy.where(particles[:, 0] < 10, 2, 7), numpy.ones(len(particles))

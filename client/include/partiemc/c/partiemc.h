@@ -147,6 +147,14 @@ typedef struct partiemc_options {
   const int32_t* phases;
   size_t phase_count;
   const char* phase_attribute; /* The attribute with the phase of each particle. NULL: "phase". */
+  /* Walls at which the outline is cut, with the fluid on their left: x and y of each point, wall
+   * after wall. Wall k has wall_sizes[k] points. Two points: the endless line through them. More
+   * points: a closed polygon, a tank if it is counter-clockwise, an obstacle if it is clockwise. At
+   * most 1024 points together. Excludes surfaces, slices, isovalues, own sizes, phases and `box`.
+   */
+  const double* walls;
+  const uint32_t* wall_sizes;
+  size_t wall_count;
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);
@@ -345,6 +353,15 @@ typedef struct partiemc_event {
   size_t cut_count;
   const uint32_t* cuts;
   uint64_t cut_bodies; /* Number of bodies that were cut. */
+
+  /* With `walls`: wetted_count points, ascending, whose segment to the next point of the ring lies
+   * on a wall; contact_count points, ascending, where an outline meets a wall, and the angle of the
+   * fluid at each, between the wall and the outline, in radians. */
+  size_t wetted_count;
+  const uint32_t* wetted;
+  size_t contact_count;
+  const uint32_t* contacts;
+  const float* contact_angles;
 } partiemc_event;
 /* Sets an empty event. `size` is sizeof(partiemc_event). */
 void partiemc_event_init(partiemc_event* event, size_t size);
