@@ -195,6 +195,7 @@ function frameOf(
       particles: Float64Array.from(area, (one) => Math.max(0, Math.round(one / spacing ** 2))),
       parents: Array.from({ length: count }, (_, ring) => [BigInt(ring + 1)]),
       cuts: new Uint32Array(0),
+      wetted: new Uint32Array(0), contacts: new Uint32Array(0), contactAngles: new Float32Array(0),
       normals,
       attributes: new Map([['speed', speed]]),
     },

@@ -26,6 +26,7 @@ function ringsOf(corners: number[][], outerOf: number[]): Rings {
     particles: new Float64Array(corners.length),
     parents: corners.map(() => []),
     cuts: new Uint32Array(0),
+    wetted: new Uint32Array(0), contacts: new Uint32Array(0), contactAngles: new Float32Array(0),
     normals: null,
     attributes: new Map(),
   };

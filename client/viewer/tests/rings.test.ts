@@ -40,6 +40,14 @@ test('cuts are decoded', () => {
   assert.deepEqual([...frameOf({ cuts: words(1, 3) }).rings.cuts], [1, 3]);
 });
 
+test('points at walls are decoded', () => {
+  const angles = Float32Array.of(0.5, 2.25);
+  const { rings } = frameOf({ wetted: words(0, 1), contacts: words(2, 6), contactAngles: bytesOf(angles) });
+  assert.deepEqual([[...rings.wetted], [...rings.contacts], [...rings.contactAngles]], [[0, 1], [2, 6], [0.5, 2.25]]);
+  const dry = frameOf({}).rings;
+  assert.deepEqual([dry.wetted.length, dry.contacts.length, dry.contactAngles.length], [0, 0, 0]);
+});
+
 test('rings without identities have the identity 0', () => {
   assert.deepEqual([...frameOf({ identities: new Uint8Array(0) }).rings.identities], [0n, 0n]);
 });
@@ -60,6 +68,13 @@ test('a damaged message has no outline and names the field', () => {
     [{ cuts: words(3, 7) }, /rings\.cuts must be ascending numbers of the 7 points\./],
     [{ cuts: words(3, 3) }, /rings\.cuts must be ascending/],
     [{ cuts: new Uint8Array(6) }, /rings\.cuts must be ascending/],
+    [{ wetted: words(0, 7) }, /rings\.wetted must be ascending numbers of the 7 points\./],
+    [{ wetted: new Uint8Array(3) }, /rings\.wetted must be ascending/],
+    [{ contacts: words(2, 1), contactAngles: bytesOf(new Float32Array(2)) }, /rings\.contacts must be ascending/],
+    [{ contacts: words(2) }, /rings\.contact_angles must be a finite number for each of the 1 contacts\./],
+    [{ contactAngles: bytesOf(new Float32Array(1)) }, /rings\.contact_angles must be a finite number/],
+    [{ contacts: words(2), contactAngles: bytesOf(Float32Array.of(NaN)) }, /rings\.contact_angles must be/],
+    [{ contacts: words(2), contactAngles: new Uint8Array(5) }, /rings\.contact_angles must be/],
     [{ offsets: words(0, 4, 8) }, /rings\.offsets must end with the 7 points\./],
     [{ offsets: words(0, 4, 6) }, /rings\.offsets gives ring 1 fewer than 3\./],
     [{ offsets: words(0, 5, 3) }, /rings\.offsets gives ring 1 fewer than 3\./],

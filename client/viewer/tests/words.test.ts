@@ -76,6 +76,16 @@ test('another placement has the same periodic box', () => {
   assert.equal(parametersOf(AS_STREAMED, null, 1).box, undefined);
 });
 
+test('only the placement that is cut at walls keeps them', () => {
+  const base = create(ReconstructionParametersSchema, {
+    placement: Placement.VIRTUAL_PLANE, walls: [{ points: [0, 0, 1, 0] }],
+  });
+  const wallsOf = (placement: Placement) => parametersOf({ ...AS_STREAMED, placement }, base, 1).walls;
+  assert.deepEqual(wallsOf(Placement.UNSPECIFIED).map(({ points }) => points), [[0, 0, 1, 0]]);
+  assert.equal(wallsOf(Placement.VIRTUAL_PLANE).length, 1);
+  assert.deepEqual(wallsOf(Placement.QEF), []);
+});
+
 test('a status becomes a sentence with a remedy', () => {
   const status = parseStatus('{"code": 5, "reason": "NO_SUCH_STREAM", "message": "stream_name: dam; no open stream has it"}');
   assert.ok(status);

@@ -98,9 +98,17 @@ function decodeRings(message: RingsMessage, relative: Relative): Rings {
   if (![0, 8 * count].includes(normals.length)) throw lost('rings.normals', `must have two floats for each of the ${count} points`);
   const outerOf = arrayOf(Uint32Array, message.outerOf);
   checkNesting(outerOf, 'rings.outer_of', 'ring');
-  const cuts = arrayOf(Uint32Array, message.cuts);
-  if (message.cuts.length % 4 !== 0 || !cuts.every((cut, k) => cut < count && (k === 0 || cuts[k - 1] < cut))) {
-    throw lost('rings.cuts', `must be ascending numbers of the ${count} points`);
+  const chosenPoints = (bytes: Uint8Array, field: string) => {
+    const chosen = arrayOf(Uint32Array, bytes);
+    if (bytes.length % 4 !== 0 || !chosen.every((point, k) => point < count && (k === 0 || chosen[k - 1] < point))) {
+      throw lost(field, `must be ascending numbers of the ${count} points`);
+    }
+    return chosen;
+  };
+  const contacts = chosenPoints(message.contacts, 'rings.contacts');
+  const contactAngles = arrayOf(Float32Array, message.contactAngles);
+  if (message.contactAngles.length !== 4 * contacts.length || !contactAngles.every(Number.isFinite)) {
+    throw lost('rings.contact_angles', `must be a finite number for each of the ${contacts.length} contacts`);
   }
   return {
     points, offsets, outerOf,
@@ -109,7 +117,9 @@ function decodeRings(message: RingsMessage, relative: Relative): Rings {
     perimeter: Float64Array.from(measures, ({ perimeter }) => perimeter),
     particles: Float64Array.from(measures, ({ particleCount }) => Number(particleCount)),
     parents: measures.map((measure) => measure.parentIdentities),
-    cuts,
+    cuts: chosenPoints(message.cuts, 'rings.cuts'),
+    wetted: chosenPoints(message.wetted, 'rings.wetted'),
+    contacts, contactAngles,
     normals: normals.length > 0 ? arrayOf(Float32Array, normals) : null,
     attributes: new AttributeChannels(message.attributes),
   };

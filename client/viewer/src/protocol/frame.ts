@@ -20,6 +20,12 @@ export interface Rings {
   parents: bigint[][];
   /** Vertices, ascending, whose segment to the next one lies on a face of the periodic box. */
   cuts: Uint32Array;
+  /** Vertices, ascending, whose segment to the next one lies on a wall. */
+  wetted: Uint32Array;
+  /** Vertices, ascending, where an outline meets a wall. */
+  contacts: Uint32Array;
+  /** Of each contact: the angle of the fluid between the wall and the outline, in radians. */
+  contactAngles: Float32Array;
   normals: Float32Array | null;
   /** Numbers per vertex. */
   attributes: Channels;
@@ -109,6 +115,9 @@ export function bareRings(points: Float32Array, offsets: Uint32Array): Rings {
     particles: new Float64Array(count),
     parents: Array.from({ length: count }, () => []),
     cuts: new Uint32Array(0),
+    wetted: new Uint32Array(0),
+    contacts: new Uint32Array(0),
+    contactAngles: new Float32Array(0),
     normals: null,
     attributes: new AttributeChannels([]),
   };

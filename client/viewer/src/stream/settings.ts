@@ -160,6 +160,8 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     minComponentParticles: base?.minComponentParticles,
     output: base?.output,
     surface: base?.surface,
+    // Other placements cannot be cut at walls.
+    walls: placement === Placement.VIRTUAL_PLANE || placement === Placement.UNSPECIFIED ? base?.walls : undefined,
     // Farthest-particle cannot be wrapped.
     box: base?.box && { ...base.box, wraps: base.box.wraps && !farthest },
   });

@@ -26,6 +26,12 @@ function reduction(statistics: Statistics): string {
   return Number.isFinite(percent) ? `${percent.toFixed(1)} %` : '–';
 }
 
+function contactAngles({ rings: { contactAngles: angles } }: Frame): string {
+  if (angles.length === 0) return '';
+  const mean = angles.reduce((sum, angle) => sum + angle, 0) / angles.length;
+  return `${number(mean * 180 / Math.PI, 3)}°, mean of ${count(angles.length)}`;
+}
+
 const unlessZero = (value: number) => (value > 0 ? count(value) : '');
 
 const ROWS: Row[] = [
@@ -43,6 +49,7 @@ const ROWS: Row[] = [
   { key: 'area', title: 'Area', text: ({ statistics }) => number(statistics.area, 7) },
   { key: 'volume', of: 'space', title: 'Volume', text: ({ statistics }) => number(statistics.volume ?? 0, 7) },
   { key: 'perimeter', of: 'plane', title: 'Perimeter', text: ({ statistics }) => number(statistics.perimeter, 7) },
+  { key: 'contact-angles', of: 'plane', title: 'Contact angles', text: ({ frame }) => contactAngles(frame), isWide: true },
   { key: 'spacing', title: 'Spacing', text: ({ statistics }) => number(statistics.spacing) },
   { key: 'ms', title: 'Milliseconds', text: ({ statistics }) => number(statistics.milliseconds, 3) },
   { key: 'holes', title: 'Dropped holes', text: ({ statistics }) => unlessZero(statistics.droppedHoles) },

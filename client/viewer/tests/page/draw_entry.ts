@@ -84,6 +84,7 @@ function polygon(corners: [number, number][]): Frame {
       particles: Float64Array.of(1),
       parents: [[]],
       cuts: new Uint32Array(0),
+      wetted: new Uint32Array(0), contacts: new Uint32Array(0), contactAngles: new Float32Array(0),
       normals: null,
       attributes: new Map(),
     },
