@@ -59,6 +59,22 @@ double HostileRatio(Choices& choices, double low, double usual, double high) {
   }
 }
 
+// A line, a rectangle in either direction, or points in any order, near the particles or far from
+// them. The lines of the first two are often lines of the lattice.
+Wall HostileWall(Choices& choices, double spacing) {
+  const auto coordinate = [&] { return HostileCoordinate(choices, 0, spacing, 32); };
+  const auto kind = choices.Take<std::uint8_t>();
+  Wall wall;
+  if (kind % 4 == 3) {
+    const std::size_t count = choices.Below(13);
+    for (std::size_t k = 0; k < count; ++k) wall.points.push_back(coordinate());
+    return wall;
+  }
+  const double x0 = coordinate(), y0 = coordinate(), x1 = coordinate(), y1 = coordinate();
+  if (kind % 4 == 0) return {.points = {x0, y0, x1, y1}};
+  return {.points = {x0, y0, x1, y0, x1, y1, x0, y1}};
+}
+
 // The id of particle `k`: usually its number, so that successive frames share particles; otherwise
 // any byte, which may repeat an id or reuse another particle's.
 std::uint64_t HostileId(Choices& choices, std::size_t k) {
@@ -189,6 +205,14 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     const auto last = static_cast<std::int32_t>(choices.Below(3));
     for (std::int32_t phase = 0; phase <= last; ++phase) {
       parameters.sections.push_back({.phase = phase});
+    }
+  }
+  const bool may_have_walls =
+      may_have_phases && parameters.sections.empty() && parameters.sizes == Sizes::kEqual;
+  if (may_have_walls && choices.Below(2) == 1) {
+    const std::size_t count = 1 + choices.Below(3);
+    for (std::size_t k = 0; k < count; ++k) {
+      parameters.walls.push_back(HostileWall(choices, parameters.spacing.value_or(1)));
     }
   }
   return parameters;

@@ -48,7 +48,8 @@ def assert_equal(case, one, other, but=()):
         if name not in but:
             case.assertEqual(getattr(one, name), getattr(other, name), name)
     of_all = "points normals area centroids particle_counts identities parents parent_offsets outer_of"
-    for part, names in (("rings", f"{of_all} offsets perimeter"), ("mesh", "points triangles classes"),
+    for part, names in (("rings", f"{of_all} offsets perimeter cuts wetted contacts contact_angles"),
+                        ("mesh", "points triangles classes"),
                         ("surface", f"{of_all} point_offsets triangle_offsets triangles volume")):
         for name in names.split():
             mine, its = (getattr(getattr(each, part), name) for each in (one, other))
