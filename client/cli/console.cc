@@ -1,9 +1,11 @@
 #include "client/cli/console.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -59,11 +61,16 @@ std::string AsFlag(const absl::Status& status) {
   // Removes the prefix "sections[K].": a user of --slice and --isolines does not know the index K.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   if (line.starts_with("surface.")) line.erase(0, line.find('.') + 1);
-  // "walls[K]" and its members: the K-th --wall.
-  if (line.starts_with("walls")) line.replace(0, std::min(line.find(':'), line.size()), "wall");
+  // "walls[0].points" is the first --wall.
+  constexpr std::string_view kWalls = "walls[";
+  if (line.starts_with(kWalls)) {
+    const std::size_t index = std::strtoul(line.c_str() + kWalls.size(), nullptr, 10);
+    line.replace(0, std::min(line.find(':'), line.size()), absl::StrCat("wall number ", index + 1));
+  }
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
-        std::pair("phase:", "phases:"), std::pair("min_component_volume:", "min-volume:")}) {
+        std::pair("walls:", "wall:"), std::pair("phase:", "phases:"),
+        std::pair("min_component_volume:", "min-volume:")}) {
     if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
   }
   line.insert(0, "--");

@@ -29,7 +29,8 @@ std::string OneLine(std::string_view text);
 std::string OneLine(const absl::Status& status);
 
 /// Replaces the field at the start of a message by its flag, "address" by "--server":
-/// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...".
+/// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...",
+/// "parameters.walls[1].points: ..." -> "--wall number 2: ...".
 std::string AsFlag(const absl::Status& status);
 
 /// Prints why a server could not be reached. Returns kUsage for INVALID_ARGUMENT, which means a

@@ -114,6 +114,21 @@ TEST_F(Record, ReplaysToTheSameBitsByTheFlagsThatItTells) {
   EXPECT_EQ(Digests(Content(Path("again.csv"))), digests);
 }
 
+TEST_F(Record, TellsTheWallsOfTheStream) {
+  const std::string tank = "-30,-40,30.5,-40,30.5,40,-30,40";
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles", "--wall", tank,
+                                               "--wall", "-1,-60,1,-60"}));
+  const Ran ran = Watch({"--record", Path("seen.pemc"), "--stats", Path("seen.csv")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_THAT(ran.out, HasSubstr(" --wall " + tank + " --wall -1,-60,1,-60\n"));
+  EXPECT_THAT(Content(Path("seen.csv")), HasSubstr("wetted_length"));
+  const Ran again = RunPartiemc(ToldCommand(ran.out, {"--stats", Path("again.csv")}));
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+  EXPECT_EQ(Column(Content(Path("again.csv")), "rings_digest"),
+            Column(Content(Path("made.csv")), "rings_digest"));
+}
+
 TEST_F(Record, HoldsEverythingThatWasSent) {
   Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles"}));
   EXPECT_EQ(Watch({"--record", Path("seen.pemc"), "--quiet"}).exit_code, 0);

@@ -105,8 +105,9 @@ TEST(WallsReplay, WrongWallsAreRefused) {
   for (int k = 1; k <= 1024; ++k) many += "," + std::to_string(k) + "," + std::to_string(k * k);
   EXPECT_THAT(refusal({"--wall", many}), HasSubstr("partiemc: --wall: "));
   // These break rules of the core.
-  EXPECT_THAT(refusal({"--wall", "1,2,1,2"}), HasSubstr("partiemc: --wall: "));
-  EXPECT_THAT(refusal({"--wall", "0,0,4,4,4,0,0,4"}), HasSubstr("partiemc: --wall: "));
+  EXPECT_THAT(refusal({"--wall", "1,2,1,2"}), HasSubstr("partiemc: --wall number 1: "));
+  EXPECT_THAT(refusal({"--wall", kTank, "--wall", "0,0,4,4,4,0,0,4"}),
+              HasSubstr("partiemc: --wall number 2: "));
   for (const std::vector<std::string>& other : {std::vector<std::string>{"--placement", "qef"},
                                                 {"--isolines", ".5"},
                                                 {"--periodic", "x", "--box", "0,40,0,40"}}) {
