@@ -123,6 +123,8 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   }
   if (options.phase_attribute != nullptr) parameters.phase_attribute = options.phase_attribute;
   parameters.walls = WallsOf(options);
+  parameters.wall_phases.assign(options.wall_phases,
+                                options.wall_phases + options.wall_phase_count);
   absl::Status named;
   if (options.output != nullptr) named.Update(SetByName(options.output, parameters.output));
   if (options.placement != nullptr)

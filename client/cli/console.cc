@@ -69,8 +69,8 @@ std::string AsFlag(const absl::Status& status) {
   }
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
-        std::pair("walls:", "wall:"), std::pair("phase:", "phases:"),
-        std::pair("min_component_volume:", "min-volume:")}) {
+        std::pair("walls:", "wall:"), std::pair("wall_phases", "wall"),
+        std::pair("phase:", "phases:"), std::pair("min_component_volume:", "min-volume:")}) {
     if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
   }
   line.insert(0, "--");

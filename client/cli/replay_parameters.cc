@@ -104,30 +104,49 @@ std::optional<SlicePlane> SliceOf(std::string_view text) {
   return slice;
 }
 
+// The name in "NAME=1,2"; empty without one.
+std::string AttributeOf(std::string_view text) {
+  const std::size_t end = text.find('=');
+  return std::string(text.substr(0, end == std::string_view::npos ? 0 : end));
+}
+
+// Parses "NAME=1,2", an attribute and phases. Returns false if the text is no such thing.
+bool ParsePhases(std::string_view text, std::string& attribute, std::vector<std::int32_t>& phases) {
+  attribute = AttributeOf(text);
+  if (attribute.empty()) return false;
+  for (const std::string_view of : Split(text.substr(attribute.size() + 1), ',', /*blanks=*/"")) {
+    const auto phase = Number(of);
+    if (!phase || *phase != std::floor(*phase) || std::abs(*phase) > 0x1p24) return false;
+    phases.push_back(static_cast<std::int32_t>(*phase));
+  }
+  return true;
+}
+
 // Parses --phases and adds a section for each phase.
 absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   if (flags.phases.empty()) return absl::OkStatus();
-  const auto wrong = [&] {
+  std::vector<std::int32_t> phases;
+  if (!ParsePhases(flags.phases, parameters.phase_attribute, phases)) {
     return WrongFlag("--phases", flags.phases, "an attribute and whole numbers: type=1,2");
-  };
-  parameters.phase_attribute = PhaseAttributeOf(flags);
-  if (parameters.phase_attribute.empty()) return wrong();
-  const std::string_view list =
-      std::string_view(flags.phases).substr(parameters.phase_attribute.size() + 1);
-  for (const std::string_view text : Split(list, ',', /*blanks=*/"")) {
-    const auto phase = Number(text);
-    if (!phase || *phase != std::floor(*phase) || std::abs(*phase) > 0x1p24) return wrong();
-    parameters.sections.push_back({.phase = static_cast<std::int32_t>(*phase)});
   }
+  for (const std::int32_t phase : phases) parameters.sections.push_back({.phase = phase});
   return absl::OkStatus();
 }
 
 // Parses each --wall. The core's Validate checks what the points form.
 absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   for (const std::string& text : flags.walls) {
+    if (text.find('=') != std::string::npos) {
+      const std::string attribute = parameters.phase_attribute;
+      const bool is_other = !parameters.wall_phases.empty() && AttributeOf(text) != attribute;
+      if (is_other || !ParsePhases(text, parameters.phase_attribute, parameters.wall_phases)) {
+        return WrongFlag("--wall", text, "one attribute and whole numbers, such as type=2");
+      }
+      continue;
+    }
     const std::vector<double> points = Numbers(text);
     if (points.size() < 4 || points.size() % 2 != 0) {
-      return WrongFlag("--wall", text, "X0,Y0,X1,Y1,...: two points or more");
+      return WrongFlag("--wall", text, "X0,Y0,X1,Y1,...: two points or more; or particles: type=2");
     }
     parameters.walls.push_back({points});
   }
@@ -165,8 +184,11 @@ std::optional<double> PositiveNumber(std::string_view text) {
 }
 
 std::string PhaseAttributeOf(const ReplayFlags& flags) {
-  const std::size_t end = flags.phases.find('=');
-  return end == std::string::npos ? "" : flags.phases.substr(0, end);
+  if (!flags.phases.empty()) return AttributeOf(flags.phases);
+  for (const std::string& wall : flags.walls) {
+    if (const std::string attribute = AttributeOf(wall); !attribute.empty()) return attribute;
+  }
+  return "";
 }
 
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing) {

@@ -82,7 +82,8 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
   for (const Wall& wall : parameters.walls) AppendAll(flags, " --wall ", NumberList(wall.points));
-  std::string isovalues;  // A recording has no phases, so it gives the outline of all particles.
+  // A recording has no phases, so it gives the outline of all particles, without walls of theirs.
+  std::string isovalues;
   for (const Section& section : parameters.sections) {
     // Every slice has the same isolines.
     if (!section.isovalue || section.slice != parameters.sections.front().slice) continue;

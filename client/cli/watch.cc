@@ -330,7 +330,8 @@ int Watch(const WatchFlags& flags) {
     return ComplainOfServer(watcher.status());
   }
   places.surface = (*watcher)->stream().parameters.output == Output::kSurface;
-  places.walls = !(*watcher)->stream().parameters.walls.empty();
+  const ReconstructionParameters& parameters = (*watcher)->stream().parameters;
+  places.walls = !parameters.walls.empty() || !parameters.wall_phases.empty();
   auto outputs = FrameOutputs::Create(places);
   if (!outputs.ok()) {
     progress.reset();

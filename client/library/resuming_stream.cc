@@ -44,7 +44,7 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->boundary != requested.boundary) {
     return absl::UnimplementedError("the server does not support grains: use a newer one");
   }
-  if (parameters->walls != requested.walls) {
+  if (parameters->walls != requested.walls || parameters->wall_phases != requested.wall_phases) {
     return absl::UnimplementedError("the server does not support walls: use a newer one");
   }
   return StreamInfo{

@@ -255,6 +255,9 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
   for (std::size_t k = 0; k < parameters.walls.size(); ++k) {
     lines.emplace_back(Concat("wall ", k + 1), NumberList(parameters.walls[k].points));
   }
+  for (const std::int32_t phase : parameters.wall_phases) {
+    lines.emplace_back("walls", Concat(parameters.phase_attribute, "=", phase));
+  }
   if (parameters.attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     lines.emplace_back("attribute tolerance", ShortestNumber(parameters.attribute_tolerance));
   }

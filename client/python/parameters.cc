@@ -213,6 +213,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeBox(arguments, parameters.box);
   TakeInto(arguments, "noise_filter", parameters.noise_filter);
   TakeWalls(arguments, parameters.walls);
+  TakeInto(arguments, "wall_phases", parameters.wall_phases);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
@@ -326,6 +327,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
                 "wrap"_a = parameters.box && parameters.box->wraps,
                 "noise_filter"_a = parameters.noise_filter, "walls"_a = walls,
+                "wall_phases"_a = parameters.wall_phases,
                 "phase_attribute"_a = parameters.phase_attribute,
                 "sizes"_a = named(parameters.sizes), "boundary"_a = named(parameters.boundary));
   if (parameters.output == Output::kSurface) {

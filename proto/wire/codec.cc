@@ -407,6 +407,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   parameters.boundary = *boundary;
   parameters.plane = *plane;
   parameters.walls = *std::move(walls);
+  parameters.wall_phases = {message.wall_phases().begin(), message.wall_phases().end()};
   if (message.has_spacing()) parameters.spacing = message.spacing();
   if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
   if (message.has_cell_size()) parameters.cell_size = message.cell_size();
@@ -475,6 +476,10 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.sizes == Sizes::kOwn) message.set_sizes(v1::SIZES_OWN);
   if (parameters.boundary == Boundary::kGrains) message.set_boundary(v1::BOUNDARY_GRAINS);
   EncodeWalls(parameters.walls, message);
+  for (const std::int32_t phase : parameters.wall_phases) {
+    message.add_wall_phases(phase);
+    message.set_phase_attribute(parameters.phase_attribute);
+  }
 }
 
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present) {

@@ -242,6 +242,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("surfaces");
   response.add_capabilities("surface-levels");
   response.add_capabilities("walls");
+  response.add_capabilities("wall-phases");
   if (context_.relay != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");
   if (context_.limits.history_bytes > 0) response.add_capabilities("history");

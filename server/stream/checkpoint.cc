@@ -38,7 +38,7 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   const auto& [output, placement, fill, spacing, spacing_rule, sizes, boundary, kernel_radius,
                cell_size, reference_radius, surface_offset, attribute_tolerance, normal_memory,
                clean, min_component_area, min_component_particles, plane, slice, isovalue, sections,
-               phase_attribute, surface, box, noise_filter, walls] = parameters;
+               phase_attribute, surface, box, noise_filter, walls, wall_phases] = parameters;
   const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
@@ -120,6 +120,11 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     put_small('l');
     PutNumber(std::uint64_t{wall.points.size()}, bytes);
     for (const double coordinate : wall.points) PutNumber(coordinate, bytes);
+  }
+  for (const std::int32_t phase : wall_phases) {
+    put_small('x');
+    put_small(phase);
+    bytes += phase_attribute;
   }
   return ChecksumOf(bytes);
 }

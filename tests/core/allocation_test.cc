@@ -220,6 +220,54 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
   EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
 }
 
+// Bodies that slide along a floor around an obstacle, with walls as lines and as particles.
+class WarmFrameAtWalls : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(AreParticles, WarmFrameAtWalls, testing::Bool(),
+                         testing::PrintToStringParamName());
+
+TEST_P(WarmFrameAtWalls, AllocatesNothing) {
+  ReconstructionParameters parameters{.spacing = 1.0};
+  if (GetParam()) {
+    parameters.wall_phases = {2};
+  } else {
+    parameters.walls = {{{0, 0, 1, 0}}, {{20, 6, 24, 12, 28, 6}}};
+  }
+  const auto reconstructor = Reconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<Particles> frames;
+  for (int k = 0; k < 4; ++k) {
+    Particles frame = support::Lattice(40 + 3 * k, 20 - k, .5, .5);
+    frame.Add(support::Disc(6, 70.0 - 3 * k, 3));
+    frame.phases.assign(frame.size(), 1);
+    if (GetParam()) {
+      frame.Add(support::Lattice(120, 2, -20.5, -1.5));
+      frame.phases.resize(frame.size(), 2);
+    }
+    for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
+    frames.push_back(frame);
+  }
+  State state;
+  Workspace workspace;
+  Result result;
+  std::size_t before = 0;
+  tbb::task_arena arena(1);
+  for (int round = 0; round < 40; ++round) {
+    before = allocations;
+    for (const Particles& frame : frames) {
+      arena.execute([&] {
+        const absl::Status status =
+            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
+        ASSERT_TRUE(status.ok()) << status;
+      });
+    }
+    if (round == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  EXPECT_GE(result.rings.contacts.size(), 2u);
+}
+
 // A disc that moves, given in another order each time, with noise.
 TEST(WarmFilteredFrame, AllocatesNothing) {
   const auto reconstructor = Reconstructor::Create(

@@ -44,6 +44,8 @@ std::vector<Stream> Streams() {
   }
   add("EstimatingTheSpacing", {.spacing_rule = SpacingRule::kEveryFrame});
   add("DividedAmongPhases", {.spacing = 1, .sections = {{.phase = 1}, {.phase = 2}}});
+  add("CutAtWalls", {.spacing = 1, .walls = {{{0, -60, 1, -60}}, {{125, 3, 131, 3, 131, -2}}}});
+  add("CutAtWallParticles", {.spacing = 1, .wall_phases = {2}});
   add("OfAWideKernel", {.spacing = 1, .kernel_radius = 5, .cell_size = 2});
   streams.push_back({"WithEverythingKnown", {.spacing = 1}, /*brings_everything=*/true});
   return streams;
@@ -60,7 +62,7 @@ Particles SceneAt(const Stream& stream, int frame) {
   }
   Particles particles = scene;
   if (stream.brings_everything) particles.volumes.assign(particles.size(), 0.9f);
-  if (!stream.parameters.sections.empty()) {
+  if (!stream.parameters.sections.empty() || !stream.parameters.wall_phases.empty()) {
     for (std::size_t k = 0; k < particles.size(); ++k) {
       particles.phases.push_back(std::sin(particles.x(k) / 9) < .3 ? 1 : 2);
     }

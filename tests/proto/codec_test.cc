@@ -82,6 +82,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
       .axes = {PeriodicAxis{-1.5, 40.25}, std::nullopt, PeriodicAxis{3, 9}}, .wraps = true};
   parameters.noise_filter = 0.375;
   parameters.walls = {{.points = {0, 0, 1, 0}}, {.points = {0.1, -2, 3, 4, 5, 6.5}}};
+  parameters.wall_phases = {7, -16'777'216};
   parameters.sizes = Sizes::kOwn;
   parameters.boundary = Boundary::kGrains;
   v1::ReconstructionParameters message;

@@ -148,7 +148,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(23, BlobParameters());
+  std::vector<ReconstructionParameters> others(25, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -173,6 +173,8 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[20].walls = {{.points = {0, -100, 1, -100}}};
   others[21].walls = {{.points = {0, -100, 1, -100}}, {.points = {1, 100, 0, 100}}};
   others[22].walls = {{.points = {-100, -100, 100, -100, 0, 100}}};
+  others[23].wall_phases = {1};
+  others[24].wall_phases = {1, 2};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

@@ -174,6 +174,7 @@ class Reconstructor:
         wrap: bool = ...,
         noise_filter: Optional[float] = ...,
         walls: Optional[Sequence[ArrayLike]] = ...,
+        wall_phases: Optional[Sequence[int]] = ...,
         sizes: Optional[str] = ...,
         boundary: Optional[str] = ...) -> None: ...
     def reconstruct(
@@ -253,6 +254,7 @@ def reconstruct(
     wrap: bool = ...,
     noise_filter: Optional[float] = ...,
     walls: Optional[Sequence[ArrayLike]] = ...,
+    wall_phases: Optional[Sequence[int]] = ...,
     sizes: Optional[str] = ...,
     boundary: Optional[str] = ...) -> Result: ...
 def estimate_spacing(positions: Positions) -> Optional[float]: ...

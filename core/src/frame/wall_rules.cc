@@ -120,7 +120,8 @@ absl::Status CheckWalls(const ReconstructionParameters& p) {
   for (const Wall& wall : p.walls) points += wall.points.size() / 2;
   if (points > p.kMaxWallPoints) {
     return Refused("walls", absl::StrCat(points, " points"),
-                   absl::StrCat("must have at most ", p.kMaxWallPoints));
+                   absl::StrCat("must have at most ", p.kMaxWallPoints,
+                                " points together, and at least 2 points each"));
   }
   if (absl::Status status = CheckOthers(p, "walls", p.walls.size()); !status.ok()) return status;
   for (std::size_t k = 0; k < p.walls.size(); ++k) {

@@ -75,6 +75,38 @@ TEST(WallsReplay, WithoutWallsFilesAreAsBefore) {
   EXPECT_THAT(Content(folder.Path("out/frame_000000.svg")), Not(HasSubstr("contacts")));
 }
 
+// A tank of particles, of which the last row of the fluid is the eighth.
+TEST(WallsReplay, ParticlesOfATypeAreATank) {
+  const support::TemporaryFolder folder;
+  {
+    std::ofstream file(folder.Path("tank.csv"));
+    file << "x,y,type\n";
+    for (int i = -2; i < 22; ++i) {
+      for (int j = -2; j < 14; ++j) {
+        const bool is_wall = i < 0 || i >= 20 || j < 0;
+        if (is_wall || j < 8) {
+          file << i + .5 << "," << j + .5 << "," << (is_wall ? 3 : 1) << "\n";
+        }
+      }
+    }
+  }
+  ServerProgram server;
+  std::vector<std::string> digests;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local", "--check"}, {"--server", server.address()}}) {
+    std::vector<std::string> flags = {"--wall", "type=3", "--stats", folder.Path("s.csv")};
+    flags.insert(flags.end(), where.begin(), where.end());
+    const Ran ran = Replayed(folder.Path("tank.csv"), flags);
+    ASSERT_EQ(ran.exit_code, 0) << ran.error;
+    const std::string stats = Content(folder.Path("s.csv"));
+    digests.push_back(Column(stats, "rings_digest").at(0));
+    EXPECT_NEAR(std::stod(Column(stats, "area").at(0)), 160, 2);
+    EXPECT_EQ(Column(stats, "contacts").at(0), "2");
+    EXPECT_NEAR(std::stod(Column(stats, "wetted_length").at(0)), 36, 1);
+  }
+  EXPECT_EQ(digests[0], digests[1]);
+}
+
 // Repeated flags, also with a negative first coordinate, are walls in their order.
 TEST(WallsReplay, ReportListsTheWalls) {
   const support::TemporaryFolder folder;
@@ -101,6 +133,11 @@ TEST(WallsReplay, WrongWallsAreRefused) {
     EXPECT_THAT(refusal({"--wall", text}),
                 HasSubstr("--wall: '" + text + "'; must be X0,Y0,X1,Y1,...: two points or more"));
   }
+  for (const std::string text : {"type=", "type=1.5", "=1"}) {
+    EXPECT_THAT(refusal({"--wall", text}), HasSubstr("type=2"));
+  }
+  EXPECT_THAT(refusal({"--wall", "type=1", "--wall", "kind=2"}), HasSubstr("one attribute"));
+  EXPECT_THAT(refusal({"--wall", "type=1,1"}), HasSubstr("--wall"));
   std::string many = "0,0";
   for (int k = 1; k <= 1024; ++k) many += "," + std::to_string(k) + "," + std::to_string(k * k);
   EXPECT_THAT(refusal({"--wall", many}), HasSubstr("partiemc: --wall: "));

@@ -103,10 +103,29 @@ class Streams(unittest.TestCase):
                     numpy.testing.assert_array_equal(getattr(result.rings, name),
                                                      getattr(expected.rings, name))
 
+    def test_wall_particles_are_those_of_this_process(self):
+        x, y = numpy.meshgrid(numpy.arange(-2, 24) + 0.5, numpy.arange(-2, 15) + 0.5)
+        positions = numpy.column_stack([x.ravel(), y.ravel()])
+        kinds = numpy.where((x < 0) | (x > 22) | (y < 0), 2, 1).ravel()
+        is_there = (kinds == 2) | (positions[:, 1] < 10)
+        positions, kinds = positions[is_there], kinds[is_there]
+        parameters = {"spacing": 1, "wall_phases": [2], "phase_attribute": "kind"}
+        expected = partiemc.reconstruct(positions, attributes={"kind": kinds}, **parameters)
+        self.assertEqual(len(expected.rings.contacts), 2)
+        self.assertAlmostEqual(expected.statistics.area, 220, delta=2)
+        self.assertEqual(list(expected.rings.attributes), [])
+        with partiemc.connect(self.address, **parameters) as stream:
+            self.assertEqual(stream.parameters["wall_phases"], [2])
+            stream.send(positions, attributes={"kind": kinds})
+            result = stream.receive()
+            self.assertEqual(digests(result), digests(expected))
+            numpy.testing.assert_array_equal(result.rings.wetted, expected.rings.wetted)
+
     def test_phases_and_grains_come_in_parts(self):
         particles = block()
         types, diameters = numpy.where(particles[:, 0] < 10, 2, 7), numpy.ones(len(particles))
         cases = {"phases": ({"sections": [{"phase": 2}, {"phase": 7}]}, {"attributes": {"phase": types}}),
+                 "walls": ({"wall_phases": [7]}, {"attributes": {"phase": types}}),
                  "grains": ({"sizes": "own", "boundary": "grains"}, {"volumes": diameters ** 2})}
         for name, (parameters, arrays) in cases.items():
             received = [None, None]

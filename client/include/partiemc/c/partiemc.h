@@ -155,6 +155,10 @@ typedef struct partiemc_options {
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
+  /* The phases (`phase_attribute`) of the particles of walls. Their outline is a further wall. At
+   * most 16. Excludes what `walls` exclude. */
+  const int32_t* wall_phases;
+  size_t wall_phase_count;
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);

@@ -135,6 +135,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
   const sameField = (settings.placement === 0 || settings.placement === base?.placement) &&
     settings.kernelRadius === null;
   const farthest = placement === Placement.FARTHEST_PARTICLE;
+  const canHaveWalls = placement === Placement.VIRTUAL_PLANE || placement === Placement.UNSPECIFIED;
   return create(ReconstructionParametersSchema, {
     placement,
     fill: settings.fill || (base?.fill ?? Fill.UNSPECIFIED),
@@ -161,7 +162,9 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     output: base?.output,
     surface: base?.surface,
     // Other placements cannot be cut at walls.
-    walls: placement === Placement.VIRTUAL_PLANE || placement === Placement.UNSPECIFIED ? base?.walls : undefined,
+    walls: canHaveWalls ? base?.walls : undefined,
+    wallPhases: canHaveWalls ? base?.wallPhases : undefined,
+    phaseAttribute: base?.phaseAttribute,
     // Farthest-particle cannot be wrapped.
     box: base?.box && { ...base.box, wraps: base.box.wraps && !farthest },
   });
