@@ -90,7 +90,18 @@ std::vector<Wall> WallsOf(const partiemc_options& options) {
   return walls;
 }
 
+// Checks the arrays of walls.
+absl::Status CheckWalls(const partiemc_options& options) {
+  const bool has_walls = options.wall_count == 0 || (options.walls && options.wall_sizes);
+  const bool has_phases = options.wall_phase_count == 0 || options.wall_phases;
+  if (has_walls && has_phases) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      has_walls ? "wall_phases: NULL; must be an array of wall_phase_count phases"
+                : "walls, wall_sizes: NULL; must be arrays of wall_count walls");
+}
+
 absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
+  if (absl::Status status = CheckWalls(options); !status.ok()) return status;
   ReconstructionParameters parameters;
   if (options.spacing != 0) parameters.spacing = options.spacing;
   if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;

@@ -124,6 +124,22 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
 }
 
+// Finds the tiles near walls, and adds their number to `size`. Errors: RESOURCE_EXHAUSTED if memory
+// is short.
+absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& size,
+                       FrameMemory& memory, Workspace::Buffers& b) {
+  const TileDirectory& directory = b.bins.tiles;
+  InStage(task.observer, Stage::kField, [&] {
+    b.walls.ListLines(task.parameters.walls, task.wall_outlines, scale.cell_size, directory);
+  });
+  size.wall_pairs = b.walls.PairCount();
+  size.wall_tiles = std::min<std::uint64_t>(size.wall_pairs, directory.size());
+  if (absl::Status status = memory.ReserveOutline(size); !status.ok()) return status;
+  InStage(task.observer, Stage::kField, [&] { b.walls.FindTiles(directory); });
+  size.wall_tiles = b.walls.TileCount();
+  return absl::OkStatus();
+}
+
 // Runs the stages field, crossings and rings.
 void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& b) {
   StageObserver* const observer = task.observer;
@@ -306,20 +322,18 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   });
   b.last.doubts = result.statistics.doubts;
   if (!status.ok() || !lengths) return status;
-  if (HasWalls(task)) {
-    b.walls.FindTiles(parameters.walls, task.wall_outlines, scale.cell_size, b.bins.tiles);
-  }
-  status = memory.ReserveOutline({.particles = seen.ParticleCount(),
-                                  .tiles = b.bins.tiles.size(),
-                                  .attribute_values = AttributeValuesOf(seen),
-                                  .phases = CountPhases(parameters),
-                                  .wall_tiles = HasWalls(task) ? b.walls.TileCount() : 0});
+  FrameSize size{.particles = seen.ParticleCount(),
+                 .tiles = b.bins.tiles.size(),
+                 .attribute_values = AttributeValuesOf(seen),
+                 .phases = CountPhases(parameters)};
+  status = HasWalls(task) ? FindWalls(task, scale, size, memory, b) : memory.ReserveOutline(size);
   if (!status.ok()) return status;
   FindRings(task, scale, b);
-  FrameSize size = SizeOf(parameters, seen, b);
-  if (task.HasCopies()) size.cut_segments = size.segments;
-  if (HasWalls(task)) size.wall_tiles = b.walls.TileCount();
-  status = memory.ReserveOutline(size);
+  FrameSize whole = SizeOf(parameters, seen, b);
+  if (task.HasCopies()) whole.cut_segments = whole.segments;
+  whole.wall_tiles = size.wall_tiles;
+  whole.wall_pairs = size.wall_pairs;
+  status = memory.ReserveOutline(whole);
   if (!status.ok()) return status;
   status = FillOutline(task, seen, scale, memory, b, result);
   if (!status.ok()) return status;

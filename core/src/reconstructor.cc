@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
 #include "bins/cell_mask.h"
+#include "bins/resolution.h"
 #include "core/internal/research.h"
 #include "field/slice_field.h"
 #include "frame/frame_view.h"
@@ -75,6 +76,33 @@ ReconstructionParameters WallParametersOf(const ReconstructionParameters& parame
   of.min_component_area = 0;
   of.min_component_particles = 0;
   return of;
+}
+
+// Divides a frame that has passed CheckFrame into fluid and walls. The fluid decides the lengths of
+// both. Errors: see Reconstruct.
+absl::Status PrepareWalls(const Frame& given, const ReconstructionParameters& parameters,
+                          const State& state, FrameMemory& memory, Workspace::Buffers& b,
+                          Prepared& prepared) {
+  absl::Status status =
+      memory.ReserveParticles(WallParticles::BytesFor(given), "particles of fluid and walls");
+  if (!status.ok()) return status;
+  memory.Done();
+  status = b.wall_particles.Take(given, parameters);
+  if (!status.ok()) return status;
+  const Frame& fluid = b.wall_particles.fluid();
+  prepared.lifted = {.frame = fluid, .particles = fluid.ParticleCount()};
+  const auto lengths = DecideLengths(parameters, fluid, state, b.spacing);
+  if (!lengths.ok()) return lengths.status();
+  prepared.lengths = *lengths;
+  if (!prepared.lengths) return absl::OkStatus();
+  const double spacing = prepared.lengths->spacing;
+  // Before they are divided, particles have the caller's numbers.
+  Doubts of_volumes;
+  if (auto lightest = LightestVolume(given, spacing * spacing, of_volumes); !lightest.ok()) {
+    return lightest.status();
+  }
+  status = CheckStep(given, parameters.plane, spacing, prepared.doubts);
+  return prepared.lengths->is_provisional ? absl::OkStatus() : status;
 }
 
 // Commits the new state of one outline. Buffers are swapped, so that both states keep their memory.
@@ -221,25 +249,31 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     if (!status.ok()) return status;
     frame.attributes = b.attributes;
   }
+  Prepared prepared;
   const Rings* wall_outlines = nullptr;
   if (!parameters_.wall_phases.empty()) {
     status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
     if (!status.ok()) return status;
-    status = b.wall_particles.Take(given, parameters_);
+    status = PrepareWalls(given, parameters_, state, memory, b, prepared);
     if (!status.ok()) return status;
-    b.wall_result.Clear();
-    status =
-        ReconstructOutline({*walls_, VariantFor(*walls_, *variant_), limits_,
-                            b.wall_particles.walls(), unseen, control.observer, false, nullptr},
-                           memory, b, b.wall_state, b.wall_result);
-    if (!status.ok()) return status;
-    memory.Done();
-    SharpenCorners(b.wall_result.statistics.spacing, b.wall_corners, b.wall_result.rings);
     frame = b.wall_particles.fluid();
+    b.wall_result.Clear();
+    if (prepared.lengths) {
+      Prepared of_walls = prepared;
+      of_walls.lifted.particles = b.wall_particles.walls().ParticleCount();
+      status =
+          ReconstructOutline({*walls_, VariantFor(*walls_, *variant_), limits_,
+                              b.wall_particles.walls(), unseen, control.observer, false, &of_walls},
+                             memory, b, b.wall_state, b.wall_result);
+      if (!status.ok()) return status;
+      memory.Done();
+      InStage(control.observer, Stage::kField, [&] {
+        SharpenCorners(prepared.lengths->spacing, b.wall_corners, b.wall_result.rings);
+      });
+    }
     wall_outlines = &b.wall_result.rings;
   }
   Prepare(frame.attributes, parameters_, result);
-  Prepared prepared;
   if (is_prepared) {
     status = InStage(control.observer, Stage::kBins, [&] {
       return PrepareFrame({parameters_, limits_, frame, state}, memory,
@@ -254,7 +288,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     return OutlineTask{parameters,   VariantFor(parameters, *variant_),
                        limits_,      frame,
                        previous,     control.observer,
-                       is_first,     is_prepared ? &prepared : nullptr,
+                       is_first,     is_prepared || wall_outlines != nullptr ? &prepared : nullptr,
                        wall_outlines};
   };
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,

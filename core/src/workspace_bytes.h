@@ -18,6 +18,7 @@ struct FrameSize {
   std::uint64_t phases = 0;            ///< Phases that divide the outline.
   std::uint64_t interface_points = 0;  ///< Points of the interfaces between phases.
   std::uint64_t wall_tiles = 0;        ///< Tiles near walls.
+  std::uint64_t wall_pairs = 0;        ///< Pairs of such a tile and a line near it.
 };
 
 /// Bytes per item: measured over frames of all kinds, plus a margin because vectors grow by
@@ -53,8 +54,9 @@ inline constexpr std::uint64_t kBytesPerPhaseTile = 10'000;
 inline constexpr std::uint64_t kBytesPerTileOfPhase = 900;
 inline constexpr std::uint64_t kBytesPerInterfacePoint = 500;
 
-/// Bytes for each tile near walls.
-inline constexpr std::uint64_t kBytesPerWallTile = 12'000;
+/// Bytes for each tile near walls, and for each line near such a tile.
+inline constexpr std::uint64_t kBytesPerWallTile = 9'000;
+inline constexpr std::uint64_t kBytesPerWallPair = 60;
 
 /// Bytes that any frame takes.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
@@ -67,8 +69,8 @@ inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +
                         kBytesPerCutSegment * size.cut_segments +
-                        kBytesPerWallTile * size.wall_tiles + kBytesPerGridCell * size.grid_cells +
-                        kBytesPerBlockCell * size.block_cells;
+                        kBytesPerWallTile * size.wall_tiles + kBytesPerWallPair * size.wall_pairs +
+                        kBytesPerGridCell * size.grid_cells + kBytesPerBlockCell * size.block_cells;
   if (size.phases > 0) {
     bytes += kBytesPerPhaseParticle * size.particles + kBytesPerPhaseTile * size.tiles +
              kBytesPerTileOfPhase * size.tiles * (size.phases + 1) +

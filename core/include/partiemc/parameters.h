@@ -248,8 +248,8 @@ struct ReconstructionParameters {
   std::vector<Section> sections = {};
 
   /// The attribute (Frame::attributes) with the phases of the particles, such as a type: one whole
-  /// number each. At most 64 bytes. Frames of a stream with Section::phase must have it. It is not
-  /// interpolated.
+  /// number each. At most 64 bytes. Frames of a stream with Section::phase or `wall_phases` must
+  /// have it. It is not interpolated.
   std::string phase_attribute = "phase";
 
   SurfaceOptions surface = {};

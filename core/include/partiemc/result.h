@@ -49,10 +49,11 @@ struct Rings {
   /// box, where a body was cut (ReconstructionParameters::box).
   std::vector<std::uint32_t> cuts;
   /// Points, ascending, whose segment to the next point of the ring lies on a wall
-  /// (ReconstructionParameters::walls).
+  /// (ReconstructionParameters::walls), except where the repair has moved an end of it off the
+  /// wall.
   std::vector<std::uint32_t> wetted;
   /// Points, ascending, where an outline meets a wall, and the angle of the fluid there, between
-  /// the wall and the outline: in radians, in (0, pi).
+  /// the wall and the outline, in radians.
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 
@@ -93,7 +94,7 @@ struct Mesh {
 };
 
 struct FrameStatistics {
-  std::uint64_t particles = 0;
+  std::uint64_t particles = 0;  ///< Without those of walls.
   /// Tiles of 32 x 32 nodes that were allocated; for surfaces, bricks of 8 x 8 x 8 nodes.
   std::uint64_t tiles = 0;
   std::uint64_t active_cells = 0;        ///< Cells that the outline crosses; 0 for surfaces.

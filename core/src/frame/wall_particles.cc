@@ -32,6 +32,15 @@ void WallParticles::Part::Take(const Frame& from) {
   copy.View(frame);
 }
 
+std::uint64_t WallParticles::BytesFor(const Frame& frame) {
+  std::uint64_t each = sizeof(std::uint32_t) + sizeof(double) * frame.components;
+  if (!frame.volumes.empty()) each += sizeof(float);
+  if (!frame.ids.empty()) each += sizeof(std::uint64_t);
+  if (!frame.velocities.empty()) each += sizeof(float) * frame.components;
+  for (const Attribute& attribute : frame.attributes) each += sizeof(float) * attribute.components;
+  return 2 * each * frame.ParticleCount();  // Vectors grow by doubling.
+}
+
 absl::Status WallParticles::Take(const Frame& frame, const ReconstructionParameters& parameters) {
   std::span<const float> phases;
   absl::Status status = TakePhaseValues(frame, parameters.phase_attribute, phases, attributes_);
@@ -48,6 +57,8 @@ absl::Status WallParticles::Take(const Frame& frame, const ReconstructionParamet
   others.attributes = attributes_;
   fluid_.Take(others);
   others.attributes = {};
+  others.ids = {};
+  others.velocities = {};
   walls_.Take(others);
   return absl::OkStatus();
 }

@@ -15,8 +15,12 @@ class WallParticles {
  public:
   /// Divides a frame by ReconstructionParameters::wall_phases. Errors: INVALID_ARGUMENT if a frame
   /// with particles lacks the attribute of the phases, or if this is not one whole number per
-  /// particle. Requires: CheckFrame has passed the frame. Cost: linear.
+  /// particle. Walls have positions and volumes only. Requires: CheckFrame has passed the frame.
+  /// Cost: linear.
   absl::Status Take(const Frame& frame, const ReconstructionParameters& parameters);
+
+  /// An upper bound of the memory for a frame.
+  static std::uint64_t BytesFor(const Frame& frame);
 
   /// Views of this object. Neither has the attribute of the phases.
   const Frame& fluid() const { return fluid_.frame; }

@@ -7,7 +7,8 @@
 namespace partiemc {
 
 /// Checks the walls, and that nothing excludes them. Errors: INVALID_ARGUMENT with the Violation of
-/// the first broken rule. Cost: quadratic in the points of a polygon, a few ms at most.
+/// the first broken rule. Cost: quadratic in the points of a polygon, of which there are at most
+/// 1024.
 absl::Status CheckWalls(const ReconstructionParameters& parameters);
 
 }  // namespace partiemc

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/point_math.h"
+
 namespace partiemc {
 namespace {
 
@@ -15,11 +17,8 @@ constexpr double kLeastSine = .17;
 // Farthest foot from the fitted stretch, and from the contact along the wall, in spacings. With a
 // smaller angle the outline is a film.
 constexpr double kFarthest = 8, kFarthestMove = 4;
-
-double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
-double Length(const Point& a) { return std::sqrt(Dot(a, a)); }
+// Largest height of the foot above the wall, in cells.
+constexpr double kTolerance = 1e-6;
 
 // Weighted least squares for side = c . (1, s, s^2).
 class Fit {
@@ -90,8 +89,10 @@ Stretch FindStretch(const Point& contact, const Point& up, double h,
 
 }  // namespace
 
-std::optional<ContactCurve> ContactCurve::Fit(const WallLines& lines, const WallPlace& contact,
-                                              double spacing, StretchPoint point) {
+std::optional<ContactCurve> ContactCurve::Fit(const WallField& walls, std::uint32_t tile,
+                                              const WallPlace& contact, double spacing,
+                                              StretchPoint point) {
+  const WallLines& lines = walls.lines();
   const WallEdge& edge = lines.edges()[contact.edge];
   const Stretch stretch = FindStretch(lines.At(contact), edge.Left(), spacing, point);
   if (stretch.first == 0 || stretch.length < kLineLength * spacing) return std::nullopt;
@@ -110,29 +111,37 @@ std::optional<ContactCurve> ContactCurve::Fit(const WallLines& lines, const Wall
     fit.Add(Dot(curve.axis_, from), Cross(curve.axis_, from), Length(Minus(after, before)));
   }
   if (!fit.Solve(stretch.length < kParabolaLength * spacing ? 2 : 3, curve.c_)) return std::nullopt;
-  if (!curve.FindFoot(lines, edge.loop, spacing)) return std::nullopt;
+  if (!curve.FindFoot(lines, contact, spacing)) return std::nullopt;
   const double move =
       lines.Between(edge.loop, lines.Along(contact), lines.Along(curve.foot_place_));
   if (std::abs(move) > kFarthestMove * spacing) return std::nullopt;
-  const Point foot = lines.At(curve.foot_place_);
-  for (std::size_t solid = 0; solid < lines.SolidCount(); ++solid) {
-    if (solid != edge.solid && lines.IsSolid(solid, foot)) return std::nullopt;
+  bool is_free = true;
+  if (tile != kNoTile) {
+    walls.ForEachSolidNear(
+        tile, lines.At(curve.foot_place_), [&](std::size_t solid, const NearestWall& nearest) {
+          const bool is_other =
+              solid != edge.solid && std::abs(nearest.height) < WallField::kMostHeight;
+          is_free &= !is_other || nearest.height > 0;
+        });
   }
-  return curve;
+  return is_free ? std::optional(curve) : std::nullopt;
 }
 
-bool ContactCurve::FindFoot(const WallLines& lines, std::size_t loop, double spacing) {
+bool ContactCurve::FindFoot(const WallLines& lines, const WallPlace& contact, double spacing) {
+  const double reach = (kFarthest + kFarthestMove) * spacing;
+  NearestWall nearest;
   for (int step = 0; step < 6; ++step) {
-    const NearestWall nearest = lines.NearestOfLoop(loop, At(foot_));
-    foot_place_ = nearest.place;
+    nearest = lines.NearestAlong(contact, reach, At(foot_));
     const Point direction = DirectionAt(foot_);
-    const double sine = Dot(direction, lines.edges()[foot_place_.edge].Left()) / Length(direction);
+    const double sine =
+        Dot(direction, lines.edges()[nearest.place.edge].Left()) / Length(direction);
     if (sine < kLeastSine) return false;
     foot_ -= nearest.height / (sine * Length(direction));
     if (!(foot_ < 0 && foot_ > -kFarthest * spacing)) return false;
   }
-  foot_place_ = lines.NearestOfLoop(loop, At(foot_)).place;
-  return true;
+  nearest = lines.NearestAlong(contact, reach, At(foot_));
+  foot_place_ = nearest.place;
+  return std::abs(nearest.height) < kTolerance;
 }
 
 }  // namespace partiemc

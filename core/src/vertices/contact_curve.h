@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "absl/functional/function_ref.h"
 #include "base/point.h"
-#include "walls/wall_lines.h"
+#include "walls/wall_field.h"
 
 namespace partiemc {
 
@@ -36,14 +37,15 @@ class ContactCurve {
   using StretchPoint = absl::FunctionRef<std::optional<Point>(std::size_t k)>;
 
   /// Fits the stretch from 1.5 h above the wall by least squares. Empty if the stretch is too
-  /// short, or if the curve does not meet the wall of the contact at an angle above about ten
-  /// degrees. `spacing`: h in cells. Cost: linear in the points, and a few times in the lines of
-  /// the wall.
-  static std::optional<ContactCurve> Fit(const WallLines& lines, const WallPlace& contact,
-                                         double spacing, StretchPoint point);
+  /// short, or if the curve does not meet the wall of the contact nearby, in the fluid of the other
+  /// walls, at an angle above about ten degrees. `tile`: near the contact. `spacing`: h in cells.
+  /// Cost: linear in the points and in the lines near the contact.
+  static std::optional<ContactCurve> Fit(const WallField& walls, std::uint32_t tile,
+                                         const WallPlace& contact, double spacing,
+                                         StretchPoint point);
 
  private:
-  bool FindFoot(const WallLines& lines, std::size_t loop, double spacing);
+  bool FindFoot(const WallLines& lines, const WallPlace& contact, double spacing);
 
   Point origin_, axis_;
   std::array<double, 3> c_{};

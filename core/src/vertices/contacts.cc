@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "base/cancellation.h"
+#include "base/point_math.h"
 #include "vertices/contact_curve.h"
 #include "vertices/vertices.h"
 
@@ -18,15 +20,12 @@ constexpr double kClearance = .02;
 // A contact keeps at least this share of the wet stretch to the next one.
 constexpr double kMostShare = .45;
 
-double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
-
 // Fits one contact. Lengths are in cells.
 class ContactFitter {
  public:
   ContactFitter(const VertexInput& input, WallVertices& points, Rings& rings)
-      : lines_(input.walls->lines()),
+      : walls_(*input.walls),
+        lines_(input.walls->lines()),
         h_(input.scale.spacing),
         cell_size_(input.scale.cell_size),
         p_(points),
@@ -41,8 +40,8 @@ class ContactFitter {
     const WallEdge& edge = lines_.edges()[place.edge];
     loop_ = edge.loop;
     start_ = lines_.Along(place);
-    const std::optional<ContactCurve> curve =
-        ContactCurve::Fit(lines_, place, h_, [&](std::size_t k) -> std::optional<Point> {
+    const std::optional<ContactCurve> curve = ContactCurve::Fit(
+        walls_, p_.tile[contact], place, h_, [&](std::size_t k) -> std::optional<Point> {
           if (k >= count_ || p_.kind[Free(k)] != VertexKind::kFree) return std::nullopt;
           return PointOf(Free(k));
         });
@@ -158,10 +157,10 @@ class ContactFitter {
 
   void SetAngle(const Point& direction) {
     const Point& unit = lines_.edges()[p_.place[contact_].edge].unit;
-    const double turn = std::abs(Cross(unit, direction));
-    p_.angle[contact_] = static_cast<float>(std::atan2(turn, WetSign() * Dot(unit, direction)));
+    p_.angle[contact_] = static_cast<float>(AngleBetween(Times(unit, WetSign()), direction));
   }
 
+  const WallField& walls_;
   const WallLines& lines_;
   const double h_, cell_size_;
   WallVertices& p_;
@@ -177,6 +176,7 @@ class ContactFitter {
 void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings) {
   ContactFitter fitter(input, points, rings);
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
+    ThrowIfCancelled();
     for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
       if (points.kind[k] == VertexKind::kContact) fitter.Fit(ring, k);
     }
@@ -195,15 +195,16 @@ void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rin
       continue;
     }
     if (points.tile[k] == kNoTile) continue;
-    for (std::size_t solid = 0; solid < walls.lines().SolidCount(); ++solid) {
-      const NearestWall nearest = walls.NearestOfSolid(
-          points.tile[k], solid, {target[0] / cell_size, target[1] / cell_size});
-      if (!(nearest.height < clearance)) continue;
-      const Point on = walls.lines().At(nearest.place);
-      const Point up = walls.lines().edges()[nearest.place.edge].Left();
-      target[0] = (on.x + clearance * up.x) * cell_size;
-      target[1] = (on.y + clearance * up.y) * cell_size;
-    }
+    const Point given{target[0] / cell_size, target[1] / cell_size};
+    Point moved = given;
+    walls.ForEachSolidNear(points.tile[k], given, [&](std::size_t, const NearestWall& nearest) {
+      if (!(nearest.height < clearance) || nearest.height < -WallField::kMostHeight) return;
+      moved = Plus(walls.lines().At(nearest.place),
+                   Times(walls.lines().edges()[nearest.place.edge].Left(), clearance));
+    });
+    if (moved == given) continue;
+    target[0] = moved.x * cell_size;
+    target[1] = moved.y * cell_size;
   }
 }
 

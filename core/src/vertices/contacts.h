@@ -8,14 +8,12 @@ namespace partiemc {
 
 struct VertexInput;
 
-/// Near a wall, the field sees no particles beyond it, so the outline there is wrong by up to a
-/// spacing. The stretch from 1.5 to 6 h above the wall therefore continues to the wall: a parabola,
-/// t = a + b w + c w^2 in the height w above the wall and the length t along it, fitted to its
-/// vertices by least squares. Moves each contact to where its parabola meets the wall, and the
-/// vertices below 1.5 h onto it. The vertices on the wall that the contact passes move ahead of it.
-/// A contact stays before sharp corners of its wall, and where its stretch is too low for a fit.
-/// `points`: of `rings`. Cost: for each contact, linear in the lines of its wall and the vertices
-/// of the stretch.
+/// Moves each contact to where the curve of its stretch (contact_curve.h) meets the wall, and the
+/// vertices below the fitted part onto the curve. The vertices on the wall that the contact passes
+/// move ahead of it. A contact stays before sharp corners of its wall, and where there is no curve.
+/// Call it before the area step, whose target counts the wetted area, and after it, because that
+/// step moves the curves. `points`: of `rings`. Cost: for each contact, linear in the lines near it
+/// and in the vertices of the stretch.
 void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings);
 
 /// Moves vertices on walls to their places, and free vertices in the solid out of it.

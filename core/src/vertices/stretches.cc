@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/point_math.h"
 #include "vertices/contact_curve.h"
 
 namespace partiemc {
@@ -20,7 +21,7 @@ struct Vertices {
 
 // Outward normal where the ring, with the inside on its left, runs along `direction`.
 VertexNormal NormalOf(const Point& direction, double sign) {
-  const double length = std::hypot(direction.x, direction.y) * sign;
+  const double length = Length(direction) * sign;
   return {static_cast<float>(direction.y / length), static_cast<float>(-direction.x / length)};
 }
 
@@ -37,8 +38,8 @@ struct StretchEnd {
   }
 
   std::optional<ContactCurve> Fit(const RingVertices& v) const {
-    return ContactCurve::Fit(input.walls->lines(), v.walls.place[At(0)], input.scale.spacing,
-                             [&](std::size_t k) -> std::optional<Point> {
+    return ContactCurve::Fit(*input.walls, v.walls.tile[At(0)], v.walls.place[At(0)],
+                             input.scale.spacing, [&](std::size_t k) -> std::optional<Point> {
                                if (k >= ring.count) return std::nullopt;
                                if (v.walls.kind[At(k)] != VertexKind::kFree) return std::nullopt;
                                return v.point[At(k)];

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "base/cancellation.h"
 #include "base/parallel.h"
 #include "base/prefetch.h"
 #include "core/internal/research.h"
@@ -50,6 +51,8 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
   const double x = point.x - origin.x + cell.i;
   const double y = point.y - origin.y + cell.j;
   if (x >= 0 && y >= 0 && x < kTileSize && y < kTileSize) return {cell.tile, x, y};
+  // Contacts may be far from their cells.
+  if (!(x >= -kTileSize && y >= -kTileSize && x < 2 * kTileSize && y < 2 * kTileSize)) return {};
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));
   const TilePlace place = Normalise(input.bins.tiles, cell.tile, i, j);
@@ -391,6 +394,7 @@ void RefineStretches(const VertexInput& input, RingVertices& v) {
   PeriodicRings& memory = v.periodic_rings;
   for (std::size_t ring = 0; ring < input.topology.RingCount(); ++ring) {
     if (v.meets_wall[ring] == 0) continue;
+    ThrowIfCancelled();
     ForEachStretch(input, ring, min_length / 2, v, [&] {
       std::vector<Point>& path = v.stretch_path;
       path.clear();
@@ -418,7 +422,8 @@ void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
     const Point& b = v.point[k + 1];
     const Point chord{b.x - a.x, b.y - a.y};
     const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
-    v.is_kept[k] = input.variant.steps.edge_vertices &&
+    // At a corner of walls, vertices may coincide.
+    v.is_kept[k] = input.variant.steps.edge_vertices && p != a && p != b &&
                    std::abs(cross) >= min_distance * v.SizeOf(k) * std::sqrt(Dot(chord, chord));
     v.is_kept[k + 1] = 1;
   }

@@ -1,10 +1,12 @@
 #include "vertices/wall_vertices.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "base/point_math.h"
 #include "vertices/placement.h"
 #include "vertices/vertices.h"
 
@@ -14,8 +16,9 @@ namespace {
 // A corner counts as part of a cell if it is at most this far outside, in cells.
 constexpr double kCornerTolerance = 1e-9;
 
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+bool AreEqual(const Point& a, const Point& b) {
+  return std::abs(a.x - b.x) < kCornerTolerance && std::abs(a.y - b.y) < kCornerTolerance;
+}
 
 // A crossed lattice edge, from its node in the fluid to the other one.
 struct CrossedEdge {
@@ -126,10 +129,10 @@ class WallVertexFinder {
     v_.walls.kind[vertex] = VertexKind::kFree;
     if (!from_wall && !to_wall) return;
     const Point &a = v_.point[2 * segment], &b = v_.point[2 * next];
-    const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
     if (from_wall && to_wall) {
-      SetWall(vertex, PlaceInCell(cell, middle), VertexKind::kWall);
+      SetWall(vertex, PlaceInCell(cell, a, b), VertexKind::kWall);
     } else {
+      const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
       SetWall(vertex, walls_.Nearest(cell.tile, middle).place, VertexKind::kContact);
     }
     v_.root[vertex] =
@@ -137,62 +140,66 @@ class WallVertexFinder {
                     input_.crossings.segments[input_.topology.segments[segment]], v_.point[vertex]);
   }
 
-  // The sharpest corner of the walls in a cell; without one, the place nearest to `middle`.
-  WallPlace PlaceInCell(const ActiveCell& cell, const Point& middle) const {
+  // The sharpest corner of the walls in a cell, unless it is the vertex of an edge of the cell, at
+  // `a` or `b`; without one, the place nearest to the middle between them.
+  WallPlace PlaceInCell(const ActiveCell& cell, const Point& a, const Point& b) const {
+    constexpr std::size_t kMostLines = 16;  // Of a cell. Others have no corner.
     const Point origin = CellOrigin(input_.bins.tiles, cell);
-    const auto edges = walls_.EdgesNear(cell.tile);
-    WallPlace best = walls_.Nearest(cell.tile, middle).place;
-    double sharpest = 0;
-    const auto consider = [&](const WallPlace& place, const WallEdge& a, const WallEdge& b) {
-      const Point at = lines_.At(place);
+    const auto is_in = [&](const Point& at) {
       const double x = at.x - origin.x, y = at.y - origin.y;
-      const auto is_in = [](double c) {
-        return c >= -kCornerTolerance && c <= 1 + kCornerTolerance;
-      };
-      if (!is_in(x) || !is_in(y)) return;
-      const double turn =
-          1 - a.unit.x * b.unit.x - a.unit.y * b.unit.y;  // 1 - cos: grows with the angle.
-      if (turn <= sharpest || IsBehindWall(cell.tile, at)) return;
-      sharpest = turn;
+      return std::min(x, y) >= -kCornerTolerance && std::max(x, y) <= 1 + kCornerTolerance;
+    };
+    WallPlace best = walls_.Nearest(cell.tile, {(a.x + b.x) / 2, (a.y + b.y) / 2}).place;
+    double straightest = 1;  // Cosine of the turn.
+    const auto consider = [&](const WallPlace& place, const WallEdge& from, const WallEdge& to) {
+      const Point at = lines_.At(place);
+      if (!is_in(at) || AreEqual(at, a) || AreEqual(at, b)) return;
+      const double cosine = Dot(from.unit, to.unit);
+      if (cosine >= straightest || IsBehindWall(cell.tile, at)) return;
+      straightest = cosine;
       best = place;
     };
-    for (std::size_t n = 0; n < edges.size(); ++n) {
-      const WallEdge& a = lines_.edges()[edges[n]];
-      if (!a.is_endless) {
-        const auto of = lines_.EdgesOfLoop(a.loop);
-        const WallEdge& next = &a + 1 == of.data() + of.size() ? of.front() : *(&a + 1);
-        consider({edges[n], 1}, a, next);
+    std::array<std::uint32_t, kMostLines> near;
+    std::size_t count = 0;
+    for (const std::uint32_t k : walls_.EdgesNear(cell.tile)) {
+      const WallEdge& line = lines_.edges()[k];
+      if (!line.is_endless) {
+        const auto of = lines_.EdgesOfLoop(line.loop);
+        const WallEdge& next = &line + 1 == of.data() + of.size() ? of.front() : *(&line + 1);
+        consider({k, 1}, line, next);
       }
-      for (std::size_t m = n + 1; m < edges.size(); ++m) {
-        const WallEdge& b = lines_.edges()[edges[m]];
-        if (b.solid != a.solid) ConsiderCrossing(edges[n], a, b, consider);
-      }
+      const Point middle{origin.x + .5, origin.y + .5};
+      const bool is_near = std::abs(lines_.NearestOn(k, middle).height) < .75;
+      if (is_near && count < kMostLines) near[count++] = k;
+    }
+    for (std::size_t n = 0; n < count; ++n) {
+      for (std::size_t m = n + 1; m < count; ++m) ConsiderCrossing(near[n], near[m], consider);
     }
     return best;
   }
 
+  // Considers where lines of two solids cross.
   template <typename Consider>
-  void ConsiderCrossing(std::uint32_t edge, const WallEdge& a, const WallEdge& b,
-                        Consider consider) const {
+  void ConsiderCrossing(std::uint32_t of_a, std::uint32_t of_b, Consider consider) const {
+    const WallEdge &a = lines_.edges()[of_a], &b = lines_.edges()[of_b];
     const Point along_a = Minus(a.to, a.from), along_b = Minus(b.to, b.from);
     const double divisor = Cross(along_a, along_b);
-    if (divisor == 0) return;
+    if (a.solid == b.solid || divisor == 0) return;
     const Point to = Minus(b.from, a.from);
     const double on_a = Cross(to, along_b) / divisor, on_b = Cross(to, along_a) / divisor;
     const auto is_on = [](const WallEdge& e, double at) {
       return e.is_endless || (at >= 0 && at <= 1);
     };
-    if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{edge, on_a}, a, b);
+    if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{of_a, on_a}, a, b);
   }
 
-  // Whether a point is in a solid, by more than rounding.
+  // Whether a point is in a solid near the tile, by more than rounding.
   bool IsBehindWall(std::uint32_t tile, const Point& point) const {
-    for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
-      if (!lines_.IsSolid(solid, point)) continue;
-      const NearestWall nearest = walls_.NearestOfSolid(tile, solid, point);
-      if (nearest.height < -10 * kCornerTolerance) return true;
-    }
-    return false;
+    bool is_behind = false;
+    walls_.ForEachSolidNear(tile, point, [&](std::size_t, const NearestWall& nearest) {
+      is_behind |= nearest.height < -10 * kCornerTolerance && nearest.height > -1;
+    });
+    return is_behind;
   }
 
   const VertexInput& input_;

@@ -18,7 +18,7 @@ enum class VertexKind : std::uint8_t {
   kContact,  ///< Where a free stretch of a ring meets a wall.
 };
 
-/// What is known of vertices, of RingVertices or of Rings, if there are walls; else empty.
+/// What is known of vertices, of RingVertices or of Rings, if there are walls; else unused.
 struct WallVertices {
   std::vector<VertexKind> kind;
   std::vector<WallPlace> place;  ///< Of vertices on walls and of contacts.
@@ -46,8 +46,8 @@ struct WallVertices {
 
 /// Finds the kinds and places of the vertices of a ring, and moves vertices and anchors of walls
 /// and contacts to their places: the vertex of a lattice edge to where the edge meets the wall,
-/// that of a cell to a corner of the walls in it, else to the middle of the wall in the cell.
-/// Requires: the vertices have their roots. Returns whether the ring meets a wall.
+/// that of a cell to a corner of the walls in it, else to the place of the wall nearest to its
+/// middle there. Requires: the vertices have their roots. Returns whether the ring meets a wall.
 bool FindWallVertices(const VertexInput& input, std::size_t ring, RingVertices& vertices);
 
 }  // namespace partiemc

@@ -7,6 +7,9 @@
 #include <optional>
 #include <span>
 
+#include "base/cancellation.h"
+#include "base/point_math.h"
+
 namespace partiemc {
 namespace {
 
@@ -18,13 +21,6 @@ constexpr double kLength = kBegin + kStep * (kSamples - 1);
 constexpr double kLeastTurn = .52, kMostBend = 1.0 / 7;
 // Farthest corner from the outline, in spacings.
 constexpr double kFarthest = 1.5;
-
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
-Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
-double AngleBetween(const Point& a, const Point& b) {
-  return std::abs(std::atan2(Cross(a, b), Dot(a, b)));
-}
 
 using Arm = std::array<Point, kSamples>;
 
@@ -46,8 +42,11 @@ Line LineOf(std::span<const Point> samples) {
     xy += from.x * from.y;
     yy += from.y * from.y;
   }
-  const double angle = std::atan2(2 * xy, xx - yy) / 2;
-  Point direction{std::cos(angle), std::sin(angle)};
+  // The larger axis of the ellipse of the samples.
+  const double half = (xx - yy) / 2, root = std::sqrt(half * half + xy * xy);
+  Point direction = half > 0 ? Point{half + root, xy} : Point{xy, root - half};
+  const double length = Length(direction);
+  if (length > 0) direction = Times(direction, 1 / length);
   if (Dot(direction, Minus(samples.back(), samples.front())) < 0) {
     direction = {-direction.x, -direction.y};
   }
@@ -126,17 +125,24 @@ std::optional<WallCornerScratch::Corner> CornerAt(const Ring& ring, std::size_t 
   return WallCornerScratch::Corner{static_cast<std::uint32_t>(point), at, distance};
 }
 
-// Keeps of corners that are nearer than an arm only the one nearest to the outline.
+// Keeps of corners that are nearer than two arms' beginnings only the one nearest to the outline:
+// one after another, along the ring.
 void KeepNearest(const Ring& ring, double h, std::vector<WallCornerScratch::Corner>& corners) {
-  std::ranges::sort(corners, [](const auto& a, const auto& b) {
-    return a.distance != b.distance ? a.distance < b.distance : a.point < b.point;
-  });
+  const auto are_near = [&](const auto& a, const auto& b) {
+    return std::abs(ring.Between(a.point, b.point)) < 2 * kBegin * h;
+  };
   std::size_t kept = 0;
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    const bool is_near = std::ranges::any_of(std::span(corners).first(kept), [&](const auto& of) {
-      return std::abs(ring.Between(of.point, corners[k].point)) < 2 * kBegin * h;
-    });
-    if (!is_near) corners[kept++] = corners[k];
+  for (const WallCornerScratch::Corner& corner : corners) {
+    if (kept == 0 || !are_near(corners[kept - 1], corner)) {
+      corners[kept++] = corner;
+    } else if (corner.distance < corners[kept - 1].distance) {
+      corners[kept - 1] = corner;
+    }
+  }
+  // The last one may be near the first one.
+  if (kept > 1 && are_near(corners[kept - 1], corners[0])) {
+    if (corners[kept - 1].distance < corners[0].distance) corners[0] = corners[kept - 1];
+    --kept;
   }
   corners.resize(kept);
   std::ranges::sort(corners, {}, &WallCornerScratch::Corner::point);
@@ -145,17 +151,22 @@ void KeepNearest(const Ring& ring, double h, std::vector<WallCornerScratch::Corn
 // Appends a ring with its corners.
 void AddRing(const Ring& ring, double h, const std::vector<WallCornerScratch::Corner>& corners,
              std::vector<double>& points) {
-  std::size_t next = 0;
+  std::size_t next = 0;  // The first corner at this point or after it.
   for (std::size_t k = 0; k < ring.count(); ++k) {
-    bool is_rounded = false;
-    for (const WallCornerScratch::Corner& corner : corners) {
-      is_rounded |= std::abs(ring.Between(corner.point, k)) < kBegin * h;
-    }
+    if (next < corners.size() && corners[next].point < k) ++next;
     if (next < corners.size() && corners[next].point == k) {
       points.insert(points.end(), {corners[next].at.x, corners[next].at.y});
-      ++next;
+      continue;
     }
-    if (is_rounded) continue;
+    const auto is_rounded = [&](const WallCornerScratch::Corner& corner) {
+      return std::abs(ring.Between(corner.point, k)) < kBegin * h;
+    };
+    // A point may belong to the corner before it or after it, around the end of the ring.
+    const std::size_t count = corners.size();
+    if (count > 0 &&
+        (is_rounded(corners[next % count]) || is_rounded(corners[(next + count - 1) % count]))) {
+      continue;
+    }
     points.insert(points.end(), {ring.At(k).x, ring.At(k).y});
   }
 }
@@ -166,6 +177,7 @@ void SharpenCorners(double spacing, WallCornerScratch& s, Rings& rings) {
   s.points.clear();
   s.offsets.assign(1, 0);
   for (std::size_t of = 0; of < rings.RingCount(); ++of) {
+    ThrowIfCancelled();
     const Ring ring(rings.RingPoints(of), s.lengths);
     s.corners.clear();
     // The arms of a short ring would meet.

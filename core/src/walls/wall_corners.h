@@ -26,7 +26,7 @@ struct WallCornerScratch {
 /// to 4.5 h away, that differ by more than 30 degrees, the point where their lines meet replaces
 /// the points between the arms. Arms that bend by more than a seventh of the turn are part of a
 /// curve, which stays. Changes only the points and offsets of `rings`. `spacing`: h in world units.
-/// Cost: linear in the points, and logarithmic in those of a ring.
+/// Cost: the points, times the logarithm of those of their ring.
 void SharpenCorners(double spacing, WallCornerScratch& scratch, Rings& rings);
 
 }  // namespace partiemc

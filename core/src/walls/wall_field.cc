@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
+#include "base/cancellation.h"
 #include "base/parallel.h"
 
 namespace partiemc {
@@ -14,10 +14,66 @@ namespace {
 constexpr float kMostDepth = 1.5F;
 // Limit of the coordinates of tiles.
 constexpr double kMostTiles = 1 << 30;
+// A line whose bounds have more tiles than this is long.
+constexpr double kShortTiles = 64;
+// Half the diagonal of a tile.
+constexpr double kTileRadius = kTileSize * .7072;
+// The mark of a tile lies this far, in cells, left of and below its first node. From the mark,
+// paths between the columns and rows of nodes lead to every node of the tile. The number is odd, so
+// that corners of walls rarely lie on paths; a corner on one may put a row of nodes on the wrong
+// side.
+constexpr double kMark = .3819660112501051;
 
 Point OriginOf(const TileDirectory& directory, std::uint32_t tile) {
   return {static_cast<double>(std::int64_t{directory[tile].x} << kTileShift),
           static_cast<double>(std::int64_t{directory[tile].y} << kTileShift)};
+}
+
+Point MiddleOf(const TileDirectory& directory, std::uint32_t tile) {
+  const Point origin = OriginOf(directory, tile);
+  return {origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
+}
+
+// The bounds of the tiles, with a margin.
+WallLines::Window WindowOf(const TileDirectory& directory) {
+  constexpr double kMargin = 2 * kTileSize;
+  WallLines::Window window{{0, 0}, {0, 0}};
+  for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
+    const Point at = OriginOf(directory, tile);
+    if (tile == 0) window = {at, at};
+    window.low = {std::min(window.low.x, at.x), std::min(window.low.y, at.y)};
+    window.high = {std::max(window.high.x, at.x), std::max(window.high.y, at.y)};
+  }
+  window.low = {window.low.x - kMargin, window.low.y - kMargin};
+  window.high = {window.high.x + kMargin, window.high.y + kMargin};
+  return window;
+}
+
+// The tiles around a line.
+struct TileBounds {
+  double left, right, low, high;
+
+  explicit TileBounds(const WallEdge& edge) {
+    const auto tile_of = [](double at) { return std::floor(at / kTileSize); };
+    left = tile_of(std::min(edge.from.x, edge.to.x) - WallField::kMostHeight);
+    right = tile_of(std::max(edge.from.x, edge.to.x) + WallField::kMostHeight);
+    low = tile_of(std::min(edge.from.y, edge.to.y) - WallField::kMostHeight);
+    high = tile_of(std::max(edge.from.y, edge.to.y) + WallField::kMostHeight);
+  }
+  bool IsShort() const { return (right - left + 1) * (high - low + 1) <= kShortTiles; }
+  bool IsInRange() const {
+    return left > -kMostTiles && right < kMostTiles && low > -kMostTiles && high < kMostTiles;
+  }
+};
+
+// Whether the line crosses a horizontal (vertical) line, and where.
+bool SpansRow(const WallEdge& edge, double y) { return (edge.from.y <= y) != (edge.to.y <= y); }
+bool SpansColumn(const WallEdge& edge, double x) { return (edge.from.x <= x) != (edge.to.x <= x); }
+double CrossesRowAt(const WallEdge& edge, double y) {
+  return edge.from.x + (y - edge.from.y) / (edge.to.y - edge.from.y) * (edge.to.x - edge.from.x);
+}
+double CrossesColumnAt(const WallEdge& edge, double x) {
+  return edge.from.y + (x - edge.from.x) / (edge.to.x - edge.from.x) * (edge.to.y - edge.from.y);
 }
 
 // F at a point of a tile and its neighbours, by bilinear interpolation.
@@ -36,32 +92,42 @@ double Interpolate(const TileDirectory& directory, const LevelSet& level_set, st
   return (1 - v) * ((1 - u) * at(0, 0) + u * at(1, 0)) + v * ((1 - u) * at(0, 1) + u * at(1, 1));
 }
 
-// Bit i of the result is set if i < `end`.
-std::uint32_t BitsBelow(double end) {
-  if (!(end > 0)) return 0;
-  return end >= kTileSize ? ~std::uint32_t{0} : (std::uint32_t{1} << static_cast<int>(end)) - 1;
+// Bits i >= `begin`.
+std::uint32_t BitsFrom(double begin) {
+  if (!(begin < kTileSize)) return 0;
+  return begin > 0 ? ~std::uint32_t{0} << static_cast<int>(begin) : ~std::uint32_t{0};
 }
 
-// The nodes of a tile in a solid. As WallLines::IsSolid, for all nodes at once.
-BitRows SolidNodes(const WallLines& lines, std::size_t solid, const Point& origin) {
+// The nodes of a tile in a solid, by crossings of paths from the tile's mark.
+BitRows SolidNodes(const WallLines& lines, std::span<const std::uint32_t> edges, std::size_t solid,
+                   bool is_solid_at_mark, const Point& origin) {
   BitRows rows{};
-  const auto edges = lines.EdgesOfSolid(solid);
-  if (edges.front().is_endless) {
+  if (lines.IsEndless(solid)) {
     for (int node = 0; node < kTileNodes; ++node) {
       const Point at{origin.x + node % kTileSize, origin.y + node / kTileSize};
-      rows[node / kTileSize] |= std::uint32_t{lines.IsSolid(solid, at)} << node % kTileSize;
+      rows[node / kTileSize] |= std::uint32_t{lines.IsBehindEndless(solid, at)} << node % kTileSize;
     }
     return rows;
   }
-  if (!lines.IsSolidInside(solid)) rows.fill(~std::uint32_t{0});
-  for (const WallEdge& edge : edges) {
-    const double low = std::min(edge.from.y, edge.to.y) - origin.y;
+  if (is_solid_at_mark) rows.fill(~std::uint32_t{0});
+  const Point mark{origin.x - kMark, origin.y - kMark};
+  for (const std::uint32_t line : edges) {
+    const WallEdge& edge = lines.edges()[line];
+    if (SpansColumn(edge, mark.x)) {
+      const double y = CrossesColumnAt(edge, mark.x);
+      const double first = std::max(0.0, std::ceil(y - origin.y));
+      for (int j = y > mark.y && first < kTileSize ? static_cast<int>(first) : kTileSize;
+           j < kTileSize; ++j) {
+        rows[j] = ~rows[j];
+      }
+    }
+    const double low = std::max(std::min(edge.from.y, edge.to.y) - origin.y, 0.0);
     const double high = std::max(edge.from.y, edge.to.y) - origin.y;
-    for (int j = low > 0 ? static_cast<int>(std::min<double>(std::ceil(low), kTileSize)) : 0;
-         j < kTileSize && j < high; ++j) {
-      const double share = (origin.y + j - edge.from.y) / (edge.to.y - edge.from.y);
-      const double x = edge.from.x + share * (edge.to.x - edge.from.x) - origin.x;
-      rows[j] ^= BitsBelow(std::ceil(x));
+    for (int j = low < kTileSize ? static_cast<int>(std::ceil(low)) : kTileSize;
+         j < kTileSize && j <= high; ++j) {
+      if (!SpansRow(edge, origin.y + j)) continue;
+      const double x = CrossesRowAt(edge, origin.y + j);
+      if (x > mark.x) rows[j] ^= BitsFrom(std::ceil(x - origin.x));
     }
   }
   return rows;
@@ -92,91 +158,182 @@ void MeasureDistances(const WallLines& lines, std::uint32_t edge, const Point& o
 
 }  // namespace
 
-// Pairs each line with the tiles that it is near to.
-void WallField::ListLines(const TileDirectory& directory) {
-  constexpr double kRadius = kTileSize * .7072;  // Half the diagonal of a tile.
-  constexpr double kMargin = kRadius + kMostHeight;
+bool WallField::IsNear(const TileDirectory& directory, std::uint32_t tile,
+                       std::uint32_t line) const {
+  return std::abs(lines_.NearestOn(line, MiddleOf(directory, tile)).height) <=
+         kTileRadius + kMostHeight;
+}
+
+// Pairs a short line with the tiles near it, and lists the rows of tiles whose marks it crosses.
+void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line) {
+  const WallEdge& edge = lines_.edges()[line];
+  const TileBounds bounds(edge);
+  if (!bounds.IsInRange()) return;
+  const auto left = static_cast<std::int32_t>(bounds.left);
+  const auto right = static_cast<std::int32_t>(bounds.right);
+  const auto high = static_cast<std::int32_t>(bounds.high);
+  for (auto y = static_cast<std::int32_t>(bounds.low); y <= high; ++y) {
+    if (SpansRow(edge, std::int64_t{y} * kTileSize - kMark)) by_row_.emplace_back(y, line);
+    for (std::int32_t x = left; x <= right; ++x) {
+      const std::uint32_t tile = directory.Find({y, x});
+      if (tile != kNoTile && IsNear(directory, tile, line)) pairs_.emplace_back(tile, line);
+    }
+  }
+}
+
+void WallField::ListLines(const std::vector<Wall>& walls, const Rings* particle_walls,
+                          double cell_size, const TileDirectory& directory) {
+  lines_.Build(walls, particle_walls, cell_size, WindowOf(directory));
   pairs_.clear();
-  const auto add_if_near = [&](std::uint32_t tile, std::uint32_t line) {
-    const Point origin = OriginOf(directory, tile);
-    const Point middle{origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
-    if (std::abs(lines_.NearestOn(line, middle).height) <= kMargin) pairs_.emplace_back(tile, line);
-  };
+  by_row_.clear();
+  long_lines_.clear();
   for (std::uint32_t line = 0; line < lines_.edges().size(); ++line) {
     const WallEdge& edge = lines_.edges()[line];
-    const auto tile_of = [](double at) { return std::floor(at / kTileSize); };
-    const double left = tile_of(std::min(edge.from.x, edge.to.x) - kMostHeight);
-    const double right = tile_of(std::max(edge.from.x, edge.to.x) + kMostHeight);
-    const double low = tile_of(std::min(edge.from.y, edge.to.y) - kMostHeight);
-    const double high = tile_of(std::max(edge.from.y, edge.to.y) + kMostHeight);
-    // Long lines meet most tiles.
-    if (edge.is_endless ||
-        (right - left + 1) * (high - low + 1) >= static_cast<double>(directory.size())) {
-      for (std::uint32_t tile = 0; tile < directory.size(); ++tile) add_if_near(tile, line);
-      continue;
-    }
-    for (double y = low; y <= high; ++y) {
-      for (double x = left; x <= right; ++x) {
-        if (!(std::max(std::abs(x), std::abs(y)) < kMostTiles)) continue;
-        const std::uint32_t tile =
-            directory.Find({static_cast<std::int32_t>(y), static_cast<std::int32_t>(x)});
-        if (tile != kNoTile) add_if_near(tile, line);
-      }
+    if (edge.is_endless || !TileBounds(edge).IsShort()) {
+      long_lines_.push_back(line);
+    } else {
+      ListShortLine(directory, line);
     }
   }
+  ThrowIfCancelled();
+  std::ranges::sort(by_row_);
+  long_counts_.resize(long_lines_.size());
+  ParallelFor(long_lines_.size(), [&](std::size_t k) {
+    std::size_t count = 0;
+    for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
+      count += IsNear(directory, tile, long_lines_[k]);
+    }
+    long_counts_[k] = count;
+  });
+  pair_count_ = pairs_.size();
+  for (const std::size_t count : long_counts_) pair_count_ += count;
+}
+
+void WallField::FindTiles(const TileDirectory& directory) {
+  std::size_t at = pairs_.size();
+  pairs_.resize(pair_count_);
+  for (std::size_t& count : long_counts_) at += std::exchange(count, at);
+  ParallelFor(long_lines_.size(), [&](std::size_t k) {
+    std::size_t to = long_counts_[k];
+    for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
+      if (IsNear(directory, tile, long_lines_[k])) pairs_[to++] = {tile, long_lines_[k]};
+    }
+  });
+  ThrowIfCancelled();
   std::ranges::sort(pairs_);
+  GroupBySolid(directory);
+  FindSolids(directory);
 }
 
-// Whether a tile without lines is solid: as the tile left of it, if that one has no lines either.
-bool WallField::IsSolidTile(const TileDirectory& directory, std::uint32_t tile) const {
-  const std::uint32_t left = directory.neighbours(tile)[3];
-  if (left < tile && (near_of_tile_[left] == kFluid || near_of_tile_[left] == kSolid)) {
-    return near_of_tile_[left] == kSolid;
-  }
-  const Point origin = OriginOf(directory, tile);
-  const Point middle{origin.x + kTileSize / 2.0, origin.y + kTileSize / 2.0};
-  for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
-    if (lines_.IsSolid(solid, middle)) return true;
-  }
-  return false;
-}
-
-void WallField::FindTiles(const std::vector<Wall>& walls, const Rings* particle_walls,
-                          double cell_size, const TileDirectory& directory) {
-  lines_.Build(walls, particle_walls, cell_size);
+// Makes the near tiles of the sorted pairs. Lines of one solid follow each other.
+void WallField::GroupBySolid(const TileDirectory& directory) {
   near_of_tile_.assign(directory.size(), kFluid);
-  near_.clear();
+  solids_.clear();
   edges_.clear();
-  ListLines(directory);
-  std::size_t pair = 0;
-  for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
-    if (pair == pairs_.size() || pairs_[pair].first != tile) {
-      if (IsSolidTile(directory, tile)) near_of_tile_[tile] = kSolid;
-      continue;
-    }
-    near_of_tile_[tile] = static_cast<std::uint32_t>(near_.size());
-    NearTile& near = near_.emplace_back();
-    near.tile = tile;
-    near.first = static_cast<std::uint32_t>(edges_.size());
-    for (; pair < pairs_.size() && pairs_[pair].first == tile; ++pair) {
-      edges_.push_back(pairs_[pair].second);
-    }
-    near.last = static_cast<std::uint32_t>(edges_.size());
+  near_count_ = 0;
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    near_count_ += k == 0 || pairs_[k].first != pairs_[k - 1].first;
   }
+  if (near_.size() < near_count_) {
+    near_.reserve(near_count_);
+    near_.resize(near_count_);
+  }
+  std::size_t near = 0;
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const auto [tile, line] = pairs_[k];
+    const bool is_new_tile = k == 0 || tile != pairs_[k - 1].first;
+    if (is_new_tile) {
+      near_of_tile_[tile] = static_cast<std::uint32_t>(near);
+      near_[near].tile = tile;
+      near_[near].first = static_cast<std::uint32_t>(solids_.size());
+      ++near;
+    }
+    const std::uint32_t solid = lines_.edges()[line].solid;
+    if (is_new_tile || solid != solids_.back().solid) {
+      const auto first = static_cast<std::uint32_t>(edges_.size());
+      solids_.push_back({.solid = solid, .first = first, .last = first});
+    }
+    edges_.push_back(line);
+    solids_.back().last = static_cast<std::uint32_t>(edges_.size());
+    near_[near - 1].last = static_cast<std::uint32_t>(solids_.size());
+  }
+}
+
+// Sets `crossings_` to where closed loops cross the marks of a row of tiles.
+void WallField::CollectCrossings(std::uint32_t row, double y) {
+  crossings_.clear();
+  const auto add = [&](std::uint32_t line) {
+    const WallEdge& edge = lines_.edges()[line];
+    crossings_.push_back({CrossesRowAt(edge, y), edge.solid});
+  };
+  const auto of_row = std::ranges::equal_range(by_row_, static_cast<std::int32_t>(row), {},
+                                               &std::pair<std::int32_t, std::uint32_t>::first);
+  for (const auto& [_, line] : of_row) add(line);
+  for (const std::uint32_t line : long_lines_) {
+    const WallEdge& edge = lines_.edges()[line];
+    if (!edge.is_endless && SpansRow(edge, y)) add(line);
+  }
+  std::ranges::sort(crossings_, {}, &Crossing::x);
+}
+
+// Finds the solids that contain the marks of tiles, row by row, by the crossings left of a mark.
+void WallField::FindSolids(const TileDirectory& directory) {
+  std::uint32_t tile = 0;
+  while (tile < directory.size()) {
+    ThrowIfCancelled();
+    const std::int32_t row = directory[tile].y;
+    CollectCrossings(static_cast<std::uint32_t>(row), std::int64_t{row} * kTileSize - kMark);
+    is_odd_.assign(lines_.SolidCount(), 0);
+    covering_ = 0;
+    for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
+      covering_ += !lines_.IsEndless(solid) && !lines_.IsSolidInside(solid);
+    }
+    std::size_t crossing = 0;
+    for (; tile < directory.size() && directory[tile].y == row; ++tile) {
+      const double x = OriginOf(directory, tile).x - kMark;
+      for (; crossing < crossings_.size() && crossings_[crossing].x <= x; ++crossing) {
+        const std::uint32_t solid = crossings_[crossing].solid;
+        is_odd_[solid] ^= 1;
+        (is_odd_[solid] != 0) == lines_.IsSolidInside(solid) ? ++covering_ : --covering_;
+      }
+      SetTile(directory, tile);
+    }
+  }
+}
+
+// Sets whether solids of the tile contain its mark. If others do, the tile is solid.
+void WallField::SetTile(const TileDirectory& directory, std::uint32_t tile) {
+  const Point origin = OriginOf(directory, tile);
+  const Point mark{origin.x - kMark, origin.y - kMark};
+  std::size_t covering = covering_;
+  const std::uint32_t near = near_of_tile_[tile];
+  const auto listed = near == kFluid ? std::span<NearSolid>()
+                                     : std::span(solids_).subspan(
+                                           near_[near].first, near_[near].last - near_[near].first);
+  for (NearSolid& of : listed) {
+    if (lines_.IsEndless(of.solid)) continue;
+    of.is_solid_at_mark = (is_odd_[of.solid] != 0) == lines_.IsSolidInside(of.solid);
+    covering -= of.is_solid_at_mark;
+  }
+  for (const std::uint32_t line : long_lines_) {
+    const WallEdge& edge = lines_.edges()[line];
+    if (!edge.is_endless || !lines_.IsBehindEndless(edge.solid, mark)) continue;
+    covering +=
+        std::ranges::none_of(listed, [&](const NearSolid& of) { return of.solid == edge.solid; });
+  }
+  if (covering > 0) near_of_tile_[tile] = kSolid;
 }
 
 // The heights above each solid, of which the lowest counts.
 void WallField::MeasureHeights(const TileDirectory& directory, NearTile& near) const {
   const Point origin = OriginOf(directory, near.tile);
-  const auto edges = std::span(edges_).subspan(near.first, near.last - near.first);
   near.height.fill(kMostHeight);
-  for (std::uint32_t solid = 0; solid < lines_.SolidCount(); ++solid) {
+  for (std::uint32_t k = near.first; k < near.last; ++k) {
+    const NearSolid& of = solids_[k];
     std::array<float, kTileNodes> distance;
     distance.fill(kMostHeight);
-    for (const std::uint32_t edge : edges) {
-      if (lines_.edges()[edge].solid == solid) MeasureDistances(lines_, edge, origin, distance);
-    }
-    const BitRows nodes = SolidNodes(lines_, solid, origin);
+    for (const std::uint32_t edge : EdgesOf(of)) MeasureDistances(lines_, edge, origin, distance);
+    const BitRows nodes = SolidNodes(lines_, EdgesOf(of), of.solid, of.is_solid_at_mark, origin);
     for (int node = 0; node < kTileNodes; ++node) {
       const bool is_solid = (nodes[node / kTileSize] >> (node % kTileSize) & 1) != 0;
       near.height[node] = std::min(near.height[node], is_solid ? -distance[node] : distance[node]);
@@ -213,7 +370,8 @@ void WallField::ExtendFluid(const TileDirectory& directory, const LevelSet& leve
 }
 
 void WallField::Apply(const TileDirectory& directory, double spacing, LevelSet& level_set) {
-  ParallelFor(near_.size(), [&](std::size_t k) {
+  ParallelFor(near_count_, [&](std::size_t k) {
+    if (near_of_tile_[near_[k].tile] == kSolid) return;
     MeasureHeights(directory, near_[k]);
     ExtendFluid(directory, level_set, kReach * spacing, near_[k]);
   });
@@ -256,16 +414,13 @@ float WallField::FluidAt(const LevelSet& level_set, const TilePlace& node) const
 std::span<const std::uint32_t> WallField::EdgesNear(std::uint32_t tile) const {
   const std::uint32_t of = near_of_tile_[tile];
   if (of == kFluid || of == kSolid) return {};
-  return std::span(edges_).subspan(near_[of].first, near_[of].last - near_[of].first);
-}
-
-NearestWall WallField::NearestOfSolid(std::uint32_t tile, std::size_t solid,
-                                      const Point& point) const {
-  return lines_.Nearest(EdgesNear(tile), point, solid);
+  const std::uint32_t first = solids_[near_[of].first].first;
+  return std::span(edges_).subspan(first, solids_[near_[of].last - 1].last - first);
 }
 
 NearestWall WallField::Nearest(std::uint32_t tile, const Point& point) const {
-  return lines_.Nearest(EdgesNear(tile), point);
+  const NearestWall nearest = lines_.Nearest(EdgesNear(tile), point);
+  return std::abs(nearest.height) <= kMostHeight ? nearest : NearestWall{};
 }
 
 }  // namespace partiemc

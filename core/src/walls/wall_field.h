@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -20,58 +21,103 @@ namespace partiemc {
 /// touches the wall. An outside node lower than `kReach` spacings therefore has the F of the point
 /// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
 /// lattice: its zeros are the outline of the fluid, cut at the walls.
+///
+/// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
  public:
   /// Fluid nearer to a wall than this touches it. In spacings: the outline lies about half a
   /// spacing outside of the outermost particles, so a gap of this height holds no layer of
   /// particles.
   static constexpr double kReach = .5;
+  /// Heights of a larger magnitude are unknown.
+  static constexpr float kMostHeight = 4;
 
-  /// Reads the walls (WallLines::Build) and finds the tiles near them. Cost: linear in tiles and
-  /// lines; linear in the lines for each tile beside tiles with lines.
-  void FindTiles(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+  /// Reads the walls (WallLines::Build) and counts the pairs of a line and a tile near it. Cost:
+  /// linear in the tiles, and in the lines; long lines, at most those of `walls`, times tiles.
+  void ListLines(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
                  const TileDirectory& directory);
-  std::size_t TileCount() const { return near_.size(); }
+  std::size_t PairCount() const { return pair_count_; }
 
-  /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the tiles
-  /// near walls times the lines near them.
+  /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles.
+  void FindTiles(const TileDirectory& directory);
+  std::size_t TileCount() const { return near_count_; }
+
+  /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the nodes
+  /// near walls times the lines near their tiles.
   void Apply(const TileDirectory& directory, double spacing, LevelSet& level_set);
 
   const WallLines& lines() const { return lines_; }
 
-  /// Height of a node: at least `kMostHeight` in magnitude if it is not near a wall.
-  static constexpr float kMostHeight = 4;
+  /// Height of a node; kMostHeight in magnitude if it is not near a wall.
   float HeightAt(const TilePlace& node) const;
   /// F of the fluid at a node.
   float FluidAt(const LevelSet& level_set, const TilePlace& node) const;
-  /// The wall nearest to a point of a tile, given in cells from the origin of the world. Far away
-  /// if no wall is within kMostHeight of it.
+
+  /// The wall nearest to a point near a tile, in cells from the origin of the world. Its height is
+  /// infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
   NearestWall Nearest(std::uint32_t tile, const Point& point) const;
-  /// The same for one solid.
-  NearestWall NearestOfSolid(std::uint32_t tile, std::size_t solid, const Point& point) const;
   /// The lines near a tile.
   std::span<const std::uint32_t> EdgesNear(std::uint32_t tile) const;
+
+  /// Calls visit(solid, nearest) for each solid with lines near a tile. `nearest` may be farther
+  /// than kMostHeight. Cost: linear in these lines.
+  template <typename Visit>
+  void ForEachSolidNear(std::uint32_t tile, const Point& point, Visit visit) const {
+    const std::uint32_t of = near_of_tile_[tile];
+    if (of == kFluid || of == kSolid) return;
+    for (std::uint32_t k = near_[of].first; k < near_[of].last; ++k) {
+      visit(std::size_t{solids_[k].solid}, lines_.Nearest(EdgesOf(solids_[k]), point));
+    }
+  }
 
  private:
   static constexpr std::uint32_t kFluid = 0xffffffff, kSolid = 0xfffffffe;  // Without lines nearby.
 
   struct NearTile {
     std::uint32_t tile = 0;
-    std::uint32_t first = 0, last = 0;  // Its lines in `edges_`.
+    std::uint32_t first = 0, last = 0;  // Its solids in `solids_`.
     std::array<float, kTileNodes> height, fluid;
   };
+  // The lines of a solid near a tile.
+  struct NearSolid {
+    std::uint32_t solid;
+    std::uint32_t first, last;      // Its lines in `edges_`.
+    bool is_solid_at_mark = false;  // Whether the tile's mark (wall_field.cc) is in the solid.
+  };
+  // Where a line crosses a horizontal line.
+  struct Crossing {
+    double x;
+    std::uint32_t solid;
+  };
 
-  void ListLines(const TileDirectory& directory);
-  bool IsSolidTile(const TileDirectory& directory, std::uint32_t tile) const;
+  std::span<const std::uint32_t> EdgesOf(const NearSolid& near) const {
+    return std::span(edges_).subspan(near.first, near.last - near.first);
+  }
+  void ListShortLine(const TileDirectory& directory, std::uint32_t line);
+  bool IsNear(const TileDirectory& directory, std::uint32_t tile, std::uint32_t line) const;
+  void GroupBySolid(const TileDirectory& directory);
+  void FindSolids(const TileDirectory& directory);
+  void CollectCrossings(std::uint32_t row, double y);
+  void SetTile(const TileDirectory& directory, std::uint32_t tile);
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
   void ExtendFluid(const TileDirectory& directory, const LevelSet& level_set, double reach,
                    NearTile& near) const;
 
   WallLines lines_;
   std::vector<std::uint32_t> near_of_tile_;  // Index in near_, kFluid or kSolid.
-  std::vector<NearTile> near_;
-  std::vector<std::uint32_t> edges_;                            // By near tile.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Scratch: tile, line.
+  std::vector<NearTile> near_;               // The first near_count_ are of this frame.
+  std::size_t near_count_ = 0, pair_count_ = 0;
+  std::vector<NearSolid> solids_;
+  std::vector<std::uint32_t> edges_;
+
+  // Scratch of ListLines and FindTiles.
+  std::vector<std::uint32_t> long_lines_;
+  std::vector<std::size_t> long_counts_;                        // By long line: tiles near it.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Tile, line.
+  std::vector<std::pair<std::int32_t, std::uint32_t>> by_row_;  // Row of tiles, short line.
+  std::vector<Crossing> crossings_;                             // Of a row, by x.
+  std::vector<std::uint8_t> is_odd_;  // By solid: odd number of crossings so far.
+  std::size_t covering_ = 0;          // Solids that cover the mark, of those with closed loops.
 };
 
 }  // namespace partiemc

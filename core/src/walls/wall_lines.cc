@@ -2,16 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
+
+#include "base/point_math.h"
 
 namespace partiemc {
 namespace {
 
 // Two lines whose distances differ by less than this, in cells, are equally near.
 constexpr double kTie = 1e-9;
+// Longer lines, in cells, get points at the window, and count as having this length.
+constexpr double kLong = 1 << 20;
 
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
-Point Minus(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+// The unit vector from a to b, which differ. Products of their differences may overflow.
+Point UnitFrom(const Point& a, const Point& b) {
+  Point along = Minus(b, a);
+  along = Times(along, 1 / std::max(std::abs(along.x), std::abs(along.y)));
+  return Times(along, 1 / Length(along));
+}
 
 // Chooses the nearest of several lines.
 class Choice {
@@ -35,68 +44,148 @@ class Choice {
   double slant_ = -1;  // Distance of the point from the endless line.
 };
 
+// The part of the line from a to b in a window, if it crosses the window. A point on a side has the
+// coordinate of the side.
+std::optional<std::pair<Point, Point>> PartIn(const WallLines::Window& window, const Point& a,
+                                              const Point& b) {
+  std::pair<Point, Point> part{a, b};
+  const auto clip = [&](double Point::*axis, double Point::*other, double low, double high) {
+    const auto cut = [&](Point& end, const Point& from, double at) {
+      const double share = (at - from.*axis) / (end.*axis - from.*axis);
+      end.*other = from.*other + share * (end.*other - from.*other);
+      end.*axis = at;
+    };
+    auto& [first, second] = part;
+    if (std::max(first.*axis, second.*axis) < low || std::min(first.*axis, second.*axis) > high) {
+      return false;
+    }
+    for (const double at : {low, high}) {
+      const auto is_out = [&](const Point& p) { return at == low ? p.*axis < at : p.*axis > at; };
+      if (is_out(first)) cut(first, second, at);
+      if (is_out(second)) cut(second, first, at);
+    }
+    return true;
+  };
+  if (!clip(&Point::x, &Point::y, window.low.x, window.high.x)) return std::nullopt;
+  if (!clip(&Point::y, &Point::x, window.low.y, window.high.y)) return std::nullopt;
+  return part;
+}
+
 }  // namespace
 
+void WallLines::AddLine(const Point& a, const Point& b, double cell_size, Loop& loop) {
+  WallEdge edge{.from = {a.x / cell_size, a.y / cell_size},
+                .to = {b.x / cell_size, b.y / cell_size}};
+  if (edge.from == edge.to) return;
+  edge.unit = UnitFrom(edge.from, edge.to);
+  edge.length = std::abs(Dot(edge.unit, Minus(edge.to, edge.from)));
+  edge.start = loop.perimeter;
+  edge.share_size = std::min(edge.length, kLong);
+  edge.loop = static_cast<std::uint32_t>(loops_.size());
+  edge.solid = static_cast<std::uint32_t>(solids_.size() - 1);
+  loop.perimeter += edge.share_size;
+  edges_.push_back(edge);
+  world_.insert(world_.end(), {a, b});
+}
+
+void WallLines::AddLines(const Point& a, const Point& b, double cell_size, const Window& window,
+                         Loop& loop) {
+  const double longest = std::max(std::abs(b.x - a.x), std::abs(b.y - a.y)) / cell_size;
+  const Window world{Times(window.low, cell_size), Times(window.high, cell_size)};
+  const auto part = longest > kLong ? PartIn(world, a, b) : std::nullopt;
+  if (!part) return AddLine(a, b, cell_size, loop);
+  AddLine(a, part->first, cell_size, loop);
+  AddLine(part->first, part->second, cell_size, loop);
+  AddLine(part->second, b, cell_size, loop);
+}
+
 template <typename PointOf>
-double WallLines::AddLoop(std::size_t count, double cell_size, PointOf at) {
+double WallLines::AddLoop(std::size_t count, double cell_size, const Window& window, PointOf at) {
   Loop loop{.first = static_cast<std::uint32_t>(edges_.size())};
   double area = 0;
   const Point origin = at(0);
-  for (std::size_t k = 0; k < (count == 2 ? 1 : count); ++k) {
-    const Point a = at(k), b = at(k + 1 < count ? k + 1 : 0);
-    WallEdge edge{.from = {a.x / cell_size, a.y / cell_size},
-                  .to = {b.x / cell_size, b.y / cell_size}};
-    const Point along = Minus(edge.to, edge.from);
-    edge.length = std::sqrt(Dot(along, along));
-    edge.unit = {along.x / edge.length, along.y / edge.length};
-    edge.start = loop.perimeter;
-    edge.loop = static_cast<std::uint32_t>(loops_.size());
-    edge.solid = static_cast<std::uint32_t>(solids_.size() - 1);
-    edge.is_endless = count == 2;
-    loop.perimeter += edge.length;
-    area += Cross(Minus(a, origin), Minus(b, origin));
-    edges_.push_back(edge);
-    world_.insert(world_.end(), {a, b});
+  Point before = origin;
+  for (std::size_t k = 1; k <= count; ++k) {
+    const Point next = k < count ? at(k) : origin;
+    area += Cross(Times(Minus(before, origin), 1 / cell_size),
+                  Times(Minus(next, origin), 1 / cell_size));
+    const bool is_one =
+        before.x / cell_size == next.x / cell_size && before.y / cell_size == next.y / cell_size;
+    if (is_one) continue;  // `before` stays, so that the lines join.
+    AddLines(before, next, cell_size, window, loop);
+    before = next;
   }
   loop.last = static_cast<std::uint32_t>(edges_.size());
-  if (count == 2) loop.perimeter = 0;
+  if (loop.last == loop.first) return area;
   loops_.push_back(loop);
   solids_.back().last = loop.last;
   return area;
 }
 
-void WallLines::Build(const std::vector<Wall>& walls, const Rings* particle_walls,
-                      double cell_size) {
+void WallLines::AddEndless(const Point& a, const Point& b, double cell_size, const Window& window) {
+  const Point unit = UnitFrom(a, b);
+  const Point middle = Times(Plus(window.low, window.high), cell_size / 2);
+  const Point from = Plus(a, Times(unit, Dot(Minus(middle, a), unit)));
+  const Point to = Plus(from, Times(unit, cell_size));
+  const auto first = static_cast<std::uint32_t>(edges_.size());
+  edges_.push_back({.from = Times(from, 1 / cell_size),
+                    .to = Plus(Times(from, 1 / cell_size), unit),
+                    .unit = unit,
+                    .length = 1,
+                    .share_size = 1,
+                    .loop = static_cast<std::uint32_t>(loops_.size()),
+                    .solid = static_cast<std::uint32_t>(solids_.size() - 1),
+                    .is_endless = true});
+  world_.insert(world_.end(), {from, to});
+  loops_.push_back({first, first + 1, 0});
+  solids_.back().last = first + 1;
+}
+
+void WallLines::Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+                      const Window& window) {
   edges_.clear();
   world_.clear();
   loops_.clear();
   solids_.clear();
+  const auto begin_solid = [&](bool is_inside) {
+    const auto first = static_cast<std::uint32_t>(edges_.size());
+    solids_.push_back({first, first, is_inside});
+  };
+  const auto end_solid = [&] {
+    if (solids_.back().first == solids_.back().last) solids_.pop_back();
+  };
   for (const Wall& wall : walls) {
-    solids_.push_back({.first = static_cast<std::uint32_t>(edges_.size())});
-    const double area = AddLoop(wall.points.size() / 2, cell_size,
-                                [&](std::size_t k) { return PointAt(wall.points, k); });
+    const auto at = [&](std::size_t k) { return PointAt(wall.points, k); };
+    begin_solid(false);
+    if (wall.points.size() == 4) {
+      AddEndless(at(0), at(1), cell_size, window);
+      continue;
+    }
+    const double area = AddLoop(wall.points.size() / 2, cell_size, window, at);
     solids_.back().is_inside = area < 0;
+    end_solid();
   }
-  if (particle_walls == nullptr || particle_walls->RingCount() == 0) return;
-  solids_.push_back({.first = static_cast<std::uint32_t>(edges_.size()), .is_inside = true});
+  if (particle_walls == nullptr) return;
+  begin_solid(true);
   for (std::size_t ring = 0; ring < particle_walls->RingCount(); ++ring) {
     // Rings have the solid on their left.
     const std::span<const double> points = particle_walls->RingPoints(ring);
     const std::size_t count = points.size() / 2;
-    AddLoop(count, cell_size, [&](std::size_t k) { return PointAt(points, count - 1 - k); });
+    AddLoop(count, cell_size, window,
+            [&](std::size_t k) { return PointAt(points, count - 1 - k); });
   }
+  end_solid();
 }
 
 Point WallLines::At(const WallPlace& place) const {
   const WallEdge& edge = edges_[place.edge];
-  return {edge.from.x + place.share * (edge.to.x - edge.from.x),
-          edge.from.y + place.share * (edge.to.y - edge.from.y)};
+  return Plus(edge.from, Times(Minus(edge.to, edge.from), place.share));
 }
 
 Point WallLines::InWorld(const WallPlace& place) const {
   const Point &a = world_[2 * place.edge], &b = world_[2 * place.edge + 1];
   if (place.share == 1) return b;
-  return {a.x + place.share * (b.x - a.x), a.y + place.share * (b.y - a.y)};
+  return Plus(a, Times(Minus(b, a), place.share));
 }
 
 double WallLines::Between(std::size_t loop, double from, double to) const {
@@ -106,23 +195,25 @@ double WallLines::Between(std::size_t loop, double from, double to) const {
 
 WallPlace WallLines::PlaceAt(std::size_t loop, double along) const {
   const auto [first, last, perimeter] = loops_[loop];
-  if (perimeter == 0) return {first, along / edges_[first].length};
+  if (perimeter == 0) return {first, along / edges_[first].share_size};
   along -= std::floor(along / perimeter) * perimeter;
   const auto of = EdgesOfLoop(loop);
   const auto after = std::ranges::upper_bound(of, along, {}, &WallEdge::start);
   const auto k = static_cast<std::uint32_t>(std::max<std::ptrdiff_t>(after - of.begin(), 1) - 1);
-  return {first + k, std::clamp((along - of[k].start) / of[k].length, 0.0, 1.0)};
+  return {first + k, std::clamp((along - of[k].start) / of[k].share_size, 0.0, 1.0)};
 }
 
 NearestWall WallLines::NearestOn(std::uint32_t edge, const Point& point) const {
   const WallEdge& line = edges_[edge];
-  const Point to = Minus(point, line.from);
-  const double above = Cross(line.unit, to);
-  double share = Dot(line.unit, to) / line.length;
-  if (line.is_endless || (share >= 0 && share <= 1)) return {{edge, share}, above};
-  share = share < 0 ? 0 : 1;
-  const Point from_end = Minus(point, share == 0 ? line.from : line.to);
-  return {{edge, share}, std::copysign(std::sqrt(Dot(from_end, from_end)), above)};
+  const Point from = Minus(point, line.from), to = Minus(point, line.to);
+  const double above = Cross(line.unit, from), ahead = Dot(line.unit, from);
+  // Differences from both ends, because one may be too far away to tell.
+  const bool is_before = ahead<0, is_after = Dot(line.unit, to)> 0;
+  if (line.is_endless || !(is_before || is_after)) {
+    const double share = ahead / line.length;
+    return {{edge, line.is_endless ? share : std::min(share, 1.0)}, above};
+  }
+  return {{edge, is_before ? 0.0 : 1.0}, std::copysign(Length(is_before ? from : to), above)};
 }
 
 NearestWall WallLines::Nearest(std::span<const std::uint32_t> edges, const Point& point) const {
@@ -131,34 +222,30 @@ NearestWall WallLines::Nearest(std::span<const std::uint32_t> edges, const Point
   return choice.best();
 }
 
-NearestWall WallLines::Nearest(std::span<const std::uint32_t> edges, const Point& point,
-                               std::size_t solid) const {
+NearestWall WallLines::NearestAlong(const WallPlace& place, double reach,
+                                    const Point& point) const {
   Choice choice(*this);
-  for (const std::uint32_t edge : edges) {
-    if (edges_[edge].solid == solid) choice.Consider(edge, point);
+  const auto [first, last, perimeter] = loops_[edges_[place.edge].loop];
+  const double along = Along(place);
+  choice.Consider(place.edge, point);
+  if (perimeter == 0) return choice.best();
+  const std::uint32_t count = last - first;
+  for (const bool forward : {true, false}) {
+    for (std::uint32_t k = 1; k < count; ++k) {
+      const std::uint32_t at = place.edge - first + (forward ? k : count - k);
+      const WallEdge& edge = edges_[first + at % count];
+      const double end = forward ? edge.start : edge.start + edge.share_size;
+      const double length = forward ? end - along : along - end;
+      if (length - std::floor(length / perimeter) * perimeter > reach) break;
+      choice.Consider(first + at % count, point);
+    }
   }
   return choice.best();
 }
 
-NearestWall WallLines::NearestOfLoop(std::size_t loop, const Point& point) const {
-  Choice choice(*this);
-  for (std::uint32_t edge = loops_[loop].first; edge < loops_[loop].last; ++edge) {
-    choice.Consider(edge, point);
-  }
-  return choice.best();
-}
-
-bool WallLines::IsSolid(std::size_t solid, const Point& point) const {
-  const auto of = EdgesOfSolid(solid);
-  if (of.front().is_endless) return Cross(of[0].unit, Minus(point, of[0].from)) <= 0;
-  bool is_inside = false;
-  for (const WallEdge& edge : of) {
-    if ((edge.from.y <= point.y) == (edge.to.y <= point.y)) continue;
-    const double share = (point.y - edge.from.y) / (edge.to.y - edge.from.y);
-    const double x = edge.from.x + share * (edge.to.x - edge.from.x);
-    if (point.x < x) is_inside = !is_inside;
-  }
-  return is_inside == solids_[solid].is_inside;
+bool WallLines::IsBehindEndless(std::size_t solid, const Point& point) const {
+  const WallEdge& line = edges_[solids_[solid].first];
+  return Cross(line.unit, Minus(point, line.from)) <= 0;
 }
 
 }  // namespace partiemc

@@ -15,10 +15,11 @@ namespace partiemc {
 
 /// A straight line of a wall, with the fluid on its left.
 struct WallEdge {
-  Point from, to;     ///< In cells from the origin of the world.
-  Point unit;         ///< Its direction.
-  double length = 0;  ///< In cells.
-  double start = 0;   ///< Length of the loop up to `from`, in cells.
+  Point from, to;         ///< In cells from the origin of the world.
+  Point unit;             ///< Its direction.
+  double length = 0;      ///< In cells.
+  double start = 0;       ///< Length of the loop up to `from`, in cells.
+  double share_size = 0;  ///< The length, in cells, for which the line counts in its loop.
   std::uint32_t loop = 0, solid = 0;
   bool is_endless = false;  ///< The only line of its loop, and not limited to the two points.
 
@@ -43,9 +44,17 @@ struct NearestWall {
 /// bound a solid: a wall, or the body of wall particles.
 class WallLines {
  public:
-  /// Reads the walls of a stream, and the outlines of wall particles if there are any. Requires:
-  /// Validate has passed the walls.
-  void Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size);
+  /// Where places must be precise, in cells.
+  struct Window {
+    Point low, high;
+  };
+
+  /// Reads the walls of a stream, and the outlines of wall particles if there are any. Long lines
+  /// get further points at the sides of the window, because shares of a long line are not precise.
+  /// Points of the window that round to the same cell coordinates become one. Requires: Validate
+  /// has passed the walls.
+  void Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+             const Window& window);
 
   std::span<const WallEdge> edges() const { return edges_; }
   std::size_t SolidCount() const { return solids_.size(); }
@@ -56,7 +65,9 @@ class WallLines {
     return std::span(edges_).subspan(solids_[solid].first,
                                      solids_[solid].last - solids_[solid].first);
   }
-  /// Whether points inside of an odd number of its loops are solid; else the others are.
+  /// Whether the solid is bounded by one endless line.
+  bool IsEndless(std::size_t solid) const { return edges_[solids_[solid].first].is_endless; }
+  /// Whether points inside of an odd number of its closed loops are solid; else the others are.
   bool IsSolidInside(std::size_t solid) const { return solids_[solid].is_inside; }
 
   /// A place in cells, and in world units. The latter is the given point, bit for bit, where
@@ -64,10 +75,10 @@ class WallLines {
   Point At(const WallPlace& place) const;
   Point InWorld(const WallPlace& place) const;
 
-  /// The length of the loop up to a place, in cells.
+  /// The length of the loop up to a place, in cells. Lines far from the window count as shorter.
   double Along(const WallPlace& place) const {
     const WallEdge& edge = edges_[place.edge];
-    return edge.start + place.share * edge.length;
+    return edge.start + place.share * edge.share_size;
   }
   /// The length along a loop from one length to another, by the nearer way around a closed one.
   double Between(std::size_t loop, double from, double to) const;
@@ -79,14 +90,12 @@ class WallLines {
   /// The nearest place on some lines. The sign is that of the line which sees the point under the
   /// larger angle if a corner is nearest. Cost: linear in the lines.
   NearestWall Nearest(std::span<const std::uint32_t> edges, const Point& point) const;
-  /// The same for the lines of one solid.
-  NearestWall Nearest(std::span<const std::uint32_t> edges, const Point& point,
-                      std::size_t solid) const;
-  NearestWall NearestOfLoop(std::size_t loop, const Point& point) const;
+  /// The same on the part of a loop within `reach` cells along it from a place. Cost: linear in its
+  /// lines there.
+  NearestWall NearestAlong(const WallPlace& place, double reach, const Point& point) const;
 
-  /// Whether a point is in a solid; on an endless line counts as such. Cost: linear in the lines of
-  /// the solid.
-  bool IsSolid(std::size_t solid, const Point& point) const;
+  /// Whether a point is in the solid of an endless line; on the line counts as such.
+  bool IsBehindEndless(std::size_t solid, const Point& point) const;
 
  private:
   struct Loop {
@@ -98,9 +107,13 @@ class WallLines {
     bool is_inside = false;
   };
 
+  void AddEndless(const Point& a, const Point& b, double cell_size, const Window& window);
   // Adds a loop through points that `at` returns for 0 <= k < count. Returns twice its area.
   template <typename PointOf>
-  double AddLoop(std::size_t count, double cell_size, PointOf at);
+  double AddLoop(std::size_t count, double cell_size, const Window& window, PointOf at);
+  // Adds lines from a to b, in world units.
+  void AddLines(const Point& a, const Point& b, double cell_size, const Window& window, Loop& loop);
+  void AddLine(const Point& a, const Point& b, double cell_size, Loop& loop);
 
   std::vector<WallEdge> edges_;
   std::vector<Point> world_;  // By line: both points in world units.
