@@ -15,7 +15,7 @@
 #include "frame/scale.h"
 #include "frame/slab.h"
 #include "frame/spacing.h"
-#include "frame/wall_particles.h"
+#include "walls/wall_particles.h"
 #include "frame_lengths.h"
 #include "identities/identities.h"
 #include "mesh/mesh.h"

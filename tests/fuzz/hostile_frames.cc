@@ -72,6 +72,8 @@ Wall HostileWall(Choices& choices, double spacing) {
   }
   const double x0 = coordinate(), y0 = coordinate(), x1 = coordinate(), y1 = coordinate();
   if (kind % 4 == 0) return {.points = {x0, y0, x1, y1}};
+  if (kind % 8 == 1)
+    return {.points = {x0 - 1e20, y0, x0 + 1e20, y0, x0 + 1e20, y1, x0 - 1e20, y1}};
   return {.points = {x0, y0, x1, y0, x1, y1, x0, y1}};
 }
 
@@ -213,6 +215,11 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     const std::size_t count = 1 + choices.Below(3);
     for (std::size_t k = 0; k < count; ++k) {
       parameters.walls.push_back(HostileWall(choices, parameters.spacing.value_or(1)));
+    }
+  }
+  if (may_have_walls && !parameters.noise_filter && choices.Below(2) == 1) {
+    for (std::int32_t phase = static_cast<std::int32_t>(choices.Below(3)); phase >= 0; --phase) {
+      parameters.wall_phases.push_back(phase);
     }
   }
   return parameters;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "base/point.h"
@@ -103,5 +104,11 @@ absl::Status CheckAttributes(const Frame& frame);
 /// first particle at fault.
 absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
                         const FrameLimits& limits, DistinctIdsScratch& scratch);
+
+/// Sets `phases` to the values of the attribute `name`, one whole number for each particle, and
+/// `others` to the other attributes. Errors: INVALID_ARGUMENT if a frame with particles lacks the
+/// attribute, or if its values are others. Requires: CheckFrame has passed the frame.
+absl::Status TakePhaseValues(const Frame& frame, const std::string& name,
+                             std::span<const float>& phases, std::vector<Attribute>& others);
 
 }  // namespace partiemc

@@ -1,7 +1,7 @@
 #include "frame/phase_rules.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "core/internal/research.h"
-#include "frame/phase_values.h"
+#include "frame/frame_view.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 

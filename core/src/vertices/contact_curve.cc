@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/point_math.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

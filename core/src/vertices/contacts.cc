@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "base/cancellation.h"
-#include "base/point_math.h"
 #include "vertices/contact_curve.h"
 #include "vertices/vertices.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "base/cancellation.h"
-#include "base/point_math.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "base/point_math.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {
@@ -208,7 +208,8 @@ NearestWall WallLines::NearestOn(std::uint32_t edge, const Point& point) const {
   const Point from = Minus(point, line.from), to = Minus(point, line.to);
   const double above = Cross(line.unit, from), ahead = Dot(line.unit, from);
   // Differences from both ends, because one may be too far away to tell.
-  const bool is_before = ahead<0, is_after = Dot(line.unit, to)> 0;
+  const bool is_before = ahead < 0;
+  const bool is_after = Dot(line.unit, to) > 0;
   if (line.is_endless || !(is_before || is_after)) {
     const double share = ahead / line.length;
     return {{edge, line.is_endless ? share : std::min(share, 1.0)}, above};

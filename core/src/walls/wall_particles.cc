@@ -1,10 +1,10 @@
-#include "frame/wall_particles.h"
+#include "walls/wall_particles.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <span>
 
-#include "frame/phase_values.h"
+#include "frame/frame_view.h"
 
 namespace partiemc {
 
