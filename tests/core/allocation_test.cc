@@ -15,6 +15,7 @@
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
 #include "support/particles.h"
+#include "support/wall_scenes.h"
 
 namespace partiemc {
 namespace {
@@ -389,6 +390,12 @@ std::vector<MemoryCase> MemoryCases() {
   const std::vector<Section> phases = {{.phase = 1}, {.phase = 2}};
   add("body of two phases", phased(support::Disc(300)), {.sections = phases});
   add("drops of two phases", phased(spread(150, 5)), {.sections = phases});
+  const std::vector<Wall> tank = {support::PolygonWall(0, 0, 280, 1000, 0, true)};
+  add("body in a round tank", support::Disc(300), {.walls = tank});
+  add("drops at walls", spread(150, 5),
+      {.walls = {{{0, 7, 1, 7}}, {{7, 1, 7, 0}}, {{0, 0, 1, 1}}}});
+  add("drops among wall particles", phased(spread(150, 1.2)), {.wall_phases = {2}});
+  add("body among wall particles", phased(support::Disc(300)), {.wall_phases = {2}});
   const ReconstructionParameters grains{
       .sizes = Sizes::kOwn, .boundary = Boundary::kGrains, .cell_size = kCellOfGrains};
   add("body of grains", sized(support::Disc(60)), grains);

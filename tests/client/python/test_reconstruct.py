@@ -551,7 +551,7 @@ class Errors(unittest.TestCase):
         for wall in ([0, 0, 1], [0, 0], [0, 0, 0, 0], [0, 0, 1, numpy.inf]):
             with self.assertRaises(partiemc.Error) as caught:
                 partiemc.Reconstructor(walls=[wall])
-            self.assertEqual(caught.exception.field, "parameters.walls[0].points")
+            self.assertTrue(caught.exception.field.startswith("parameters.walls[0].points"))
         self.assert_refused("COUNT", "ids", ids=numpy.arange(count + 1))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count))
         self.assert_refused("UNSUPPORTED", "ids", ids=numpy.ones(count, numpy.int16))
