@@ -133,6 +133,7 @@ absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& s
     b.walls.ListLines(task.parameters.walls, task.wall_outlines, scale.cell_size, directory);
   });
   size.wall_pairs = b.walls.PairCount();
+  size.wall_lines = b.walls.lines().edges().size();
   size.wall_tiles = std::min<std::uint64_t>(size.wall_pairs, directory.size());
   if (absl::Status status = memory.ReserveOutline(size); !status.ok()) return status;
   InStage(task.observer, Stage::kField, [&] { b.walls.FindTiles(directory); });
@@ -333,6 +334,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   if (task.HasCopies()) whole.cut_segments = whole.segments;
   whole.wall_tiles = size.wall_tiles;
   whole.wall_pairs = size.wall_pairs;
+  whole.wall_lines = size.wall_lines;
   status = memory.ReserveOutline(whole);
   if (!status.ok()) return status;
   status = FillOutline(task, seen, scale, memory, b, result);

@@ -15,7 +15,6 @@
 #include "frame/scale.h"
 #include "frame/slab.h"
 #include "frame/spacing.h"
-#include "walls/wall_particles.h"
 #include "frame_lengths.h"
 #include "identities/identities.h"
 #include "mesh/mesh.h"
@@ -32,6 +31,7 @@
 #include "vertices/vertices.h"
 #include "walls/wall_corners.h"
 #include "walls/wall_field.h"
+#include "walls/wall_particles.h"
 
 namespace partiemc {
 

@@ -19,6 +19,7 @@ struct FrameSize {
   std::uint64_t interface_points = 0;  ///< Points of the interfaces between phases.
   std::uint64_t wall_tiles = 0;        ///< Tiles near walls.
   std::uint64_t wall_pairs = 0;        ///< Pairs of such a tile and a line near it.
+  std::uint64_t wall_lines = 0;        ///< Lines of walls.
 };
 
 /// Bytes per item: measured over frames of all kinds, plus a margin because vectors grow by
@@ -54,9 +55,10 @@ inline constexpr std::uint64_t kBytesPerPhaseTile = 10'000;
 inline constexpr std::uint64_t kBytesPerTileOfPhase = 900;
 inline constexpr std::uint64_t kBytesPerInterfacePoint = 500;
 
-/// Bytes for each tile near walls, and for each line near such a tile.
+/// Bytes for each tile near walls, for each line near such a tile, and for each line.
 inline constexpr std::uint64_t kBytesPerWallTile = 9'000;
 inline constexpr std::uint64_t kBytesPerWallPair = 60;
+inline constexpr std::uint64_t kBytesPerWallLine = 300;
 
 /// Bytes that any frame takes.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
@@ -70,7 +72,8 @@ inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +
                         kBytesPerCutSegment * size.cut_segments +
                         kBytesPerWallTile * size.wall_tiles + kBytesPerWallPair * size.wall_pairs +
-                        kBytesPerGridCell * size.grid_cells + kBytesPerBlockCell * size.block_cells;
+                        kBytesPerWallLine * size.wall_lines + kBytesPerGridCell * size.grid_cells +
+                        kBytesPerBlockCell * size.block_cells;
   if (size.phases > 0) {
     bytes += kBytesPerPhaseParticle * size.particles + kBytesPerPhaseTile * size.tiles +
              kBytesPerTileOfPhase * size.tiles * (size.phases + 1) +

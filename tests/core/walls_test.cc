@@ -264,6 +264,12 @@ TEST(Walls, FarPointsOfWallsDoNotMatter) {
     EXPECT_LT(distance(), 1e-12);
     parameters.walls = {{{-far, 0, far, 0, far, 10, -far, 10}}, kTank.walls[0]};
     EXPECT_EQ(ReconstructOnce(parameters, Column()).statistics.area, 200);
+    // A high tank and a high block, of whose sides rows of tiles see no more than the crossings.
+    const Particles high = support::Lattice(20, 150, .5, .5);
+    parameters.walls = {{{-far, 0, far, 0, far, 200, -far, 200}}};
+    EXPECT_NEAR(ReconstructOnce(parameters, high).statistics.area, 3000, 10);
+    parameters.walls = {{{-far, 0, -far, 200, 10, 200, 10, 0}}};
+    EXPECT_NEAR(ReconstructOnce(parameters, high).statistics.area, 1500, 10);
   }
 }
 

@@ -87,12 +87,40 @@ Stretch FindStretch(const Point& contact, const Point& up, double h,
   return stretch;
 }
 
+// Whether no other solid covers the wall from a contact on, up to a length along it.
+bool IsFree(const ContactCurve::Surroundings& around, const WallPlace& contact, double move) {
+  constexpr double kStep = 2;  // In cells; less than WallField::kMostHeight.
+  if (around.tile == kNoTile) return true;
+  const WallLines& lines = around.walls.lines();
+  const WallEdge& edge = lines.edges()[contact.edge];
+  const TileCoordinate& tile = around.directory[around.tile];
+  const Point origin{static_cast<double>(std::int64_t{tile.x} << kTileShift),
+                     static_cast<double>(std::int64_t{tile.y} << kTileShift)};
+  const int steps = static_cast<int>(std::ceil(std::abs(move) / kStep));
+  bool is_free = true;
+  for (int step = 1; step <= steps && is_free; ++step) {
+    const double along = lines.Along(contact) + move * step / steps;
+    const Point at = lines.At(lines.PlaceAt(edge.loop, along)), from = Minus(at, origin);
+    const auto is_near = [](double of) { return of >= -kTileSize && of < 2 * kTileSize; };
+    if (!is_near(from.x) || !is_near(from.y)) return true;
+    const TilePlace place =
+        Normalise(around.directory, around.tile, static_cast<int>(std::floor(from.x)),
+                  static_cast<int>(std::floor(from.y)));
+    if (place.tile == kNoTile) return true;
+    around.walls.ForEachSolidNear(
+        place.tile, at, [&](std::size_t solid, const NearestWall& nearest) {
+          const bool covers = nearest.height <= 0 && nearest.height > -WallField::kMostHeight;
+          is_free &= solid == edge.solid || !covers;
+        });
+  }
+  return is_free;
+}
+
 }  // namespace
 
-std::optional<ContactCurve> ContactCurve::Fit(const WallField& walls, std::uint32_t tile,
-                                              const WallPlace& contact, double spacing,
-                                              StretchPoint point) {
-  const WallLines& lines = walls.lines();
+std::optional<ContactCurve> ContactCurve::Fit(const Surroundings& around, const WallPlace& contact,
+                                              double spacing, StretchPoint point) {
+  const WallLines& lines = around.walls.lines();
   const WallEdge& edge = lines.edges()[contact.edge];
   const Stretch stretch = FindStretch(lines.At(contact), edge.Left(), spacing, point);
   if (stretch.first == 0 || stretch.length < kLineLength * spacing) return std::nullopt;
@@ -115,16 +143,8 @@ std::optional<ContactCurve> ContactCurve::Fit(const WallField& walls, std::uint3
   const double move =
       lines.Between(edge.loop, lines.Along(contact), lines.Along(curve.foot_place_));
   if (std::abs(move) > kFarthestMove * spacing) return std::nullopt;
-  bool is_free = true;
-  if (tile != kNoTile) {
-    walls.ForEachSolidNear(
-        tile, lines.At(curve.foot_place_), [&](std::size_t solid, const NearestWall& nearest) {
-          const bool is_other =
-              solid != edge.solid && std::abs(nearest.height) < WallField::kMostHeight;
-          is_free &= !is_other || nearest.height > 0;
-        });
-  }
-  return is_free ? std::optional(curve) : std::nullopt;
+  if (!IsFree(around, contact, move)) return std::nullopt;
+  return curve;
 }
 
 bool ContactCurve::FindFoot(const WallLines& lines, const WallPlace& contact, double spacing) {

@@ -36,13 +36,19 @@ class ContactCurve {
   /// The k-th point from a contact along its free stretch, k >= 1; empty at its end.
   using StretchPoint = absl::FunctionRef<std::optional<Point>(std::size_t k)>;
 
+  /// Walls, and a tile near the contact; kNoTile: no walls are near.
+  struct Surroundings {
+    const WallField& walls;
+    const TileDirectory& directory;
+    std::uint32_t tile;
+  };
+
   /// Fits the stretch from 1.5 h above the wall by least squares. Empty if the stretch is too
   /// short, or if the curve does not meet the wall of the contact nearby, in the fluid of the other
-  /// walls, at an angle above about ten degrees. `tile`: near the contact. `spacing`: h in cells.
-  /// Cost: linear in the points and in the lines near the contact.
-  static std::optional<ContactCurve> Fit(const WallField& walls, std::uint32_t tile,
-                                         const WallPlace& contact, double spacing,
-                                         StretchPoint point);
+  /// walls, at an angle above about ten degrees. `spacing`: h in cells. Cost: linear in the points
+  /// and in the lines near the contact.
+  static std::optional<ContactCurve> Fit(const Surroundings& around, const WallPlace& contact,
+                                         double spacing, StretchPoint point);
 
  private:
   bool FindFoot(const WallLines& lines, const WallPlace& contact, double spacing);

@@ -24,7 +24,8 @@ constexpr double kMostShare = .45;
 class ContactFitter {
  public:
   ContactFitter(const VertexInput& input, WallVertices& points, Rings& rings)
-      : walls_(*input.walls),
+      : input_(input),
+        walls_(*input.walls),
         lines_(input.walls->lines()),
         h_(input.scale.spacing),
         cell_size_(input.scale.cell_size),
@@ -85,22 +86,30 @@ class ContactFitter {
   bool MoveContact(const WallPlace& foot) {
     const double wanted = From(lines_.Along(foot));
     double move = wanted;
-    for (const WallEdge& edge : lines_.EdgesOfLoop(loop_)) {
-      if (edge.is_endless || !IsSharpAt(edge)) continue;
-      const double corner = From(edge.start);
-      if (move > 0 ? corner > 0 && corner < move : corner < 0 && corner > move) move = corner;
-    }
+    move = ToCorner(move);
     move = PassWetPoints(move);
     const bool is_free = move == wanted;
     SetPlace(contact_, is_free ? foot : lines_.PlaceAt(loop_, start_ + move));
     return is_free;
   }
 
-  // Whether the wall has a sharp corner at the beginning of a line.
-  bool IsSharpAt(const WallEdge& edge) const {
+  // The move up to the first sharp corner of the wall.
+  double ToCorner(double move) const {
     const auto of = lines_.EdgesOfLoop(loop_);
-    const WallEdge& before = &edge == of.data() ? of.back() : *(&edge - 1);
-    return 1 - Dot(before.unit, edge.unit) > kSharp;
+    if (of.front().is_endless) return move;
+    const std::size_t count = of.size();
+    const auto line =
+        static_cast<std::size_t>(&lines_.edges()[p_.place[contact_].edge] - of.data());
+    const bool is_forward = move > 0;
+    for (std::size_t step = 0; step < count; ++step) {
+      const std::size_t after = (is_forward ? line + 1 + step : line + count - step) % count;
+      const double corner = From(of[after].start);
+      if (is_forward ? corner >= move : corner <= move) return move;
+      const WallEdge& before = of[(after + count - 1) % count];
+      const bool is_passed = is_forward ? corner > 0 : corner < 0;
+      if (is_passed && 1 - Dot(before.unit, of[after].unit) > kSharp) return corner;
+    }
+    return move;
   }
 
   // Moves the points on the wall that the contact passes ahead of it. Returns the move of the
@@ -160,6 +169,7 @@ class ContactFitter {
     p_.angle[contact_] = static_cast<float>(AngleBetween(Times(unit, WetSign()), direction));
   }
 
+  const VertexInput& input_;
   const WallField& walls_;
   const WallLines& lines_;
   const double h_, cell_size_;

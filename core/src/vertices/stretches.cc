@@ -38,8 +38,9 @@ struct StretchEnd {
   }
 
   std::optional<ContactCurve> Fit(const RingVertices& v) const {
-    return ContactCurve::Fit(*input.walls, v.walls.tile[At(0)], v.walls.place[At(0)],
-                             input.scale.spacing, [&](std::size_t k) -> std::optional<Point> {
+    return ContactCurve::Fit({*input.walls, input.bins.tiles, v.walls.tile[At(0)]},
+                             v.walls.place[At(0)], input.scale.spacing,
+                             [&](std::size_t k) -> std::optional<Point> {
                                if (k >= ring.count) return std::nullopt;
                                if (v.walls.kind[At(k)] != VertexKind::kFree) return std::nullopt;
                                return v.point[At(k)];

@@ -82,7 +82,7 @@ class WallVertexFinder {
     double first = 2;
     for (const std::uint32_t k : walls_.EdgesNear(tile)) {
       const WallEdge& line = lines_.edges()[k];
-      const Point along = Minus(line.to, line.from), to = Minus(line.from, edge.from);
+      const Point along = line.Span(), to = Minus(line.from, edge.from);
       const double divisor = Cross(way, along);
       if (divisor == 0) continue;
       const double at = Cross(to, along) / divisor, share = Cross(to, way) / divisor;
@@ -182,7 +182,7 @@ class WallVertexFinder {
   template <typename Consider>
   void ConsiderCrossing(std::uint32_t of_a, std::uint32_t of_b, Consider consider) const {
     const WallEdge &a = lines_.edges()[of_a], &b = lines_.edges()[of_b];
-    const Point along_a = Minus(a.to, a.from), along_b = Minus(b.to, b.from);
+    const Point along_a = a.Span(), along_b = b.Span();
     const double divisor = Cross(along_a, along_b);
     if (a.solid == b.solid || divisor == 0) return;
     const Point to = Minus(b.from, a.from);

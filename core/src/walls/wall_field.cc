@@ -61,9 +61,8 @@ struct TileBounds {
     high = tile_of(std::max(edge.from.y, edge.to.y) + WallField::kMostHeight);
   }
   bool IsShort() const { return (right - left + 1) * (high - low + 1) <= kShortTiles; }
-  bool IsInRange() const {
-    return left > -kMostTiles && right < kMostTiles && low > -kMostTiles && high < kMostTiles;
-  }
+  bool HasRows() const { return low > -kMostTiles && high < kMostTiles; }
+  bool HasColumns() const { return left > -kMostTiles && right < kMostTiles; }
 };
 
 // Whether the line crosses a horizontal (vertical) line, and where.
@@ -168,9 +167,10 @@ bool WallField::IsNear(const TileDirectory& directory, std::uint32_t tile,
 void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line) {
   const WallEdge& edge = lines_.edges()[line];
   const TileBounds bounds(edge);
-  if (!bounds.IsInRange()) return;
-  const auto left = static_cast<std::int32_t>(bounds.left);
-  const auto right = static_cast<std::int32_t>(bounds.right);
+  if (!bounds.HasRows()) return;
+  // A line far to the left still decides what is solid.
+  const auto left = bounds.HasColumns() ? static_cast<std::int32_t>(bounds.left) : 0;
+  const auto right = bounds.HasColumns() ? static_cast<std::int32_t>(bounds.right) : -1;
   const auto high = static_cast<std::int32_t>(bounds.high);
   for (auto y = static_cast<std::int32_t>(bounds.low); y <= high; ++y) {
     if (SpansRow(edge, std::int64_t{y} * kTileSize - kMark)) by_row_.emplace_back(y, line);
@@ -187,8 +187,10 @@ void WallField::ListLines(const std::vector<Wall>& walls, const Rings* particle_
   pairs_.clear();
   by_row_.clear();
   long_lines_.clear();
+  endless_.clear();
   for (std::uint32_t line = 0; line < lines_.edges().size(); ++line) {
     const WallEdge& edge = lines_.edges()[line];
+    if (edge.is_endless) endless_.push_back(edge.solid);
     if (edge.is_endless || !TileBounds(edge).IsShort()) {
       long_lines_.push_back(line);
     } else {

@@ -38,7 +38,8 @@ class WallField {
                  const TileDirectory& directory);
   std::size_t PairCount() const { return pair_count_; }
 
-  /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles.
+  /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles;
+  /// endless lines times tiles.
   void FindTiles(const TileDirectory& directory);
   std::size_t TileCount() const { return near_count_; }
 
@@ -111,8 +112,8 @@ class WallField {
   std::vector<std::uint32_t> edges_;
 
   // Scratch of ListLines and FindTiles.
-  std::vector<std::uint32_t> long_lines_;
-  std::vector<std::size_t> long_counts_;                        // By long line: tiles near it.
+  std::vector<std::uint32_t> long_lines_, endless_;  // Lines; solids with an endless line.
+  std::vector<std::size_t> long_counts_;             // By long line: tiles near it.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Tile, line.
   std::vector<std::pair<std::int32_t, std::uint32_t>> by_row_;  // Row of tiles, short line.
   std::vector<Crossing> crossings_;                             // Of a row, by x.

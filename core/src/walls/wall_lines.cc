@@ -73,14 +73,15 @@ std::optional<std::pair<Point, Point>> PartIn(const WallLines::Window& window, c
 
 }  // namespace
 
-void WallLines::AddLine(const Point& a, const Point& b, double cell_size, Loop& loop) {
+void WallLines::AddLine(const Point& a, const Point& b, double cell_size, Loop& loop,
+                        bool is_precise) {
   WallEdge edge{.from = {a.x / cell_size, a.y / cell_size},
                 .to = {b.x / cell_size, b.y / cell_size}};
   if (edge.from == edge.to) return;
   edge.unit = UnitFrom(edge.from, edge.to);
   edge.length = std::abs(Dot(edge.unit, Minus(edge.to, edge.from)));
   edge.start = loop.perimeter;
-  edge.share_size = std::min(edge.length, kLong);
+  edge.share_size = is_precise ? edge.length : std::min(edge.length, kLong);
   edge.loop = static_cast<std::uint32_t>(loops_.size());
   edge.solid = static_cast<std::uint32_t>(solids_.size() - 1);
   loop.perimeter += edge.share_size;
@@ -95,7 +96,7 @@ void WallLines::AddLines(const Point& a, const Point& b, double cell_size, const
   const auto part = longest > kLong ? PartIn(world, a, b) : std::nullopt;
   if (!part) return AddLine(a, b, cell_size, loop);
   AddLine(a, part->first, cell_size, loop);
-  AddLine(part->first, part->second, cell_size, loop);
+  AddLine(part->first, part->second, cell_size, loop, /*is_precise=*/true);
   AddLine(part->second, b, cell_size, loop);
 }
 
@@ -126,7 +127,6 @@ void WallLines::AddEndless(const Point& a, const Point& b, double cell_size, con
   const Point unit = UnitFrom(a, b);
   const Point middle = Times(Plus(window.low, window.high), cell_size / 2);
   const Point from = Plus(a, Times(unit, Dot(Minus(middle, a), unit)));
-  const Point to = Plus(from, Times(unit, cell_size));
   const auto first = static_cast<std::uint32_t>(edges_.size());
   edges_.push_back({.from = Times(from, 1 / cell_size),
                     .to = Plus(Times(from, 1 / cell_size), unit),
@@ -136,7 +136,7 @@ void WallLines::AddEndless(const Point& a, const Point& b, double cell_size, con
                     .loop = static_cast<std::uint32_t>(loops_.size()),
                     .solid = static_cast<std::uint32_t>(solids_.size() - 1),
                     .is_endless = true});
-  world_.insert(world_.end(), {from, to});
+  world_.insert(world_.end(), {from, Times(unit, cell_size)});
   loops_.push_back({first, first + 1, 0});
   solids_.back().last = first + 1;
 }
@@ -179,11 +179,12 @@ void WallLines::Build(const std::vector<Wall>& walls, const Rings* particle_wall
 
 Point WallLines::At(const WallPlace& place) const {
   const WallEdge& edge = edges_[place.edge];
-  return Plus(edge.from, Times(Minus(edge.to, edge.from), place.share));
+  return Plus(edge.from, Times(edge.Span(), place.share));
 }
 
 Point WallLines::InWorld(const WallPlace& place) const {
   const Point &a = world_[2 * place.edge], &b = world_[2 * place.edge + 1];
+  if (edges_[place.edge].is_endless) return Plus(a, Times(b, place.share));
   if (place.share == 1) return b;
   return Plus(a, Times(Minus(b, a), place.share));
 }
@@ -206,7 +207,9 @@ WallPlace WallLines::PlaceAt(std::size_t loop, double along) const {
 NearestWall WallLines::NearestOn(std::uint32_t edge, const Point& point) const {
   const WallEdge& line = edges_[edge];
   const Point from = Minus(point, line.from), to = Minus(point, line.to);
-  const double above = Cross(line.unit, from), ahead = Dot(line.unit, from);
+  const double ahead = Dot(line.unit, from);
+  // From the nearer end, because the farther one is less precise.
+  const double above = Cross(line.unit, std::abs(ahead) < line.length / 2 ? from : to);
   // Differences from both ends, because one may be too far away to tell.
   const bool is_before = ahead < 0;
   const bool is_after = Dot(line.unit, to) > 0;

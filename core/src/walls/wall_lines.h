@@ -23,11 +23,13 @@ struct WallEdge {
   std::uint32_t loop = 0, solid = 0;
   bool is_endless = false;  ///< The only line of its loop, and not limited to the two points.
 
+  /// From `from` to `to`. Of an endless line, `to` may be rounded.
+  Point Span() const { return is_endless ? unit : Point{to.x - from.x, to.y - from.y}; }
   /// To the left: into the fluid.
   Point Left() const { return {-unit.y, unit.x}; }
 };
 
-/// A point on a line of a wall: `from` + `share` * (`to` - `from`); `share` is in [0, 1] unless the
+/// A point on a line of a wall: `from` + `share` * Span(); `share` is in [0, 1] unless the
 /// line is endless.
 struct WallPlace {
   std::uint32_t edge = 0;
@@ -52,7 +54,7 @@ class WallLines {
   /// Reads the walls of a stream, and the outlines of wall particles if there are any. Long lines
   /// get further points at the sides of the window, because shares of a long line are not precise.
   /// Points of the window that round to the same cell coordinates become one. Requires: Validate
-  /// has passed the walls.
+  /// has passed the walls. A slanted line is off by 2^-52 of the distance of its points.
   void Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
              const Window& window);
 
@@ -113,10 +115,13 @@ class WallLines {
   double AddLoop(std::size_t count, double cell_size, const Window& window, PointOf at);
   // Adds lines from a to b, in world units.
   void AddLines(const Point& a, const Point& b, double cell_size, const Window& window, Loop& loop);
-  void AddLine(const Point& a, const Point& b, double cell_size, Loop& loop);
+  // `is_precise`: in the window, where lengths along the loop must be right.
+  void AddLine(const Point& a, const Point& b, double cell_size, Loop& loop,
+               bool is_precise = false);
 
   std::vector<WallEdge> edges_;
-  std::vector<Point> world_;  // By line: both points in world units.
+  // By line: both points in world units; of an endless line, a point and its step for a share of 1.
+  std::vector<Point> world_;
   std::vector<Loop> loops_;
   std::vector<Solid> solids_;
 };
