@@ -140,9 +140,14 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
   if (frame.volumes.empty()) return SizeRange{};
   const auto [least, most] = std::ranges::minmax_element(frame.volumes);
   const double spacing = lengths.spacing;
-  const SizeRange sizes{std::sqrt(double{*least}) / spacing, std::sqrt(double{*most}) / spacing};
+  const bool is_in_space = parameters.slice.has_value();
+  const auto size_of = [is_in_space](double volume) {
+    return is_in_space ? std::cbrt(volume) : std::sqrt(volume);
+  };
+  const SizeRange sizes{size_of(*least) / spacing, size_of(*most) / spacing};
   constexpr double kRatio = ReconstructionParameters::kMostSizeRatio;
-  // A kernel reaches at most the tiles beside the tile of its particle.
+  // A kernel reaches at most the tiles beside the tile of its particle. In space, the same limit
+  // bounds the bricks that a particle reaches.
   const double largest =
       std::min(kRatio, kTileSize * lengths.cell_size / (parameters.kernel_radius * spacing));
   const double smallest =
@@ -157,17 +162,16 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
   const auto count = [&](auto is_beyond) {
     return std::ranges::count_if(frame.volumes, is_beyond);
   };
-  const auto above =
-      count([&](float v) { return std::sqrt(double{v}) > largest * kRounded * spacing; });
-  const auto below =
-      count([&](float v) { return std::sqrt(double{v}) < kBelow * smallest * spacing; });
+  const auto above = count([&](float v) { return size_of(v) > largest * kRounded * spacing; });
+  const auto below = count([&](float v) { return size_of(v) < kBelow * smallest * spacing; });
   const bool is_large = above > 0 && (below == 0 || above <= below);
   const auto worst = is_large ? most : least;
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
       {std::string(kReasonOutOfRange), absl::StrCat("volumes[", worst - frame.volumes.begin(), "]"),
        ShortestNumber(*worst),
-       absl::StrCat("must have a square root, the size, of ", ShortestNumber(smallest), " to ",
+       absl::StrCat("must have a ", std::string(is_in_space ? "cube" : "square"),
+                    " root, the size, of ", ShortestNumber(smallest), " to ",
                     ShortestNumber(largest), " spacings of ", ShortestNumber(spacing))});
 }
 

@@ -133,6 +133,7 @@ SurfaceParameters SurfaceParametersOf(const ReconstructionParameters& parameters
   surface.spacing = *parameters.spacing;
   surface.kernel_radius = parameters.kernel_radius;
   surface.cell_size = parameters.cell_size;
+  surface.sizes = parameters.sizes;
   surface.reference_radius = parameters.reference_radius;
   surface.clean = parameters.clean;
   surface.thinning_distance = parameters.surface.thinning_distance;

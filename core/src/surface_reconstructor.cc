@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame/scale.h"
+#include "frame_lengths.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "periodic/lift.h"
@@ -85,11 +87,14 @@ ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   if (!in_space.reference_radius) {
     in_space.reference_radius = CalibratedSurfaceRadius(parameters.kernel_radius);
   }
+  in_space.sizes = parameters.sizes;  // Slices exclude own sizes, so Validate must not see them.
   return in_space;
 }
 
-double LightestVolume(const Frame& frame, double spacing) {
-  if (frame.volumes.empty()) return spacing * spacing * spacing;
+/// With own sizes, weights do not contain volumes.
+double LightestVolume(const Frame& frame, const SurfaceParameters& parameters) {
+  const double h = parameters.spacing;
+  if (frame.volumes.empty() || parameters.sizes == Sizes::kOwn) return h * h * h;
   float lightest = frame.volumes[0];
   for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
   return lightest;
@@ -199,6 +204,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   if (placement == SurfacePlacement::kQef) {
     space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
     space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);
+    b.virtual_plane.volumes.sizes.clear();
   } else {
     space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors,
                          b.virtual_plane, b.positions, b.normals);
@@ -206,6 +212,8 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   KeepFixedVertices(b);
   for (Vec3& position : b.positions) position = scale.cell_size * position;
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
+  // Empty for qef and for equal sizes.
+  const std::span<const float> sizes(b.virtual_plane.volumes.sizes);
   space::BeginSearch(b.bodies, b.positions, b.virtual_plane.volumes);
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
@@ -214,7 +222,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
       return absl::InternalError("a face is refused although its vertices are at their anchors");
     }
     space::FindThinEdges(bricks, b.crossings, scale.cell_size, b.certificate, b.positions,
-                         parameters.thinning_distance * scale.spacing, b.thin);
+                         parameters.thinning_distance * scale.spacing, b.thin, sizes);
     space::EmitQuads(bricks, b.crossings, b.certificate, b.thin, b.mesh.triangles);
     if (placement != SurfacePlacement::kVirtualPlane || round > kVolumeRounds) break;
     if (round == 0) {
@@ -275,6 +283,11 @@ SurfaceReconstructor::SurfaceReconstructor(const SurfaceParameters& parameters,
 absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
+  if (parameters.box && parameters.sizes == Sizes::kOwn) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(kReasonOutOfRange), "parameters.sizes", "own",
+                           "must be equal with a periodic box"});
+  }
   if (parameters.box) {
     absl::Status status = Validate(*parameters.box, parameters.kernel_radius, parameters.spacing);
     if (!status.ok()) return status;
@@ -360,7 +373,13 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                      b.lift, lifted);
       if (!checked.ok()) return checked;
     }
-    scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, h));
+    SizeRange sizes;
+    if (parameters_.sizes == Sizes::kOwn) {
+      const auto range = RangeOfSizes(frame, in_space_, {.spacing = h, .cell_size = cell_size});
+      if (!range.ok()) return range.status();
+      sizes = *range;
+    }
+    scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, parameters_), sizes);
     checked = space::FindBricks(frame, scale, limits_, b.bins);
     size.bricks = bricks.size();
     if (checked.ok()) checked = Reserve(size, control.memory);

@@ -49,7 +49,7 @@ enum class SpacingRule : std::uint8_t {
 /// The size h_i of a particle: the spacing that it needs between its neighbours and itself.
 enum class Sizes : std::uint8_t {
   kEqual,  ///< The spacing h, for all particles.
-  kOwn,    ///< h_i = sqrt(v_i) with the particle's volume v_i (core/SIZES.md).
+  kOwn,    ///< h_i = sqrt(v_i), of a surface cbrt(v_i), with the volume v_i (core/SIZES.md).
 };
 
 /// What the outline runs around.
@@ -171,13 +171,14 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within kernel_radius h_i, and smoothing follows the local
   /// size. Frames must have volumes. An absent spacing is the root mean square of the sizes; it
   /// sets the lattice. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
-  /// kernel radius at most 32 cells. Excludes surfaces, slices, `box`, `noise_filter` and
+  /// kernel radius at most 32 cells. Excludes slices, `box`, `noise_filter` and
   /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 
   /// With grains, outlines follow discs, voids without room for another grain are inside, and a
-  /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues.
+  /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues and
+  /// surfaces.
   /// `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half spacings. An absent
   /// spacing is the smallest diameter, or a tenth of the largest if this is larger. A diameter must
   /// be at least `kSmallestGrain` cells, so that no grain falls between the nodes of the lattice,

@@ -189,8 +189,10 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
   const auto refused = [&](const std::string& with) {
     return Refused("sizes", std::string(Name(p.sizes)), "must be equal " + with);
   };
-  if (p.output == Output::kSurface) return refused("for a surface");
-  if (p.slice) return refused("for a slice");
+  const bool has_slice = p.slice || std::ranges::any_of(p.sections, [](const Section& section) {
+                           return section.slice.has_value();
+                         });
+  if (has_slice) return refused("for a slice");
   if (p.box) return refused("with a periodic box");
   if (p.noise_filter) return refused("with a noise filter");
   if (!KeepsGuarantees(p.placement)) {
@@ -205,6 +207,9 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
   const bool is_isoline = p.isovalue || std::ranges::any_of(p.sections, [](const Section& s) {
                             return s.isovalue.has_value();
                           });
+  if (p.output == Output::kSurface) {
+    return Refused("boundary", std::string(Name(p.boundary)), "must be bulk for a surface");
+  }
   if (p.sizes == Sizes::kOwn && !is_isoline) {
     // An absent spacing is the smallest diameter.
     if (p.spacing || p.cell_size * p.kSmallestGrain <= 2) return absl::OkStatus();

@@ -37,11 +37,28 @@ std::uint64_t KeyOf(const std::array<std::int64_t, 3>& at) {
 }
 
 constexpr int kFractionsOfKey = 3 * kFractionBits;
+constexpr int kCellBits = 3 * kBrickShift;
+constexpr int kClassShift = kFractionsOfKey + kCellBits;
+static_assert(kMostClasses <= 1 << (64 - kClassShift), "a key has room for the class");
 
 float Coordinate(std::uint64_t key, int axis) {
   const std::uint64_t cell = key >> (kFractionsOfKey + axis * kBrickShift) & 7;
   const std::uint64_t fraction = key >> (axis * kFractionBits) & 0x1ffff;
   return static_cast<float>(cell << kFractionBits | fraction) * (1.0f / (1 << kFractionBits));
+}
+
+/// The key by which particles are sorted: the class, its cell, the place in this cell.
+std::uint64_t SortKey(std::uint64_t key, std::uint32_t of_class, int shift) {
+  constexpr std::uint64_t kInBrick = kBrickSize - 1;
+  const std::uint64_t within = (std::uint64_t{1} << shift) - 1;
+  std::uint64_t cell = of_class, rest = 0;
+  for (int axis = 2; axis >= 0; --axis) {
+    const std::uint64_t at = key >> (kFractionsOfKey + axis * kBrickShift) & kInBrick;
+    cell = cell << (kBrickShift - shift) | at >> shift;
+    rest = rest << shift | (at & within);
+  }
+  constexpr std::uint64_t kFractions = (std::uint64_t{1} << kFractionsOfKey) - 1;
+  return (cell << 3 * shift | rest) << kFractionsOfKey | (key & kFractions);
 }
 
 absl::Status TooFar(std::size_t particle, int axis, double value, const Scale& scale) {
@@ -91,19 +108,58 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
   return absl::OkStatus();
 }
 
-/// Adds the bricks within `reach` of the box around the particles of each brick. Returns false if
-/// there are more than `most`.
-bool AddReachedBricks(double reach, std::size_t most, SpaceBins& bins) {
+/// Finds the sizes and the size classes of the particles. Keys receive the class.
+void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
+  const double world = scale.spacing * scale.cell_size;
+  std::vector<float>& size = bins.given_size;
+  size.resize(frame.volumes.size());
+  float largest = 0;
+  for (std::size_t p = 0; p < size.size(); ++p) {
+    size[p] = static_cast<float>(std::cbrt(double{frame.volumes[p]}) / world);
+    largest = std::max(largest, size[p]);
+  }
+  std::array<SizeClass, kMostClasses> classes;
+  for (SizeClass& of : classes) of.most = 0;
+  for (std::size_t p = 0; p < size.size(); ++p) {
+    std::uint64_t index = 0;
+    for (float limit = largest / kClassRatio; size[p] <= limit && index + 1 < kMostClasses;
+         limit /= kClassRatio) {
+      ++index;
+    }
+    bins.keys[p] |= index << kClassShift;
+    classes[index].most = std::max(classes[index].most, size[p]);
+  }
+  // Only classes with particles stay.
+  std::array<std::uint64_t, kMostClasses> place{};
+  bins.classes.clear();
+  for (int k = 0; k < kMostClasses; ++k) {
+    if (classes[k].most == 0) continue;
+    place[k] = bins.classes.size();
+    // Cells that are about as wide as the particles.
+    const double cells = std::log2(double{classes[k].most} * scale.spacing);
+    classes[k].shift = std::clamp(static_cast<int>(std::lround(cells)), 0, kBrickShift);
+    bins.classes.push_back(classes[k]);
+  }
+  constexpr std::uint64_t kPosition = (std::uint64_t{1} << kClassShift) - 1;
+  for (std::uint64_t& key : bins.keys) {
+    key = (key & kPosition) | place[key >> kClassShift] << kClassShift;
+  }
+}
+
+/// Adds the bricks within `reach` of the box around the particles of each brick; with own sizes,
+/// particles reach farther by (size - 1) kernel radii. Returns false if there are more than `most`.
+bool AddReachedBricks(double reach, float kernel_radius, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();
   bins.homes.assign(bins.bricks.bricks().begin(), bins.bricks.bricks().end());
   std::vector<SpaceBins::Box>& boxes = bins.boxes;
   boxes.assign(homes, {});
   for (std::size_t p = 0; p < bins.keys.size(); ++p) {
     SpaceBins::Box& box = boxes[bins.home[p]];
+    const float farther = bins.given_size.empty() ? 0 : kernel_radius * (bins.given_size[p] - 1);
     for (int axis = 0; axis < 3; ++axis) {
       const float value = Coordinate(bins.keys[p], axis);
-      box.low[axis] = std::min(box.low[axis], value);
-      box.high[axis] = std::max(box.high[axis], value);
+      box.low[axis] = std::min(box.low[axis], value - farther);
+      box.high[axis] = std::max(box.high[axis], value + farther);
     }
   }
   for (std::size_t home = 0; home < homes; ++home) {
@@ -151,13 +207,18 @@ void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBin
   };
   std::sort(bins.sorted.begin() + first, bins.sorted.begin() + last, before);
   std::size_t p = first;
-  for (int cell = 0; cell < kBrickNodes; ++cell) {
-    bins.cells[brick][cell] = static_cast<std::uint32_t>(p);
-    while (p < last && bins.sorted[p].key >> kFractionsOfKey == static_cast<std::uint64_t>(cell)) {
-      ++p;
+  for (std::size_t k = 0; k < bins.classes.size(); ++k) {
+    const int shift = bins.classes[k].shift, bits = kCellBits - 3 * shift;
+    const int count = 1 << bits;
+    auto& cells = bins.cells[brick * bins.classes.size() + k];
+    const std::uint64_t of_class = std::uint64_t{k} << bits;
+    for (int cell = 0; cell < count; ++cell) {
+      cells[cell] = static_cast<std::uint32_t>(p);
+      const std::uint64_t wanted = of_class + static_cast<std::uint64_t>(cell);
+      while (p < last && bins.sorted[p].key >> (kFractionsOfKey + 3 * shift) == wanted) ++p;
     }
+    std::fill(cells.begin() + count, cells.end(), static_cast<std::uint32_t>(p));
   }
-  bins.cells[brick][kBrickNodes] = static_cast<std::uint32_t>(last);
 }
 
 }  // namespace
@@ -169,6 +230,9 @@ void SpaceBins::Clear() {
   y.clear();
   z.clear();
   weight.clear();
+  size.clear();
+  given_size.clear();
+  classes.assign(1, {});
   source.clear();
 }
 
@@ -182,7 +246,9 @@ absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimit
   // Inside nodes are within the kernel radius of a particle, and the other corners of their cells
   // at most one cell farther. 1/64 of a cell is for the rounding of positions.
   constexpr double kMargin = 1 + 1.0 / 64;
-  if (!AddReachedBricks(scale.kernel_radius + kMargin, limits.max_tiles, bins)) {
+  if (scale.has_own_sizes) FindClasses(frame, scale, bins);
+  if (!AddReachedBricks(scale.kernel_radius + kMargin, static_cast<float>(scale.kernel_radius),
+                        limits.max_tiles, bins)) {
     return TooManyBricks(scale, limits.max_tiles);
   }
   bins.bricks.Seal();
@@ -204,14 +270,20 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   for (std::size_t brick = 0; brick < bricks; ++brick) next[brick + 1] += next[brick];
   bins.sorted.resize(count);
   for (std::size_t p = 0; p < count; ++p) {
-    bins.sorted[next[bins.home[p]]++] = {bins.keys[p], static_cast<std::uint32_t>(p)};
+    const auto of_class = static_cast<std::uint32_t>(bins.keys[p] >> kClassShift);
+    const int shift = bins.classes[of_class].shift;
+    bins.sorted[next[bins.home[p]]++] = {
+        shift == 0 ? bins.keys[p] : SortKey(bins.keys[p], of_class, shift),
+        static_cast<std::uint32_t>(p)};
   }
-  bins.cells.resize(bricks);
+  bins.cells.resize(bricks * bins.classes.size());
   bins.x.resize(count + kBinPadding);
   bins.y.resize(count + kBinPadding);
   bins.z.resize(count + kBinPadding);
   bins.source.resize(count);
-  bins.weight.resize(frame.volumes.empty() ? 0 : count + kBinPadding);
+  const bool has_own_sizes = scale.has_own_sizes;
+  bins.weight.resize(frame.volumes.empty() || has_own_sizes ? 0 : count + kBinPadding);
+  bins.size.resize(has_own_sizes ? count + kBinPadding : 0);
   const double weight_per_world_volume =
       scale.weight_per_volume / scale.cell_size / scale.cell_size / scale.cell_size;
   ParallelFor(static_cast<std::uint32_t>(bricks), [&](std::uint32_t brick) {
@@ -220,10 +292,13 @@ void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins) {
     SortBrick(frame, first, last, bins, brick);
     for (std::size_t p = first; p < last; ++p) {
       const SpaceBins::Keyed& particle = bins.sorted[p];
-      bins.x[p] = Coordinate(particle.key, 0);
-      bins.y[p] = Coordinate(particle.key, 1);
-      bins.z[p] = Coordinate(particle.key, 2);
+      // With size classes, the key by which particles are sorted has another order of its bits.
+      const std::uint64_t key = has_own_sizes ? bins.keys[particle.source] : particle.key;
+      bins.x[p] = Coordinate(key, 0);
+      bins.y[p] = Coordinate(key, 1);
+      bins.z[p] = Coordinate(key, 2);
       bins.source[p] = particle.source;
+      if (has_own_sizes) bins.size[p] = bins.given_size[particle.source];
       if (bins.weight.empty()) continue;
       bins.weight[p] = static_cast<float>(frame.volumes[particle.source] * weight_per_world_volume);
     }

@@ -18,15 +18,31 @@ namespace partiemc::space {
 
 inline constexpr std::size_t kBinPadding = 8;
 
-/// Particles by brick, cell (layer, row, column), position and weight. Positions are in cells
-/// relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
+/// Particles of similar sizes. They are sorted into cells of 2^shift lattice cells.
+struct SizeClass {
+  float most = 1;  ///< The largest size of its particles, in spacings.
+  int shift = 0;   ///< At most kBrickShift.
+};
+
+/// Own sizes are divided into classes of this ratio. A walk over the particles near a point has the
+/// reach of the largest particle of a class, so smaller ratios find fewer particles in vain, but
+/// more classes have more rows of cells.
+inline constexpr float kClassRatio = 1.4142135f;
+/// Most classes: sizes differ at most by the square of ReconstructionParameters::kMostSizeRatio.
+inline constexpr int kMostClasses = 16;
+
+/// Particles by brick, size class, cell (layer, row, column), position and weight. Positions are in
+/// cells relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
-  /// Per brick: the first particle of each cell, then the end of the last cell.
+  /// Of the particles of this frame, largest first; one for equal sizes.
+  std::vector<SizeClass> classes{SizeClass{}};
+  /// Per brick and class: the first particle of each cell, then the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   /// kBinPadding values follow the last particle, so that vectors may read beyond it.
   std::vector<float> x, y, z;
   std::vector<float> weight;          ///< Empty if uniform; else padded, too.
+  std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
 
   struct Keyed {
@@ -41,15 +57,22 @@ struct SpaceBins {
   std::vector<std::uint32_t> brick_of;    ///< Scratch: by home brick.
   std::vector<std::uint32_t> home, next;  ///< Scratch: by particle, by brick.
   std::vector<std::uint64_t> keys;        ///< Scratch, by particle.
+  std::vector<float> given_size;          ///< Scratch, by particle: as `size`.
   std::vector<Keyed> sorted;              ///< Scratch.
   std::vector<BrickCoordinate> homes;     ///< Scratch.
 
   void Clear();
+
+  /// The particles of a brick are [FirstOf, EndOf).
+  std::uint32_t FirstOf(std::size_t brick) const { return cells[brick * classes.size()].front(); }
+  std::uint32_t EndOf(std::size_t brick) const {
+    return cells[(brick + 1) * classes.size() - 1].back();
+  }
 };
 
 /// Finds the bricks of a frame: they exist where a node is at most the kernel radius plus one cell
-/// away from a particle. Sorts no particle yet. Requires: CheckFrame has passed the frame as for a
-/// slice, with three components.
+/// away from a particle. Sorts no particle yet, but finds their size classes. Requires: CheckFrame
+/// has passed the frame as for a slice, with three components.
 /// Errors with a Violation: INVALID_ARGUMENT for positions beyond 2^30 cells from the origin;
 /// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
 absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,

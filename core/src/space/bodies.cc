@@ -144,7 +144,7 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
   const double usual = spacing * spacing * spacing;
   bodies.body_of_particle.assign(bins.source.size(), kNoIndex);
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
-    for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
+    for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
       BrickPlace node{kNoIndex, 0, 0, 0};
       for (int layers = 0; node.brick == kNoIndex && layers <= kMostLayers; ++layers) {
         node = NearestInside(bins, field, brick, p, layers);

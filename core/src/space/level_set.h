@@ -56,25 +56,28 @@ inline Vec3 Eigenvector(const Symmetric& a, double value) {
   return Normalised(longest);
 }
 
-/// Sums over the particles around a point x, with D = x_i - x.
+/// Sums over the particles around a point x, with D = (x_i - x) / s_i. s_i is the own size of a
+/// particle in spacings, 1 for equal sizes.
 struct Sums {
   double kernel = 0;   ///< sum k
   double density = 0;  ///< f = sum w k
   Vec3 first;          ///< sum k D
   Symmetric second;    ///< sum k D D^T
+  double size = 1;     ///< The local size sum k s / sum k.
 };
 
 /// Sums for the gradients of Sums, for the same particles. With t = 1 - |D|^2 / R^2: grad k = 6 t^2
-/// D / R^2.
+/// D / (R^2 s).
 struct Slopes {
-  Vec3 first;        ///< sum t^2 D
-  Symmetric second;  ///< sum t^2 D D^T
-  Vec3 density;      ///< sum w t^2 D
+  Vec3 first;           ///< sum t^2 D / s
+  Symmetric second;     ///< sum t^2 D D^T / s
+  Vec3 density;         ///< sum w t^2 D / s
+  double per_size = 1;  ///< sum k / s / sum k
 };
 
 enum class Term { kPhi, kGuard, kGap, kSaturation };
 
-/// F at a point, and the term that determines F there.
+/// F at a point, in cells, and the term that determines F there.
 struct LevelSetAt {
   double value;
   Term term;
@@ -94,17 +97,19 @@ inline LevelSetAt LevelSetOf(const Sums& sums, const Scale& scale) {
   if (guard > at.value) at = {guard, Term::kGuard};
   if (gap > at.value) at = {gap, Term::kGap};
   if (saturation < at.value) at = {saturation, Term::kSaturation};
+  at.value *= sums.size;
   return at;
 }
 
-/// grad phi = grad m n - n with m = sum k D / sum k, n = m / |m|.
+/// grad phi = grad m n - n sum k / s / sum k with m = sum k D / sum k, n = m / |m|; without the
+/// local size.
 inline Vec3 GradientOfPhi(const Sums& sums, const Slopes& slopes, const Scale& scale) {
   const double length = Length(sums.first);
   if (length == 0) return {};
   const double six = 6 / (scale.kernel_radius * scale.kernel_radius);
   const Vec3 n = (1 / length) * sums.first;
   const double mean = length / sums.kernel;
-  return (six / sums.kernel) * (slopes.second.Times(n) - mean * slopes.first) - n;
+  return (six / sums.kernel) * (slopes.second.Times(n) - mean * slopes.first) - slopes.per_size * n;
 }
 
 }  // namespace partiemc::space

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "space/bins.h"
 #include "space/lattice.h"
@@ -34,8 +36,10 @@ struct NearBlock {
   static_assert(kLanes <= kBinPadding);
 
   alignas(64) PerParticle<float> x, y, z;
-  alignas(64) PerParticle<float> weight;  ///< 1 if uniform.
+  alignas(64) PerParticle<float> weight;    ///< 1 if uniform; the size if particles have own sizes.
+  alignas(64) PerParticle<float> per_size;  ///< 1 / size; unset without own sizes.
   int count = 0;
+  bool has_sizes = false;
 
   /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Vectors
   /// also copy what follows them in the bins, which counts for nothing.
@@ -58,6 +62,7 @@ struct NearBlock {
     for (int k = count; k % kLanes != 0; ++k) {
       x[k] = y[k] = z[k] = 1e6f;
       weight[k] = 0;
+      per_size[k] = 1;
     }
   }
 
@@ -67,11 +72,15 @@ struct NearBlock {
   }
 };
 
-/// Calls visit(NearRun) for runs that contain all particles within `radius` of the box, in the
-/// order of the bins: brick by brick, row by row. Runs may also contain other particles.
-template <typename Visit>
-void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
-                    Visit visit) {
+/// Calls visit(NearRun) for runs that contain all particles of a size class within `radius` of the
+/// box, in the order of the bins: brick by brick, row by row. Runs may also contain other particles
+/// of the class. Lengths are in cells of the class.
+template <bool kHasCoarseCells, typename Visit>
+void ForEachNearRunOf(const SpaceBins& bins, std::size_t of_class, std::uint32_t brick,
+                      const NearBox& box, float radius, Visit visit) {
+  const int brick_shift =
+      kHasCoarseCells ? kBrickShift - bins.classes[of_class].shift : kBrickShift;
+  const int side = 1 << brick_shift;
   std::array<int, 3> low, high;
   for (int axis = 0; axis < 3; ++axis) {
     low[axis] = static_cast<int>(std::floor(box.low[axis] - radius));
@@ -83,17 +92,19 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
                      box.low[axis] - static_cast<float>(at + 1)});
   };
   const float square = radius * radius;
-  for (int bz = low[2] >> kBrickShift; bz <= high[2] >> kBrickShift; ++bz) {
-    for (int by = low[1] >> kBrickShift; by <= high[1] >> kBrickShift; ++by) {
-      for (int bx = low[0] >> kBrickShift; bx <= high[0] >> kBrickShift; ++bx) {
+  for (int bz = low[2] >> brick_shift; bz <= high[2] >> brick_shift; ++bz) {
+    for (int by = low[1] >> brick_shift; by <= high[1] >> brick_shift; ++by) {
+      for (int bx = low[0] >> brick_shift; bx <= high[0] >> brick_shift; ++bx) {
         const std::uint32_t owner = bins.bricks.At(brick, bx, by, bz);
         if (owner == kNoIndex) continue;
-        const auto& cells = bins.cells[owner];
+        const auto& cells = bins.cells[owner * bins.classes.size() + of_class];
         if (cells.front() == cells.back()) continue;
-        const int base[3] = {bx * kBrickSize, by * kBrickSize, bz * kBrickSize};
-        for (int z = std::max(low[2], base[2]); z <= std::min(high[2], base[2] + 7); ++z) {
+        const int base[3] = {bx * side, by * side, bz * side};
+        const int last_z = std::min(high[2], base[2] + side - 1);
+        const int last_y = std::min(high[1], base[1] + side - 1);
+        for (int z = std::max(low[2], base[2]); z <= last_z; ++z) {
           const float dz = distance(z, 2);
-          for (int y = std::max(low[1], base[1]); y <= std::min(high[1], base[1] + 7); ++y) {
+          for (int y = std::max(low[1], base[1]); y <= last_y; ++y) {
             const float dy = distance(y, 1);
             const float rest = square - dy * dy - dz * dz;
             if (rest <= 0) continue;
@@ -102,12 +113,13 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
             const int first =
                 std::max(static_cast<int>(box.low[0] - half + 64) - 64, base[0]) - base[0];
             const int last =
-                std::min(static_cast<int>(box.high[0] + half + 64) - 64, base[0] + 7) - base[0];
+                std::min(static_cast<int>(box.high[0] + half + 64) - 64, base[0] + side - 1) -
+                base[0];
             if (first > last) continue;
-            const int row = ((z - base[2]) * kBrickSize + y - base[1]) * kBrickSize;
-            const NearRun run{cells[row + first], cells[row + last + 1],
-                              static_cast<float>(base[0]), static_cast<float>(base[1]),
-                              static_cast<float>(base[2])};
+            const int row = ((z - base[2]) * side + y - base[1]) * side;
+            const NearRun run{
+                cells[row + first], cells[row + last + 1], static_cast<float>(bx * kBrickSize),
+                static_cast<float>(by * kBrickSize), static_cast<float>(bz * kBrickSize)};
             if (run.first < run.last) visit(run);
           }
         }
@@ -116,11 +128,93 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
   }
 }
 
-/// Calls visit(const NearBlock&) for blocks with all particles within `radius` of the box.
+/// Calls visit(NearRun) for runs that contain all particles within `radius`, times their own sizes,
+/// of the box, class by class, in the order of the bins. Runs may also contain other particles.
+template <typename Visit>
+void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
+                    Visit visit) {
+  if (bins.size.empty()) return ForEachNearRunOf<false>(bins, 0, brick, box, radius, visit);
+  for (std::size_t k = 0; k < bins.classes.size(); ++k) {
+    const SizeClass& of = bins.classes[k];
+    const float reach = radius * of.most;
+    if (of.shift == 0) {
+      ForEachNearRunOf<false>(bins, k, brick, box, reach, visit);
+      continue;
+    }
+    const float unit = 1.0f / static_cast<float>(1 << of.shift);
+    NearBox scaled = box;
+    for (int axis = 0; axis < 3; ++axis) {
+      scaled.low[axis] *= unit;
+      scaled.high[axis] *= unit;
+    }
+    ForEachNearRunOf<true>(bins, k, brick, scaled, reach * unit, visit);
+  }
+}
+
+/// A particle of a list of runs.
+struct NearCursor {
+  std::size_t run = 0;
+  std::uint32_t skipped = 0;  ///< Particles of the run before it.
+};
+
+/// Adds the particles of `runs` from `at` on whose kernels reach the box to a block, until the
+/// block is full. `radius`: the kernel radius of size 1. Moves `at` to the first particle that is
+/// left. Requires: own sizes.
+void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
+                    float radius, NearCursor& at, NearBlock& block);
+
+/// Collects the runs near a box, so that AppendReaching gets many at once. Particles have own
+/// sizes.
+template <typename Visit>
+class ReachingBlocks {
+ public:
+  ReachingBlocks(const SpaceBins& bins, const NearBox& box, float radius, NearBlock& block,
+                 Visit& visit)
+      : bins_(bins), box_(box), radius_(radius), block_(block), visit_(visit) {}
+
+  void Add(const NearRun& run) {
+    if (count_ == runs_.size()) Flush();
+    runs_[count_++] = run;
+  }
+
+  void Flush() {
+    NearCursor at;
+    for (;;) {
+      AppendReaching(bins_, std::span(runs_).first(count_), box_, radius_, at, block_);
+      if (at.run == count_) break;
+      block_.Pad();
+      visit_(block_);
+      block_.count = 0;
+    }
+    count_ = 0;
+  }
+
+ private:
+  const SpaceBins& bins_;
+  const NearBox& box_;
+  const float radius_;
+  NearBlock& block_;
+  Visit& visit_;
+  std::array<NearRun, 64> runs_;
+  std::size_t count_ = 0;
+};
+
+/// Calls visit(const NearBlock&) for blocks with all particles within `radius`, times their own
+/// sizes, of the box.
 template <typename Visit>
 void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
                       NearBlock& block, Visit visit) {
   block.count = 0;
+  block.has_sizes = !bins.size.empty();
+  if (block.has_sizes) {
+    ReachingBlocks<Visit> blocks(bins, box, radius, block, visit);
+    ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) { blocks.Add(run); });
+    blocks.Flush();
+    if (block.count == 0) return;
+    block.Pad();
+    visit(block);
+    return;
+  }
   ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
     for (std::uint32_t p = run.first; p < run.last;) {
       if (block.count == NearBlock::kCapacity) {

@@ -40,7 +40,7 @@ double PointSampler::Value(const Vec3& point) {
   const QueryPoint at = QueryAt(point);
   ForEachBlock(
       [&](const NearBlock& block) { AddMoments(block, at, InverseSquare(scale_), moments); });
-  return LevelSetOf(TotalOf(moments, WeightOf(bins_, scale_)), scale_).value;
+  return LevelSetOf(Total(moments), scale_).value;
 }
 
 PointSample PointSampler::Sample(const Vec3& point) {
@@ -51,26 +51,37 @@ PointSample PointSampler::Sample(const Vec3& point) {
     AddMoments(block, at, InverseSquare(scale_), moments);
     AddSlopes(block, at, InverseSquare(scale_), partial);
   });
-  const double weight = WeightOf(bins_, scale_);
-  const Sums sums = TotalOf(moments, weight);
-  const Slopes slopes = TotalOf(partial, weight);
+  const Sums sums = Total(moments);
   const LevelSetAt level = LevelSetOf(sums, scale_);
-  if (!(sums.kernel > 0)) return {level.value, {}};
-  switch (level.term) {
+  if (!(sums.kernel > 0)) return {level.value, {}, 1};
+  const Slopes slopes = bins_.size.empty()
+                            ? TotalOf(partial, WeightOf(bins_, scale_))
+                            : SizedTotalOf(partial, scale_.uniform_weight, sums.kernel);
+  return {level.value, sums.size * GradientOf(level.term, sums, slopes, at), sums.size};
+}
+
+Sums PointSampler::Total(const PartialMoments& moments) const {
+  return bins_.size.empty() ? TotalOf(moments, WeightOf(bins_, scale_))
+                            : SizedTotalOf(moments, scale_.uniform_weight);
+}
+
+Vec3 PointSampler::GradientOf(Term term, const Sums& sums, const Slopes& slopes,
+                              const QueryPoint& point) {
+  switch (term) {
     case Term::kPhi:
-      return {level.value, GradientOfPhi(sums, slopes, scale_)};
+      return GradientOfPhi(sums, slopes, scale_);
     case Term::kGap:
-      return {level.value, GradientOfGap(sums, slopes, at)};
+      return GradientOfGap(sums, slopes, point);
     case Term::kGuard:
     case Term::kSaturation:
       break;
   }
   const double six = 6 / (scale_.kernel_radius * scale_.kernel_radius);
-  return {level.value, (-six * scale_.guard_slope) * slopes.density};
+  return (-six * scale_.guard_slope) * slopes.density;
 }
 
 // With the unit eigenvector v of M = sum k D D^T and its eigenvalue m:
-//   grad m = 6 / R^2 sum t^2 D (v . D)^2 - 2 (v . sum k D) v,
+//   grad m = 6 / R^2 sum t^2 D (v . D)^2 / s - 2 (v . sum k D / s) v,
 //   sigma = m / (R^2 sum k).
 Vec3 PointSampler::GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point) {
   const Vec3 v = Eigenvector(sums.second, LargestEigenvalue(sums.second));
@@ -80,7 +91,8 @@ Vec3 PointSampler::GradientOfGap(const Sums& sums, const Slopes& slopes, const Q
   const Vec3 third{partial.Total(0), partial.Total(1), partial.Total(2)};
   const double square = scale_.kernel_radius * scale_.kernel_radius;
   const double six = 6 / square;
-  const Vec3 of_moment = six * third - (2 * Dot(v, sums.first)) * v;
+  const double along = bins_.size.empty() ? Dot(v, sums.first) : partial.Total(3);
+  const Vec3 of_moment = six * third - (2 * along) * v;
   const double spread = SpreadOf(sums, scale_);
   return (scale_.gap_slope / sums.kernel) *
          ((1 / square) * of_moment - (spread * six) * slopes.first);

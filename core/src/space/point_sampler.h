@@ -9,10 +9,12 @@
 
 namespace partiemc::space {
 
-/// F at a point and its gradient. Lengths in cells.
+/// F at a point and its gradient. Lengths in cells. With own sizes, the gradient leaves out the
+/// gradient of the local size, which does not move roots.
 struct PointSample {
   double value = 0;
   Vec3 gradient;
+  double size = 1;  ///< The local size, in spacings.
 };
 
 /// Collects the particles around a box once for all points in it. Not thread-safe; about 12 kB.
@@ -33,6 +35,8 @@ class PointSampler {
  private:
   template <typename Visit>
   void ForEachBlock(Visit visit);
+  Sums Total(const PartialMoments& moments) const;
+  Vec3 GradientOf(Term term, const Sums& sums, const Slopes& slopes, const QueryPoint& point);
   Vec3 GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point);
 
   const SpaceBins& bins_;

@@ -1,6 +1,9 @@
 #include "space/point_sums.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
 
 // Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -18,9 +21,11 @@ using Lanes = hn::CappedTag<float, NearBlock::kLanes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// The offsets of some particles of a block from a point, and t = max(0, 1 - |D|^2 / R^2).
+// The offsets D of some particles of a block from a point, with own sizes divided by them, and t =
+// max(0, 1 - |D|^2 / R^2).
+template <bool kSized>
 struct Offsets {
-  Vector x, y, z, t;
+  Vector x, y, z, t, per_size;
 
   HWY_INLINE Offsets(const NearBlock& block, int k, Vector px, Vector py, Vector pz,
                      Vector inverse_square) {
@@ -28,6 +33,12 @@ struct Offsets {
     x = hn::Sub(hn::LoadU(d, block.x.data() + k), px);
     y = hn::Sub(hn::LoadU(d, block.y.data() + k), py);
     z = hn::Sub(hn::LoadU(d, block.z.data() + k), pz);
+    if constexpr (kSized) {
+      per_size = hn::LoadU(d, block.per_size.data() + k);
+      x = hn::Mul(x, per_size);
+      y = hn::Mul(y, per_size);
+      z = hn::Mul(z, per_size);
+    }
     const Vector square = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
     t = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0f), hn::Mul(square, inverse_square)));
   }
@@ -35,25 +46,26 @@ struct Offsets {
 
 // A vector of particles is added to the partial sums [lane, lane + kLanes). Calls add(offsets, k)
 // for each vector of these sums, where k is the index of its first particle.
-template <class Add>
+template <bool kSized, class Add>
 HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, float inverse_square,
                               int lane, Add add) {
   const Lanes d;
   const Vector px = hn::Set(d, point.x), py = hn::Set(d, point.y), pz = hn::Set(d, point.z);
   const Vector inverse = hn::Set(d, inverse_square);
   for (int k = lane; k < block.count; k += NearBlock::kLanes) {
-    add(Offsets(block, k, px, py, pz, inverse), k);
+    add(Offsets<kSized>(block, k, px, py, pz, inverse), k);
   }
 }
 
-void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
-                PartialMoments& sums) {
+template <bool kSized>
+void AddMomentsOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                  PartialMoments& sums) {
   const Lanes d;
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
     const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
     Vector k0 = load(0), kw = load(1), kx = load(2), ky = load(3), kz = load(4);
     Vector xx = load(5), xy = load(6), xz = load(7), yy = load(8), yz = load(9), zz = load(10);
-    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int p) HWY_ATTR {
+    const auto add = [&](const Offsets<kSized>& to, int p) HWY_ATTR {
       const Vector k = hn::Mul(hn::Mul(to.t, to.t), to.t);
       k0 = hn::Add(k0, k);
       kw = hn::Add(kw, hn::Mul(k, hn::LoadU(d, block.weight.data() + p)));
@@ -67,22 +79,28 @@ void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_s
       yy = hn::Add(yy, hn::Mul(y, to.y));
       yz = hn::Add(yz, hn::Mul(y, to.z));
       zz = hn::Add(zz, hn::Mul(z, to.z));
-    });
+    };
+    ForEachOffset<kSized>(block, point, inverse_square, lane, add);
     const Vector all[] = {k0, kw, kx, ky, kz, xx, xy, xz, yy, yz, zz};
     for (int q = 0; q < 11; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
   }
 }
 
-void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
-               PartialSlopes& sums) {
+template <bool kSized>
+void AddSlopesOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                 PartialSlopes& sums) {
   const Lanes d;
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
     const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
     Vector sx = load(0), sy = load(1), sz = load(2);
     Vector xx = load(3), xy = load(4), xz = load(5), yy = load(6), yz = load(7), zz = load(8);
     Vector wx = load(9), wy = load(10), wz = load(11);
-    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int p) HWY_ATTR {
-      const Vector square = hn::Mul(to.t, to.t);
+    const auto add = [&](const Offsets<kSized>& to, [[maybe_unused]] int p) HWY_ATTR {
+      Vector square = hn::Mul(to.t, to.t);
+      if constexpr (kSized) {
+        wx = hn::Add(wx, hn::Mul(hn::Mul(square, to.t), to.per_size));
+        square = hn::Mul(square, to.per_size);
+      }
       const Vector x = hn::Mul(square, to.x), y = hn::Mul(square, to.y), z = hn::Mul(square, to.z);
       sx = hn::Add(sx, x);
       sy = hn::Add(sy, y);
@@ -93,35 +111,113 @@ void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_sq
       yy = hn::Add(yy, hn::Mul(y, to.y));
       yz = hn::Add(yz, hn::Mul(y, to.z));
       zz = hn::Add(zz, hn::Mul(z, to.z));
-      const Vector w = hn::LoadU(d, block.weight.data() + p);
-      wx = hn::Add(wx, hn::Mul(w, x));
-      wy = hn::Add(wy, hn::Mul(w, y));
-      wz = hn::Add(wz, hn::Mul(w, z));
-    });
+      if constexpr (!kSized) {
+        const Vector w = hn::LoadU(d, block.weight.data() + p);
+        wx = hn::Add(wx, hn::Mul(w, x));
+        wy = hn::Add(wy, hn::Mul(w, y));
+        wz = hn::Add(wz, hn::Mul(w, z));
+      }
+    };
+    ForEachOffset<kSized>(block, point, inverse_square, lane, add);
     const Vector all[] = {sx, sy, sz, xx, xy, xz, yy, yz, zz, wx, wy, wz};
     for (int q = 0; q < 12; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
   }
 }
 
-void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
-               PartialThirds& sums) {
+template <bool kSized>
+void AddThirdsOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                 const Vec3& v, PartialThirds& sums) {
   const Lanes d;
   const Vector vx = hn::Set(d, static_cast<float>(v.x)), vy = hn::Set(d, static_cast<float>(v.y)),
                vz = hn::Set(d, static_cast<float>(v.z));
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
     const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
-    Vector sx = load(0), sy = load(1), sz = load(2);
-    ForEachOffset(block, point, inverse_square, lane, [&](const Offsets& to, int) HWY_ATTR {
+    Vector sx = load(0), sy = load(1), sz = load(2), kv = load(3);
+    const auto add = [&](const Offsets<kSized>& to, int) HWY_ATTR {
       const Vector along =
           hn::Mul(to.t, hn::Add(hn::Add(hn::Mul(vx, to.x), hn::Mul(vy, to.y)), hn::Mul(vz, to.z)));
-      const Vector square = hn::Mul(along, along);
+      Vector square = hn::Mul(along, along);
+      if constexpr (kSized) {
+        kv = hn::Add(kv, hn::Mul(hn::Mul(hn::Mul(to.t, to.t), along), to.per_size));
+        square = hn::Mul(square, to.per_size);
+      }
       sx = hn::Add(sx, hn::Mul(square, to.x));
       sy = hn::Add(sy, hn::Mul(square, to.y));
       sz = hn::Add(sz, hn::Mul(square, to.z));
-    });
+    };
+    ForEachOffset<kSized>(block, point, inverse_square, lane, add);
     hn::Store(sx, d, sums.lanes[0].data() + lane);
     hn::Store(sy, d, sums.lanes[1].data() + lane);
     hn::Store(sz, d, sums.lanes[2].data() + lane);
+    hn::Store(kv, d, sums.lanes[3].data() + lane);
+  }
+}
+
+void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                PartialMoments& sums) {
+  const auto add = block.has_sizes ? AddMomentsOf<true> : AddMomentsOf<false>;
+  add(block, point, inverse_square, sums);
+}
+
+void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+               PartialSlopes& sums) {
+  const auto add = block.has_sizes ? AddSlopesOf<true> : AddSlopesOf<false>;
+  add(block, point, inverse_square, sums);
+}
+
+void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
+               PartialThirds& sums) {
+  const auto add = block.has_sizes ? AddThirdsOf<true> : AddThirdsOf<false>;
+  add(block, point, inverse_square, v, sums);
+}
+
+// Adds the particles [p, p + kLanes) of a run to a block if their kernels reach the box. Vectors
+// read beyond the run, and write beyond the count of the block.
+HWY_INLINE void AppendLanes(const SpaceBins& bins, const NearRun& run, std::uint32_t p,
+                            const NearBox& box, float radius, NearBlock& block) {
+  const Lanes d;
+  const auto along = [&](const std::vector<float>& of, float shift) HWY_ATTR {
+    return hn::Add(hn::LoadU(d, of.data() + p), hn::Set(d, shift));
+  };
+  const auto beyond = [&](Vector at, int axis) HWY_ATTR {
+    const Vector below = hn::Sub(hn::Set(d, box.low[axis]), at);
+    const Vector above = hn::Sub(at, hn::Set(d, box.high[axis]));
+    const Vector by = hn::Max(hn::Zero(d), hn::Max(below, above));
+    return hn::Mul(by, by);
+  };
+  const Vector x = along(bins.x, run.shift_x), y = along(bins.y, run.shift_y),
+               z = along(bins.z, run.shift_z);
+  const Vector size = hn::LoadU(d, bins.size.data() + p);
+  const Vector reach = hn::Mul(size, hn::Set(d, radius));
+  const Vector square = hn::Add(hn::Add(beyond(x, 0), beyond(y, 1)), beyond(z, 2));
+  const auto is_in =
+      hn::And(hn::Lt(square, hn::Mul(reach, reach)), hn::FirstN(d, std::size_t{run.last - p}));
+  const auto store = [&](NearBlock::PerParticle<float>& to, Vector values) HWY_ATTR {
+    hn::StoreU(hn::Compress(values, is_in), d, to.data() + block.count);
+  };
+  store(block.x, x);
+  store(block.y, y);
+  store(block.z, z);
+  store(block.weight, size);
+  store(block.per_size, hn::Div(hn::Set(d, 1.0f), size));
+  block.count += static_cast<int>(hn::CountTrue(d, is_in));
+}
+
+void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
+                    float radius, NearCursor& at, NearBlock& block) {
+  for (; at.run < runs.size(); ++at.run, at.skipped = 0) {
+    const NearRun& run = runs[at.run];
+    // Always eight at once: the end of a block must not depend on the instruction set.
+    for (std::uint32_t p = run.first + at.skipped; p < run.last; p += NearBlock::kLanes) {
+      if (block.count + NearBlock::kLanes > NearBlock::kCapacity) {
+        at.skipped = p - run.first;
+        return;
+      }
+      for (std::uint32_t lane = 0; lane < NearBlock::kLanes && p + lane < run.last;
+           lane += kLanes) {
+        AppendLanes(bins, run, p + lane, box, radius, block);
+      }
+    }
   }
 }
 
@@ -136,11 +232,17 @@ struct NodeRange {
   }
 };
 
-void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
+template <bool kSized>
+void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius, float* nodes) {
   const Lanes d;
-  const float inverse = 1 / (radius * radius);
-  const Vector inverse_square = hn::Set(d, inverse);
+  float radius = kernel_radius, inverse = 1 / (radius * radius);
+  Vector inverse_square = hn::Set(d, inverse);
   for (std::uint32_t p = run.first; p < run.last; ++p) {
+    if constexpr (kSized) {
+      radius = kernel_radius * bins.size[p];
+      inverse = 1 / (radius * radius);
+      inverse_square = hn::Set(d, inverse);
+    }
     const float x = bins.x[p] + run.shift_x;
     const float y = bins.y[p] + run.shift_y;
     const float z = bins.z[p] + run.shift_z;
@@ -164,6 +266,11 @@ void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* 
   }
 }
 
+void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
+  const auto add = bins.size.empty() ? AddDensityOf<false> : AddDensityOf<true>;
+  add(bins, run, radius, nodes);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc::space
 HWY_AFTER_NAMESPACE();
@@ -175,6 +282,7 @@ HWY_EXPORT(AddMoments);
 HWY_EXPORT(AddSlopes);
 HWY_EXPORT(AddThirds);
 HWY_EXPORT(AddDensity);
+HWY_EXPORT(AppendReaching);
 
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums) {
@@ -192,6 +300,11 @@ void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* 
   HWY_DYNAMIC_DISPATCH(AddDensity)(bins, run, radius, nodes);
 }
 
+void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
+                    float radius, NearCursor& at, NearBlock& block) {
+  HWY_DYNAMIC_DISPATCH(AppendReaching)(bins, runs, box, radius, at, block);
+}
+
 Sums TotalOf(const PartialMoments& sums, double weight) {
   const auto at = [&](int q) { return sums.Total(q); };
   return {
@@ -203,6 +316,21 @@ Slopes TotalOf(const PartialSlopes& sums, double weight) {
   return {{at(0), at(1), at(2)},
           {at(3), at(4), at(5), at(6), at(7), at(8)},
           weight * Vec3{at(9), at(10), at(11)}};
+}
+
+Sums SizedTotalOf(const PartialMoments& sums, double weight) {
+  Sums total = TotalOf(sums, 1);
+  const double sizes = total.density;  // In the place of sum w k.
+  total.density = weight * total.kernel;
+  if (total.kernel > 0) total.size = sizes / total.kernel;
+  return total;
+}
+
+Slopes SizedTotalOf(const PartialSlopes& sums, double weight, double kernel) {
+  Slopes total = TotalOf(sums, 1);
+  total.per_size = total.density.x / kernel;  // In the place of sum w t^2 D.
+  total.density = weight * total.first;
+  return total;
 }
 
 }  // namespace partiemc::space

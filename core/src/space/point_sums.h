@@ -22,9 +22,12 @@ struct PartialSums {
   }
 };
 
+/// With own sizes s, D is divided by s, and s takes the place of the weight w.
 using PartialMoments = PartialSums<11>;  ///< k, w k, k D, k D D^T.
-using PartialSlopes = PartialSums<12>;   ///< t^2 D, t^2 D D^T, w t^2 D.
-using PartialThirds = PartialSums<3>;    ///< t^2 D (v . D)^2.
+/// t^2 D, t^2 D D^T, w t^2 D; with own sizes t^2 D / s, t^2 D D^T / s, k / s.
+using PartialSlopes = PartialSums<12>;
+/// t^2 D (v . D)^2; with own sizes t^2 D (v . D)^2 / s, k (v . D) / s.
+using PartialThirds = PartialSums<4>;
 
 /// A point in cells relative to the brick of a block.
 struct QueryPoint {
@@ -44,8 +47,12 @@ void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_sq
 Sums TotalOf(const PartialMoments& sums, double weight);
 Slopes TotalOf(const PartialSlopes& sums, double weight);
 
+/// The totals of partial sums with own sizes. `weight`: of every particle. `kernel`: sum k.
+Sums SizedTotalOf(const PartialMoments& sums, double weight);
+Slopes SizedTotalOf(const PartialSlopes& sums, double weight, double kernel);
+
 /// Adds the kernels of a run of particles, times their weights, to the nodes of a brick, by layer,
-/// row, column.
+/// row, column. `radius`: the kernel radius of size 1.
 void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes);
 
 }  // namespace partiemc::space

@@ -33,7 +33,7 @@ void SampleShells(const Frame& frame, const SpaceBins& bins, const ShellHistory&
     const auto nearest_node = [](std::int32_t coordinate, float within) {
       return coordinate * kBrickSize + static_cast<std::int32_t>(within + .5f);
     };
-    for (std::uint32_t p = bins.cells[brick].front(); p < bins.cells[brick].back(); ++p) {
+    for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
       const std::uint32_t shell = shells.of_particle[p];
       if (shell == kNoShell) continue;
       const ShellSample now{HashOf(frame.ids[bins.source[p]]), nearest_node(at.x, bins.x[p]),

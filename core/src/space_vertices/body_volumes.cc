@@ -85,8 +85,9 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
   });
   volumes.measures.assign(bodies.bodies.size(), {});
   for (std::uint32_t loop = 0; loop < crossings.loop_count; ++loop) {
-    BodyMeasure& measure = volumes.measures[volumes.body_of[crossings.edge_count + loop]];
-    measure.area += volumes.areas[loop];
+    const std::uint32_t vertex = crossings.edge_count + loop;
+    BodyMeasure& measure = volumes.measures[volumes.body_of[vertex]];
+    measure.area += volumes.areas[loop] * volumes.SizeOf(vertex);
     measure.volume += volumes.parts[loop].volume;
     measure.centroid = measure.centroid + volumes.parts[loop].moment;
   }
@@ -106,7 +107,13 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
     const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
                c = positions[triangle[2]] - origin;
-    volumes.measures[body].area += Length(Cross(b - a, c - a)) / 2;
+    double area = Length(Cross(b - a, c - a)) / 2;
+    if (!volumes.sizes.empty()) {
+      area *= (volumes.SizeOf(triangle[0]) + volumes.SizeOf(triangle[1]) +
+               volumes.SizeOf(triangle[2])) /
+              3;
+    }
+    volumes.measures[body].area += area;
     volumes.measures[body].volume += Dot(a, Cross(b, c)) / 6;
   }
 }
@@ -127,7 +134,8 @@ bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
     has_moved = true;
   }
   ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
-    positions[v] = positions[v] + volumes.offsets[volumes.body_of[v]] * normals[v];
+    const double offset = volumes.offsets[volumes.body_of[v]] * volumes.SizeOf(v);
+    positions[v] = positions[v] + offset * normals[v];
   });
   return has_moved;
 }
@@ -166,7 +174,7 @@ bool SearchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vect
       return;
     }
     if (volumes.steps[body] == BodyStep::kIsSaved) volumes.best_positions[v] = positions[v];
-    positions[v] = positions[v] + volumes.offsets[body] * normals[v];
+    positions[v] = positions[v] + volumes.offsets[body] * volumes.SizeOf(v) * normals[v];
   });
   return has_moved;
 }

@@ -17,7 +17,8 @@ namespace partiemc::space {
 
 /// Measures of a body, which its outer shell and its cavities bound.
 struct BodyMeasure {
-  double area = 0, volume = 0;
+  double area = 0;  ///< With own sizes, each part times the local size.
+  double volume = 0;
   Vec3 centroid;
 };
 
@@ -25,6 +26,11 @@ struct BodyVolumes {
   std::vector<std::uint32_t> body_of;  ///< By vertex.
   std::vector<BodyMeasure> measures;   ///< By body.
   std::vector<double> areas;           ///< By loop: area of the triangles around its vertex.
+  /// By vertex: the local size, in spacings, by which offsets are multiplied; empty for equal
+  /// sizes.
+  std::vector<float> sizes;
+
+  double SizeOf(std::size_t vertex) const { return sizes.empty() ? 1 : double{sizes[vertex]}; }
 
   struct Part {
     double volume = 0;
@@ -65,8 +71,8 @@ struct VolumeStep {
   double tolerance = 0;  ///< Relative error up to which a body is not moved.
 };
 
-/// Moves the vertices of each body along their normals by one offset: (volume of its particles -
-/// its volume) / area, limited. Returns whether a body has moved.
+/// Moves the vertices of each body along their normals by one offset, times their local sizes:
+/// (volume of its particles - its volume) / area, limited. Returns whether a body has moved.
 /// Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
 bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);

@@ -140,8 +140,8 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
   const bool takes_lone = limits.least_particles <= 1;
   for (std::uint32_t brick = 0; brick < input.bins.bricks.size(); ++brick) {
     const Vec3 origin = OriginOf(input.bins.bricks[brick]);
-    const auto& cells = input.bins.cells[brick];
-    for (std::uint32_t p = cells.front(); p < cells.back(); ++p) {
+    const SpaceBins& bins = input.bins;
+    for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
       const std::uint32_t body = bodies.body_of_particle[p];
       if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
       const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};

@@ -36,7 +36,7 @@ std::array<std::uint32_t, 4> LoopsAround(const BrickDirectory& bricks,
 
 void PlaceEdgesByLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                        const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
-                       std::vector<Vec3>& normals) {
+                       std::vector<Vec3>& normals, std::span<float> sizes) {
   ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
     ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
       const std::array<std::uint32_t, 4> around =
@@ -59,6 +59,10 @@ void PlaceEdgesByLoops(const BrickDirectory& bricks, const SpaceCrossings& cross
       }
       positions[v] = anchors[v] + (height / total) * normal;
       normals[v] = normal;
+      if (sizes.empty()) return;
+      double size = 0;
+      for (int n = 0; n < 4; ++n) size += weights[n] * double{sizes[around[n]]};
+      sizes[v] = static_cast<float>(size / total);
     });
   });
 }

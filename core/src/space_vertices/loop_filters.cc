@@ -37,12 +37,13 @@ void LoadNear(const LoopSurface& surface, std::span<const Vec3> normals,
 template <typename Body>
 void ForEachWindow(const LoopSurface& surface, std::span<const Vec3> normals,
                    std::span<const double> bases, double reach, const Body& body) {
-  const auto inverse_square = static_cast<float>(1 / (reach * reach));
   ParallelFor(surface.windows.chunk_count, [&](std::size_t index) {
     const LoopWindows::Chunk& chunk = surface.windows.chunks[index];
     NearLoops loops;
     LoadNear(surface, normals, bases, chunk.near, loops);
     for (std::uint32_t loop = chunk.begin; loop < chunk.end; ++loop) {
+      const double own = reach * surface.SizeOf(loop);
+      const auto inverse_square = static_cast<float>(1 / (own * own));
       body(loop, loops, Window{chunk.Of(loop), chunk.self[loop - chunk.begin], inverse_square});
     }
   });
@@ -64,7 +65,8 @@ void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double
   ForEachWindow(surface, normals, {}, reach,
                 [&](std::size_t i, const NearLoops& loops, const Window& window) {
                   const auto [turn, way] = SumBends(loops, window);
-                  bends[i] = way > 0 ? std::clamp(2 * turn / way, -limit, limit) : 0;
+                  const double most = limit / surface.SizeOf(i);
+                  bends[i] = way > 0 ? std::clamp(2 * turn / way, -most, most) : 0;
                 });
 }
 

@@ -1,10 +1,11 @@
 // Weighted means over windows of loops: normals, bends and planes.
 //
-// In the window of loop i, loop j has the weight area_j B(d, reach), where d = |c_j - c_i| and B(d,
-// r) = max(0, 1 - d^2 / r^2)^2. `kAtEdges` multiplies this weight by max(0, n_i . n_j)^32. Lengths
-// are in cells.
+// In the window of loop i, loop j has the weight area_j B(d, s_i reach), where d = |c_j - c_i|,
+// B(d, r) = max(0, 1 - d^2 / r^2)^2, and s_i is the local size. `kAtEdges` multiplies this weight
+// by max(0, n_i . n_j)^32. Lengths are in cells.
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "base/vec3.h"
@@ -17,6 +18,9 @@ struct LoopSurface {
   const LoopWindows& windows;
   std::span<const Vec3> centres;  ///< c.
   std::span<const double> areas;  ///< Areas of the triangles around the centres.
+  std::span<const float> sizes;   ///< Local sizes s, in spacings; empty for equal sizes.
+
+  double SizeOf(std::size_t loop) const { return sizes.empty() ? 1 : double{sizes[loop]}; }
 };
 
 enum class Stop { kNowhere, kAtEdges };
@@ -27,7 +31,7 @@ void SmoothNormals(const LoopSurface& surface, std::span<const Vec3> normals, do
                    Stop stop, std::span<Vec3> smooth);
 
 /// The sum of the principal curvatures, positive where the surface is convex, from the turn of the
-/// normals. Limited to +-`limit`.
+/// normals. Limited to +-`limit` / s_i.
 void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                double limit, std::span<double> bends);
 

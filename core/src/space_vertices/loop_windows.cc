@@ -78,9 +78,13 @@ struct Box {
 /// Finds the windows of the loops of a chunk: those within reach to which links lead.
 class ChunkSearch {
  public:
-  ChunkSearch(const LoopWindows& windows, std::span<const Vec3> centres, double reach,
-              LoopWindows::Chunk& chunk)
-      : windows_(windows), centres_(centres), square_(reach * reach), chunk_(chunk) {}
+  ChunkSearch(const LoopWindows& windows, std::span<const Vec3> centres,
+              std::span<const float> sizes, double reach, LoopWindows::Chunk& chunk)
+      : windows_(windows),
+        centres_(centres),
+        sizes_(sizes),
+        square_(reach * reach),
+        chunk_(chunk) {}
 
   void Find() {
     FindNear();
@@ -91,7 +95,8 @@ class ChunkSearch {
     chunk_.bits.assign((chunk_.end - chunk_.begin) * words, 0);
     for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
       chunk_.self.push_back(static_cast<std::uint16_t>(IndexOf(loop)));
-      FindWindow(chunk_.self.back(), chunk_.bits.data() + (loop - chunk_.begin) * words);
+      FindWindow(chunk_.self.back(), SquareOf(loop),
+                 chunk_.bits.data() + (loop - chunk_.begin) * words);
     }
   }
 
@@ -108,21 +113,28 @@ class ChunkSearch {
   }
   std::uint16_t IndexOf(std::uint32_t loop) const { return slots_[SlotOf(loop)]; }
 
+  /// The squared reach of the window of a loop.
+  double SquareOf(std::uint32_t loop) const {
+    return sizes_.empty() ? square_ : square_ * double{sizes_[loop]} * double{sizes_[loop]};
+  }
+
   /// Finds the loops within reach of the box around the chunk.
   void FindNear() {
     std::vector<std::uint32_t>& near = chunk_.near;
     near.clear();
     slots_.fill(kFree);
     Box box{centres_[chunk_.begin], centres_[chunk_.begin]};
+    double square = SquareOf(chunk_.begin);
     for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
       box.Include(centres_[loop]);
+      square = std::max(square, SquareOf(loop));
       Add(loop);
     }
     for (std::size_t k = 0; k < near.size(); ++k) {
       for (std::uint32_t n = windows_.link_first[near[k]]; n < windows_.link_first[near[k] + 1];
            ++n) {
         const std::uint32_t to = windows_.links[n];
-        if (near.size() < LoopWindows::kMostNear && box.SquareTo(centres_[to]) < square_) Add(to);
+        if (near.size() < LoopWindows::kMostNear && box.SquareTo(centres_[to]) < square) Add(to);
       }
     }
     std::sort(near.begin(), near.end());
@@ -172,9 +184,9 @@ class ChunkSearch {
   }
 
   /// Sets the bits of the window of a near loop. Requires: they are 0.
-  void FindWindow(std::uint16_t loop, std::uint32_t* found) {
+  void FindWindow(std::uint16_t loop, double square, std::uint32_t* found) {
     const std::size_t words = chunk_.Words();
-    FindWithin(places_, words, loop, static_cast<float>(square_), within_.data());
+    FindWithin(places_, words, loop, static_cast<float>(square), within_.data());
     std::fill_n(done_.begin(), words, 0u);
     found[loop / kWordBits] |= std::uint32_t{1} << loop % kWordBits;
     // Alternate directions reach all loops in few passes.
@@ -206,6 +218,7 @@ class ChunkSearch {
 
   const LoopWindows& windows_;
   std::span<const Vec3> centres_;
+  std::span<const float> sizes_;
   const double square_;
   LoopWindows::Chunk& chunk_;
   std::array<std::uint16_t, kSlots> slots_;
@@ -216,12 +229,13 @@ class ChunkSearch {
 }  // namespace
 
 void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 std::span<const Vec3> centres, double reach, LoopWindows& windows) {
+                 std::span<const Vec3> centres, double reach, LoopWindows& windows,
+                 std::span<const float> sizes) {
   windows.loop_count = crossings.loop_count;
   LinkLoops(bricks, crossings, windows);
   SplitLoops(crossings, windows);
   ParallelFor(windows.chunk_count, [&](std::size_t index) {
-    ChunkSearch(windows, centres, reach, windows.chunks[index]).Find();
+    ChunkSearch(windows, centres, sizes, reach, windows.chunks[index]).Find();
   });
 }
 

@@ -53,9 +53,11 @@ struct LoopWindows {
   std::vector<std::uint32_t> link_first, links;  ///< By loop: loops across its faces.
 };
 
-/// Finds the window of each loop, the loops within `reach` cells. `centres` by loop. Deterministic,
-/// parallel over loops. Cost: linear in the sizes of the windows.
+/// Finds the window of each loop, the loops within `reach` cells, times its local size. `centres`
+/// by loop, `sizes` also or empty. Deterministic, parallel over loops. Cost: linear in the sizes of
+/// the windows.
 void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                 std::span<const Vec3> centres, double reach, LoopWindows& windows);
+                 std::span<const Vec3> centres, double reach, LoopWindows& windows,
+                 std::span<const float> sizes = {});
 
 }  // namespace partiemc::space

@@ -24,28 +24,51 @@ BrickCoordinate BrickAt(const Vec3& place) {
   return {along(place.z), along(place.y), along(place.x)};
 }
 
-/// Adds the particles within `radius` cells of a place relative to `brick`.
-void AddParticlesAround(const Frame& frame, const SpaceBins& bins, std::uint32_t brick,
-                        const Vec3& place, double radius, PlaneFit& fit, CarriedSums& carried) {
-  const auto x = static_cast<float>(place.x), y = static_cast<float>(place.y),
-             z = static_cast<float>(place.z);
-  const NearBox box{{x, y, z}, {x, y, z}};
-  // Rounding to float moves the box by less than the margin.
-  const float reach = static_cast<float>(radius) + 1e-4f;
-  ForEachNearRun(bins, brick, box, reach, [&](const NearRun& run) {
-    for (std::uint32_t p = run.first; p < run.last; ++p) {
-      const double dx = (double{bins.x[p]} + run.shift_x - place.x) / radius;
-      const double dy = (double{bins.y[p]} + run.shift_y - place.y) / radius;
-      const double dz = (double{bins.z[p]} + run.shift_z - place.z) / radius;
-      const double within = 1 - dx * dx - dy * dy - dz * dz;
-      if (within <= 0) continue;
-      const double own = bins.weight.empty() ? 1 : double{bins.weight[p]};
-      const double weight = own * within * within * within;
-      fit.Add(weight, dx, dy, dz);
-      carried.Add(frame.attributes, bins.source[p], weight, dx, dy, dz);
-    }
-  });
-}
+/// The particles around a point: a place relative to a brick.
+struct Around {
+  const SpaceBins& bins;
+  std::uint32_t brick;
+  Vec3 place;
+  double radius;  ///< The kernel radius of size 1, in cells.
+
+  /// Calls visit(particle, w k, D, s) for each particle whose kernel reaches the place: D is in
+  /// kernel radii of size 1, s the own size.
+  template <typename Visit>
+  void ForEach(Visit visit) const {
+    const auto x = static_cast<float>(place.x), y = static_cast<float>(place.y),
+               z = static_cast<float>(place.z);
+    const NearBox box{{x, y, z}, {x, y, z}};
+    // Rounding to float moves the box by less than the margin.
+    const float reach = static_cast<float>(radius) + 1e-4f;
+    ForEachNearRun(bins, brick, box, reach, [&](const NearRun& run) {
+      for (std::uint32_t p = run.first; p < run.last; ++p) {
+        const Vec3 to{(double{bins.x[p]} + run.shift_x - place.x) / radius,
+                      (double{bins.y[p]} + run.shift_y - place.y) / radius,
+                      (double{bins.z[p]} + run.shift_z - place.z) / radius};
+        if (bins.size.empty()) {
+          const double within = 1 - to.x * to.x - to.y * to.y - to.z * to.z;
+          if (within <= 0) continue;
+          const double own = bins.weight.empty() ? 1 : double{bins.weight[p]};
+          visit(p, own * within * within * within, to, 1.0);
+        } else {
+          const double size = bins.size[p], within = 1 - Dot(to, to) / (size * size);
+          if (within > 0) visit(p, std::pow(size * within, 3), to, size);
+        }
+      }
+    });
+  }
+
+  /// The mean size, weighted by kernels and volumes; 1 for equal sizes.
+  double Size() const {
+    if (bins.size.empty()) return 1;
+    double sum = 0, weights = 0;
+    ForEach([&](std::uint32_t, double weight, const Vec3&, double size) {
+      sum += weight * size;
+      weights += weight;
+    });
+    return weights > 0 ? sum / weights : 1;
+  }
+};
 
 }  // namespace
 
@@ -60,8 +83,14 @@ void InterpolateInSpace(const Frame& frame, const SpaceBins& bins, const Scale& 
       PlaneFit fit;
       CarriedSums carried(frame.attributes);
       if (brick != kNoIndex) {
-        AddParticlesAround(frame, bins, brick, place - OriginOf(at), scale.kernel_radius, fit,
-                           carried);
+        const Around around{bins, brick, place - OriginOf(at), scale.kernel_radius};
+        // Offsets in local sizes keep the fit well conditioned.
+        const double unit = 1 / around.Size();
+        around.ForEach([&](std::uint32_t p, double weight, const Vec3& to, double) {
+          const Vec3 scaled = unit * to;
+          fit.Add(weight, scaled.x, scaled.y, scaled.z);
+          carried.Add(frame.attributes, bins.source[p], weight, scaled.x, scaled.y, scaled.z);
+        });
       }
       carried.Evaluate(fit, point, values);
     }

@@ -1,6 +1,7 @@
 #include "space_vertices/roots.h"
 
 #include <cstdint>
+#include <span>
 
 #include "base/parallel.h"
 #include "space/brick_blocks.h"
@@ -25,11 +26,11 @@ class RootFinder {
   }
 
   /// Takes one step, which ends at the sides of the cell with the lowest node `low`. If the
-  /// gradient is weak, position and normal stay as they are.
-  void Step(const Vec3& low, Vec3& position, Vec3& normal) {
+  /// gradient is weak, position and normal stay as they are. Returns the local size.
+  double Step(const Vec3& low, Vec3& position, Vec3& normal) {
     const PointSample sample = sampler_.Sample(position - origin_);
     const double square = Dot(sample.gradient, sample.gradient);
-    if (square < kWeakGradient) return;
+    if (square < kWeakGradient) return sample.size;
     Vec3 step = (-sample.value / square) * sample.gradient;
     const double length = Length(step);
     if (length > constants_.newton_step) step = (constants_.newton_step / length) * step;
@@ -41,6 +42,7 @@ class RootFinder {
     }
     position = moved;
     normal = Normalised(gradient);
+    return sample.size;
   }
 
  private:
@@ -68,7 +70,7 @@ Vec3 NormalOfLoop(const BrickDirectory& bricks, const SpaceCrossings& crossings,
 
 void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                const RootConstants& constants, std::vector<Vec3>& positions,
-               std::vector<Vec3>& normals) {
+               std::vector<Vec3>& normals, std::span<float> sizes) {
   const BrickDirectory& bricks = bins.bricks;
   normals.resize(positions.size());
   ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
@@ -83,7 +85,8 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
           for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
             const std::uint32_t v = cell.first_loop + loop;
             normals[v] = NormalOfLoop(bricks, crossings, cell, loop, positions);
-            finder.Step(low, positions[v], normals[v]);
+            const double size = finder.Step(low, positions[v], normals[v]);
+            if (!sizes.empty()) sizes[v] = static_cast<float>(size);
           }
         });
   });

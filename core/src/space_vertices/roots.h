@@ -1,6 +1,7 @@
 // Roots of the level set and normals at the vertices in cells.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "base/vec3.h"
@@ -16,11 +17,11 @@ struct RootConstants {
 };
 
 /// Moves the vertices in cells by one Newton step, but not out of their cells, and sets their
-/// normals. A normal is the direction of the gradient, or, if the gradient is weak, the area normal
-/// of the loop. Vertices on edges stay. Positions and normals by vertex, in cells. Parallel over
-/// cells.
+/// normals. If `sizes` is not empty, sets the local sizes there, in spacings. A normal is the
+/// direction of the gradient, or, if the gradient is weak, the area normal of the loop. Vertices on
+/// edges stay. Positions and normals by vertex, in cells. Parallel over cells.
 void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                const RootConstants& constants, std::vector<Vec3>& positions,
-               std::vector<Vec3>& normals);
+               std::vector<Vec3>& normals, std::span<float> sizes = {});
 
 }  // namespace partiemc::space

@@ -116,7 +116,7 @@ ThinQuad Thinner::FindQuad(std::uint32_t vertex, const EdgeStar& star, double di
 
 void FindThinEdges(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Certificate& certificate, const std::vector<Vec3>& positions,
-                   double distance, std::vector<ThinQuad>& thin) {
+                   double distance, std::vector<ThinQuad>& thin, std::span<const float> sizes) {
   thin.assign(crossings.edge_count, {});
   if (!(distance > 0)) return;
   const Thinner thinner(bricks, crossings, cell_size, certificate, positions);
@@ -124,7 +124,7 @@ void FindThinEdges(const BrickDirectory& bricks, const SpaceCrossings& crossings
     ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
       EdgeStar star;
       if (!thinner.FindStar({brick, i, j, k}, axis, star)) return;
-      thin[v] = thinner.FindQuad(v, star, distance);
+      thin[v] = thinner.FindQuad(v, star, sizes.empty() ? distance : distance * double{sizes[v]});
     });
   });
 }

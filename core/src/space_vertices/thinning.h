@@ -20,11 +20,12 @@
 namespace partiemc::space {
 
 /// Finds the vertices on edges that can be dropped and are at most `distance` from the triangles
-/// that replace them: by vertex on an edge, empty if it stays. The nearer of two valid cuts is
-/// taken. World units. Requires: Certify of the positions. Parallel over bricks.
+/// that replace them: by vertex on an edge, empty if it stays. `sizes`: by vertex, factors of the
+/// distance, or empty. The nearer of two valid cuts is taken. World units. Requires: Certify of the
+/// positions. Parallel over bricks.
 void FindThinEdges(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Certificate& certificate, const std::vector<Vec3>& positions,
-                   double distance, std::vector<ThinQuad>& thin);
+                   double distance, std::vector<ThinQuad>& thin, std::span<const float> sizes = {});
 
 /// The triangles of all quads in their modes, without the vertices that are dropped.
 void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,

@@ -15,7 +15,7 @@
 
 namespace partiemc::space {
 
-/// Lengths in spacings.
+/// Lengths in spacings; with own sizes in local sizes.
 struct VirtualPlaneConstants {
   RootConstants root;
   double normal_reach = 2.5;
