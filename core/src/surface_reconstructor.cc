@@ -382,6 +382,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, parameters_), sizes);
     checked = space::FindBricks(frame, scale, limits_, b.bins);
     size.bricks = bricks.size();
+    if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);
     if (checked.ok()) space::SortParticles(frame, scale, b.bins);
     return checked;

@@ -4,10 +4,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -30,7 +32,11 @@ using support::RecordingGuard;
 // Frames in space with ids, velocities and an attribute.
 class TrackedFrames {
  public:
-  explicit TrackedFrames(const std::vector<std::vector<double>>& frames) : frames_(frames) {
+  // `volumes` of each frame, or none.
+  explicit TrackedFrames(const std::vector<std::vector<double>>& frames,
+                         std::vector<std::vector<float>> volumes = {})
+      : frames_(frames), volumes_(std::move(volumes)) {
+    volumes_.resize(frames.size());
     for (const std::vector<double>& xyz : frames) {
       velocities_.emplace_back(xyz.size(), 1.0f);
       ids_.emplace_back();
@@ -41,9 +47,10 @@ class TrackedFrames {
     }
   }
 
-  // Frame k; with positions only unless it is tracked.
+  // Frame k; with positions and volumes only unless it is tracked.
   Frame At(std::size_t k, bool is_tracked = true) const {
-    Frame frame{.positions = std::span<const double>(frames_[k]), .components = 3};
+    Frame frame{
+        .positions = std::span<const double>(frames_[k]), .components = 3, .volumes = volumes_[k]};
     if (!is_tracked) return frame;
     frame.ids = ids_[k];
     frame.velocities = velocities_[k];
@@ -54,21 +61,24 @@ class TrackedFrames {
 
  private:
   const std::vector<std::vector<double>>& frames_;
+  std::vector<std::vector<float>> volumes_;
   std::vector<std::vector<float>> velocities_;
   std::vector<std::vector<std::uint64_t>> ids_;
   std::vector<Attribute> attributes_;
 };
 
-class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int, bool>> {};
+class WarmSurface : public testing::TestWithParam<std::tuple<SurfacePlacement, int, bool, Sizes>> {
+};
 
 TEST_P(WarmSurface, AllocatesNothing) {
   const auto placement = std::get<SurfacePlacement>(GetParam());
   const int threads = std::get<int>(GetParam());
   const bool is_tracked = std::get<bool>(GetParam());
+  const auto sizes = std::get<Sizes>(GetParam());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   tbb::task_arena arena(threads);
   const auto reconstructor = SurfaceReconstructor::Create(
-      {.placement = placement, .clean = true, .min_component_particles = 2});
+      {.placement = placement, .sizes = sizes, .clean = true, .min_component_particles = 2});
   ASSERT_TRUE(reconstructor.ok());
   // Balls that meet, with spray; then a few particles, then none.
   std::vector<std::vector<double>> frames;
@@ -85,7 +95,13 @@ TEST_P(WarmSurface, AllocatesNothing) {
   }
   frames.push_back({0, 0, 0, 1, 0, 0});
   frames.emplace_back();
-  const TrackedFrames tracked(frames);
+  std::vector<std::vector<float>> volumes(frames.size());
+  for (std::size_t k = 0; k < frames.size() && sizes == Sizes::kOwn; ++k) {
+    for (std::size_t p = 0; p < frames[k].size() / 3; ++p) {
+      volumes[k].push_back(p % 7 == 0 ? 8 : p % 5 == 0 ? .3f : 1);
+    }
+  }
+  const TrackedFrames tracked(frames, volumes);
   SurfaceWorkspace workspace;
   Surface surface;
   SurfaceState state;
@@ -113,12 +129,18 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
                          testing::Combine(testing::Values(SurfacePlacement::kMarchingCubes,
                                                           SurfacePlacement::kQef,
                                                           SurfacePlacement::kVirtualPlane),
-                                          testing::Values(1, 2), testing::Bool()));
+                                          testing::Values(1, 2), testing::Bool(),
+                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
 struct SurfaceCase {
   std::string name;
   std::vector<double> xyz;
   SurfaceParameters parameters;
+  std::vector<float> volumes = {};
+
+  Frame AsFrame() const {
+    return {.positions = std::span<const double>(xyz), .components = 3, .volumes = volumes};
+  }
 };
 
 // Frames in space that differ in their largest consumer of memory.
@@ -150,6 +172,21 @@ std::vector<SurfaceCase> SurfaceCases() {
     cases.push_back({"drops" + suffix, spread(16, 5), parameters});
     cases.push_back({"noise" + suffix, noise, parameters});
     cases.push_back({"noise, all vertices" + suffix, noise, whole});
+    // Own sizes: mixed, large, small, far apart.
+    SurfaceParameters own = parameters;
+    own.sizes = Sizes::kOwn;
+    std::vector<float> mixed;
+    for (std::size_t p = 0; p < noise.size() / 3; ++p) {
+      mixed.push_back(static_cast<float>(std::pow(random.Uniform(.3, 2), 3)));
+    }
+    const auto all = [](const std::vector<double>& xyz, float volume) {
+      return std::vector<float>(xyz.size() / 3, volume);
+    };
+    cases.push_back({"noise of own sizes" + suffix, noise, own, mixed});
+    const std::vector<double> large = spread(6, 9), small = spread(50, .4), far = spread(4, 90);
+    cases.push_back({"one body of large particles" + suffix, large, own, all(large, 729)});
+    cases.push_back({"one body of small particles" + suffix, small, own, all(small, .064f)});
+    cases.push_back({"large particles alone" + suffix, far, own, all(far, 729)});
   }
   return cases;
 }
@@ -159,7 +196,7 @@ TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
     SCOPED_TRACE(tested.name);
     const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const Frame frame = tested.AsFrame();
     const std::size_t before = live_bytes;
     RecordingGuard guard(2);
     SurfaceWorkspace workspace;
@@ -180,7 +217,7 @@ TEST(MemoryGuard, IsToldNoLessThanASimplificationTakes) {
     tested.parameters.simplify = .1;
     const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const Frame frame = tested.AsFrame();
     const std::size_t before = live_bytes;
     peak_bytes = before;
     RecordingGuard guard(2);
@@ -215,13 +252,19 @@ TEST(MemoryGuard, IsToldNoLessThanAStreamOfSurfacesTakes) {
     cases.push_back({"lone particles", lone, {.placement = placement}});
     cases.push_back({"one body", cube, {.placement = placement}});
     cases.push_back({"noise", noise, {.placement = placement}});
+    const SurfaceParameters own{.placement = placement, .sizes = Sizes::kOwn};
+    cases.push_back(
+        {"lone particles of own sizes", lone, own, std::vector<float>(lone.size() / 3, 2)});
+    std::vector<float> mixed;
+    for (std::size_t p = 0; p < noise.size() / 3; ++p) mixed.push_back(p % 9 == 0 ? 8 : .5f);
+    cases.push_back({"noise of own sizes", noise, own, mixed});
   }
   for (const SurfaceCase& tested : cases) {
     SCOPED_TRACE(tested.name);
     const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
     const std::vector<std::vector<double>> frames = {tested.xyz};
-    const TrackedFrames tracked(frames);
+    const TrackedFrames tracked(frames, {tested.volumes});
     const std::size_t before = live_bytes;
     std::uint64_t told = 0;
     SurfaceWorkspace workspace;
@@ -255,7 +298,7 @@ TEST(MemoryGuard, RefusesASurfaceBeforeItsBricksTakeMemory) {
     SCOPED_TRACE(granted);
     const std::size_t live = live_bytes;
     RecordingGuard guard(granted);
-    const Frame frame{.positions = std::span<const double>(tested.xyz), .components = 3};
+    const Frame frame = tested.AsFrame();
     const absl::Status status =
         reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
     EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
@@ -282,7 +325,7 @@ TEST(LevelBytes, AreNoLessThanALevelTakesAndNotMuchMore) {
     const auto reconstructor = SurfaceReconstructor::Create(tested.parameters);
     ASSERT_TRUE(reconstructor.ok());
     const std::vector<std::vector<double>> frames = {tested.xyz};
-    const TrackedFrames tracked(frames);  // With an attribute of three values.
+    const TrackedFrames tracked(frames, {tested.volumes});  // With an attribute of three values.
     SurfaceWorkspace workspace;
     Surface exact;
     ASSERT_TRUE(reconstructor->Reconstruct(tracked.At(0), workspace, exact).ok());

@@ -27,9 +27,9 @@ struct SizeClass {
 /// Own sizes are divided into classes of this ratio. A walk over the particles near a point has the
 /// reach of the largest particle of a class, so smaller ratios find fewer particles in vain, but
 /// more classes have more rows of cells.
-inline constexpr float kClassRatio = 1.4142135f;
+inline constexpr float kClassRatio = 2;
 /// Most classes: sizes differ at most by the square of ReconstructionParameters::kMostSizeRatio.
-inline constexpr int kMostClasses = 16;
+inline constexpr int kMostClasses = 8;
 
 /// Particles by brick, size class, cell (layer, row, column), position and weight. Positions are in
 /// cells relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.

@@ -8,23 +8,25 @@
 
 namespace partiemc::space {
 
-/// Calls visit(i, j, k) for each marked node or cell of a brick, in blocks of 2 x 2 x 2. Before
-/// each block, calls move_to(i, j, k) with the lowest place of the block.
+/// Calls visit(i, j, k) for each marked node or cell of a brick, in blocks of 2 x 2 x 2, part by
+/// part of 4 x 4 x 4. Before each block, calls move_to(i, j, k) with the lowest place of the block.
 template <typename MoveTo, typename Visit>
 void ForEachInBlocks(const BrickBits& marked, MoveTo move_to, Visit visit) {
-  for (int k = 0; k < kBrickSize; k += 2) {
-    for (int j = 0; j < kBrickSize; j += 2) {
-      for (int i = 0; i < kBrickSize; i += 2) {
-        constexpr std::uint64_t kSquare = 0x303;
-        const std::uint64_t square = kSquare << (j * kBrickSize + i);
-        if (((marked[k] | marked[k + 1]) & square) == 0) continue;
-        move_to(i, j, k);
-        for (int layer = k; layer < k + 2; ++layer) {
-          for (std::uint64_t bits = marked[layer] & square; bits != 0; bits &= bits - 1) {
-            const int bit = std::countr_zero(bits);
-            visit(bit % kBrickSize, bit / kBrickSize, layer);
-          }
-        }
+  constexpr int kBlocks = 64;
+  for (int block = 0; block < kBlocks; ++block) {
+    // The bits of `block`: z, y, x of the part, then z, y, x of the block in the part.
+    const auto along = [block](int axis) {
+      return 4 * (block >> (3 + axis) & 1) + 2 * (block >> axis & 1);
+    };
+    const int i = along(0), j = along(1), k = along(2);
+    constexpr std::uint64_t kSquare = 0x303;
+    const std::uint64_t square = kSquare << (j * kBrickSize + i);
+    if (((marked[k] | marked[k + 1]) & square) == 0) continue;
+    move_to(i, j, k);
+    for (int layer = k; layer < k + 2; ++layer) {
+      for (std::uint64_t bits = marked[layer] & square; bits != 0; bits &= bits - 1) {
+        const int bit = std::countr_zero(bits);
+        visit(bit % kBrickSize, bit / kBrickSize, layer);
       }
     }
   }

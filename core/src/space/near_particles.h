@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "space/bins.h"
 #include "space/lattice.h"
@@ -28,7 +27,7 @@ struct NearRun {
 /// A block of particles, in cells relative to a brick. Dummies that are too far away to count fill
 /// the block up to a multiple of kLanes.
 struct NearBlock {
-  static constexpr int kCapacity = 512;
+  static constexpr int kCapacity = 1024;
   static constexpr int kLanes = 8;
   template <typename Value>
   using PerParticle = std::array<Value, kCapacity + kLanes>;
@@ -49,7 +48,10 @@ struct NearBlock {
     Shift(bins.x.data() + first, run.shift_x, x.data() + count);
     Shift(bins.y.data() + first, run.shift_y, y.data() + count);
     Shift(bins.z.data() + first, run.shift_z, z.data() + count);
-    if (bins.weight.empty()) {
+    if (!bins.size.empty()) {
+      std::copy_n(bins.size.data() + first, kLanes, weight.data() + count);
+      for (int k = count; k < count + kLanes; ++k) per_size[k] = 1 / weight[k];
+    } else if (bins.weight.empty()) {
       std::fill_n(weight.data() + count, kLanes, 1.0f);
     } else {
       std::copy_n(bins.weight.data() + first, kLanes, weight.data() + count);
@@ -151,53 +153,23 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
   }
 }
 
-/// A particle of a list of runs.
-struct NearCursor {
-  std::size_t run = 0;
-  std::uint32_t skipped = 0;  ///< Particles of the run before it.
+/// The particles near a part of a brick, from which blocks for smaller boxes are selected.
+/// Particles have own sizes.
+struct NearRegion {
+  static constexpr int kCapacity = 4096;
+  using PerParticle = std::array<float, kCapacity + NearBlock::kLanes>;
+
+  alignas(64) PerParticle x, y, z, size;
+  int count = 0;
+
+  /// Collects the particles within `radius`, times their own sizes, of the box, and others. Returns
+  /// false if there are more than fit.
+  bool Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius);
 };
 
-/// Adds the particles of `runs` from `at` on whose kernels reach the box to a block, until the
-/// block is full. `radius`: the kernel radius of size 1. Moves `at` to the first particle that is
-/// left. Requires: own sizes.
-void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
-                    float radius, NearCursor& at, NearBlock& block);
-
-/// Collects the runs near a box, so that AppendReaching gets many at once. Particles have own
-/// sizes.
-template <typename Visit>
-class ReachingBlocks {
- public:
-  ReachingBlocks(const SpaceBins& bins, const NearBox& box, float radius, NearBlock& block,
-                 Visit& visit)
-      : bins_(bins), box_(box), radius_(radius), block_(block), visit_(visit) {}
-
-  void Add(const NearRun& run) {
-    if (count_ == runs_.size()) Flush();
-    runs_[count_++] = run;
-  }
-
-  void Flush() {
-    NearCursor at;
-    for (;;) {
-      AppendReaching(bins_, std::span(runs_).first(count_), box_, radius_, at, block_);
-      if (at.run == count_) break;
-      block_.Pad();
-      visit_(block_);
-      block_.count = 0;
-    }
-    count_ = 0;
-  }
-
- private:
-  const SpaceBins& bins_;
-  const NearBox& box_;
-  const float radius_;
-  NearBlock& block_;
-  Visit& visit_;
-  std::array<NearRun, 64> runs_;
-  std::size_t count_ = 0;
-};
+/// Replaces a block by the particles of a region whose kernels reach the box. `radius`: the kernel
+/// radius of size 1. Returns false if there are more than fit.
+bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block);
 
 /// Calls visit(const NearBlock&) for blocks with all particles within `radius`, times their own
 /// sizes, of the box.
@@ -206,15 +178,6 @@ void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox&
                       NearBlock& block, Visit visit) {
   block.count = 0;
   block.has_sizes = !bins.size.empty();
-  if (block.has_sizes) {
-    ReachingBlocks<Visit> blocks(bins, box, radius, block, visit);
-    ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) { blocks.Add(run); });
-    blocks.Flush();
-    if (block.count == 0) return;
-    block.Pad();
-    visit(block);
-    return;
-  }
   ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
     for (std::uint32_t p = run.first; p < run.last;) {
       if (block.count == NearBlock::kCapacity) {
@@ -227,6 +190,26 @@ void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox&
   if (block.count == 0) return;
   block.Pad();
   visit(block);
+}
+
+inline bool NearRegion::Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box,
+                                float radius) {
+  count = 0;
+  bool fits = true;
+  ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
+    const auto added = static_cast<int>(run.last - run.first);
+    fits = fits && added <= kCapacity - count;
+    if (!fits) return;
+    for (int k = 0; k < added; ++k) {
+      const std::uint32_t p = run.first + static_cast<std::uint32_t>(k);
+      x[count + k] = bins.x[p] + run.shift_x;
+      y[count + k] = bins.y[p] + run.shift_y;
+      z[count + k] = bins.z[p] + run.shift_z;
+      size[count + k] = bins.size[p];
+    }
+    count += added;
+  });
+  return fits;
 }
 
 }  // namespace partiemc::space

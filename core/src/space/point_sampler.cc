@@ -1,5 +1,8 @@
 #include "space/point_sampler.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace partiemc::space {
 namespace {
 
@@ -18,12 +21,37 @@ double WeightOf(const SpaceBins& bins, const Scale& scale) {
 }  // namespace
 
 void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
+  has_region_ = has_region_ && brick == brick_;
   brick_ = brick;
   box_ = box;
+  if (!bins_.size.empty()) {
+    is_whole_ = Select();
+    return;
+  }
   int blocks = 0;
   ForEachNearBlock(bins_, brick_, box_, static_cast<float>(scale_.kernel_radius), block_,
                    [&](const NearBlock&) { ++blocks; });
   is_whole_ = blocks <= 1;
+}
+
+// Selects the particles whose kernels reach the box. Walks with the reaches of all size classes are
+// slow, so there is one for the boxes of each part of 4 x 4 x 4 cells of the brick, unless its
+// particles are too many.
+bool PointSampler::Select() {
+  constexpr float kPart = 4;
+  const auto radius = static_cast<float>(scale_.kernel_radius);
+  NearBox part;
+  for (int axis = 0; axis < 3; ++axis) {
+    part.low[axis] = kPart * std::floor(box_.low[axis] / kPart);
+    part.high[axis] = std::max(part.low[axis] + kPart, box_.high[axis]);
+  }
+  const bool is_same = has_region_ && part.low == region_box_.low && part.high == region_box_.high;
+  if (!is_same) {
+    has_region_ = region_.Collect(bins_, brick_, part, radius);
+    region_box_ = part;
+    if (!has_region_ && !region_.Collect(bins_, brick_, box_, radius)) return false;
+  }
+  return SelectReaching(region_, box_, radius, block_);
 }
 
 template <typename Visit>

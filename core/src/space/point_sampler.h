@@ -17,7 +17,7 @@ struct PointSample {
   double size = 1;  ///< The local size, in spacings.
 };
 
-/// Collects the particles around a box once for all points in it. Not thread-safe; about 12 kB.
+/// Collects the particles around a box once for all points in it. Not thread-safe; about 90 kB.
 class PointSampler {
  public:
   PointSampler(const SpaceBins& bins, const Scale& scale) : bins_(bins), scale_(scale) {}
@@ -33,6 +33,7 @@ class PointSampler {
   PointSample Sample(const Vec3& point);
 
  private:
+  bool Select();
   template <typename Visit>
   void ForEachBlock(Visit visit);
   Sums Total(const PartialMoments& moments) const;
@@ -45,6 +46,11 @@ class PointSampler {
   NearBox box_;
   NearBlock block_;
   bool is_whole_ = false;  // All particles around the box are in block_.
+
+  // With own sizes, the particles around a larger box, for several boxes in it.
+  NearRegion region_;
+  NearBox region_box_;
+  bool has_region_ = false;
 };
 
 }  // namespace partiemc::space

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <span>
-#include <vector>
 
 // Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -171,54 +169,40 @@ void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_sq
   add(block, point, inverse_square, v, sums);
 }
 
-// Adds the particles [p, p + kLanes) of a run to a block if their kernels reach the box. Vectors
-// read beyond the run, and write beyond the count of the block.
-HWY_INLINE void AppendLanes(const SpaceBins& bins, const NearRun& run, std::uint32_t p,
-                            const NearBox& box, float radius, NearBlock& block) {
+bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block) {
   const Lanes d;
-  const auto along = [&](const std::vector<float>& of, float shift) HWY_ATTR {
-    return hn::Add(hn::LoadU(d, of.data() + p), hn::Set(d, shift));
-  };
+  block.count = 0;
+  block.has_sizes = true;
+  // The squared distance of coordinates from the box along an axis.
   const auto beyond = [&](Vector at, int axis) HWY_ATTR {
     const Vector below = hn::Sub(hn::Set(d, box.low[axis]), at);
     const Vector above = hn::Sub(at, hn::Set(d, box.high[axis]));
     const Vector by = hn::Max(hn::Zero(d), hn::Max(below, above));
     return hn::Mul(by, by);
   };
-  const Vector x = along(bins.x, run.shift_x), y = along(bins.y, run.shift_y),
-               z = along(bins.z, run.shift_z);
-  const Vector size = hn::LoadU(d, bins.size.data() + p);
-  const Vector reach = hn::Mul(size, hn::Set(d, radius));
-  const Vector square = hn::Add(hn::Add(beyond(x, 0), beyond(y, 1)), beyond(z, 2));
-  const auto is_in =
-      hn::And(hn::Lt(square, hn::Mul(reach, reach)), hn::FirstN(d, std::size_t{run.last - p}));
-  const auto store = [&](NearBlock::PerParticle<float>& to, Vector values) HWY_ATTR {
-    hn::StoreU(hn::Compress(values, is_in), d, to.data() + block.count);
-  };
-  store(block.x, x);
-  store(block.y, y);
-  store(block.z, z);
-  store(block.weight, size);
-  store(block.per_size, hn::Div(hn::Set(d, 1.0f), size));
-  block.count += static_cast<int>(hn::CountTrue(d, is_in));
-}
-
-void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
-                    float radius, NearCursor& at, NearBlock& block) {
-  for (; at.run < runs.size(); ++at.run, at.skipped = 0) {
-    const NearRun& run = runs[at.run];
-    // Always eight at once: the end of a block must not depend on the instruction set.
-    for (std::uint32_t p = run.first + at.skipped; p < run.last; p += NearBlock::kLanes) {
-      if (block.count + NearBlock::kLanes > NearBlock::kCapacity) {
-        at.skipped = p - run.first;
-        return;
-      }
-      for (std::uint32_t lane = 0; lane < NearBlock::kLanes && p + lane < run.last;
-           lane += kLanes) {
-        AppendLanes(bins, run, p + lane, box, radius, block);
-      }
-    }
+  for (int p = 0; p < region.count; p += kLanes) {
+    const Vector x = hn::LoadU(d, region.x.data() + p), y = hn::LoadU(d, region.y.data() + p);
+    const Vector z = hn::LoadU(d, region.z.data() + p), size = hn::LoadU(d, region.size.data() + p);
+    const Vector reach = hn::Mul(size, hn::Set(d, radius));
+    const Vector square = hn::Add(hn::Add(beyond(x, 0), beyond(y, 1)), beyond(z, 2));
+    const auto is_in = hn::And(hn::Lt(square, hn::Mul(reach, reach)),
+                               hn::FirstN(d, static_cast<std::size_t>(region.count - p)));
+    const auto chosen = static_cast<int>(hn::CountTrue(d, is_in));
+    if (chosen == 0) continue;
+    // Vectors write beyond the count, but not beyond the padding.
+    if (block.count + chosen > NearBlock::kCapacity) return false;
+    const auto store = [&](NearBlock::PerParticle<float>& to, Vector values) HWY_ATTR {
+      hn::StoreU(hn::Compress(values, is_in), d, to.data() + block.count);
+    };
+    store(block.x, x);
+    store(block.y, y);
+    store(block.z, z);
+    store(block.weight, size);
+    store(block.per_size, hn::Div(hn::Set(d, 1.0f), size));
+    block.count += chosen;
   }
+  block.Pad();
+  return true;
 }
 
 // The nodes [first, last] of a brick within the radius of a coordinate.
@@ -282,7 +266,7 @@ HWY_EXPORT(AddMoments);
 HWY_EXPORT(AddSlopes);
 HWY_EXPORT(AddThirds);
 HWY_EXPORT(AddDensity);
-HWY_EXPORT(AppendReaching);
+HWY_EXPORT(SelectReaching);
 
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums) {
@@ -300,9 +284,8 @@ void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* 
   HWY_DYNAMIC_DISPATCH(AddDensity)(bins, run, radius, nodes);
 }
 
-void AppendReaching(const SpaceBins& bins, std::span<const NearRun> runs, const NearBox& box,
-                    float radius, NearCursor& at, NearBlock& block) {
-  HWY_DYNAMIC_DISPATCH(AppendReaching)(bins, runs, box, radius, at, block);
+bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block) {
+  return HWY_DYNAMIC_DISPATCH(SelectReaching)(region, box, radius, block);
 }
 
 Sums TotalOf(const PartialMoments& sums, double weight) {

@@ -9,6 +9,7 @@ namespace partiemc::space {
 struct SurfaceSize {
   std::uint64_t particles = 0;
   std::uint64_t bricks = 0;
+  std::uint64_t size_classes = 0;      ///< Of own sizes; 0 for equal sizes.
   std::uint64_t edges = 0;             ///< Crossed edges.
   std::uint64_t loops = 0;             ///< Loops of cells, if vertices leave their anchors; else 0.
   bool has_windows = false;            ///< True for `kVirtualPlane`.
@@ -27,6 +28,12 @@ inline constexpr std::uint64_t kBytesPerBrick = 6'000;
 inline constexpr std::uint64_t kBytesPerEdge = 300;
 inline constexpr std::uint64_t kBytesPerLoop = 450;
 inline constexpr std::uint64_t kBytesPerWindow = 1'100;
+
+/// Bytes of own sizes, on top. Windows in local sizes reach more loops.
+inline constexpr std::uint64_t kBytesPerSizedParticle = 16;
+inline constexpr std::uint64_t kBytesPerCellsOfClass = 2'060;  ///< Per brick and further class.
+inline constexpr std::uint64_t kBytesPerSizedVertex = 4;
+inline constexpr std::uint64_t kBytesPerSizedWindow = 700;
 
 /// Bytes of identities: runs of nodes, of which two edges along x make one or two; histories of two
 /// frames and their relations.
@@ -54,6 +61,13 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
                         kBytesPerBrick * size.bricks + kBytesPerEdge * size.edges +
                         per_loop * size.loops;
   bytes += size.lift_bytes;
+  if (size.size_classes > 0) {
+    bytes += kBytesPerSizedParticle * size.particles +
+             kBytesPerCellsOfClass * (size.size_classes - 1) * size.bricks;
+    if (size.has_windows) {
+      bytes += kBytesPerSizedVertex * (size.edges + size.loops) + kBytesPerSizedWindow * size.loops;
+    }
+  }
   const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
   const std::uint64_t points = size.edges + size.loops + drop_points;
   bytes += kBytesPerValue * size.attribute_values * points;
