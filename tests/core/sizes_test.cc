@@ -340,9 +340,6 @@ TEST(Sizes, RefusesWhatHasNoOwnSizes) {
     return violation ? violation->field + "=" + violation->value : "";
   };
   ReconstructionParameters parameters = kOwn;
-  parameters.output = Output::kSurface;
-  EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
-  parameters = kOwn;
   parameters.slice = SlicePlane();
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = kOwn;

@@ -82,11 +82,12 @@ void Relax(const ExactShape& shape, double step, Packing& packing) {
   }
 }
 
-double LocalSize(const SpaceParticles& particles, const Vec3& at) {
+double LocalSize(const SpaceParticles& particles, const std::vector<double>& sizes,
+                 const Vec3& at) {
   double sum = 0, weights = 0;
   for (std::size_t k = 0; k < particles.size(); ++k) {
     const Vec3 to = particles.At(k) - at;
-    const double square = Dot(to, to), size = std::cbrt(double{particles.volumes[k]});
+    const double square = Dot(to, to), size = sizes[k];
     if (square >= 9 * size * size) continue;
     const double weight = std::pow(1 - square / (9 * size * size), 3);
     sum += weight * size;
@@ -139,6 +140,8 @@ double MeanSpacing(const SpaceParticles& particles) {
 double SizedDeviation(const Surface& surface, const ExactShape& shape,
                       const SpaceParticles& particles) {
   double sum = 0, area = 0;
+  std::vector<double> sizes;
+  for (const float volume : particles.volumes) sizes.push_back(std::cbrt(double{volume}));
   for (std::size_t t = 0; t < surface.TriangleCount(); ++t) {
     std::array<Vec3, 3> at;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -148,7 +151,7 @@ double SizedDeviation(const Surface& surface, const ExactShape& shape,
     const Vec3 centre = (1.0 / 3) * (at[0] + at[1] + at[2]);
     double distance = 0;
     for (const Vec3& corner : at) distance += std::abs(shape.Distance(.5 * (corner + centre))) / 3;
-    sum += size * distance / LocalSize(particles, centre);
+    sum += size * distance / LocalSize(particles, sizes, centre);
     area += size;
   }
   return area > 0 ? sum / area : 1e300;

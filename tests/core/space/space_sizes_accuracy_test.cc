@@ -52,9 +52,9 @@ std::vector<Sampling> AllSamplings() {
           {"1:1.5 uniform", uniform(1.5), 1.27, .03, .1},
           {"1:3 uniform", uniform(3), 2.15, .04, .1},
           {"1:3, as many of each", of_two(3, .5), 2.41, .04, .1},
-          {"1:3, half the volume", of_two(3, 1.0 / 28), 1.25, .04, .1},
+          {"1:3, half the volume", of_two(3, 1.0 / 28), 1.25, .08, .1},
           {"2:1, two zones", zones(2), 1.21, .05, .1},
-          {"3:1, two zones", zones(3), 1.25, .05, .1}};
+          {"3:1, two zones", zones(3), 1.25, .08, .1}};
 }
 
 std::uint64_t Seed() {
