@@ -153,10 +153,11 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
   }
 }
 
-/// The particles near a part of a brick, from which blocks for smaller boxes are selected.
-/// Particles have own sizes.
-struct NearRegion {
-  static constexpr int kCapacity = 4096;
+/// The particles near a box, from which those near smaller boxes are selected. Particles have own
+/// sizes.
+template <int kMost>
+struct NearRegionOf {
+  static constexpr int kCapacity = kMost;
   using PerParticle = std::array<float, kCapacity + NearBlock::kLanes>;
 
   alignas(64) PerParticle x, y, z, size;
@@ -167,9 +168,13 @@ struct NearRegion {
   bool Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius);
 };
 
-/// Replaces a block by the particles of a region whose kernels reach the box. `radius`: the kernel
-/// radius of size 1. Returns false if there are more than fit.
-bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block);
+using NearBrick = NearRegionOf<8192>;  ///< Of a whole brick.
+using NearPart = NearRegionOf<4096>;   ///< Of a part of a brick.
+
+/// Replaces a part or a block by the particles of a region whose kernels reach the box. `radius`:
+/// the kernel radius of size 1. Returns false if there are more than fit.
+bool SelectReaching(const NearBrick& region, const NearBox& box, float radius, NearPart& part);
+bool SelectReaching(const NearPart& region, const NearBox& box, float radius, NearBlock& block);
 
 /// Calls visit(const NearBlock&) for blocks with all particles within `radius`, times their own
 /// sizes, of the box.
@@ -192,8 +197,9 @@ void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox&
   visit(block);
 }
 
-inline bool NearRegion::Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box,
-                                float radius) {
+template <int kMost>
+bool NearRegionOf<kMost>::Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box,
+                                  float radius) {
   count = 0;
   bool fits = true;
   ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {

@@ -21,7 +21,7 @@ double WeightOf(const SpaceBins& bins, const Scale& scale) {
 }  // namespace
 
 void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
-  has_region_ = has_region_ && brick == brick_;
+  is_in_brick_ = is_in_brick_ && brick == brick_;
   brick_ = brick;
   box_ = box;
   if (!bins_.size.empty()) {
@@ -35,23 +35,31 @@ void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
 }
 
 // Selects the particles whose kernels reach the box. Walks with the reaches of all size classes are
-// slow, so there is one for the boxes of each part of 4 x 4 x 4 cells of the brick, unless its
-// particles are too many.
+// slow, so one walk serves the whole brick, unless its particles are too many. A selection for each
+// part of 4 x 4 x 4 cells comes between.
 bool PointSampler::Select() {
-  constexpr float kPart = 4;
   const auto radius = static_cast<float>(scale_.kernel_radius);
+  if (!is_in_brick_) {
+    constexpr float kSide = kBrickSize;
+    has_whole_ = whole_.Collect(bins_, brick_, {{0, 0, 0}, {kSide, kSide, kSide}}, radius);
+    has_part_ = false;
+    is_in_brick_ = true;
+  }
+  constexpr float kPart = 4;
   NearBox part;
   for (int axis = 0; axis < 3; ++axis) {
     part.low[axis] = kPart * std::floor(box_.low[axis] / kPart);
     part.high[axis] = std::max(part.low[axis] + kPart, box_.high[axis]);
   }
-  const bool is_same = has_region_ && part.low == region_box_.low && part.high == region_box_.high;
-  if (!is_same) {
-    has_region_ = region_.Collect(bins_, brick_, part, radius);
-    region_box_ = part;
-    if (!has_region_ && !region_.Collect(bins_, brick_, box_, radius)) return false;
+  const bool is_within = *std::ranges::min_element(part.low) >= 0 &&
+                         *std::ranges::max_element(part.high) <= static_cast<float>(kBrickSize);
+  if (!has_part_ || part.low != part_box_.low || part.high != part_box_.high) {
+    part_box_ = part;
+    has_part_ = has_whole_ && is_within ? SelectReaching(whole_, part, radius, part_)
+                                        : part_.Collect(bins_, brick_, part, radius);
+    if (!has_part_ && !part_.Collect(bins_, brick_, box_, radius)) return false;
   }
-  return SelectReaching(region_, box_, radius, block_);
+  return SelectReaching(part_, box_, radius, block_);
 }
 
 template <typename Visit>

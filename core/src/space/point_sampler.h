@@ -17,7 +17,7 @@ struct PointSample {
   double size = 1;  ///< The local size, in spacings.
 };
 
-/// Collects the particles around a box once for all points in it. Not thread-safe; about 90 kB.
+/// Collects the particles around a box once for all points in it. Not thread-safe; about 220 kB.
 class PointSampler {
  public:
   PointSampler(const SpaceBins& bins, const Scale& scale) : bins_(bins), scale_(scale) {}
@@ -47,10 +47,12 @@ class PointSampler {
   NearBlock block_;
   bool is_whole_ = false;  // All particles around the box are in block_.
 
-  // With own sizes, the particles around a larger box, for several boxes in it.
-  NearRegion region_;
-  NearBox region_box_;
-  bool has_region_ = false;
+  // With own sizes, the particles around the brick, and around the part of it that has the box.
+  NearBrick whole_;
+  NearPart part_;
+  NearBox part_box_;
+  bool is_in_brick_ = false;  // `whole_` is of `brick_`, or `part_` is if `whole_` has no room.
+  bool has_whole_ = false, has_part_ = false;
 };
 
 }  // namespace partiemc::space

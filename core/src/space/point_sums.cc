@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 
 // Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -169,10 +170,13 @@ void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_sq
   add(block, point, inverse_square, v, sums);
 }
 
-bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block) {
+// `found` is a NearPart or a NearBlock.
+template <class Region, class Found>
+HWY_INLINE bool SelectReachingOf(const Region& region, const NearBox& box, float radius,
+                                 Found& found) {
+  constexpr bool kIsBlock = std::is_same_v<Found, NearBlock>;
   const Lanes d;
-  block.count = 0;
-  block.has_sizes = true;
+  found.count = 0;
   // The squared distance of coordinates from the box along an axis.
   const auto beyond = [&](Vector at, int axis) HWY_ATTR {
     const Vector below = hn::Sub(hn::Set(d, box.low[axis]), at);
@@ -190,19 +194,30 @@ bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, 
     const auto chosen = static_cast<int>(hn::CountTrue(d, is_in));
     if (chosen == 0) continue;
     // Vectors write beyond the count, but not beyond the padding.
-    if (block.count + chosen > NearBlock::kCapacity) return false;
-    const auto store = [&](NearBlock::PerParticle<float>& to, Vector values) HWY_ATTR {
-      hn::StoreU(hn::Compress(values, is_in), d, to.data() + block.count);
+    if (found.count + chosen > Found::kCapacity) return false;
+    const auto store = [&](auto& to, Vector values) HWY_ATTR {
+      hn::StoreU(hn::Compress(values, is_in), d, to.data() + found.count);
     };
-    store(block.x, x);
-    store(block.y, y);
-    store(block.z, z);
-    store(block.weight, size);
-    store(block.per_size, hn::Div(hn::Set(d, 1.0f), size));
-    block.count += chosen;
+    store(found.x, x);
+    store(found.y, y);
+    store(found.z, z);
+    if constexpr (kIsBlock) {
+      store(found.weight, size);
+      store(found.per_size, hn::Div(hn::Set(d, 1.0f), size));
+    } else {
+      store(found.size, size);
+    }
+    found.count += chosen;
   }
-  block.Pad();
   return true;
+}
+
+bool SelectPart(const NearBrick& region, const NearBox& box, float radius, NearPart& part) {
+  return SelectReachingOf(region, box, radius, part);
+}
+
+bool SelectBlock(const NearPart& region, const NearBox& box, float radius, NearBlock& block) {
+  return SelectReachingOf(region, box, radius, block);
 }
 
 // The nodes [first, last] of a brick within the radius of a coordinate.
@@ -266,7 +281,8 @@ HWY_EXPORT(AddMoments);
 HWY_EXPORT(AddSlopes);
 HWY_EXPORT(AddThirds);
 HWY_EXPORT(AddDensity);
-HWY_EXPORT(SelectReaching);
+HWY_EXPORT(SelectBlock);
+HWY_EXPORT(SelectPart);
 
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums) {
@@ -284,8 +300,14 @@ void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* 
   HWY_DYNAMIC_DISPATCH(AddDensity)(bins, run, radius, nodes);
 }
 
-bool SelectReaching(const NearRegion& region, const NearBox& box, float radius, NearBlock& block) {
-  return HWY_DYNAMIC_DISPATCH(SelectReaching)(region, box, radius, block);
+bool SelectReaching(const NearBrick& region, const NearBox& box, float radius, NearPart& part) {
+  return HWY_DYNAMIC_DISPATCH(SelectPart)(region, box, radius, part);
+}
+bool SelectReaching(const NearPart& region, const NearBox& box, float radius, NearBlock& block) {
+  const bool fits = HWY_DYNAMIC_DISPATCH(SelectBlock)(region, box, radius, block);
+  block.has_sizes = true;
+  block.Pad();
+  return fits;
 }
 
 Sums TotalOf(const PartialMoments& sums, double weight) {
