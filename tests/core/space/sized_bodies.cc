@@ -123,6 +123,19 @@ SpaceParticles FillSized(const ExactShape& shape, Random& random, const DrawSize
   return particles;
 }
 
+SpaceParticles RandomSizedScene(std::uint64_t seed, double ratio) {
+  Random random(seed);
+  SpaceParticles particles = RandomSpaceScene(seed);
+  particles.volumes.clear();
+  const double low = 1 / std::sqrt(ratio);
+  const bool is_bidisperse = random.Chance(.3);
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double power = is_bidisperse ? std::floor(random.Uniform(0, 2)) : random.Unit();
+    particles.volumes.push_back(static_cast<float>(std::pow(low * std::pow(ratio, power), 3)));
+  }
+  return particles;
+}
+
 SpaceParticles Shaken(SpaceParticles particles, Random& random, double noise) {
   for (std::size_t k = 0; k < particles.xyz.size(); ++k) {
     const double range = noise * std::cbrt(double{particles.volumes[k / 3]}) * std::numbers::sqrt3;

@@ -1,6 +1,7 @@
-// Bodies in space that are filled with particles of different sizes.
+// Particles of different sizes in space: filled bodies and random scenes.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 
 #include "base/vec3.h"
@@ -18,6 +19,9 @@ using DrawSize = std::function<double(support::Random& random, const Vec3& at)>;
 /// until pairs are about (h_i + h_j) / 2 apart, and the outermost particles half their size from
 /// the boundary. The counterpart of support::Filled in space.
 SpaceParticles FillSized(const ExactShape& shape, support::Random& random, const DrawSize& draw);
+
+/// A scene of RandomSpaceScene, with sizes within a factor of `ratio` of each other.
+SpaceParticles RandomSizedScene(std::uint64_t seed, double ratio);
 
 /// Moves particles at random. The standard deviation along each axis is `noise` times their size.
 SpaceParticles Shaken(SpaceParticles particles, support::Random& random, double noise);
