@@ -35,10 +35,9 @@ absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParamet
 /// far from `usual`.
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
-/// Returns the range of the sizes of a frame with own sizes; with `parameters.slice`, particles fill
-/// space, as for a surface. Errors: INVALID_ARGUMENT for the size
-/// that is farthest from the spacing, if it is out of range (ReconstructionParameters::sizes and
-/// boundary).
+/// Returns the range of the sizes of a frame with own sizes; with `parameters.slice`, particles
+/// fill space, as for a surface. Errors: INVALID_ARGUMENT for the size that is farthest from the
+/// spacing, if it is out of range (ReconstructionParameters::sizes and boundary).
 absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
                                        const ReconstructionParameters& parameters,
                                        const Lengths& lengths);

@@ -177,12 +177,12 @@ struct ReconstructionParameters {
   Sizes sizes = Sizes::kEqual;
 
   /// With grains, outlines follow discs, voids without room for another grain are inside, and a
-  /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues and
-  /// surfaces.
-  /// `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half spacings. An absent
-  /// spacing is the smallest diameter, or a tenth of the largest if this is larger. A diameter must
-  /// be at least `kSmallestGrain` cells, so that no grain falls between the nodes of the lattice,
-  /// and at most `kLargestGrain` cells, because kernels reach neighbouring tiles only.
+  /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues
+  /// and surfaces. `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half
+  /// spacings. An absent spacing is the smallest diameter, or a tenth of the largest if this is
+  /// larger. A diameter must be at least `kSmallestGrain` cells, so that no grain falls between the
+  /// nodes of the lattice, and at most `kLargestGrain` cells, because kernels reach neighbouring
+  /// tiles only.
   static constexpr double kSmallestGrain = 1.42, kLargestGrain = 20;
   Boundary boundary = Boundary::kBulk;
 
