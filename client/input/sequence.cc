@@ -312,6 +312,7 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
   recording.request.attributes = options.attributes;
   recording.request.max_expansion = options.max_expansion;
   recording.request.needs_sizes = options.needs_sizes;
+  recording.request.in_space = options.in_space;
   recording.request.needs_diameters = options.needs_diameters;
   const auto range = ParseFrameRange(options.frames);
   if (!range.ok()) return range.status();

@@ -67,7 +67,7 @@ struct SequenceOptions {
   std::vector<std::string> attributes = {};
 
   /// Read volumes from a column of diameters d or radii r if there is none of volumes: d^2, (2
-  /// r)^2.
+  /// r)^2; with `in_space` d^3, (2 r)^3.
   bool needs_sizes = false;
 
   /// Read volumes for grains, which are squared diameters: from a column of diameters or radii,

@@ -288,6 +288,7 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
   const Names canonical = AllCanonical(names);
   ColumnPlan plan;
   plan.column_count = names.size();
+  plan.in_space = request.in_space;
   plan.velocities = FindVelocities(canonical);
   plan.id = FindFirst(
       canonical, {"id", "ids", "idp", "particleid", "particleids", "originalid", "pid", "gid"});

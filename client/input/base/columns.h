@@ -35,6 +35,7 @@ struct ColumnRequest {
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
   bool tag_is_id = true;                 ///< Whether a column "tag" can hold the ids.
   bool needs_sizes = false;              ///< SequenceOptions::needs_sizes.
+  bool in_space = false;                 ///< SequenceOptions::in_space.
   bool needs_diameters = false;          ///< SequenceOptions::needs_diameters.
 };
 
@@ -55,9 +56,10 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> velocities;
   std::optional<std::size_t> id;
   std::optional<std::size_t> volume;
-  /// If not 0, the column of volumes holds lengths: a volume is the square of the length times
-  /// this.
+  /// If not 0, the column of volumes holds lengths: a volume is the square, in space the cube, of
+  /// the length times this.
   double size_of_length = 0;
+  bool in_space = false;
   double per_volume = 1;  ///< Factor of a column of volumes.
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
@@ -71,8 +73,9 @@ struct ColumnPlan {
   /// The volume that a value of the column of volumes stands for.
   double VolumeOf(double value) const {
     if (size_of_length == 0) return per_volume * value;
-    // A negative length is no size.
-    return value > 0 ? size_of_length * value * (size_of_length * value) : value;
+    if (!(value > 0)) return value;  // A negative length is no size.
+    const double size = size_of_length * value;
+    return in_space ? size * size * size : size * size;
   }
 };
 

@@ -86,7 +86,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         wall, `rings.contacts` the points where the outline meets a wall, `rings.contact_angles` the
         angles of the fluid there, in radians.
     wall_phases: the phases of the particles of walls (`phase_attribute`). Their outline is a wall.
-    sizes: "equal" (the default), or "own": each particle has the size sqrt(volume).
+    sizes: "equal" (the default), or "own": each particle has the size sqrt(volume), for a surface
+        cbrt(volume).
     boundary: "bulk" (the default), or "grains", with own sizes: particles are discs of the diameter
         sqrt(volume), and the outline follows their surfaces.
     surface_offset, normal_memory, clean, min_component_area, min_component_particles, spacing_rule:

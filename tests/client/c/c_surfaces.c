@@ -201,11 +201,9 @@ static void try_wrong_surfaces(const char* address) {
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
   EXPECT(strcmp(partiemc_last_error()->field, "outputs.coordinates") == 0);
   options.coordinates = NULL;
-  for (int k = 0; k < 2; ++k) {
-    options.sizes = k == 0 ? "large" : "own"; /* Surfaces have no own sizes. */
-    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
-    EXPECT(strcmp(partiemc_last_error()->field, "parameters.sizes") == 0);
-  }
+  options.sizes = "large";
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
+  EXPECT(strcmp(partiemc_last_error()->field, "parameters.sizes") == 0);
   options.sizes = NULL;
   for (int k = 0; k < 2; ++k) {
     options.boundary = k == 0 ? "smooth" : "grains"; /* Grains have own sizes. */

@@ -42,6 +42,40 @@ std::string DigestOf(const std::string& input, std::vector<std::string> more) {
   return digests.empty() ? "" : digests[0];
 }
 
+// A block of particles 2 apart beside one of particles 1 apart.
+TEST(SizedReplay, SurfacesTakeCubedDiameters) {
+  const support::TemporaryFolder input;
+  const auto write = [&](const std::string& column, int power) {
+    std::ofstream file(input.Path(column + ".csv"));
+    file << "x,y,z," << column << "\n";
+    for (const int size : {2, 1}) {
+      const int count = 8 / size;
+      for (int k = 0; k < count * count * count; ++k) {
+        const double at[] = {size * (k % count + .5), size * (k / count % count + .5),
+                             size * (k / (count * count) + .5)};
+        file << at[0] + (size == 1 ? 8 : 0) << "," << at[1] << "," << at[2] << ","
+             << std::pow(size, power) << "\n";
+      }
+    }
+  };
+  write("volume", 3);
+  write("diameter", 1);
+  const auto digest = [&](const std::string& column, std::vector<std::string> more) {
+    const support::TemporaryFolder output;
+    more.insert(more.begin(), {"replay", input.Path(column + ".csv"), "--surface", "--spacing", "1",
+                               "--stats", output.Path("s.csv")});
+    const Ran ran = RunPartiemc(more);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    const std::string stats = Content(output.Path("s.csv"));
+    EXPECT_NEAR(std::stod(Column(stats, "volume").at(0)), 1024, 10);
+    return Column(stats, "surface_digest").at(0);
+  };
+  const std::string expected = digest("volume", {"--local", "--sizes", "own", "--check"});
+  EXPECT_EQ(digest("diameter", {"--local", "--sizes", "own"}), expected);
+  ServerProgram server;
+  EXPECT_EQ(digest("diameter", {"--server", server.address(), "--sizes", "own"}), expected);
+}
+
 TEST(SizedReplay, VolumesDiametersAndRadiiGiveTheSame) {
   const support::TemporaryFolder input;
   const std::vector<std::string> flags = {"--local", "--sizes", "own", "--check"};

@@ -80,6 +80,9 @@ TEST(Columns, SizesComeFromVolumesElseDiametersElseRadii) {
   EXPECT_EQ(plan({"x", "y", "radius", "volume"}).volume, 3u);
   EXPECT_EQ(plan({"x", "y", "radius", "volume"}).VolumeOf(3), 3);
   EXPECT_LT(plan({"x", "y", "radius"}).VolumeOf(-3), 0);
+  ColumnRequest request{.needs_sizes = true, .in_space = true};
+  EXPECT_EQ(PlanNamedColumns({"x", "y", "z", "radius"}, request)->VolumeOf(3), 216);
+  EXPECT_EQ(PlanNamedColumns({"x", "y", "z", "volume"}, request)->VolumeOf(3), 3);
 }
 
 TEST(Columns, DiametersOfGrainsComeFromDiametersElseRadiiElseAreas) {

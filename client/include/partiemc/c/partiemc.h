@@ -139,7 +139,8 @@ typedef struct partiemc_options {
                         0: the axis is not periodic. A body that crosses a face is one body; an
                         outline that reaches its own image is cut at the faces. NULL: no box. */
   int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
-  const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume). NULL: equal. */
+  const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume), for a surface
+                        cbrt(volume). NULL: equal. */
   const char* boundary; /* "bulk", or "grains" with own sizes: particles are discs of the diameter
                            sqrt(volume), and the outline follows their surfaces. NULL: bulk. */
   /* Outlines of these phases, after `sections`: they divide the outline of all particles and share
