@@ -13,10 +13,10 @@ namespace partiemc::client {
 /// section has one or walls have.
 inline std::vector<std::string> WithPhases(const ReconstructionParameters& parameters,
                                            std::vector<std::string> attributes) {
-  const bool has_phases =
-      !parameters.wall_phases.empty() ||
-      std::ranges::any_of(parameters.sections,
-                          [](const Section& section) { return section.phase.has_value(); });
+  const bool has_phases = !parameters.wall_phases.empty() ||
+                          std::ranges::any_of(parameters.sections, [](const Section& section) {
+                            return section.phase.has_value();
+                          });
   if (has_phases && std::ranges::find(attributes, parameters.phase_attribute) == attributes.end()) {
     attributes.push_back(parameters.phase_attribute);
   }

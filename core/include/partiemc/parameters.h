@@ -281,10 +281,9 @@ struct ReconstructionParameters {
 
   static constexpr std::size_t kMaxWallPhases = 16;
 
-  /// The phases (`phase_attribute`) of the particles of walls, at most 16, distinct. Their outline
-  /// is a further wall, half a spacing outside of their outermost layers, anew in each frame; they
-  /// are no fluid. Two layers or more are a wall; excludes what `walls` exclude, and
-  /// `noise_filter`.
+  /// The phases (`phase_attribute`) of wall particles, at most 16, distinct. The outline of these
+  /// particles is a further wall in each frame, half a spacing outside of their outermost layers.
+  /// Walls need two layers or more. Excludes what `walls` exclude, and `noise_filter`.
   std::vector<std::int32_t> wall_phases = {};
 
   friend bool operator==(const ReconstructionParameters&,

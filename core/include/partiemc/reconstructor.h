@@ -99,7 +99,7 @@ class Reconstructor {
   FrameLimits limits_;
   std::shared_ptr<const VirtualPlaneVariant> variant_;
   std::shared_ptr<const SurfaceReconstructor> surface_;  // Null for Output::kOutline.
-  // Of the outline of wall particles; null without wall phases.
+  // The parameters for the outline of wall particles; null without wall phases.
   std::shared_ptr<const ReconstructionParameters> walls_;
 };
 

@@ -94,7 +94,7 @@ struct Mesh {
 };
 
 struct FrameStatistics {
-  std::uint64_t particles = 0;  ///< Without those of walls.
+  std::uint64_t particles = 0;  ///< Wall particles do not count.
   /// Tiles of 32 x 32 nodes that were allocated; for surfaces, bricks of 8 x 8 x 8 nodes.
   std::uint64_t tiles = 0;
   std::uint64_t active_cells = 0;        ///< Cells that the outline crosses; 0 for surfaces.

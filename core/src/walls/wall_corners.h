@@ -12,7 +12,7 @@ namespace partiemc {
 /// Warm buffers of SharpenCorners.
 struct WallCornerScratch {
   struct Corner {
-    std::uint32_t point;  // Of the ring: the middle of the rounded part.
+    std::uint32_t point;  // The ring's point in the middle of the rounded part.
     Point at;
     double distance;  // Of `at` from the point.
   };
@@ -22,11 +22,11 @@ struct WallCornerScratch {
   std::vector<std::uint32_t> offsets;
 };
 
-/// The field rounds corners by about .8 h. Where a ring has straight arms on both sides, from 1.5
-/// to 4.5 h away, that differ by more than 30 degrees, the point where their lines meet replaces
-/// the points between the arms. Arms that bend by more than a seventh of the turn are part of a
-/// curve, which stays. Changes only the points and offsets of `rings`. `spacing`: h in world units.
-/// Cost: the points, times the logarithm of those of their ring.
+/// The field rounds corners by about .8 h. An arm is the part of a ring from 1.5 to 4.5 h away from
+/// a point. If both arms are straight and differ by more than 30 degrees, their lines meet in a
+/// corner, which replaces the points between the arms. Arms that bend by more than a seventh of the
+/// turn are part of a curve, which stays. Changes only the points and offsets of `rings`.
+/// `spacing`: h in world units. Cost: near-linear in the points.
 void SharpenCorners(double spacing, WallCornerScratch& scratch, Rings& rings);
 
 }  // namespace partiemc

@@ -17,8 +17,8 @@ namespace partiemc {
 /// The fluid near walls. A node has the height w above the nearest wall, negative in the solid, and
 /// the value F of the fluid. Lengths are in cells.
 ///
-/// Near a wall, kernels see no particles beyond it, so F there does not tell whether the fluid
-/// touches the wall. An outside node lower than `kReach` spacings therefore has the F of the point
+/// Kernels see no particles beyond a wall, so F near a wall does not tell whether the fluid touches
+/// it. An outside node lower than `kReach` spacings therefore has the F of the point
 /// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
 /// lattice: its zeros are the outline of the fluid, cut at the walls.
 ///
@@ -33,7 +33,7 @@ class WallField {
   static constexpr float kMostHeight = 4;
 
   /// Reads the walls (WallLines::Build) and counts the pairs of a line and a tile near it. Cost:
-  /// linear in the tiles, and in the lines; long lines, at most those of `walls`, times tiles.
+  /// linear in tiles and lines, and in the product of tiles and long lines.
   void ListLines(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
                  const TileDirectory& directory);
   std::size_t PairCount() const { return pair_count_; }
@@ -116,7 +116,7 @@ class WallField {
   std::vector<std::size_t> long_counts_;             // By long line: tiles near it.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Tile, line.
   std::vector<std::pair<std::int32_t, std::uint32_t>> by_row_;  // Row of tiles, short line.
-  std::vector<Crossing> crossings_;                             // Of a row, by x.
+  std::vector<Crossing> crossings_;                             // In a row, by x.
   std::vector<std::uint8_t> is_odd_;  // By solid: odd number of crossings so far.
   std::size_t covering_ = 0;          // Solids that cover the mark, of those with closed loops.
 };

@@ -23,7 +23,7 @@ struct WallEdge {
   std::uint32_t loop = 0, solid = 0;
   bool is_endless = false;  ///< The only line of its loop, and not limited to the two points.
 
-  /// From `from` to `to`. Of an endless line, `to` may be rounded.
+  /// From `from` to `to`, exact also for an endless line, whose `to` is rounded.
   Point Span() const { return is_endless ? unit : Point{to.x - from.x, to.y - from.y}; }
   /// To the left: into the fluid.
   Point Left() const { return {-unit.y, unit.x}; }
@@ -89,8 +89,8 @@ class WallLines {
 
   /// The place on one line nearest to a point, and the signed distance.
   NearestWall NearestOn(std::uint32_t edge, const Point& point) const;
-  /// The nearest place on some lines. The sign is that of the line which sees the point under the
-  /// larger angle if a corner is nearest. Cost: linear in the lines.
+  /// The nearest place on some lines. If a corner is nearest, two lines are equally near. The sign
+  /// is that of the line whose endless line is farther from the point. Cost: linear in the lines.
   NearestWall Nearest(std::span<const std::uint32_t> edges, const Point& point) const;
   /// The same on the part of a loop within `reach` cells along it from a place. Cost: linear in its
   /// lines there.

@@ -1,4 +1,4 @@
-// Divides a frame into the particles of the fluid and those of walls.
+// Divides a frame into fluid and wall particles.
 #pragma once
 
 #include <cstdint>
