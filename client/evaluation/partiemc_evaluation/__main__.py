@@ -1,17 +1,19 @@
-"""The command: python3 -m partiemc_evaluation paper|set ..."""
+"""The command: python3 -m partiemc_evaluation paper|set|surfaces|matter ..."""
 
 import argparse
 import hashlib
 import os
 import pathlib
 import sys
-from typing import Sequence as Seq
+from typing import Callable, Sequence as Seq
 
 import partiemc
 
+from .matter import matter_tables, run_matter
+from .matter_scenes import SETS as MATTER_SETS, make_matter_set
 from .paper import default_film, judge_claims, run_paper
 from .recordings import read_recording
-from .report import Evaluation, as_html, as_json, as_text
+from .report import Evaluation, as_html, as_json, as_text, matter_html, matter_json
 from .scenes import SETS, digest, make_scene, make_set
 from .shapes import TUNING_SHAPES, VALIDATION_SHAPES
 from .study import PLACEMENTS, Method, all_methods, run_study
@@ -59,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--quiet", action="store_true", help="no progress")
     parser = argparse.ArgumentParser("partiemc_evaluation", description=_ABOUT, epilog=_EXAMPLES,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="set|paper|surfaces")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="set|paper|surfaces|matter")
     one = verbs.add_parser("set", parents=[shared], help="measure every method on a set of synthetic sequences: ratios "
                            "to marching squares in accuracy, area and jitter, by group and by sampler, with intervals")
     one.add_argument("set", choices=(*SETS, "none"), help="the set; 'none' for recordings alone")
@@ -73,9 +75,15 @@ def _parser() -> argparse.ArgumentParser:
     space.add_argument("set", choices=surface_sets())
     space.add_argument("--digests", action="store_true", help="print a digest of the particles of each scene, and measure "
                        "nothing")
-    space.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1, help="scenes at a time; one for "
-                       "each processor by default")
-    space.add_argument("--quiet", action="store_true", help="no progress")
+    matter = verbs.add_parser("matter", help="measure sizes, grains, phases, walls and periodic boxes with the feature and "
+                              "without it")
+    matter.add_argument("set", choices=MATTER_SETS, nargs="?", default="all", help="all groups (the default), one of them, "
+                        "or one scene of each kind")
+    matter.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="write matter.html and matter.json here")
+    for scenes in (space, matter):
+        scenes.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1, help="scenes at a time; one for "
+                            "each processor by default")
+        scenes.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 
 
@@ -128,6 +136,13 @@ def _run(options: argparse.Namespace) -> None:
         (options.output_dir / "evaluation.json").write_text(as_json(evaluation))
 
 
+def _progress(options: argparse.Namespace, count: int) -> Callable[[int], None]:
+    def progress(done: int) -> None:
+        if not options.quiet:
+            print(f"\r\x1b[K{done} of {count} scenes", end="\n" if done == count else "", file=sys.stderr, flush=True)
+    return progress
+
+
 def _run_surfaces(options: argparse.Namespace) -> None:
     recipes = surface_sets()[options.set]
     if options.digests:
@@ -135,12 +150,20 @@ def _run_surfaces(options: argparse.Namespace) -> None:
             print(f"{surface_digest(recipe)}  {options.set}/{recipe.name}", flush=True)
         return
 
-    def progress(done: int) -> None:
-        if not options.quiet:
-            print(f"\r\x1b[K{done} of {len(recipes)} scenes", end="\n" if done == len(recipes) else "", file=sys.stderr,
-                  flush=True)
-    for table in surface_tables(run_surfaces(recipes, options.jobs, progress)):
+    for table in surface_tables(run_surfaces(recipes, options.jobs, _progress(options, len(recipes)))):
         print(table.as_text())
+
+
+def _run_matter(options: argparse.Namespace) -> None:
+    recipes = make_matter_set(options.set)
+    if options.output_dir:
+        options.output_dir.mkdir(parents=True, exist_ok=True)
+    found = run_matter(recipes, options.jobs, _progress(options, len(recipes)))
+    for table in matter_tables(found.rows):
+        print(table.as_text())
+    if options.output_dir:
+        (options.output_dir / "matter.html").write_text(matter_html(found))
+        (options.output_dir / "matter.json").write_text(matter_json(found))
 
 
 def main(arguments: Seq[str] | None = None) -> int:
@@ -149,6 +172,8 @@ def main(arguments: Seq[str] | None = None) -> int:
     try:
         if options.verb == "surfaces":
             _run_surfaces(options)
+        elif options.verb == "matter":
+            _run_matter(options)
         elif options.verb == "set" and options.digests:
             _print_digests(options.set)
         else:

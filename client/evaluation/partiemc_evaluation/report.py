@@ -20,8 +20,9 @@ from matplotlib.path import Path
 
 from .comparisons import compare_rows, match
 from .geometry import Outline
+from .matter import Found, matter_tables
 from .paper import FINDINGS, SHARES, SUBJECTS, Claim, PaperRuns, Shot, thinned_values
-from .study import BASELINE, DEFAULT, PAPER, Study
+from .study import BASELINE, DEFAULT, PAPER, Row, Study
 from .tables import Table, fill_table, judged_metrics, paper_tables, study_tables
 
 _COLORS = {BASELINE: "#8a8f98", "qef": "#b08a2e", PAPER: "#c0554d", DEFAULT: "#2c6fae",
@@ -48,11 +49,13 @@ def as_text(evaluation: Evaluation) -> str:
 
 def as_json(evaluation: Evaluation) -> str:
     """title, notes, rows, claims. Absent numbers are null."""
-    rows = [{**{key: value for key, value in vars(row).items() if key not in ("values", "frames")},
-             **{metric: value if math.isfinite(value) else None for metric, value in row.values.items()}}
-            for row in evaluation.study.rows]
-    return json.dumps({"title": evaluation.title, "notes": evaluation.notes, "rows": rows,
+    return json.dumps({"title": evaluation.title, "notes": evaluation.notes, "rows": _json_rows(evaluation.study.rows),
                        "claims": [claim._asdict() for claim in evaluation.claims]}, indent=1)
+
+
+def _json_rows(rows: Seq[Row]) -> list[dict[str, Any]]:
+    return [{**{key: value for key, value in vars(row).items() if key not in ("values", "frames")},
+             **{metric: value if math.isfinite(value) else None for metric, value in row.values.items()}} for row in rows]
 
 
 def _picture(figure: Figure, alt: str) -> str:
@@ -207,7 +210,27 @@ def as_html(evaluation: Evaluation) -> str:
     sections += _paper_sections(evaluation, evaluation.runs) if evaluation.runs else []
     notes = [_ABOUT, *evaluation.notes, *(f"{method.name}: {method.remark}." for method in study.methods)]
     sections.append(_section("How it was measured", "", "".join(f"<p>{html.escape(note)}</p>" for note in notes)))
+    return _page(evaluation.title, sections)
+
+
+def matter_json(found: Found) -> str:
+    """rows, and the tables with their musts and aims. Absent numbers are null."""
+    tables = [{"title": table.title, "heads": table.heads, "rows": table.rows} for table in matter_tables(found.rows)]
+    return json.dumps({"title": _MATTER, "rows": _json_rows(found.rows), "tables": tables}, indent=1)
+
+
+def matter_html(found: Found) -> str:
+    """One page: a picture and a table for each group."""
+    sections = [_section(group, "Dashed: the truth.", _picture(shots_figure(shots, 4), f"Scenes of the group {group}"))
+                for group, shots in found.shots.items()]
+    return _page(_MATTER, sections + [table.as_html() for table in matter_tables(found.rows)])
+
+
+_MATTER = "Evaluation: real matter"
+
+
+def _page(title: str, sections: Seq[str]) -> str:
     return ("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta http-equiv=\"Content-Security-Policy\""
             " content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
-            f"<title>{html.escape(evaluation.title)} - PartiEMC</title>\n<style>{_STYLE}</style></head>\n"
-            f"<body><h1>{html.escape(evaluation.title)}</h1>\n{''.join(sections)}</body></html>\n")
+            f"<title>{html.escape(title)} - PartiEMC</title>\n<style>{_STYLE}</style></head>\n"
+            f"<body><h1>{html.escape(title)}</h1>\n{''.join(sections)}</body></html>\n")

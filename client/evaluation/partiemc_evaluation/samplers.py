@@ -95,12 +95,12 @@ def relax(region: Boundary, centers: Points, rounds: int) -> Points:
         points = rasters[k % _RASTERS]
         _, owner = cKDTree(centers, compact_nodes=False, balanced_tree=False).query(points)
         counts = np.bincount(owner, minlength=len(centers))[:, None]
-        mean = _sums(owner, points, len(centers)) / np.maximum(counts, 1)
+        mean = sums_by_owner(owner, points, len(centers)) / np.maximum(counts, 1)
         centers = push_inside(region, np.where(counts > 0, mean, centers))
     return centers
 
 
-def _sums(owner: Indices, vectors: Points, count: int) -> Points:
+def sums_by_owner(owner: Indices, vectors: Points, count: int) -> Points:
     """(count, d): sums of the vectors (N, d) by owner (N,)."""
     return np.stack([np.bincount(owner, component, count) for component in vectors.T], axis=1)
 
@@ -114,7 +114,7 @@ def _repulsion(centers: Points, others: Points) -> Points:
     rest = np.maximum(0, 1 - dot(arm, arm) / _SHIFT_RADIUS ** 2)
     dimension = centers.shape[1]
     integral = {2: np.pi / 4, 3: 64 * np.pi / 315}[dimension] * _SHIFT_RADIUS ** dimension
-    return _sums(pairs["i"], (6 * rest ** 2 / _SHIFT_RADIUS ** 2 / integral)[:, None] * arm, len(centers))
+    return sums_by_owner(pairs["i"], (6 * rest ** 2 / _SHIFT_RADIUS ** 2 / integral)[:, None] * arm, len(centers))
 
 
 def shift_particles(region: Boundary, centers: Points, rounds: int) -> Points:

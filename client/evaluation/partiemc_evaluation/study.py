@@ -4,7 +4,7 @@ import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Callable, Iterator, NamedTuple, Sequence as Seq
+from typing import Any, Callable, Iterator, NamedTuple, Sequence as Seq, TypeVar
 
 import numpy as np
 import partiemc
@@ -15,6 +15,8 @@ from .geometry import Curve, Outline
 from .metrics import ABSENT, Deviation, carried, compare, find_defects, jitter, known_jitter, nearest_neighbours
 from .recordings import wall_roughness
 from .scenes import Frame, Recipe, Sequence, make_scene
+
+Source, Found = TypeVar("Source"), TypeVar("Found")
 
 BASELINE, PAPER, DEFAULT = "marching-squares", "farthest-particle", "virtual-plane"
 PLACEMENTS = (BASELINE, "qef", PAPER, DEFAULT)
@@ -218,18 +220,24 @@ def _run_all(methods: list[Method], given: list[str], source: Recipe | Sequence)
             if each != "nothing" or not method.needs_spacing]
 
 
-def run_study(sources: Seq[Recipe | Sequence], methods: list[Method], given: list[str], jobs: int = 1,
-              progress: Callable[[int], None] = lambda done: None) -> Study:
-    """Every method on every sequence. The rows are the same for any number of jobs, except times. jobs: processes
-    that each take one sequence at a time. progress: called with the number of sequences done."""
-    run, rows = partial(_run_all, methods, given), []
+def map_in_processes(run: Callable[[Source], Found], sources: Seq[Source], jobs: int,
+                     progress: Callable[[int], None] = lambda done: None) -> Iterator[Found]:
+    """run(source) of each source, in their order. jobs: processes that each take one source at a time. progress: called
+    with the number of sources done."""
     # Starts new processes instead of forking, because a fork would lose the threads of the native module.
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
     try:
-        for k, of_sequence in enumerate(pool.map(run, sources) if pool else map(run, sources)):
-            rows += of_sequence
+        for k, found in enumerate(pool.map(run, sources) if pool else map(run, sources)):
+            yield found
             progress(k + 1)
     finally:
         if pool:
             pool.shutdown(cancel_futures=True)
+
+
+def run_study(sources: Seq[Recipe | Sequence], methods: list[Method], given: list[str], jobs: int = 1,
+              progress: Callable[[int], None] = lambda done: None) -> Study:
+    """Every method on every sequence. The rows are the same for any number of jobs, except times."""
+    run = partial(_run_all, methods, given)
+    rows = [row for of_sequence in map_in_processes(run, sources, jobs, progress) for row in of_sequence]
     return Study(methods, given, rows)

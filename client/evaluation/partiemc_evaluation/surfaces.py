@@ -1,8 +1,6 @@
 """Surfaces in space against the truth: scenes, their sets, metrics and the table of ratios to marching cubes."""
 
 import hashlib
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Callable, Iterator, Sequence as Seq
 
@@ -15,7 +13,7 @@ from .metrics import ABSENT, compare
 from .motions import Similarity
 from .samplers import SAMPLERS, Rng, raster, throw_darts
 from .solids import SOLIDS, TUNING_SOLIDS, VALIDATION_SOLIDS, Balls, Ellipsoid, Mesh, Solid
-from .study import Row, mean_of
+from .study import Row, map_in_processes, mean_of
 from .tables import Table, fixed
 
 BASELINE, DEFAULT = "marching-cubes", "virtual-plane"
@@ -299,16 +297,7 @@ def _apart(before: Frame, frame: Frame) -> Callable[[Points], Bools]:
 
 def run_surfaces(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None] = lambda done: None) -> list[Row]:
     """All placements on all scenes; the same rows for any number of jobs."""
-    rows: list[Row] = []
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
-    try:
-        for k, found in enumerate(pool.map(measure_scene, recipes) if pool else map(measure_scene, recipes)):
-            rows += found
-            progress(k + 1)
-    finally:
-        if pool:
-            pool.shutdown(cancel_futures=True)
-    return rows
+    return [row for found in map_in_processes(measure_scene, recipes, jobs, progress) for row in found]
 
 
 def surface_tables(rows: Seq[Row]) -> list[Table]:

@@ -1,0 +1,411 @@
+"""Scenes of real matter with known truth: different sizes, grains, phases, walls and periodic boxes. Each is measured with
+the feature and without it. Lengths are in spacings, areas relative.
+
+The truth, its particles and all random choices follow from a recipe. Scenes and seeds are others than those in tests/core;
+no constant is chosen by them.
+"""
+
+import warnings
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Callable, NamedTuple, Sequence as Seq
+
+import numpy as np
+import partiemc
+from shapely import affinity
+from shapely.geometry import Polygon, box
+from shapely.ops import unary_union
+
+from .geometry import Bools, Curve, Floats, Indices, Outline, Points, ellipse_ring, norm, sample_curve
+from .metrics import ABSENT, compare
+from .motions import Similarity
+from .packings import Draw, fill_sizes, pile_grains, shrink_to_grains, spray_grains
+from .samplers import SAMPLERS, Rng
+from .shapes import make_shape
+from .study import outline_of
+
+FEATURE, WITHOUT = "feature", "without"
+_CHORD = 5e-4  # Largest distance of curves from their chords.
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A scene before it is made. noise: standard deviation along each axis, in the particles' own sizes."""
+    group: str
+    kind: str
+    shape: str
+    noise: float
+    seed: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.shape}-{self.seed}"
+
+
+class Measured(NamedTuple):
+    """A scene's particles (N, 2) and truth; numbers by metric and the outline, with the feature and without it."""
+    particles: Points
+    truth: Outline
+    values: dict[str, dict[str, float]]
+    outlines: dict[str, Outline]
+
+
+def _reconstruct(positions: Points, reconstruct: Callable[..., Any] = partiemc.reconstruct, **arguments: Any) -> Any:
+    """A frame's result. Without the feature, doubts about the spacing are expected."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", partiemc.PartiemcWarning)
+        return reconstruct(positions, **arguments)
+
+
+def _measure(particles: Points, truth: Outline, results: dict[str, Outline],
+             measure: Callable[[Curve], dict[str, float]]) -> Measured:
+    """The same measure of both outlines."""
+    return Measured(particles, truth, {name: measure(Curve(outline, 1.0)) for name, outline in results.items()}, results)
+
+
+def _shaken(recipe: Recipe, positions: Points, sizes: Floats | float, rng: Rng) -> Points:
+    return positions + recipe.noise * np.reshape(sizes, (-1, 1)) * rng.standard_normal(positions.shape)
+
+
+def _disc(x: float, y: float, radius: float) -> Any:
+    return Polygon(ellipse_ring((x, y), radius, radius, 0, (8 * _CHORD * radius) ** 0.5))
+
+
+def _sampled(region: Any, seed: int, rng: Rng) -> Points:
+    """Particles of spacing 1 in a Shapely polygon."""
+    return SAMPLERS[("relaxed", "settled")[seed % 2]](Curve(Outline.of_shapely(region), 1.0), False, rng)
+
+
+# Sizes, in root mean squares.
+
+def _of_two(large: float, share: float) -> Draw:
+    """share: of the area."""
+    chance = share / (share + (1 - share) * large ** 2)
+    return lambda rng, points: np.where(rng.random(len(points)) < chance, large, 1.0)
+
+
+def _uniform(largest: float) -> Draw:
+    return lambda rng, points: rng.uniform(1, largest, len(points))
+
+
+def _zones(rng: Rng, points: Points) -> Floats:
+    """Large particles on the left of the origin, a quarter as many per area."""
+    return np.where(points[:, 0] > 0, 1.0, np.where(rng.random(len(points)) < 0.25, 2.0, 0.0))
+
+
+_DRAWS: dict[str, Draw] = {
+    **{f"1:{ratio:g} uniform": _uniform(ratio) for ratio in (1.5, 3, 10)},
+    **{f"1:{ratio:g} bidisperse": _of_two(ratio, 0.5) for ratio in (1.5, 3, 10)}, "2:1 zone": _zones}
+_PARTICLES = 700
+
+
+def _local_sizes(points: Points, particles: Points, sizes: Floats) -> Floats:
+    """(M,) mean sizes around points, weighted by the kernels of core/SIZES.md; 1 where no kernel reaches."""
+    square = ((points[:, None] - particles) ** 2).sum(axis=-1) / (9 * sizes ** 2)
+    weights = np.maximum(0, 1 - square) ** 3
+    total = weights.sum(axis=1)
+    return np.where(total > 0, weights @ sizes / np.maximum(total, 1e-300), 1.0)
+
+
+def _sizes(recipe: Recipe, rng: Rng) -> Measured:
+    truth = make_shape(recipe.shape, _PARTICLES, 0.25)
+    region = Curve(truth, 1.0)
+    rest, sizes = fill_sizes(region, _DRAWS[recipe.kind], rng)
+    positions = _shaken(recipe, rest, sizes, rng)
+
+    def measure(curve: Curve) -> dict[str, float]:
+        both = [(target.nearest(points)[0] / _local_sizes(points, rest, sizes)).mean()
+                for points, target in ((curve.samples.middles, region), (region.samples.middles, curve))]
+        return {"deviation": float(np.mean(both)), "area": abs(curve.measure / region.measure - 1)}
+    results = {name: outline_of(_reconstruct(positions, spacing=1, volumes=sizes ** 2, sizes=own, threads=1))
+               for name, own in ((FEATURE, "own"), (WITHOUT, "equal"))}
+    return _measure(positions, truth, results, measure)
+
+
+# Grains, in diameters of the smallest.
+
+def _grains(recipe: Recipe, rng: Rng) -> Measured:
+    kind, ratio = recipe.kind.split(" 1:")
+    diameters = float(ratio) ** rng.random(150 if kind == "pile" else 60)
+    if kind == "pile":
+        centers = pile_grains(diameters, 14 * float(ratio) ** 0.5, rng)
+    elif kind == "loose":
+        region = Curve(make_shape(recipe.shape, 250, 0.25), 1.0)
+        centers, sizes = fill_sizes(region, lambda rng, points: float(ratio) ** rng.random(len(points)), rng)
+        diameters = shrink_to_grains(centers, sizes)
+    else:
+        centers = spray_grains(diameters, rng)
+    centers, diameters = centers / diameters.min(), diameters / diameters.min()
+    radii = diameters / 2
+
+    def measure(curve: Curve) -> dict[str, float]:
+        distance, inside = curve.nearest(centers)[0], curve.contains(centers)
+        found = {"cut": float(np.clip((radii - np.where(inside, distance, -distance)) / diameters, 0, 1).max())}
+        if kind == "spray":
+            found["lone area"] = float(np.abs(_areas_at(centers, curve.outline) / (np.pi * radii ** 2) - 1).max())
+        return found
+    results = {FEATURE: {"sizes": "own", "boundary": "grains"}, WITHOUT: {"spacing": float((diameters ** 2).mean()) ** 0.5}}
+    outlines = {name: outline_of(_reconstruct(centers, volumes=diameters ** 2, threads=1, **parameters))
+                for name, parameters in results.items()}
+    discs = Outline.of_shapely(unary_union([_disc(*center, radius) for center, radius in zip(centers, radii)]))
+    return _measure(centers, discs, outlines, measure)
+
+
+def _areas_at(points: Points, outline: Outline) -> Floats:
+    """(N,) area of the ring around each point; 0 if there is none."""
+    areas = np.zeros(len(points))
+    for ring, area in zip(outline.rings(), outline.ring_areas):
+        if area > 0:
+            areas[Curve(Outline.of([ring]), 1.0).contains(points)] = area
+    return areas
+
+
+# Phases.
+
+_MARGIN = 3.5  # Interfaces are measured this far inside the body.
+
+
+def _half_plane(x: float, y: float, angle: float) -> Any:
+    """The left side of the line through (x, y) at this angle."""
+    return affinity.translate(affinity.rotate(box(-99, 0, 99, 99), angle, origin=(0, 0), use_radians=True), x, y)
+
+
+def _phase_regions(kind: str, center: Points, rng: Rng) -> list[Any]:
+    """A region around `center` for each phase but the first one, which has the rest of the body."""
+    (x, y), angle = center, rng.uniform(0, 2 * np.pi)
+    half = _half_plane(x, y, angle)
+    if kind == "straight":
+        return [half]
+    if kind == "curved":
+        return [_disc(x + 23 * np.cos(angle), y + 23 * np.sin(angle), 23)]
+    if kind.startswith("drop of "):
+        return [_disc(x, y, (int(kind.removeprefix("drop of ")) / np.pi) ** 0.5)]
+    turn = {"sectors": 2 * np.pi / 3, "T": np.pi}[kind]
+    other = _half_plane(x, y, angle + np.pi / 2 if kind == "T" else angle + turn)
+    second = half if kind == "T" else half.difference(other)
+    third = other.difference(half) if kind == "T" else other.difference(_half_plane(x, y, angle + 2 * turn))
+    return [second, third]
+
+
+def _phases(recipe: Recipe, rng: Rng) -> Measured:
+    truth = make_shape(recipe.shape, 1400, 0.25)
+    body, center = truth.to_shapely().simplify(_CHORD), rng.uniform(-1.5, 1.5, 2)
+    parts = _phase_regions(recipe.kind, center, rng)
+    regions = [body.difference(unary_union(parts)), *(body.intersection(part) for part in parts)]
+    rest = [_sampled(region, recipe.seed, rng) for region in regions]
+    labels = np.repeat(np.arange(len(rest)), [len(points) for points in rest])
+    positions = _shaken(recipe, np.concatenate(rest), 1.0, rng)
+    shared = _reconstruct(positions, spacing=1, volumes=np.ones(len(labels)), attributes={"phase": labels},
+                          sections=[{"phase": k} for k in range(len(rest))], threads=1).sections
+    alone = [_reconstruct(positions[labels == k], spacing=1, volumes=np.ones((labels == k).sum()), threads=1)
+             for k in range(len(rest))]
+    inner, known = body.buffer(-_MARGIN), Curve(Outline.of_shapely(regions[1]), 1.0)
+    values, outlines = {}, {}
+    for name, results in ((FEATURE, shared), (WITHOUT, alone)):
+        curves = [Curve(outline_of(result), 1.0) for result in results]
+        values[name] = {
+            "deviation": compare(curves[1], known, 1.0, Curve(Outline.of_shapely(inner), 1.0).contains).mean,
+            "gap and overlap": _gap_and_overlap(curves, inner, regions[1].boundary.intersection(inner).length),
+            "area": float(max(abs(curve.measure / (labels == k).sum() - 1) for k, curve in enumerate(curves)))}
+        if len(rest) > 2:
+            values[name]["junction"] = _junction_distance(curves, center)
+        outlines[name] = Outline.of(ring for curve in curves for ring in curve.outline.rings())
+    return Measured(positions, Outline.of(ring for region in regions for ring in Outline.of_shapely(region).rings()),
+                    values, outlines)
+
+
+def _gap_and_overlap(curves: Seq[Curve], inner: Any, length: float) -> float:
+    """Mean width along interfaces."""
+    shapes = [curve.outline.to_shapely().buffer(0) for curve in curves]
+    union = unary_union(shapes)
+    excess = max(0.0, sum(shape.area for shape in shapes) - union.area)
+    return float((excess + inner.difference(union).area) / length)
+
+
+def _junction_distance(curves: Seq[Curve], center: Points) -> float:
+    """How far the point that is nearest to all outlines is from the true junction."""
+    points = np.concatenate([curve.outline.densified(0.05).points for curve in curves])
+    points = points[norm(points - center) < 3]
+    farthest = np.max([curve.nearest(points)[0] for curve in curves], axis=0)
+    return float(norm(points[farthest.argmin()] - center))
+
+
+# Walls.
+
+_DROP_AREA, _RING_POINTS, _LAYER_DEPTHS = 400.0, 128, (0.5, 1.5)
+
+
+def _drop(recipe: Recipe, rng: Rng) -> Measured:
+    """A drop whose outline is an arc that meets a line at a known angle."""
+    degrees = float(recipe.kind.removeprefix("drop at "))
+    angle = np.radians(degrees)
+    radius = (_DROP_AREA / (angle - np.sin(angle) * np.cos(angle))) ** 0.5
+    place = Similarity.plane(rng.uniform(0, 2 * np.pi), shift=rng.uniform(-9, 9, 2))
+    region = _disc(0, -radius * np.cos(angle), radius).intersection(box(-99, 0, 99, 99))
+    positions = place(_shaken(recipe, _sampled(region, recipe.seed, rng), 1.0, rng))
+    line, feet = place(np.array([(0.0, 0), (1, 0)])), place(radius * np.sin(angle) * np.array([(-1.0, 0), (1, 0)]))
+    truth = Outline.of_shapely(region)
+    known = Curve(truth.moved(place(truth.points)), 1.0)
+    at_wall = _reconstruct(positions, spacing=1, walls=[line], threads=1)
+    free = _reconstruct(positions, spacing=1, threads=1)
+    contacts = at_wall.rings.points[at_wall.rings.contacts]
+    # The fit of a circle above the wall.
+    gauge = free.rings.gauge("contact", x=line[0, 0], y=line[0, 1], dx=line[1, 0] - line[0, 0],
+                             dy=line[1, 1] - line[0, 1], reach=6)
+    fitted = line[0] + np.outer([gauge["start"], gauge["end"]], line[1] - line[0])
+    values, outlines = {}, {}
+    for name, result, found, angles in (
+            (FEATURE, at_wall, contacts, np.degrees(at_wall.rings.contact_angles)),
+            (WITHOUT, free, fitted, np.array([gauge["start_angle"], gauge["end_angle"]]))):
+        outlines[name] = outline_of(result)
+        curve = Curve(outlines[name], 1.0)
+        values[name] = {
+            "contact": float(norm(feet[:, None] - found).min(axis=1).mean()) if len(found) else radius,
+            "angle": float(np.abs(angles - degrees).mean()) if len(angles) else ABSENT,
+            "foot": float(curve.nearest(feet)[0].mean()),
+            "deviation": compare(curve, known, 1.0, lambda points: place.inverse()(points)[:, 1] > 1).mean}
+    return Measured(positions, known.outline, values, outlines)
+
+
+def _tank(recipe: Recipe, rng: Rng) -> Measured:
+    """A tank, turned, half full of fluid with a level surface."""
+    turn = rng.uniform(8, 20) * rng.choice([-1, 1])
+    middle, is_round = rng.uniform(-5, 5, 2), recipe.kind.startswith("round")
+    tank = Polygon(ellipse_ring((0, 0), 14, 14, 0, 2 * np.pi * 14 / _RING_POINTS)) if is_round else box(-16, -11, 16, 11)
+    tank = affinity.translate(affinity.rotate(tank, turn, origin=(0, 0)), *middle)
+    level = middle[1] + rng.uniform(-1, 2)
+    region = tank.intersection(box(-99, -99, 99, level))
+    fluid = _shaken(recipe, _sampled(region, recipe.seed, rng), 1.0, rng)
+    wall, truth = Curve(Outline.of_shapely(tank), 1.0), Curve(Outline.of_shapely(region), 1.0)
+    if recipe.kind.endswith("of particles"):
+        layers = np.concatenate([sample_curve(Outline.of_shapely(tank.buffer(depth, join_style=2)), 1.0).middles
+                                 for depth in _LAYER_DEPTHS])
+        positions = np.concatenate([fluid, layers])
+        labels = np.repeat([1, 2], [len(fluid), len(layers)])
+        at_wall = _reconstruct(positions, spacing=1, wall_phases=[2], attributes={"phase": labels}, threads=1)
+    else:
+        positions = fluid
+        at_wall = _reconstruct(positions, spacing=1, walls=[wall.outline.points], threads=1)
+    corners = np.empty((0, 2)) if is_round else wall.outline.points
+    corners = corners[corners[:, 1] < level - 3]
+
+    def measure(curve: Curve) -> dict[str, float]:
+        points = curve.samples.middles
+        distance = wall.nearest(points)[0]
+        along = (distance < 1) & (points[:, 1] < level - 3)
+        along &= (norm(points[:, None] - corners) > 3).all(axis=1)
+        height = np.where(wall.contains(points), distance, -distance)[along]
+        found = {"offset": abs(float(height.mean())), "rms": float(height.std()),
+                 "deviation": compare(curve, truth, 1.0).mean}
+        return found if is_round else {**found, "corner": float(curve.nearest(corners)[0].mean())}
+    results = {FEATURE: outline_of(at_wall), WITHOUT: outline_of(_reconstruct(fluid, spacing=1, threads=1))}
+    return _measure(positions, truth.outline, results, measure)
+
+
+def _walls(recipe: Recipe, rng: Rng) -> Measured:
+    return _drop(recipe, rng) if recipe.kind.startswith("drop") else _tank(recipe, rng)
+
+
+# Periodic boxes.
+
+def _across(recipe: Recipe, rng: Rng) -> Measured:
+    """A disc across faces of the box, against the same disc in the middle."""
+    length, region = np.array([52.0, 44.0]), _disc(0, 0, 11.5)
+    points = _shaken(recipe, _sampled(region, recipe.seed, rng), 1.0, rng)
+    center = np.where([True, recipe.kind == "across a corner"], 0, length / 2) + rng.uniform(-4, 4, 2)
+    middle = _reconstruct(points + length / 2, spacing=1, threads=1)
+    truth = Outline.of_shapely(affinity.translate(region, *center))
+    values, outlines = {}, {}
+    for name, periodic in ((FEATURE, {"x": (0, length[0]), "y": (0, length[1])}), (WITHOUT, None)):
+        result = _reconstruct((points + center) % length, spacing=1, box=periodic, threads=1)
+        outlines[name] = outline_of(result)
+        values[name] = {"area": abs(result.area / middle.area - 1), "perimeter": abs(result.perimeter / middle.perimeter - 1),
+                        "bodies": abs(float((result.rings.outer_of < 0).sum()) - 1)}
+    return Measured((points + center) % length, truth, values, outlines)
+
+
+_SHEAR_FRAMES = 24
+
+
+def _shear_flow(recipe: Recipe, rng: Rng) -> Measured:
+    """Drops that a shear flow carries across faces of the box: x moves by y in all frames together."""
+    length, heights = 50.0, np.array([-24.0, -12, 0, 12, 24])
+    starts = np.stack([rng.uniform(-3, 3, 5) - heights / 2, heights], axis=1)
+    drops = [start + _sampled(_disc(0, 0, 4.4), recipe.seed, rng) for start in starts]
+    owner, points = np.repeat(np.arange(5), [len(drop) for drop in drops]), np.concatenate(drops)
+
+    def at(places: Points, t: float) -> Points:
+        moved = places + t * np.stack([places[:, 1], 0 * places[:, 1]], axis=1)
+        return np.stack([moved[:, 0] % length, moved[:, 1]], axis=1)
+    values, outlines = {}, {}
+    for name, periodic in ((FEATURE, {"x": (0, length)}), (WITHOUT, None)):
+        stream, seen = partiemc.Reconstructor(spacing=1, box=periodic, threads=1), set()
+        errors = []
+        for t in np.linspace(0, 1, _SHEAR_FRAMES):
+            result = _reconstruct(at(points, t), stream.reconstruct, ids=np.arange(len(points)))
+            outer = result.rings.outer_of < 0
+            # A drop's height does not change.
+            nearest = np.abs(result.rings.centroids[outer][:, 1, None] - heights).argmin(axis=1)
+            seen.update(zip(result.rings.identities[outer].tolist(), nearest.tolist()))
+            errors.append((abs(outer.sum() - 5.0), abs(result.area / len(owner) - 1)))
+        bodies, area = np.mean(errors, axis=0)
+        values[name] = {"area": float(area), "bodies": float(bodies), "new identities": float(len(seen) - 5)}
+        outlines[name] = outline_of(result)
+    return Measured(at(points, 1), Outline(), values, outlines)
+
+
+def _layer(recipe: Recipe, rng: Rng) -> Measured:
+    """A wavy layer that reaches its own image."""
+    length, phases = 44.0, rng.uniform(0, 2 * np.pi, 2)
+    x = np.linspace(0, length, 500)
+    low, high = (height + rise * np.sin(2 * np.pi * x / length + phase)
+                 for height, rise, phase in ((0, 1.5, phases[0]), (13, 2.5, phases[1])))
+    edges = [np.stack([x, low], axis=1), np.stack([x, high], axis=1)]
+    region = Polygon(np.concatenate([edges[0], edges[1][::-1]]))
+    points = _shaken(recipe, _sampled(region, recipe.seed, rng), 1.0, rng)
+    points = np.stack([points[:, 0] % length, points[:, 1]], axis=1)
+    true_perimeter = sum(norm(np.diff(edge, axis=0)).sum() for edge in edges)
+    values, outlines = {}, {}
+    for name, periodic in ((FEATURE, {"x": (0, length)}), (WITHOUT, None)):
+        result = _reconstruct(points, spacing=1, box=periodic, volumes=np.full(len(points), region.area / len(points)),
+                              threads=1)
+        left, right = (result.rings.heights_at(at) for at in (1e-3, length - 1e-3))
+        cut_rings = np.unique(np.searchsorted(result.rings.offsets, result.rings.cuts, side="right"))
+        values[name] = {"area": abs(result.area / region.area - 1), "perimeter": abs(result.perimeter / true_perimeter - 1),
+                        "cut bodies": abs(len(cut_rings) - 1.0),
+                        "step at the face": float(np.abs(left - right).max()) if len(left) == len(right) > 0 else ABSENT}
+        outlines[name] = outline_of(result)
+    return Measured(points, Outline.of_shapely(region), values, outlines)
+
+
+def _periodic(recipe: Recipe, rng: Rng) -> Measured:
+    return {"shear flow": _shear_flow, "layer": _layer}.get(recipe.kind, _across)(recipe, rng)
+
+
+_GROUPS: dict[str, Callable[[Recipe, Rng], Measured]] = {
+    "sizes": _sizes, "grains": _grains, "phases": _phases, "walls": _walls, "periodic": _periodic}
+SETS = ("all", "smoke", *_GROUPS)
+
+
+def measure(recipe: Recipe) -> Measured:
+    """Cost: about a second."""
+    return _GROUPS[recipe.group](recipe, np.random.default_rng(recipe.seed))
+
+
+def make_matter_set(name: str) -> list[Recipe]:
+    """The recipes of a set of SETS: all groups, one of them, or one scene of each kind (smoke)."""
+    plans: list[tuple[str, Seq[str], Seq[str], Seq[float], int]] = [  # Group, kinds, shapes, noises, seeds.
+        ("sizes", tuple(_DRAWS), ("egg", "bean", "trapezoid"), (0, 0.15), 1),
+        ("grains", [f"{kind} 1:{ratio}" for kind in ("pile", "loose", "spray") for ratio in (1, 3, 6)], ("clover",), (0,), 3),
+        ("phases", ("straight", "curved", "drop of 254", "drop of 30", "sectors", "T"), ("egg",), (0, 0.1), 4),
+        ("walls", (*(f"drop at {angle}" for angle in (30, 60, 90, 120, 150)), "tank", "round tank", "tank of particles",
+                   "round tank of particles"), ("",), (0, 0.1), 4),
+        ("periodic", ("across an edge", "across a corner", "layer"), ("",), (0, 0.1), 4),
+        ("periodic", ("shear flow",), ("",), (0,), 4)]
+    first, recipes = 52_000_000, []
+    for group, kinds, shapes, noises, seeds in plans:
+        for kind in kinds:
+            for noise in noises:
+                for k in range(1 if name == "smoke" else len(shapes) * seeds):
+                    recipes.append(Recipe(group, kind, shapes[k % len(shapes)], noise, first + 1000 * len(recipes) + k))
+    return [recipe for recipe in recipes if name in ("all", "smoke", recipe.group)]
