@@ -1,7 +1,5 @@
 """Real matter: the scenes of `matter_scenes` as rows, and their tables of the feature against its absence."""
 
-from dataclasses import dataclass
-from functools import partial
 from typing import Callable, NamedTuple, Sequence as Seq
 
 import numpy as np
@@ -28,7 +26,7 @@ _TARGETS: tuple[_Target, ...] = (
     ("walls", ("tank",), "corner", False, 0.0, 0.0), ("walls", ("tank",), "offset", False, 0.0, 0.0),
     ("walls", ("tank",), "rms", False, 0.0, 0.0))
 _BY_WORST = ("cut", "lone area", "area", "gap and overlap")  # The worst scene must reach these, else the mean.
-_ROUNDING = 1e-9
+_ROUNDING, _NEGLIGIBLE = 1e-9, 1e-3
 _PICTURED = ("1:10 bidisperse", "2:1 zone", "pile 1:3", "loose 1:3", "sectors", "drop of 30", "tank of particles",
              "drop at 120", "layer", "across a corner")
 
@@ -75,7 +73,7 @@ def matter_tables(rows: Seq[Row]) -> list[Table]:
 
 def _group_table(group: str, rows: Seq[Row]) -> Table:
     table = Table(f"Matter: {group}", "Means over scenes; ratio: geometric mean over scenes of the feature's number over that "
-                  "without it, within .1 to 10. ! beside a ratio: worse than without; beside a number: misses the must.",
+                  "without it, within .1 to 10; scenes with both below .001 are left out. ! beside a ratio: worse than without; beside a number: misses the must.",
                   ["feature", "without", "ratio", "worst", "scene", "must", "aim", "scenes"], [])
     with_it, without = ([row for row in rows if row.method == name] for name in (FEATURE, WITHOUT))
     for kind, state in dict.fromkeys((row.shape, row.sampler) for row in rows):
@@ -96,5 +94,6 @@ def _group_table(group: str, rows: Seq[Row]) -> Table:
 
 
 def _ratio(own: Seq[Row], other: Seq[Row], metric: str) -> str:
-    ratio = geometric_mean(match(own, other, metric))
+    pairs = match(own, other, metric)
+    ratio = geometric_mean(pairs[(pairs > _NEGLIGIBLE).any(axis=1)])
     return fixed(ratio) + "!" * (ratio > 1)
