@@ -75,14 +75,14 @@ def _parser() -> argparse.ArgumentParser:
     space.add_argument("set", choices=surface_sets())
     space.add_argument("--digests", action="store_true", help="print a digest of the particles of each scene, and measure "
                        "nothing")
-    matter = verbs.add_parser("matter", help="measure sizes, grains, phases, walls and periodic boxes with the feature and "
-                              "without it")
-    matter.add_argument("set", choices=MATTER_SETS, nargs="?", default="all", help="all groups (the default), one of them, "
-                        "or one scene of each kind")
+    matter = verbs.add_parser("matter", help="measure sizes, grains, phases, walls and periodic boxes with the feature "
+                              "and without it")
+    matter.add_argument("set", choices=MATTER_SETS, nargs="?", default="all", help="all groups (the default), one of "
+                        "them, or one scene of each kind (smoke)")
     matter.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="write matter.html and matter.json here")
     for scenes in (space, matter):
-        scenes.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1, help="scenes at a time; one for "
-                            "each processor by default")
+        scenes.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1, help="scenes at a time; "
+                            "one for each processor by default")
         scenes.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 

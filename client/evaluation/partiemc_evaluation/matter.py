@@ -22,9 +22,9 @@ _TARGETS: tuple[_Target, ...] = (
     ("walls", ("drop at 60", "drop at 90", "drop at 120"), "contact", False, 0.5, 0.2),
     ("walls", ("drop at 30", "drop at 60", "drop at 90", "drop at 120"), "angle", False, 5.0, 3.0),
     ("walls", ("tank of", "round tank of"), "offset", False, 0.05, 0.01),
-    ("walls", ("tank of", "round tank of"), "rms", False, 0.04, 0.015), ("walls", ("tank of",), "corner", False, 0.25, 0.12),
-    ("walls", ("tank",), "corner", False, 0.0, 0.0), ("walls", ("tank",), "offset", False, 0.0, 0.0),
-    ("walls", ("tank",), "rms", False, 0.0, 0.0))
+    ("walls", ("tank of", "round tank of"), "rms", False, 0.04, 0.015),
+    ("walls", ("tank of",), "corner", False, 0.25, 0.12), ("walls", ("tank",), "corner", False, 0.0, 0.0),
+    ("walls", ("tank",), "offset", False, 0.0, 0.0), ("walls", ("tank",), "rms", False, 0.0, 0.0))
 _BY_WORST = ("cut", "lone area", "area", "gap and overlap")  # The worst scene must reach these, else the mean.
 _ROUNDING, _NEGLIGIBLE = 1e-9, 1e-3
 _PICTURED = ("1:10 bidisperse", "2:1 zone", "pile 1:3", "loose 1:3", "sectors", "drop of 30", "tank of particles",
@@ -50,7 +50,7 @@ def run_matter(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None] 
     """All scenes; the same rows for any number of jobs. The last state of each pictured kind has a picture."""
     rows: list[Row] = []
     shots: dict[str, dict[str, list[Shot]]] = {}
-    for recipe, (of_scene, of_pictures) in zip(recipes, map_in_processes(_measure_rows, recipes, jobs, progress)):
+    for (of_scene, of_pictures), recipe in zip(map_in_processes(_measure_rows, recipes, jobs, progress), recipes):
         rows += of_scene
         if recipe.kind in _PICTURED:
             shots.setdefault(recipe.group, {})[recipe.kind] = of_pictures
@@ -72,8 +72,9 @@ def matter_tables(rows: Seq[Row]) -> list[Table]:
 
 
 def _group_table(group: str, rows: Seq[Row]) -> Table:
-    table = Table(f"Matter: {group}", "Means over scenes; ratio: geometric mean over scenes of the feature's number over that "
-                  "without it, within .1 to 10; scenes with both below .001 are left out. ! beside a ratio: worse than without; beside a number: misses the must.",
+    table = Table(f"Matter: {group}", "Means over scenes. Ratio: geometric mean over scenes of the number with the "
+                  "feature over that without, within .1 to 10; scenes with both below .001 are left out. ! beside a "
+                  "ratio: worse than without; beside a number: misses the must.",
                   ["feature", "without", "ratio", "worst", "scene", "must", "aim", "scenes"], [])
     with_it, without = ([row for row in rows if row.method == name] for name in (FEATURE, WITHOUT))
     for kind, state in dict.fromkeys((row.shape, row.sampler) for row in rows):
@@ -83,9 +84,10 @@ def _group_table(group: str, rows: Seq[Row]) -> Table:
             mean, target = mean_of([row[metric] for row in own]), target_of(group, kind, state, metric)
             judged = worst[metric] if metric in _BY_WORST else mean
             missed = target is not None and not judged <= target[0] + _ROUNDING
+            by_mean, by_worst = missed and metric not in _BY_WORST, missed and metric in _BY_WORST
             table.rows.append((f"{kind}, {state}: {metric}", [
-                fixed(mean, 4) + "!" * (missed and metric not in _BY_WORST), fixed(mean_of([row[metric] for row in other]), 4),
-                _ratio(own, other, metric), fixed(worst[metric], 4) + "!" * (missed and metric in _BY_WORST), worst.sequence,
+                fixed(mean, 4) + "!" * by_mean, fixed(mean_of([row[metric] for row in other]), 4),
+                _ratio(own, other, metric), fixed(worst[metric], 4) + "!" * by_worst, worst.sequence,
                 *(map("{:g}".format, target) if target else "--"), str(len(own))]))
     for metric in dict.fromkeys(metric for row in with_it for metric in row.values):
         own, other = ([row for row in part if metric in row.values] for part in (with_it, without))

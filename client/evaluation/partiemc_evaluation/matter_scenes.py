@@ -1,8 +1,8 @@
-"""Scenes of real matter with known truth: different sizes, grains, phases, walls and periodic boxes. Each is measured with
-the feature and without it. Lengths are in spacings, areas relative.
+"""Scenes of real matter with known truth: different sizes, grains, phases, walls and periodic boxes. Each is measured
+with the feature and without it. Lengths are in spacings, areas relative.
 
-The truth, its particles and all random choices follow from a recipe. Scenes and seeds are others than those in tests/core;
-no constant is chosen by them.
+The truth, its particles and all random choices follow from a recipe. Scenes and seeds are others than those in
+tests/core; no constant is chosen by them.
 """
 
 import warnings
@@ -271,7 +271,8 @@ def _tank(recipe: Recipe, rng: Rng) -> Measured:
     """A tank, turned, half full of fluid with a level surface."""
     turn = rng.uniform(8, 20) * rng.choice([-1, 1])
     middle, is_round = rng.uniform(-5, 5, 2), recipe.kind.startswith("round")
-    tank = Polygon(ellipse_ring((0, 0), 14, 14, 0, 2 * np.pi * 14 / _RING_POINTS)) if is_round else box(-16, -11, 16, 11)
+    ring = ellipse_ring((0, 0), 14, 14, 0, 2 * np.pi * 14 / _RING_POINTS)
+    tank = Polygon(ring) if is_round else box(-16, -11, 16, 11)
     tank = affinity.translate(affinity.rotate(tank, turn, origin=(0, 0)), *middle)
     level = middle[1] + rng.uniform(-1, 2)
     region = tank.intersection(box(-99, -99, 99, level))
@@ -319,7 +320,8 @@ def _across(recipe: Recipe, rng: Rng) -> Measured:
         return outline_of(result), {
             "area": abs(result.area / middle.area - 1), "perimeter": abs(result.perimeter / middle.perimeter - 1),
             "bodies": abs(float((result.rings.outer_of < 0).sum()) - 1)}
-    return _with_and_without((points + center) % length, Outline.of_shapely(affinity.translate(region, *center)), run)
+    truth = Outline.of_shapely(affinity.translate(region, *center % length))
+    return _with_and_without((points + center) % length, truth, run)
 
 
 _SHEAR_FRAMES = 24
@@ -382,6 +384,7 @@ def _periodic(recipe: Recipe, rng: Rng) -> Measured:
 _GROUPS: dict[str, Callable[[Recipe, Rng], Measured]] = {
     "sizes": _sizes, "grains": _grains, "phases": _phases, "walls": _walls, "periodic": _periodic}
 SETS = ("all", "smoke", *_GROUPS)
+_FIRST_SEED = 52_000_000
 
 
 def measure(recipe: Recipe) -> Measured:
@@ -393,16 +396,19 @@ def make_matter_set(name: str) -> list[Recipe]:
     """The recipes of a set of SETS: all groups, one of them, or one scene of each kind, at rest (smoke)."""
     plans: list[tuple[str, Seq[str], Seq[str], Seq[float], int]] = [  # Group, kinds, shapes, noises, seeds.
         ("sizes", tuple(_DRAWS), ("egg", "bean", "trapezoid"), (0, 0.15), 1),
-        ("grains", [f"{kind} 1:{ratio}" for kind in ("pile", "loose", "spray") for ratio in (1, 3, 6)], ("clover",), (0,), 3),
+        ("grains", [f"{kind} 1:{ratio}" for kind in ("pile", "loose", "spray") for ratio in (1, 3, 6)], ("clover",),
+         (0,), 3),
         ("phases", ("straight", "curved", "drop of 254", "drop of 30", "sectors", "T"), ("egg",), (0, 0.1), 4),
-        ("walls", (*(f"drop at {angle}" for angle in (30, 60, 90, 120, 150)), "tank", "round tank", "tank of particles",
-                   "round tank of particles"), ("",), (0, 0.1), 4),
+        ("walls", (*(f"drop at {angle}" for angle in (30, 60, 90, 120, 150)), "tank", "round tank",
+                   "tank of particles", "round tank of particles"), ("",), (0, 0.1), 4),
         ("periodic", ("across an edge", "across a corner", "layer"), ("",), (0, 0.1), 4),
         ("periodic", ("shear flow",), ("",), (0,), 4)]
-    first, recipes = 52_000_000, []
+    recipes: list[Recipe] = []
+    smoke: list[Recipe] = []
     for group, kinds, shapes, noises, seeds in plans:
         for kind in kinds:
-            for noise in noises[:1] if name == "smoke" else noises:
-                for k in range(1 if name == "smoke" else len(shapes) * seeds):
-                    recipes.append(Recipe(group, kind, shapes[k % len(shapes)], noise, first + 1000 * len(recipes) + k))
-    return [recipe for recipe in recipes if name in ("all", "smoke", recipe.group)]
+            for noise in noises:
+                recipes += [Recipe(group, kind, shapes[k % len(shapes)], noise, _FIRST_SEED + 1000 * len(recipes) + k)
+                            for k in range(len(shapes) * seeds)]
+                smoke += recipes[-len(shapes) * seeds:][:noise == 0]
+    return smoke if name == "smoke" else [recipe for recipe in recipes if name in ("all", recipe.group)]

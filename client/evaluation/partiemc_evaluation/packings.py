@@ -21,7 +21,7 @@ Draw = Callable[[Rng, Points], Floats]
 
 
 def fill_sizes(region: Curve, draw: Draw, rng: Rng) -> tuple[Points, Floats]:
-    """Centres (N, 2) and sizes (N,) of particles at rest: N is the region's area, and so is the sum of squared sizes."""
+    """Centres (N, 2) and sizes (N,) of particles at rest. N and the sum of squared sizes are the region's area."""
     low, high = region.bounds
     count, centers, sizes = round(region.measure), np.empty((0, 2)), np.empty(0)
     while len(sizes) < count:

@@ -55,7 +55,8 @@ def as_json(evaluation: Evaluation) -> str:
 
 def _json_rows(rows: Seq[Row]) -> list[dict[str, Any]]:
     return [{**{key: value for key, value in vars(row).items() if key not in ("values", "frames")},
-             **{metric: value if math.isfinite(value) else None for metric, value in row.values.items()}} for row in rows]
+             **{metric: value if math.isfinite(value) else None for metric, value in row.values.items()}}
+            for row in rows]
 
 
 def _picture(figure: Figure, alt: str) -> str:
