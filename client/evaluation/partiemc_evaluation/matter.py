@@ -88,7 +88,7 @@ def _group_table(group: str, rows: Seq[Row]) -> Table:
             table.rows.append((f"{kind}, {state}: {metric}", [
                 fixed(mean, 4) + "!" * by_mean, fixed(mean_of([row[metric] for row in other]), 4),
                 _ratio(own, other, metric), fixed(worst[metric], 4) + "!" * by_worst, worst.sequence,
-                *(map("{:g}".format, target) if target else "--"), str(len(own))]))
+                *([f"{value:g}" for value in target] if target else ["-", "-"]), str(len(own))]))
     for metric in dict.fromkeys(metric for row in with_it for metric in row.values):
         own, other = ([row for row in part if metric in row.values] for part in (with_it, without))
         table.rows.append((f"all: {metric}", ["", "", _ratio(own, other, metric), "", "", "", "", str(len(own))]))

@@ -140,8 +140,9 @@ def _grains(recipe: Recipe, rng: Rng) -> Measured:
     radii = diameters / 2
 
     def run(as_grains: bool) -> tuple[Outline, dict[str, float]]:
-        parameters = ({"sizes": "own", "boundary": "grains"} if as_grains
-                      else {"spacing": float((diameters ** 2).mean()) ** 0.5})
+        parameters: dict[str, Any] = {"spacing": float((diameters ** 2).mean()) ** 0.5}
+        if as_grains:
+            parameters = {"sizes": "own", "boundary": "grains"}
         outline = outline_of(_reconstruct(centers, volumes=diameters ** 2, **parameters))
         curve = Curve(outline, 1.0)
         distance, inside = curve.nearest(centers)[0], curve.contains(centers)
@@ -278,7 +279,8 @@ def _tank(recipe: Recipe, rng: Rng) -> Measured:
     region = tank.intersection(box(-99, -99, 99, level))
     fluid = _shaken(recipe, _sampled(region, recipe.seed, rng), 1.0, rng)
     wall, truth = Curve(Outline.of_shapely(tank), 1.0), Curve(Outline.of_shapely(region), 1.0)
-    positions, known = fluid, {"walls": [wall.outline.points]}
+    positions = fluid
+    known: dict[str, Any] = {"walls": [wall.outline.points]}
     if recipe.kind.endswith("of particles"):
         layers = np.concatenate([sample_curve(Outline.of_shapely(tank.buffer(depth, join_style=2)), 1.0).middles
                                  for depth in _LAYER_DEPTHS])
@@ -340,7 +342,8 @@ def _shear_flow(recipe: Recipe, rng: Rng) -> Measured:
 
     def run(periodic: bool) -> tuple[Outline, dict[str, float]]:
         stream = partiemc.Reconstructor(spacing=1, threads=1, box={"x": (0, length)} if periodic else None)
-        seen, errors = set(), []
+        seen: set[tuple[int, int]] = set()
+        errors: list[tuple[float, float]] = []
         for t in np.linspace(0, 1, _SHEAR_FRAMES):
             result = stream.reconstruct(at(points, t), ids=np.arange(len(points)))
             outer = result.rings.outer_of < 0
