@@ -247,6 +247,51 @@ TEST(Walls, LinesAndCornersOnTheLatticeAreExact) {
   }
 }
 
+// Corners of turned tanks and obstacles, of one wall or of several, also in cells whose nodes are
+// all outside.
+TEST(Walls, CornersOfTurnedPolygonsAreVertices) {
+  Random random(71);
+  int missed = 0;
+  for (int tank = 0; tank < 300; ++tank) {
+    SCOPED_TRACE(tank);
+    const int corners = 4 + tank % 4;
+    const double x = random.Uniform(-9, 9), y = random.Uniform(-9, 9);
+    const double radius = random.Uniform(12, 20), turn = random.Uniform(0, 7);
+    const Wall around = PolygonWall(x, y, radius, corners, turn, true);
+    const double size = random.Uniform(2.5, 4);
+    const Wall obstacle = PolygonWall(x, y, size, 3 + tank % 3, random.Uniform(0, 7), false);
+    Particles particles;
+    // Denser than the spacing, so that the fluid reaches into the corners.
+    for (int k = 0; k < 90 * 90; ++k) {
+      const double px = x + (k % 90 - 45) * .5, py = y + (k / 90 - 45) * .5;
+      if (Height({around, obstacle}, px, py) > .2) particles.Add(px, py);
+    }
+    ReconstructionParameters parameters{.spacing = 1.0, .walls = {around, obstacle}};
+    if (tank % 4 == 0) {  // The sides as endless lines.
+      parameters.walls = {obstacle};
+      for (std::size_t k = 0; k < around.points.size(); k += 2) {
+        const std::size_t next = (k + 2) % around.points.size();
+        parameters.walls.push_back({{around.points[k], around.points[k + 1], around.points[next],
+                                     around.points[next + 1]}});
+      }
+    }
+    const Result result = ReconstructOnce(parameters, particles);
+    const absl::Status status = Validate(result);
+    ASSERT_TRUE(status.ok()) << status;
+    for (const Wall& wall : {around, obstacle}) {
+      for (std::size_t k = 0; k < wall.points.size(); k += 2) {
+        double nearest = 1e300;
+        for (std::size_t p = 0; p < result.rings.PointCount(); ++p) {
+          nearest = std::min(nearest, std::hypot(X(result.rings, p) - wall.points[k],
+                                                 Y(result.rings, p) - wall.points[k + 1]));
+        }
+        missed += nearest > 1e-9;
+      }
+    }
+  }
+  EXPECT_EQ(missed, 0);
+}
+
 // Walls that reach far beyond the particles, or lie far from them.
 TEST(Walls, FarPointsOfWallsDoNotMatter) {
   const Rings expected = ReconstructOnce(kTank, Column()).rings;

@@ -41,11 +41,13 @@ class ContactFitter {
     const WallEdge& edge = lines_.edges()[place.edge];
     loop_ = edge.loop;
     start_ = lines_.Along(place);
-    const std::optional<ContactCurve> curve = ContactCurve::Fit(
-        walls_, p_.tile[contact], place, h_, [&](std::size_t k) -> std::optional<Point> {
-          if (k >= count_ || p_.kind[Free(k)] != VertexKind::kFree) return std::nullopt;
-          return PointOf(Free(k));
-        });
+    const std::optional<ContactCurve> curve =
+        ContactCurve::Fit({walls_, input_.bins.tiles, p_.tile[contact]}, place, h_,
+                          [&](std::size_t k) -> std::optional<Point> {
+                            if (k >= count_ || p_.kind[Free(k)] != VertexKind::kFree)
+                              return std::nullopt;
+                            return PointOf(Free(k));
+                          });
     bool is_free = false;  // Whether the contact moves as far as the curve says.
     if (curve) {
       is_free = MoveContact(curve->foot());

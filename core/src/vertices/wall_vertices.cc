@@ -13,6 +13,12 @@
 namespace partiemc {
 namespace {
 
+// Number of vertices of a stretch between contacts that may become wet.
+constexpr std::size_t kShortStretch = 6;
+// Corners that turn by less than about 5 degrees need no vertex: the cosine.
+constexpr double kStraight = .996;
+// A vertex moves at most this far to a corner, in cells.
+constexpr double kMostMove = 2;
 // A corner counts as part of a cell if it is at most this far outside, in cells.
 constexpr double kCornerTolerance = 1e-9;
 
@@ -40,6 +46,10 @@ class WallVertexFinder {
       meets_wall |= v_.walls.kind[2 * k] == VertexKind::kWall;
     }
     for (std::size_t k = first; k < last; ++k) FindCell(k, k + 1 < last ? k + 1 : first);
+    if (meets_wall) {
+      WetShortStretches(2 * first, 2 * last);
+      MoveToCorners(2 * first, 2 * last);
+    }
     return meets_wall;
   }
 
@@ -191,6 +201,95 @@ class WallVertexFinder {
       return e.is_endless || (at >= 0 && at <= 1);
     };
     if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{of_a, on_a}, a, b);
+  }
+
+  // In a corner of a tank, the outline of the fluid may be just inside of the walls for a few
+  // vertices. These become vertices on walls.
+  void WetShortStretches(std::size_t first, std::size_t last) {
+    const std::size_t count = last - first;
+    const auto at = [&](std::size_t k) { return first + k % count; };
+    for (std::size_t contact = 0; contact < count; ++contact) {
+      if (v_.walls.kind[at(contact)] != VertexKind::kContact) continue;
+      if (v_.walls.is_wet[at(contact)] != 0) continue;  // The ring runs along the wall from here.
+      std::size_t end = contact + 1;
+      while (end < contact + kShortStretch && IsLow(at(end))) ++end;
+      if (v_.walls.kind[at(end)] != VertexKind::kContact) continue;
+      for (std::size_t k = contact; k <= end; ++k) {
+        v_.walls.is_wet[at(k)] = 1;
+        v_.walls.kind[at(k)] = VertexKind::kWall;
+        if (k == contact || k == end) continue;
+        SetWall(at(k), walls_.Nearest(v_.walls.tile[at(k)], v_.point[at(k)]).place,
+                VertexKind::kWall);
+      }
+    }
+  }
+
+  // Whether a free vertex is nearly on a wall.
+  bool IsLow(std::size_t vertex) const {
+    if (v_.walls.kind[vertex] != VertexKind::kFree || v_.walls.tile[vertex] == kNoTile)
+      return false;
+    const double height = walls_.Nearest(v_.walls.tile[vertex], v_.root[vertex]).height;
+    return std::abs(height) < WallField::kReach / 2 * input_.scale.spacing;
+  }
+
+  // A corner of a tank may lie in a cell whose nodes are all outside. The ring then passes from one
+  // line to the other without a vertex at the corner: moves the nearer one of the two vertices
+  // there.
+  void MoveToCorners(std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const std::size_t next = k + 1 < last ? k + 1 : first;
+      if (v_.walls.is_wet[k] == 0) continue;
+      const std::optional<WallPlace> corner = CornerBetween(k, next);
+      if (!corner) continue;
+      const Point at = lines_.At(*corner);
+      if (AreEqual(v_.point[k], at) || AreEqual(v_.point[next], at)) continue;
+      const double to_k = Length(Minus(v_.point[k], at));
+      const double to_next = Length(Minus(v_.point[next], at));
+      const auto may_move = [&](std::size_t vertex) {
+        return v_.walls.kind[vertex] == VertexKind::kWall && !IsCorner(v_.walls.place[vertex]);
+      };
+      const std::size_t nearer = to_k < to_next ? k : next, other = to_k < to_next ? next : k;
+      const std::size_t moved = may_move(nearer) ? nearer : other;
+      if (!may_move(moved) || std::max(to_k, to_next) > kMostMove) continue;
+      v_.walls.place[moved] = *corner;
+      v_.point[moved] = at;
+    }
+  }
+
+  bool IsCorner(const WallPlace& place) const {
+    return !lines_.edges()[place.edge].is_endless && (place.share == 0 || place.share == 1);
+  }
+
+  // The sharpest corner between the places of two vertices that follow each other along walls.
+  std::optional<WallPlace> CornerBetween(std::size_t k, std::size_t next) const {
+    const WallPlace &from = v_.walls.place[k], &to = v_.walls.place[next];
+    const WallEdge &a = lines_.edges()[from.edge], &b = lines_.edges()[to.edge];
+    if (from.edge == to.edge) return std::nullopt;
+    std::optional<WallPlace> sharpest;
+    double straightest = kStraight;
+    const auto consider = [&](const WallPlace& place, const WallEdge& before,
+                              const WallEdge& after) {
+      const double cosine = Dot(before.unit, after.unit);
+      if (cosine >= straightest) return;
+      straightest = cosine;
+      sharpest = place;
+    };
+    if (a.loop != b.loop) {
+      ConsiderCrossing(from.edge, to.edge, consider);
+      return sharpest;
+    }
+    const auto of = lines_.EdgesOfLoop(a.loop);
+    const auto start = static_cast<std::size_t>(&a - of.data());
+    const double whole = lines_.Between(a.loop, lines_.Along(from), lines_.Along(to));
+    for (std::size_t step = 0; step < of.size(); ++step) {
+      const WallEdge& before = of[(start + step) % of.size()];
+      const WallEdge& after = of[(start + step + 1) % of.size()];
+      const double length = lines_.Between(a.loop, lines_.Along(from), after.start);
+      if (length < 0 || length > whole) break;
+      const auto edge = static_cast<std::uint32_t>(&before - lines_.edges().data());
+      consider({edge, 1}, before, after);
+    }
+    return sharpest;
   }
 
   // Whether a point is in a solid near the tile, by more than rounding.

@@ -24,6 +24,9 @@ constexpr double kTileRadius = kTileSize * .7072;
 // side.
 constexpr double kMark = .3819660112501051;
 
+// The height of the marks of a row of tiles.
+double MarkOf(std::int32_t row) { return static_cast<double>(row) * kTileSize - kMark; }
+
 Point OriginOf(const TileDirectory& directory, std::uint32_t tile) {
   return {static_cast<double>(std::int64_t{directory[tile].x} << kTileShift),
           static_cast<double>(std::int64_t{directory[tile].y} << kTileShift)};
@@ -173,7 +176,7 @@ void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line
   const auto right = bounds.HasColumns() ? static_cast<std::int32_t>(bounds.right) : -1;
   const auto high = static_cast<std::int32_t>(bounds.high);
   for (auto y = static_cast<std::int32_t>(bounds.low); y <= high; ++y) {
-    if (SpansRow(edge, std::int64_t{y} * kTileSize - kMark)) by_row_.emplace_back(y, line);
+    if (SpansRow(edge, MarkOf(y))) by_row_.emplace_back(y, line);
     for (std::int32_t x = left; x <= right; ++x) {
       const std::uint32_t tile = directory.Find({y, x});
       if (tile != kNoTile && IsNear(directory, tile, line)) pairs_.emplace_back(tile, line);
@@ -284,7 +287,7 @@ void WallField::FindSolids(const TileDirectory& directory) {
   while (tile < directory.size()) {
     ThrowIfCancelled();
     const std::int32_t row = directory[tile].y;
-    CollectCrossings(static_cast<std::uint32_t>(row), std::int64_t{row} * kTileSize - kMark);
+    CollectCrossings(static_cast<std::uint32_t>(row), MarkOf(row));
     is_odd_.assign(lines_.SolidCount(), 0);
     covering_ = 0;
     for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {
