@@ -134,10 +134,9 @@ absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& s
   });
   size.wall_pairs = b.walls.PairCount();
   size.wall_lines = b.walls.lines().edges().size();
-  size.wall_tiles = std::min<std::uint64_t>(size.wall_pairs, directory.size());
+  size.wall_tiles = b.walls.TileCount();
   if (absl::Status status = memory.ReserveOutline(size); !status.ok()) return status;
   InStage(task.observer, Stage::kField, [&] { b.walls.FindTiles(directory); });
-  size.wall_tiles = b.walls.TileCount();
   return absl::OkStatus();
 }
 

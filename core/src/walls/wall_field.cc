@@ -1,6 +1,7 @@
 #include "walls/wall_field.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "base/cancellation.h"
@@ -179,7 +180,9 @@ void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line
     if (SpansRow(edge, MarkOf(y))) by_row_.emplace_back(y, line);
     for (std::int32_t x = left; x <= right; ++x) {
       const std::uint32_t tile = directory.Find({y, x});
-      if (tile != kNoTile && IsNear(directory, tile, line)) pairs_.emplace_back(tile, line);
+      if (tile == kNoTile || !IsNear(directory, tile, line)) continue;
+      near_of_tile_[tile] = 0;
+      pairs_.emplace_back(tile, line);
     }
   }
 }
@@ -187,6 +190,7 @@ void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line
 void WallField::ListLines(const std::vector<Wall>& walls, const Rings* particle_walls,
                           double cell_size, const TileDirectory& directory) {
   lines_.Build(walls, particle_walls, cell_size, WindowOf(directory));
+  near_of_tile_.assign(directory.size(), kFluid);
   pairs_.clear();
   by_row_.clear();
   long_lines_.clear();
@@ -206,12 +210,17 @@ void WallField::ListLines(const std::vector<Wall>& walls, const Rings* particle_
   ParallelFor(long_lines_.size(), [&](std::size_t k) {
     std::size_t count = 0;
     for (std::uint32_t tile = 0; tile < directory.size(); ++tile) {
-      count += IsNear(directory, tile, long_lines_[k]);
+      if (!IsNear(directory, tile, long_lines_[k])) continue;
+      // Several lines may mark a tile.
+      std::atomic_ref(near_of_tile_[tile]).store(0, std::memory_order_relaxed);
+      ++count;
     }
     long_counts_[k] = count;
   });
   pair_count_ = pairs_.size();
   for (const std::size_t count : long_counts_) pair_count_ += count;
+  near_count_ = directory.size() -
+                static_cast<std::size_t>(std::ranges::count(near_of_tile_, std::uint32_t{kFluid}));
 }
 
 void WallField::FindTiles(const TileDirectory& directory) {
@@ -235,10 +244,6 @@ void WallField::GroupBySolid(const TileDirectory& directory) {
   near_of_tile_.assign(directory.size(), kFluid);
   solids_.clear();
   edges_.clear();
-  near_count_ = 0;
-  for (std::size_t k = 0; k < pairs_.size(); ++k) {
-    near_count_ += k == 0 || pairs_[k].first != pairs_[k - 1].first;
-  }
   if (near_.size() < near_count_) {
     near_.reserve(near_count_);
     near_.resize(near_count_);

@@ -32,16 +32,17 @@ class WallField {
   /// Heights of a larger magnitude are unknown.
   static constexpr float kMostHeight = 4;
 
-  /// Reads the walls (WallLines::Build) and counts the pairs of a line and a tile near it. Cost:
+  /// Reads the walls (WallLines::Build), and counts the pairs of a line and a tile near it, and the
+  /// tiles near lines. Cost:
   /// linear in tiles and lines, and in the product of tiles and long lines.
   void ListLines(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
                  const TileDirectory& directory);
   std::size_t PairCount() const { return pair_count_; }
+  std::size_t TileCount() const { return near_count_; }
 
   /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles;
   /// endless lines times tiles.
   void FindTiles(const TileDirectory& directory);
-  std::size_t TileCount() const { return near_count_; }
 
   /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the nodes
   /// near walls times the lines near their tiles.
