@@ -270,15 +270,15 @@ void WallField::GroupBySolid(const TileDirectory& directory) {
 }
 
 // Sets `crossings_` to where closed loops cross the marks of a row of tiles.
-void WallField::CollectCrossings(std::uint32_t row, double y) {
+void WallField::CollectCrossings(std::int32_t row) {
+  const double y = MarkOf(row);
   crossings_.clear();
   const auto add = [&](std::uint32_t line) {
     const WallEdge& edge = lines_.edges()[line];
     crossings_.push_back({CrossesRowAt(edge, y), edge.solid});
   };
-  const auto of_row = std::ranges::equal_range(by_row_, static_cast<std::int32_t>(row), {},
-                                               &std::pair<std::int32_t, std::uint32_t>::first);
-  for (const auto& [_, line] : of_row) add(line);
+  auto of_row = std::ranges::lower_bound(by_row_, std::pair(row, std::uint32_t{0}));
+  for (; of_row != by_row_.end() && of_row->first == row; ++of_row) add(of_row->second);
   for (const std::uint32_t line : long_lines_) {
     const WallEdge& edge = lines_.edges()[line];
     if (!edge.is_endless && SpansRow(edge, y)) add(line);
@@ -292,7 +292,7 @@ void WallField::FindSolids(const TileDirectory& directory) {
   while (tile < directory.size()) {
     ThrowIfCancelled();
     const std::int32_t row = directory[tile].y;
-    CollectCrossings(static_cast<std::uint32_t>(row), MarkOf(row));
+    CollectCrossings(row);
     is_odd_.assign(lines_.SolidCount(), 0);
     covering_ = 0;
     for (std::size_t solid = 0; solid < lines_.SolidCount(); ++solid) {

@@ -99,7 +99,7 @@ class WallField {
   bool IsNear(const TileDirectory& directory, std::uint32_t tile, std::uint32_t line) const;
   void GroupBySolid(const TileDirectory& directory);
   void FindSolids(const TileDirectory& directory);
-  void CollectCrossings(std::uint32_t row, double y);
+  void CollectCrossings(std::int32_t row);
   void SetTile(const TileDirectory& directory, std::uint32_t tile);
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
   void ExtendFluid(const TileDirectory& directory, const LevelSet& level_set, double reach,
