@@ -129,6 +129,7 @@ run_ctest() {
     fi
     record_skips ctest "$log" "$directory/Testing/Temporary/LastTest.log"
   else
+    tail -n 20 "$log" >>"$details"
     record_failure 1 "$name: CTest gave no result"
   fi
   rm -f "$log"
@@ -187,6 +188,7 @@ run_node() {
   well=$(sed -n -E 's/^[^ ]+ pass ([0-9]+)$/\1/p' "$log")
   bad=$(sed -n -E 's/^[^ ]+ fail ([0-9]+)$/\1/p' "$log")
   if [[ -z $well || -z $bad ]]; then
+    tail -n 20 "$log" >>"$details"
     record_failure 1 "$name: node gave no result"
   else
     passed=$((passed + well))
