@@ -12,12 +12,14 @@ CoreStream::CoreStream(const Scene& scene, const ReconstructionParameters& param
                        std::span<const std::uint64_t> ids)
     : scene_(scene),
       ids_(ids),
+      phases_{.name = "phase", .values = scene.phases},
       reconstructor_(Require(Reconstructor::Create(parameters))),
       arenas_{oneapi::tbb::task_arena(1), oneapi::tbb::task_arena(2)} {}
 
 void CoreStream::Next(int threads) {
   Frame frame = scene_.At(next_++);
   if (!ids_.empty()) frame.ids = ids_.first(frame.ParticleCount());
+  if (!phases_.values.empty()) frame.attributes = std::span(&phases_, 1);
   Require(arenas_[threads - 1].execute([&] {
     return reconstructor_.Reconstruct(frame, state_, workspace_, result_, {.observer = &stages_});
   }));

@@ -50,6 +50,7 @@ class CoreStream {
  private:
   const Scene& scene_;
   std::span<const std::uint64_t> ids_;
+  const Attribute phases_;  // Of the scene.
   Reconstructor reconstructor_;
   State state_;
   Workspace workspace_;

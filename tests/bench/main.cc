@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   if (!quick && benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   const auto scenes = partiemc::bench::Require(partiemc::bench::MakeScenes(quick));
   partiemc::bench::RegisterCore(scenes);
+  partiemc::bench::RegisterMatter();
   partiemc::bench::RegisterPeers(scenes);
   if (!quick) partiemc::bench::RegisterSurfaces();
   benchmark::RunSpecifiedBenchmarks();

@@ -31,6 +31,11 @@ void Register(const std::string& name, int iterations, Body body) {
 ///   machine
 void RegisterCore(const Scenes& scenes);
 
+/// Registers "matter/CASE" for sizes, grains, phases, walls, periodic boxes and the noise filter: a
+/// warm frame on one thread. Counter: particles. All cases are made from the blob of 100,000
+/// particles, of which "frame/100k" is a frame without them.
+void RegisterMatter();
+
 /// Registers "surface/SCENE/PLACEMENT/THREADS": a warm frame in space. Counter: triangles.
 void RegisterSurfaces();
 

@@ -88,6 +88,17 @@ def core_metrics(measures):
     return metrics
 
 
+def matter_metrics(measures):
+    """Ratios of processor time per particle over that of a frame without the feature."""
+    plain = measures.median("frame/100k") / 1e5
+    metrics = {}
+    for case in measures.scenes("matter"):
+        name = "matter/" + case
+        a_particle = measures.median(name) / measures.median(name, "particles")
+        metrics[f"{case}_over_plain"] = a_particle / plain
+    return metrics
+
+
 def peer_metrics(measures):
     """Speedup over VTK by processor time."""
     contours = measures.median("vtk_contours/1024")
@@ -268,7 +279,7 @@ def measure(output, quick):
          f"--benchmark_repetitions={3 if quick else 5}", f"--benchmark_out={document}",
          "--benchmark_out_format=json"], check=True, stdout=subprocess.DEVNULL)
     measures = Measures(json.loads(document.read_text()))
-    metrics = core_metrics(measures) | peer_metrics(measures)
+    metrics = core_metrics(measures) | matter_metrics(measures) | peer_metrics(measures)
     metrics |= end_to_end_metrics(measures, 6 if quick else 20)
     (output / "bench.md").write_text(page(metrics, measures))
     with open(output / "bench.csv", "w", encoding="utf-8") as file:

@@ -67,22 +67,29 @@ std::vector<Point> NodesIn(Shape shape, double radius) {
   return nodes;
 }
 
-// At least `count` nodes, and few more.
-std::vector<Point> NodesOfCount(Shape shape, std::size_t count) {
+// The radius at which a shape has about `count` nodes.
+double RadiusFor(Shape shape, std::size_t count) {
   constexpr double kSampleRadius = 200;
   const double area =
       static_cast<double>(NodesIn(shape, kSampleRadius).size()) / (kSampleRadius * kSampleRadius);
-  double radius = std::sqrt(static_cast<double>(count) / area);
+  return std::sqrt(static_cast<double>(count) / area);
+}
+
+// At least `count` nodes, and few more.
+std::vector<Point> NodesOfCount(Shape shape, std::size_t count) {
+  double radius = RadiusFor(shape, count);
   std::vector<Point> nodes = NodesIn(shape, radius);
   while (nodes.size() < count) nodes = NodesIn(shape, radius *= 1.0005);
   return nodes;
 }
 
+void Jitter(support::Random& random, Point& point, double size = 1) {
+  point.x += random.Uniform(-kJitter * size, kJitter * size);
+  point.y += random.Uniform(-kJitter * size, kJitter * size);
+}
+
 void Jitter(support::Random& random, std::vector<Point>& points) {
-  for (Point& point : points) {
-    point.x += random.Uniform(-kJitter, kJitter);
-    point.y += random.Uniform(-kJitter, kJitter);
-  }
+  for (Point& point : points) Jitter(random, point);
 }
 
 template <typename T>
@@ -113,6 +120,7 @@ Frame Scene::At(std::size_t index) const {
   Frame frame;
   std::visit([&](const auto& xy) { frame.positions = std::span(xy); },
              frames[index % frames.size()]);
+  frame.volumes = volumes;
   return frame;
 }
 
@@ -156,6 +164,57 @@ Scene Islands(const std::string& name, std::size_t count) {
   Jitter(random, points);
   Shuffle(random, points);
   return {.name = name, .frames = SwayingFrames<double>(points)};
+}
+
+Scene SizedBlob(const std::string& name, std::size_t count, int ratio,
+                const std::function<bool(support::Random&, double x, double y)>& is_large) {
+  support::Random random(kSeed + count);
+  const double radius = RadiusFor(InBlob, count);
+  const auto is_inside = [&](double x, double y) { return InBlob(x / radius, y / radius); };
+  struct Particle {
+    Point at;
+    double size;
+  };
+  std::vector<Particle> particles;
+  const int reach = static_cast<int>(std::ceil(1.2 * radius)) / ratio;
+  for (int j = -reach; j <= reach; ++j) {
+    for (int i = -reach; i <= reach; ++i) {
+      std::vector<Point> nodes;
+      for (int k = 0; k < ratio * ratio; ++k) {
+        const Point node{double(ratio * i + k % ratio), double(ratio * j + k / ratio)};
+        if (is_inside(node.x, node.y)) nodes.push_back(node);
+      }
+      const double middle = (ratio - 1) / 2.0;
+      const Point centre{ratio * i + middle, ratio * j + middle};
+      if (nodes.size() == static_cast<std::size_t>(ratio) * ratio &&
+          is_large(random, centre.x / radius, centre.y / radius)) {
+        particles.push_back({centre, double(ratio)});
+      } else {
+        for (const Point& node : nodes) particles.push_back({node, 1});
+      }
+    }
+  }
+  for (Particle& particle : particles) Jitter(random, particle.at, particle.size);
+  Shuffle(random, particles);
+  std::vector<Point> points;
+  Scene scene{.name = name};
+  for (const Particle& particle : particles) {
+    points.push_back(particle.at);
+    scene.volumes.push_back(static_cast<float>(particle.size * particle.size));
+  }
+  scene.frames = SwayingFrames<float>(points);
+  return scene;
+}
+
+Scene Layer(const std::string& name, int columns, int rows) {
+  support::Random random(kSeed + columns);
+  std::vector<Point> points;
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) points.push_back({i + .5, j - (rows - 1) / 2.0});
+  }
+  Jitter(random, points);
+  Shuffle(random, points);
+  return {.name = name, .frames = SwayingFrames<float>(points)};
 }
 
 absl::StatusOr<Scene> Recorded(const std::string& name, const std::string& path) {

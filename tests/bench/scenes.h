@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <variant>
@@ -10,6 +11,7 @@
 
 #include "absl/status/statusor.h"
 #include "partiemc/frame.h"
+#include "support/random.h"
 
 namespace partiemc::bench {
 
@@ -21,8 +23,11 @@ struct Scene {
   std::string name;  ///< As it appears in the names of metrics: "1m".
   double spacing = 1;
   std::vector<Positions> frames;
+  // The same in all frames; empty: none.
+  std::vector<float> volumes;
+  std::vector<float> phases;
 
-  /// Frame `index` of the endless sequence; a view.
+  /// Positions and volumes of frame `index` of the endless sequence; a view.
   Frame At(std::size_t index) const;
   std::size_t ParticleCount() const { return At(0).ParticleCount(); }
   std::size_t FrameBytes() const;
@@ -37,6 +42,16 @@ Scene Blob(const std::string& name, std::size_t count);
 /// their area, with the jitter, order and sway of Blob. Positions are double: at such distances a
 /// float does not resolve the jitter.
 Scene Islands(const std::string& name, std::size_t count);
+
+/// The blob of about `count` particles, a share of which gave way to large ones: `is_large` chooses
+/// squares of `ratio` x `ratio` nodes by the middle of the square, in units of the blob's radius.
+/// The particle in the middle of such a square has its area as volume.
+Scene SizedBlob(const std::string& name, std::size_t count, int ratio,
+                const std::function<bool(support::Random&, double x, double y)>& is_large);
+
+/// A rectangle of `columns` x `rows` particles with the origin in the middle of its left side, and
+/// the jitter, order and sway of Blob.
+Scene Layer(const std::string& name, int columns, int rows);
 
 /// The frames of a recording, with its own spacing.
 absl::StatusOr<Scene> Recorded(const std::string& name, const std::string& path);
