@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "bench/core_stream.h"
@@ -50,6 +51,20 @@ TEST(Scenes, IslandsAreAThousandBodies) {
   const Scene scene = Islands("100k", 100'000);
   ASSERT_EQ(scene.ParticleCount(), 100'000u);
   EXPECT_EQ(Reconstructed(scene).rings.RingCount(), 1000u);
+}
+
+TEST(Scenes, LargeParticlesHaveTheAreaOfTheSmallOnes) {
+  const auto area = [](int ratio, double share) {
+    const Scene scene = SizedBlob(
+        "blob", 10'000, ratio,
+        [share](support::Random& random, double, double) { return random.Chance(share); });
+    EXPECT_EQ(scene.volumes.size(), scene.ParticleCount());
+    return std::accumulate(scene.volumes.begin(), scene.volumes.end(), 0.0);
+  };
+  const double all_small = area(3, 0);
+  EXPECT_NEAR(all_small, 10'000, 100);
+  EXPECT_EQ(area(3, .5), all_small);
+  EXPECT_EQ(area(3, 1), all_small);
 }
 
 TEST(ScatterFloor, EqualsKernelSumAtEveryNode) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 
 namespace partiemc {
@@ -62,7 +63,7 @@ void AddRow(const MotionGrid& grid, std::span<const MotionCell> cells, const Mot
   const std::int32_t y = Wrapped(centre.at[1], row, grid.periods[1]);
   for (int image = -images; image <= images; ++image) {
     const std::int32_t x = centre.at[2] - image * periods;
-    const MotionCellCoordinate first{z, y, x - kMotionReach}, last{z, y, x + kMotionReach};
+    const GridCell first{z, y, x - kMotionReach}, last{z, y, x + kMotionReach};
     for (auto cell = std::ranges::lower_bound(cells, first, {}, &MotionCell::at);
          cell != cells.end() && cell->at <= last; ++cell) {
       const int column = cell->at[2] - x;
@@ -107,17 +108,17 @@ MotionGrid MakeMotionGrid(std::span<const int> axes, const std::optional<Periodi
   return grid;
 }
 
-MotionCellCoordinate CellOf(const MotionGrid& grid, const Vec3& position, Vec3& at) {
+GridCell CellOf(const MotionGrid& grid, const Vec3& position, Vec3& at) {
   const std::array<double, 3> coordinates{position.x, position.y, position.z};
   std::array<double, 3> local{};
-  MotionCellCoordinate cell{};
+  GridCell cell{};
   for (std::size_t k = 0; k < 3; ++k) {
     const double sides = (coordinates[k] - grid.origin[k]) / grid.side[k];
-    double whole = std::floor(sides);
+    double whole = Floor(sides);
     local[k] = std::clamp(sides - whole - .5, -.5, .5) * grid.side[k];
     if (grid.periods[k] > 0) {
       const double periods = grid.periods[k];
-      whole = std::clamp(whole - periods * std::floor(whole / periods), 0.0, periods - 1);
+      whole = std::clamp(whole - periods * Floor(whole / periods), 0.0, periods - 1);
     }
     cell[2 - k] = static_cast<std::int32_t>(std::clamp(whole, -kMostCells, kMostCells));
   }

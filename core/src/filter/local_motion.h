@@ -11,6 +11,7 @@
 
 #include "base/vec3.h"
 #include "partiemc/parameters.h"
+#include "periodic/cell_groups.h"
 
 namespace partiemc {
 
@@ -48,20 +49,18 @@ struct Mover {
   Vec3 moved;  ///< Displacement since the last frame.
 };
 
-/// Coordinates z, y, x of a cell, so that cells are sorted by layer, row, column.
-using MotionCellCoordinate = std::array<std::int32_t, 3>;
-
 /// The particles of one cell and their moments.
 struct MotionCell {
-  MotionCellCoordinate at{};
+  GridCell at{};                      ///< z, y, x, so that cells are sorted by layer, row, column.
   std::uint32_t first = 0, last = 0;  ///< Its movers, [first, last).
   Vec3 mean_at, mean_moved;
   std::array<Vec3, 3> square{}, product{};  ///< Sums of at x at and at x moved about the means.
 };
 
-/// Returns the cell of a position, and sets `at` to the position relative to the centre of the
-/// cell. Both in spacings. Positions too far away for the grid share its outermost cells.
-MotionCellCoordinate CellOf(const MotionGrid& grid, const Vec3& position, Vec3& at);
+/// Returns the cell of a position (MotionCell::at), and sets `at` to the position relative to the
+/// centre of the cell. Both in spacings. Positions too far away for the grid share its outermost
+/// cells.
+GridCell CellOf(const MotionGrid& grid, const Vec3& position, Vec3& at);
 
 /// Sets the moments of cells from their movers. Parallel over cells.
 void SumMoments(std::span<const Mover> movers, std::span<MotionCell> cells);

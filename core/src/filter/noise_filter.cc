@@ -7,6 +7,7 @@
 #include <numeric>
 #include <variant>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 
 namespace partiemc {
@@ -46,20 +47,33 @@ void ResizeExactly(std::size_t count, std::vector<Value>& values) {
   values.resize(count);
 }
 
-// Sets the rank of each particle in the order of the ids.
+// Sets the rank of each particle in the order of the ids: a radix sort by the digits in which ids
+// differ.
 void SortById(const Frame& frame, NoiseFilterScratch& s) {
+  constexpr int kDigit = 11;
+  constexpr std::uint64_t kMask = (1u << kDigit) - 1;
   const std::span<const std::uint64_t> ids = frame.ids;
   ResizeExactly(ids.size(), s.particles);
+  ResizeExactly(ids.size(), s.last);  // The other buffer of the sort.
   std::iota(s.particles.begin(), s.particles.end(), std::uint32_t{0});
   if (std::ranges::is_sorted(ids)) return;
-  ParallelSort(std::span(s.particles),
-               [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; });
+  std::uint64_t different = 0;
+  for (const std::uint64_t id : ids) different |= id ^ ids[0];
+  for (int shift = 0; shift < 64; shift += kDigit) {
+    if ((different >> shift & kMask) == 0) continue;
+    std::array<std::uint32_t, kMask + 2> first{};  // By digit: its first place.
+    for (const std::uint64_t id : ids) ++first[(id >> shift & kMask) + 1];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    for (const std::uint32_t particle : s.particles) {
+      s.last[first[ids[particle] >> shift & kMask]++] = particle;
+    }
+    std::swap(s.particles, s.last);
+  }
 }
 
 // Finds each particle in the last history.
 void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScratch& s) {
   const std::span<const std::uint64_t> ids = previous.ids;
-  ResizeExactly(s.particles.size(), s.last);
   ParallelForRanges(s.last.size(), kGrain, [&](std::size_t first, std::size_t last) {
     auto found = std::ranges::lower_bound(ids, frame.ids[s.particles[first]]);
     for (std::size_t rank = first; rank < last; ++rank) {
@@ -80,8 +94,15 @@ Vec3 DisplacementOf(const NoiseFilterInput& input, const MotionGrid& grid,
         (s.next.given[rank * axes + axis] - input.previous.given[s.last[rank] * axes + axis]) /
         input.spacing;
     const double length = grid.length[axis];
-    return length > 0 ? moved - length * std::floor(moved / length + .5) : moved;
+    return length > 0 ? moved - length * Floor(moved / length + .5) : moved;
   });
+}
+
+// The given position in spacings.
+Vec3 PositionOf(const NoiseFilterInput& input, const NoiseFilterScratch& s, std::size_t rank) {
+  const std::size_t axes = input.axes.size();
+  return VectorOf(
+      axes, [&](std::size_t axis) { return s.next.given[rank * axes + axis] / input.spacing; });
 }
 
 // Starts the next history with the given positions.
@@ -104,14 +125,11 @@ void StartHistory(const Frame& frame, std::span<const Real> positions, const Coo
   });
 }
 
-// Lists the particles of both frames by cell. Particles that moved too far become new.
-void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
-  const std::size_t axes = input.axes.size(), count = s.particles.size();
-  const auto position_of = [&](std::size_t rank) {
-    return VectorOf(
-        axes, [&](std::size_t axis) { return s.next.given[rank * axes + axis] / input.spacing; });
-  };
-  ResizeExactly(count, s.known);
+// Finds the particles of both frames and their cells. Particles that moved too far become new.
+// Returns the number of occupied cells.
+std::size_t FindCells(const NoiseFilterInput& input, const MotionGrid& grid,
+                      NoiseFilterScratch& s) {
+  const std::size_t count = s.particles.size();
   ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t rank = first; rank < last; ++rank) {
       if (s.last[rank] == kNew) continue;
@@ -119,50 +137,37 @@ void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
       if (!(Dot(moved, moved) <= kMostDisplacement * kMostDisplacement)) s.last[rank] = kNew;
     }
   });
-  std::size_t known = 0;
-  for (std::size_t rank = 0; rank < count; ++rank) {
-    if (s.last[rank] != kNew) s.known[known++].rank = static_cast<std::uint32_t>(rank);
+  s.known.clear();
+  s.known.reserve(count);
+  for (std::uint32_t rank = 0; rank < count; ++rank) {
+    if (s.last[rank] != kNew) s.known.push_back(rank);
   }
-  s.known.resize(known);
-  ResizeExactly(known, s.movers);
-  ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
+  ResizeExactly(s.known.size(), s.cell_of);
+  ParallelForRanges(s.known.size(), kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       Vec3 unused;
-      s.known[k].cell = CellOf(grid, position_of(s.known[k].rank), unused);
+      s.cell_of[k] = CellOf(grid, PositionOf(input, s, s.known[k]), unused);
     }
   });
-  ParallelSort(std::span(s.known),
-               [](const NoiseFilterScratch::Known& a, const NoiseFilterScratch::Known& b) {
-                 for (std::size_t k = 0; k < a.cell.size(); ++k) {
-                   if (a.cell[k] != b.cell[k]) return a.cell[k] < b.cell[k];
-                 }
-                 return a.rank < b.rank;
-               });
-  ParallelForRanges(known, kGrain, [&](std::size_t first, std::size_t last) {
+  return s.groups.Find(s.cell_of);
+}
+
+// Lists the particles of both frames by cell.
+void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
+  s.groups.Sort(s.cell_of);
+  const std::span<const std::uint32_t> items = s.groups.items();
+  ResizeExactly(items.size(), s.movers);
+  ParallelForRanges(items.size(), kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
-      const std::uint32_t rank = s.known[k].rank;
-      CellOf(grid, position_of(rank), s.movers[k].at);
+      const std::uint32_t rank = s.known[items[k]];
+      CellOf(grid, PositionOf(input, s, rank), s.movers[k].at);
       s.movers[k].moved = DisplacementOf(input, grid, s, rank);
     }
   });
-}
-
-bool StartsCell(const NoiseFilterScratch& s, std::size_t k) {
-  return k == 0 || s.known[k].cell != s.known[k - 1].cell;
-}
-
-std::size_t CountCells(const NoiseFilterScratch& s) {
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < s.known.size(); ++k) count += StartsCell(s, k) ? 1 : 0;
-  return count;
-}
-
-void ListCells(std::size_t count, NoiseFilterScratch& s) {
   s.cells.clear();
-  s.cells.reserve(count);
-  for (std::uint32_t k = 0; k < s.known.size(); ++k) {
-    if (StartsCell(s, k)) s.cells.push_back({.at = s.known[k].cell, .first = k});
-    s.cells.back().last = k + 1;
+  s.cells.reserve(s.groups.groups().size());
+  for (const CellGroups::Group& group : s.groups.groups()) {
+    s.cells.push_back({.at = group.cell, .first = group.first, .last = group.last});
   }
 }
 
@@ -175,7 +180,7 @@ void SetOffsets(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
   ParallelFor(s.cells.size(), [&](std::size_t k) {
     const LocalMotion motion = FitMotion(grid, s.cells, k);
     for (std::uint32_t i = s.cells[k].first; i < s.cells[k].last; ++i) {
-      const std::uint32_t rank = s.known[i].rank;
+      const std::uint32_t rank = s.known[s.groups.items()[i]];
       const Vec3 offset = VectorOf(axes, [&](std::size_t axis) {
         return cell * static_cast<double>(previous.offsets[s.last[rank] * axes + axis]);
       });
@@ -220,11 +225,10 @@ absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& s, F
   FindLast(input.frame, input.previous, s);
   std::visit([&](auto positions) { StartHistory(input.frame, positions, at, s); },
              input.frame.positions);
-  SortByCell(input, grid, s);
-  const std::size_t cells = CountCells(s);
+  const std::size_t cells = FindCells(input, grid, s);
   status = input.reserve(bytes + kBytesPerMotionCell * cells);
   if (!status.ok()) return status;
-  ListCells(cells, s);
+  SortByCell(input, grid, s);
   SumMoments(s.movers, s.cells);
   SetOffsets(input, grid, s);
   std::visit([&](auto positions) { WritePositions(positions, input.cell_size, at, s); },

@@ -12,6 +12,7 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
+#include "periodic/cell_groups.h"
 
 namespace partiemc {
 
@@ -25,23 +26,21 @@ inline constexpr double kMostSurprise = 1;
 
 /// Warm buffers of FilterNoise.
 struct NoiseFilterScratch {
-  /// A particle that both frames have.
-  struct Known {
-    MotionCellCoordinate cell;
-    std::uint32_t rank;  // In the order of the ids.
-  };
+  // The rank of a particle is its place in the order of the ids.
   std::vector<std::uint32_t> particles;  // By rank: index in the frame.
   std::vector<std::uint32_t> last;       // By rank: index in the last history.
-  std::vector<Known> known;              // By cell, then rank.
-  std::vector<Mover> movers;             // As `known`.
+  std::vector<std::uint32_t> known;      // Ranks of the particles that both frames have.
+  std::vector<GridCell> cell_of;         // As `known`.
+  CellGroups groups;                     // The known particles of each cell.
+  std::vector<Mover> movers;             // In the order of `groups`.
   std::vector<MotionCell> cells;
   std::vector<double> positions;  // The result.
   NoiseHistory next;              // The history for the next frame.
 };
 
 /// Bytes of a NoiseFilterScratch and of the history of a state, at most.
-inline constexpr std::uint64_t kBytesPerFilteredParticle = 192;
-inline constexpr std::uint64_t kBytesPerMotionCell = 224;
+inline constexpr std::uint64_t kBytesPerFilteredParticle = 216;
+inline constexpr std::uint64_t kBytesPerMotionCell = 248;
 
 struct NoiseFilterInput {
   const Frame& frame;
@@ -62,7 +61,7 @@ struct NoiseFilterInput {
 /// the number of threads.
 /// Requires: CheckFrame has passed the frame, which has ids; the history is empty or has
 /// `axes.size()` coordinates per particle; Validate has passed the box for this spacing.
-/// Errors: as `reserve`. Cost: n log n in particles, however close they are.
+/// Errors: as `reserve`. Cost: linear in particles, however close they are; n log n in cells.
 absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& scratch,
                          Frame& filtered);
 

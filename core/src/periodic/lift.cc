@@ -1,13 +1,13 @@
 #include "periodic/lift.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
+#include "base/bits.h"
 #include "base/parallel.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"
@@ -29,7 +29,6 @@ constexpr double kMostCells = 1 << 30;
 // coordinates would be visible.
 constexpr double kMostLengths = 1e6;
 
-constexpr std::uint32_t kNoCell = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kGrain = 1 << 12;
 
 std::uint8_t AxisBit(std::size_t axis) { return static_cast<std::uint8_t>(1u << axis); }
@@ -67,8 +66,7 @@ Grid MakeGrid(const LiftInput& input) {
 
 // The image of the box in which a coordinate lies.
 double ImageOf(const Grid& grid, std::size_t axis, double coordinate) {
-  return grid.length[axis] > 0 ? std::floor((coordinate - grid.origin[axis]) / grid.length[axis])
-                               : 0;
+  return grid.length[axis] > 0 ? Floor((coordinate - grid.origin[axis]) / grid.length[axis]) : 0;
 }
 
 // Reads the coordinates of particles. The other coordinates are 0.
@@ -87,39 +85,43 @@ std::array<double, 3> Wrapped(const Grid& grid, std::array<double, 3> at) {
   return at;
 }
 
-std::array<std::int32_t, 3> CellOf(const Grid& grid, const std::array<double, 3>& wrapped) {
-  std::array<std::int32_t, 3> cell{};
+GridCell CellOf(const Grid& grid, const std::array<double, 3>& wrapped) {
+  GridCell cell{};
   for (std::size_t k = 0; k < 3; ++k) {
     if (!grid.counts[k]) continue;
-    const double at = std::floor((wrapped[k] - grid.origin[k]) / grid.side[k]);
-    // Rounding may put a wrapped coordinate onto the upper face of the box.
-    cell[k] = static_cast<std::int32_t>(
-        grid.length[k] > 0 ? std::clamp(at, 0.0, static_cast<double>(grid.cells[k] - 1))
-                           : std::clamp(at, -kMostCells, kMostCells));
+    const double at = (wrapped[k] - grid.origin[k]) / grid.side[k];
+    // Rounding may put a wrapped coordinate onto the upper face of the box, or below the lower.
+    cell[k] = grid.length[k] > 0
+                  ? std::clamp(static_cast<std::int32_t>(at), 0, grid.cells[k] - 1)
+                  : static_cast<std::int32_t>(Floor(std::clamp(at, -kMostCells, kMostCells)));
   }
   return cell;
 }
 
-// Sorts the particles by cell.
+// Finds the cell of each particle, and returns the number of occupied cells.
 template <typename Real>
-void SortByCell(const Grid& grid, std::span<const Real> positions, std::size_t components,
-                LiftScratch& s) {
+std::size_t FindCells(const Grid& grid, std::span<const Real> positions, std::size_t components,
+                      LiftScratch& s) {
   const std::size_t count = positions.size() / components;
-  s.entries.resize(count);
-  s.wrapped.resize(count);
+  s.cell_of.reserve(count);
+  s.cell_of.resize(count);
   ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
-      const auto at = Wrapped(grid, CoordinatesOf(grid, positions, components, k));
-      s.entries[k] = {CellOf(grid, at), static_cast<std::uint32_t>(k)};
+      s.cell_of[k] = CellOf(grid, Wrapped(grid, CoordinatesOf(grid, positions, components, k)));
     }
   });
-  ParallelSort(std::span(s.entries), [](const LiftScratch::Entry& a, const LiftScratch::Entry& b) {
-    return a.cell != b.cell ? a.cell < b.cell : a.particle < b.particle;
-  });
-  ParallelForRanges(count, kGrain, [&](std::size_t first, std::size_t last) {
+  return s.groups.Find(s.cell_of);
+}
+
+template <typename Real>
+void WrapParticles(const Grid& grid, std::span<const Real> positions, std::size_t components,
+                   LiftScratch& s) {
+  const std::span<const std::uint32_t> particles = s.groups.items();
+  s.wrapped.reserve(particles.size());
+  s.wrapped.resize(particles.size());
+  ParallelForRanges(particles.size(), kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
-      const auto at =
-          Wrapped(grid, CoordinatesOf(grid, positions, components, s.entries[k].particle));
+      const auto at = Wrapped(grid, CoordinatesOf(grid, positions, components, particles[k]));
       s.wrapped[k] = {at[0], at[1], at[2]};
     }
   });
@@ -132,54 +134,18 @@ Vec3 Upper(const Vec3& a, const Vec3& b) {
   return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
 }
 
-std::size_t CountCells(const LiftScratch& s) {
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < s.entries.size(); ++k) {
-    count += k == 0 || s.entries[k].cell != s.entries[k - 1].cell ? 1 : 0;
-  }
-  return count;
-}
-
-void ListCells(std::size_t count, LiftScratch& s) {
+void ListCells(LiftScratch& s) {
   s.cells.clear();
-  s.cells.reserve(count);
-  for (std::uint32_t k = 0; k < s.entries.size(); ++k) {
-    const Vec3& at = s.wrapped[k];
-    if (s.cells.empty() || s.cells.back().at != s.entries[k].cell) {
-      s.cells.push_back({.at = s.entries[k].cell, .first = k, .low = at, .high = at});
+  s.cells.reserve(s.groups.groups().size());
+  for (const CellGroups::Group& group : s.groups.groups()) {
+    Vec3 low = s.wrapped[group.first], high = low;
+    for (std::uint32_t k = group.first + 1; k < group.last; ++k) {
+      low = Lower(low, s.wrapped[k]);
+      high = Upper(high, s.wrapped[k]);
     }
-    LiftCell& cell = s.cells.back();
-    cell.last = k + 1;
-    cell.low = Lower(cell.low, at);
-    cell.high = Upper(cell.high, at);
+    s.cells.push_back(
+        {.at = group.cell, .first = group.first, .last = group.last, .low = low, .high = high});
   }
-}
-
-std::size_t SlotOf(const std::array<std::int32_t, 3>& cell, std::size_t slots) {
-  std::uint64_t hash = 0;
-  for (const std::int32_t at : cell) {
-    hash = (hash ^ static_cast<std::uint32_t>(at)) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 32;
-  }
-  return hash & (slots - 1);
-}
-
-// Fills the hash table, at most half full.
-void IndexCells(LiftScratch& s) {
-  s.slots.assign(std::bit_ceil(2 * s.cells.size() + 1), kNoCell);
-  for (std::uint32_t k = 0; k < s.cells.size(); ++k) {
-    std::size_t slot = SlotOf(s.cells[k].at, s.slots.size());
-    while (s.slots[slot] != kNoCell) slot = (slot + 1) & (s.slots.size() - 1);
-    s.slots[slot] = k;
-  }
-}
-
-std::uint32_t FindCell(const LiftScratch& s, const std::array<std::int32_t, 3>& at) {
-  std::size_t slot = SlotOf(at, s.slots.size());
-  while (s.slots[slot] != kNoCell && s.cells[s.slots[slot]].at != at) {
-    slot = (slot + 1) & (s.slots.size() - 1);
-  }
-  return s.slots[slot];
 }
 
 Vec3 ShiftOf(const Grid& grid, const Image& image) {
@@ -210,8 +176,8 @@ bool AreNear(const Grid& grid, const LiftScratch& s, const LiftCell& a, const Li
 // Returns the axes along which any cluster percolates.
 std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
   s.sets.Reset(s.cells.size());
-  const auto visit = [&](std::uint32_t a, const std::array<std::int32_t, 3>& step) {
-    std::array<std::int32_t, 3> at{};
+  const auto visit = [&](std::uint32_t a, const GridCell& step) {
+    GridCell at{};
     Image image{};
     for (std::size_t k = 0; k < 3; ++k) {
       at[k] = s.cells[a].at[k] + step[k];
@@ -219,8 +185,8 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
       image[k] = at[k] < 0 ? -1 : at[k] >= grid.cells[k] ? 1 : 0;
       at[k] -= static_cast<std::int32_t>(image[k]) * grid.cells[k];
     }
-    const std::uint32_t b = FindCell(s, at);
-    if (b == kNoCell) return;
+    const std::uint32_t b = s.groups.GroupOf(at);
+    if (b == CellGroups::kNone) return;
     const ImageSets::Found from = s.sets.Find(a), to = s.sets.Find(b);
     const Image beyond = to.image - from.image;
     if (from.root == to.root && beyond == image) return;
@@ -300,7 +266,7 @@ void WritePositions(const Grid& grid, std::span<const Real> given, std::size_t c
   ParallelFor(s.cells.size(), [&](std::size_t k) {
     const LiftCell& cell = s.cells[k];
     for (std::uint32_t i = cell.first; i < cell.last; ++i) {
-      const std::size_t first = s.entries[i].particle * components;
+      const std::size_t first = s.groups.items()[i] * components;
       for (std::size_t axis = 0; axis < components; ++axis) {
         const auto at = static_cast<double>(given[first + axis]);
         const double lengths = static_cast<double>(cell.image[axis]) - ImageOf(grid, axis, at);
@@ -314,14 +280,15 @@ void WritePositions(const Grid& grid, std::span<const Real> given, std::size_t c
 template <typename Real>
 absl::Status CheckDistances(const Grid& grid, std::span<const Real> positions,
                             std::size_t components) {
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    const std::size_t axis = k % components;
-    const auto at = static_cast<double>(positions[k]);
-    if (std::abs(at - grid.origin[axis]) <= kMostLengths * grid.length[axis]) continue;
-    if (grid.length[axis] == 0) continue;
-    return InvalidFrame(kReasonOutOfRange,
-                        CoordinateField("positions", k / components, static_cast<int>(axis)),
-                        ShortestNumber(at), "must be at most 1e6 lengths away from the box");
+  for (std::size_t first = 0; first < positions.size(); first += components) {
+    for (std::size_t axis = 0; axis < components; ++axis) {
+      const auto at = static_cast<double>(positions[first + axis]);
+      if (std::abs(at - grid.origin[axis]) <= kMostLengths * grid.length[axis]) continue;
+      if (grid.length[axis] == 0) continue;
+      return InvalidFrame(kReasonOutOfRange,
+                          CoordinateField("positions", first / components, static_cast<int>(axis)),
+                          ShortestNumber(at), "must be at most 1e6 lengths away from the box");
+    }
   }
   return absl::OkStatus();
 }
@@ -358,7 +325,7 @@ void ForEachCopy(const Grid& grid, LiftScratch& s, std::size_t components, doubl
     const std::uint8_t axes = s.cells[s.sets.Find(k).root].percolates;
     if (axes == 0) continue;
     for (std::uint32_t i = s.cells[k].first; i < s.cells[k].last; ++i) {
-      const std::uint32_t particle = s.entries[i].particle;
+      const std::uint32_t particle = s.groups.items()[i];
       Image least{}, most{};
       for (std::size_t axis = 0; axis < components; ++axis) {
         if ((axes & AxisBit(axis)) == 0) continue;
@@ -458,14 +425,16 @@ absl::Status Lift(const LiftInput& input, LiftScratch& s, LiftedFrame& lifted) {
   std::uint64_t bytes = kBytesPerLiftedParticle * input.frame.ParticleCount();
   if (checked.ok()) checked = input.reserve(bytes);
   if (!checked.ok()) return checked;
-  std::visit([&](auto positions) { SortByCell(grid, positions, components, s); },
-             input.frame.positions);
-  const std::size_t cells = CountCells(s);
+  const std::size_t cells =
+      std::visit([&](auto positions) { return FindCells(grid, positions, components, s); },
+                 input.frame.positions);
   bytes += kBytesPerLiftCell * cells;
   checked = input.reserve(bytes);
   if (!checked.ok()) return checked;
-  ListCells(cells, s);
-  IndexCells(s);
+  s.groups.Sort(s.cell_of);
+  std::visit([&](auto positions) { WrapParticles(grid, positions, components, s); },
+             input.frame.positions);
+  ListCells(s);
   lifted.percolates = input.wraps ? WrapCells(grid, s) : JoinCells(grid, s);
   const bool has_copies = lifted.percolates != std::array<bool, 3>{};
   if (has_copies && input.margin == 0) return Percolates(lifted.percolates);

@@ -13,13 +13,14 @@
 #include "base/vec3.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
+#include "periodic/cell_groups.h"
 #include "periodic/image_sets.h"
 
 namespace partiemc {
 
 /// The particles of one cell of the grid in which Lift searches neighbours.
 struct LiftCell {
-  std::array<std::int32_t, 3> at{};
+  GridCell at{};
   std::uint32_t first = 0, last = 0;  ///< Its particles, [first, last) in the order of the cells.
   Vec3 low, high;                     ///< Bounding box of its particles, wrapped into the box.
   Image image{};                      ///< Image into which its particles are lifted.
@@ -29,16 +30,12 @@ struct LiftCell {
 
 /// Warm buffers of Lift.
 struct LiftScratch {
-  struct Entry {
-    std::array<std::int32_t, 3> cell;
-    std::uint32_t particle;
-  };
-  std::vector<Entry> entries;        // By cell.
-  std::vector<Vec3> wrapped;         // In the order of `entries`.
-  std::vector<LiftCell> cells;       // By coordinates of the grid.
-  std::vector<std::uint32_t> slots;  // Hash table of the cells.
-  ImageSets sets;                    // Of cells.
-  std::vector<Vec3> low, high;       // By root: bounding box of the lifted cluster.
+  std::vector<GridCell> cell_of;  // By particle.
+  CellGroups groups;              // The particles of each cell.
+  std::vector<Vec3> wrapped;      // In the order of `groups`.
+  std::vector<LiftCell> cells;    // In the order of `groups`.
+  ImageSets sets;                 // Of cells.
+  std::vector<Vec3> low, high;    // By root: bounding box of the lifted cluster.
   // The result: the particles of the frame, then the copies.
   std::vector<double> positions;
   std::vector<std::uint32_t> originals;  // By copy: the particle.
@@ -49,7 +46,7 @@ struct LiftScratch {
 };
 
 /// Bytes of a LiftScratch, at most.
-inline constexpr std::uint64_t kBytesPerLiftedParticle = 72;
+inline constexpr std::uint64_t kBytesPerLiftedParticle = 84;
 inline constexpr std::uint64_t kBytesPerLiftCell = 200;
 
 struct LiftInput {
@@ -94,8 +91,8 @@ struct LiftedFrame {
 /// more than 1e6 lengths away from the box; PERCOLATES if a cluster percolates and `margin` is 0;
 /// TOO_MANY_PARTICLES if there are more than FrameLimits::kMostParticles with the copies; errors of
 /// `reserve`. Positions depend neither on the order of the particles nor on the number of threads.
-/// Copies are in the order of the cells of the grid, then of their particles. Cost: n log n in
-/// particles.
+/// Copies are in the order of the cells of the grid, then of their particles. Cost: linear in
+/// particles, n log n in cells.
 absl::Status Lift(const LiftInput& input, LiftScratch& scratch, LiftedFrame& lifted);
 
 }  // namespace partiemc
