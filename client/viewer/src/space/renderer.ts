@@ -110,8 +110,8 @@ class Drawing implements SpaceDrawing {
   private readonly parallel = new OrthographicCamera();
   private readonly common = commonUniforms();
   private readonly surfaceUniforms: Uniforms = {
-    ...this.common, isFlat: { value: false }, isParallel: { value: false }, hasCutFace: { value: false }, deepest: { value: 0 }, opacity: { value: 1 },
-    accent: { value: new Color() }, ambient: { value: 0.3 },
+    ...this.common, isFlat: { value: false }, isParallel: { value: false }, hasCutFace: { value: false }, deepest: { value: 0 },
+    opacity: { value: 1 }, accent: { value: new Color() }, ambient: { value: 0.3 },
   };
   private readonly pointUniforms: Uniforms = {
     ...this.common, mode: { value: COLOUR_MODE.tint }, colour: { value: new Color() }, diameter: { value: 1 },
@@ -149,8 +149,7 @@ class Drawing implements SpaceDrawing {
     this.renderer.sortObjects = false;
     const material = (side: Side, stencilRef: number) => new ShaderMaterial({
       vertexShader: SURFACE_VERTEX, fragmentShader: SURFACE_FRAGMENT, uniforms: this.surfaceUniforms, side,
-      // Edges and sections lie in the surface, and must be in front of it.
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, stencilRef, stencilZPass: ReplaceStencilOp,
+      polygonOffsetFactor: 1, polygonOffsetUnits: 1, stencilRef, stencilZPass: ReplaceStencilOp,
     });
     this.inside = new Mesh(this.geometry, material(BackSide, 1));
     this.outside = new Mesh(this.geometry, material(DoubleSide, 0));
@@ -274,6 +273,8 @@ class Drawing implements SpaceDrawing {
       material.depthWrite = !look.isTranslucent;
       material.alphaToCoverage = clip !== null && !look.isTranslucent;
       material.stencilWrite = cutFace !== null;
+      // Edges and sections lie in the surface, and must be in front of it. The offset shows silhouettes in cut faces.
+      material.polygonOffset = hasEdges || this.sections.length > 0;
     }
     this.outside.material.side = hasTwoSteps ? FrontSide : DoubleSide;
   }
