@@ -7,15 +7,16 @@ import type { Frame } from '../src/protocol/frame';
 import { inPlane, inSpace } from '../src/protocol/sections';
 import { axesDrawing } from '../src/space/axes';
 import {
-  type Camera, cornersOf, DEFAULT_VIEW, fitBox, panBy, parseSpaceView, pointAt, project, rayAt, type SpaceView, turnBy,
+  axesOf, type Camera, cornersOf, DEFAULT_VIEW, fitBox, panBy, parseSpaceView, pointAt, project, rayAt, type SpaceView, turnBy,
   type Vector, viewText, zoomAt,
 } from '../src/space/camera';
-import { DEFAULT_SPACE_LOOK, parseSpaceLook, spaceLookText } from '../src/space/look';
+import { clipOf, cutFaceOf } from '../src/space/clip';
+import { DEFAULT_SPACE_LOOK, parseSpaceLook, type SpaceLook, spaceLookText } from '../src/space/look';
 import { applySpaceKey } from '../src/space/navigation';
 import { pickShell } from '../src/space/pick';
-import type { SpaceDrawing, SpaceState } from '../src/space/drawing';
+import { SELECTED, type SpaceDrawing, type SpaceState } from '../src/space/drawing';
 import { boxOf, spaceFrameOf, SpaceScene } from '../src/space/scene';
-import { sectionLines } from '../src/space/sections';
+import { cornersInPlane, planeBorders, sectionLines } from '../src/space/sections';
 import { type PlacedShells, shellAt, shellsByPlace } from '../src/space/shells';
 import { plainMessage } from './surface_message';
 
@@ -99,9 +100,19 @@ test('a view and a look survive an address', () => {
   for (const text of ['', '1,2,3', '1,2,3,4,5,0', '1,2,3,4,5,x']) assert.equal(parseSpaceView(text), null);
   assert.equal(parseSpaceView('1,2,3,4,0,1e300')?.height, 1e30, 'the camera stays within reach');
   assert.equal(spaceLookText(DEFAULT_SPACE_LOOK), '');
-  const look = { shading: 'flat', isTranslucent: true, isPerspective: false, clipAxis: 'y', clipAt: 0.25, isClipFlipped: true } as const;
+  const look: SpaceLook = {
+    shading: 'flat', isTranslucent: true, isPerspective: false, clipAxis: 'y', clipHeld: null, clipAt: 0.25,
+    isClipFlipped: true, hasCutFaces: false, hasPlanes: true,
+  };
   assert.deepEqual(parseSpaceLook(spaceLookText(look)), look);
-  assert.deepEqual(parseSpaceLook('clip:w:7,nonsense'), DEFAULT_SPACE_LOOK);
+  for (const clipHeld of [null, [0.6, 0, -0.8] as const]) {
+    const across: SpaceLook = { ...DEFAULT_SPACE_LOOK, clipAxis: 'view', clipHeld };
+    assert.deepEqual(parseSpaceLook(spaceLookText(across)), across);
+  }
+  assert.deepEqual(parseSpaceLook('clip:w:7,nonsense,held:1:0:0'), DEFAULT_SPACE_LOOK);
+  for (const held of ['held', 'held:1:2', 'held:9:9:9', 'held:x:0:1']) {
+    assert.deepEqual(parseSpaceLook(`clip:view:0.5,${held}`), { ...DEFAULT_SPACE_LOOK, clipAxis: 'view' }, held);
+  }
 });
 
 test('the nearest shell that is not cut away is picked', () => {
@@ -117,6 +128,59 @@ test('the nearest shell that is not cut away is picked', () => {
   assert.equal(pick([-1, 0, 0]), null);
   assert.equal(pick([-1, 0, 0], true)?.shell, 1, 'a line goes both ways, and the nearest is the last one');
   assert.equal(pick([0, 1, 0]), null);
+});
+
+const clipped = (look: Partial<SpaceLook>): SpaceLook => ({ ...DEFAULT_SPACE_LOOK, clipAt: 0.25, ...look });
+const cuboid = { low: [2, 0, 0], high: [6, 1, 2] } as const;
+
+test('a clip plane lies across an axis, the view, or a held direction', () => {
+  const cutOf = (look: Partial<SpaceLook>) => clipOf(clipped(look), view, cuboid, [1, 0, 0]);
+  assert.equal(cutOf({}), null);
+  assert.deepEqual(cutOf({ clipAxis: 'x' }), { normal: [1, 0, 0], at: 2 });
+  assert.deepEqual(cutOf({ clipAxis: 'x', isClipFlipped: true }), { normal: [-1, 0, 0], at: -2 });
+  const { back } = axesOf(view);
+  const heights = cornersOf(cuboid).map(([x, y, z]) => (x - 1) * back[0] + y * back[1] + z * back[2]);
+  const across = cutOf({ clipAxis: 'view' });
+  isNear(across?.normal ?? [], back);
+  isNear([across?.at ?? NaN], [0.75 * Math.min(...heights) + 0.25 * Math.max(...heights)]);
+  isNear(cutOf({ clipAxis: 'view', clipHeld: [0, 0.6, 0.8] })?.normal ?? [], [0, 0.6, 0.8]);
+});
+
+test('a cut face is seen from the side that is cut away', () => {
+  const origin: Vector = [1, 0, 0];
+  for (const isPerspective of [true, false]) {
+    for (const [turn, isClipFlipped, isSeen] of [[0, false, true], [0, true, false], [Math.PI, false, false], [Math.PI, true, true]] as const) {
+      const camera: Camera = { view: { ...view, turn, tilt: 0 }, isPerspective, size };
+      const faceOf = (look: Partial<SpaceLook>) => {
+        const whole = clipped({ clipAxis: 'x', isClipFlipped, ...look });
+        return cutFaceOf(clipOf(whole, camera.view, cuboid, origin), whole, camera, cuboid, origin);
+      };
+      const face = faceOf({});
+      assert.equal(face !== null, isSeen, `${turn} ${isClipFlipped} ${isPerspective}`);
+      assert.equal(faceOf({ hasCutFaces: false }), null);
+      assert.equal(faceOf({ isTranslucent: true }), null);
+      if (!face) continue;
+      isNear(face.middle, [2, 0.5, 1]);
+      assert.ok(face.halfWidth > Math.hypot(4, 1, 2) / 2);
+    }
+  }
+});
+
+test('a ray hits the cut face of a body, also in front of its cavity', () => {
+  const surface = surfaceAt([0, 0, 0], [5, 0, 0]);
+  const clip = { normal: [-1, 0, 0] as const, at: surface.origin[0] };
+  const from: Vector = [-9 - surface.origin[0], 0.1, 0.1];
+  const pick = (along: Vector, hasCutFace: boolean, isLine = false) => pickShell(surface, from, along, isLine, clip, hasCutFace);
+  isNear([(pick([1, 0, 0], false)?.point[0] ?? NaN) + surface.origin[0]], [0.8], 1e-6);
+  for (const isLine of [false, true]) {
+    isNear([(pick([1, 0, 0], true, isLine)?.point[0] ?? NaN) + surface.origin[0]], [0], 1e-6);
+  }
+  const beside = pickShell(surface, [from[0], 0.1, 0.1], [5, 0.95, 0], false, clip, true);
+  assert.equal(beside, null, 'the plane is empty there');
+  const outside = pickShell({ ...surface, triangles: surface.triangles.map((corner) => corner % 6 + 6) }, from, [1, 0, 0], false, clip, true);
+  isNear([(outside?.point[0] ?? NaN) + surface.origin[0]], [4.2], 1e-6);
+  const cavity = { ...surface, outerOf: Uint32Array.of(1, surface.outerOf[1]) };
+  assert.equal(pickShell(cavity, from, [1, 0, 0], false, clip, true)?.shell, 1);
 });
 
 test('axes lie at the border of the box and have numbers', () => {
@@ -253,4 +317,40 @@ test('sections lie in their planes', () => {
   });
   assert.deepEqual(sectionLines(withSection, outlines, { ...DEFAULT_LOOK, hidden: [1] }, [0, 0, 0]), []);
   assert.deepEqual(sectionLines(withSection, outlines, { ...DEFAULT_LOOK, sections: false }, [0, 0, 0]), []);
+});
+
+test('the border of a plane goes around the box', () => {
+  const plane = (origin: Vector, normal: Vector) => ({ origin, normal });
+  assert.deepEqual(cornersInPlane(cuboid, plane([0, 0, 3], [0, 0, 1])), [], 'above the box');
+  const across = cornersInPlane(cuboid, plane([0, 0, 0.5], [0, 0, 1]));
+  assert.equal(across.length, 4);
+  across.forEach((corner, k) => {
+    const next = across[(k + 1) % 4];
+    assert.equal(corner[2], 0.5);
+    assert.equal(Number(corner[0] !== next[0]) + Number(corner[1] !== next[1]), 1, 'along one edge');
+  });
+  assert.equal(cornersInPlane({ low: [0, 0, 0], high: [1, 1, 1] }, plane([0.5, 0.5, 0.5], [1, 1, 1])).length, 6);
+  const outlines = [{ plane: null, isovalue: null, isSurface: true }, { plane: plane([0, 0, 0.5], [0, 0, 1]), isovalue: null }];
+  const [{ positions, isBorder }] = planeBorders(outlines, DEFAULT_LOOK, cuboid, [1, 1, 1]);
+  assert.ok(isBorder && positions.length === 4 * 2 * 3);
+  assert.deepEqual([...positions.slice(3, 6)], [...positions.slice(6, 9)]);
+  assert.deepEqual(planeBorders(outlines, { ...DEFAULT_LOOK, hidden: [1] }, cuboid, [0, 0, 0]), []);
+  assert.deepEqual(planeBorders(outlines, { ...DEFAULT_LOOK, sections: false }, cuboid, [0, 0, 0]), []);
+});
+
+test('a cavity has the colour of its body, and its body is selected in a cut', () => {
+  const surface = { ...surfaceAt([0, 0, 0], [0, 0, 0]), outerOf: Uint32Array.of(0xffffffff, 0) };
+  const scene = new SpaceScene(hiddenCanvas);
+  let tints = new Uint8Array(0);
+  const drawing = { show() {}, setTints: (now: Uint8Array) => { tints = now.slice(); }, setSections() {}, draw() {}, destroy() {} };
+  scene.attach(drawing satisfies SpaceDrawing);
+  scene.setLook({ ...DEFAULT_LOOK, colour: 'identity' }, DEFAULT_SPACE_LOOK);
+  scene.show(spaceFrameOf(frame(1), surface), []);
+  const tintOf = (shell: number) => [...tints.slice(24 * shell, 24 * shell + 4)];
+  assert.deepEqual(tintOf(1), tintOf(0));
+  assert.equal(tintOf(0)[3], 0);
+  scene.select(1n);
+  assert.deepEqual([tintOf(0)[3], tintOf(1)[3]], [SELECTED.shell + SELECTED.body, SELECTED.body]);
+  scene.select(2n);
+  assert.deepEqual([tintOf(0)[3], tintOf(1)[3]], [0, SELECTED.shell]);
 });

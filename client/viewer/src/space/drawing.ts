@@ -1,11 +1,14 @@
 import type { Rgb } from '../draw/colours';
 import type { Surface } from '../protocol/surface';
 import type { Camera, Vector } from './camera';
+import type { Clip, CutFace } from './clip';
 import type { SpaceLook } from './look';
-import type { Clip } from './pick';
 
-/** The outlines of a section as lines: pairs of points relative to the surface's origin. */
-export interface SectionLines { positions: Float32Array; colour: Rgb }
+/** The outlines of a section, or the border of its plane, as lines: pairs of points relative to the surface's origin. */
+export interface SectionLines { positions: Float32Array; colour: Rgb; isBorder: boolean }
+
+/** Alpha of a point's tint if its shell is selected, and if its body is, which colours the cut face. The sum for both. */
+export const SELECTED = { shell: 170, body: 85 } as const;
 
 /** Colours of one picture. */
 export interface SpaceTheme {
@@ -40,6 +43,8 @@ export interface SpaceState {
   spacing: number;
   lineWidth: number;
   clip: Clip | null;
+  /** Null: the picture shows cut bodies from their inside. */
+  cutFace: CutFace | null;
   values: ValueColours | null;
   /** Device pixels per CSS pixel. */
   ratio: number;
@@ -54,7 +59,7 @@ export interface SpaceState {
 export interface SpaceDrawing {
   /** Uploads a surface, or removes the former one. */
   show(surface: Surface | null): void;
-  /** RGBA of each point; alpha is 255 for selected shells. */
+  /** RGBA of each point; alpha is a sum of SELECTED. */
   setTints(tints: Uint8Array): void;
   setSections(lines: readonly SectionLines[]): void;
   draw(state: SpaceState): void;

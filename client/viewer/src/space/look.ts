@@ -1,27 +1,43 @@
+import type { Vector } from './camera';
+
 /** How a surface is drawn. Its other parts and its colours are those of the common look (draw/look.ts). */
 export interface SpaceLook {
   shading: 'smooth' | 'flat';
   isTranslucent: boolean;
   isPerspective: boolean;
-  /** Cuts away one side of a plane that is perpendicular to this axis. */
-  clipAxis: 'none' | 'x' | 'y' | 'z';
+  /** Cuts away one side of a plane that is perpendicular to this axis, or to the view. */
+  clipAxis: 'none' | 'x' | 'y' | 'z' | 'view';
+  /** With the axis `view`: the direction to the camera that the plane keeps. Null: the plane turns with the camera. */
+  clipHeld: Vector | null;
   /** Place of the plane, from 0 to 1 along the axis of the box around all frames so far. */
   clipAt: number;
   /** Cuts away the side with the smaller coordinates. */
   isClipFlipped: boolean;
+  /** Closes cut bodies in the clip plane. */
+  hasCutFaces: boolean;
+  /** Draws the borders of the planes of sections in the box around all frames so far. */
+  hasPlanes: boolean;
 }
 
 export const DEFAULT_SPACE_LOOK: Readonly<SpaceLook> = {
-  shading: 'smooth', isTranslucent: false, isPerspective: true, clipAxis: 'none', clipAt: 0.5, isClipFlipped: false,
+  shading: 'smooth', isTranslucent: false, isPerspective: true, clipAxis: 'none', clipHeld: null, clipAt: 0.5,
+  isClipFlipped: false, hasCutFaces: true, hasPlanes: false,
 };
 
-export const CLIP_AXES = ['none', 'x', 'y', 'z'] as const;
+export const CLIP_AXES = ['none', 'x', 'y', 'z', 'view'] as const;
 
-/** `flat,translucent,parallel,clip:x:0.5:flipped` for an address; empty for the default. */
+/** Directions of a link have length 1 but for their rounding. */
+const ROUNDING = 1e-3;
+
+/** `flat,translucent,parallel,clip:view:0.5:flipped,held:1:0:0,hollow,planes` for an address; empty for the default. */
 export function spaceLookText(look: SpaceLook): string {
+  const { clipAxis, clipAt, clipHeld, isClipFlipped } = look;
+  const held = clipAxis === 'view' ? clipHeld : null;
   return [
     look.shading === 'flat' ? 'flat' : '', look.isTranslucent ? 'translucent' : '', look.isPerspective ? '' : 'parallel',
-    look.clipAxis === 'none' ? '' : `clip:${look.clipAxis}:${look.clipAt}${look.isClipFlipped ? ':flipped' : ''}`,
+    clipAxis === 'none' ? '' : `clip:${clipAxis}:${clipAt}${isClipFlipped ? ':flipped' : ''}`,
+    held ? `held:${held.map((part) => Number(part.toFixed(5))).join(':')}` : '',
+    look.hasCutFaces ? '' : 'hollow', look.hasPlanes ? 'planes' : '',
   ].filter(Boolean).join(',');
 }
 
@@ -30,12 +46,21 @@ export function parseSpaceLook(text: string): SpaceLook {
   const parts = text.split(',');
   const [, axis = 'none', at = '', side = ''] = (parts.find((part) => part.startsWith('clip:')) ?? '').split(':');
   const clipAt = at === '' ? NaN : Number(at);
+  const clipAxis = CLIP_AXES.find((one) => one === axis) ?? 'none';
   return {
     shading: parts.includes('flat') ? 'flat' : 'smooth',
     isTranslucent: parts.includes('translucent'),
     isPerspective: !parts.includes('parallel'),
-    clipAxis: CLIP_AXES.find((one) => one === axis) ?? 'none',
+    clipAxis,
+    clipHeld: clipAxis === 'view' ? parseHeld(parts.find((part) => part.startsWith('held:')) ?? '') : null,
     clipAt: clipAt >= 0 && clipAt <= 1 ? clipAt : DEFAULT_SPACE_LOOK.clipAt,
     isClipFlipped: side === 'flipped',
+    hasCutFaces: !parts.includes('hollow'),
+    hasPlanes: parts.includes('planes'),
   };
+}
+
+function parseHeld(text: string): Vector | null {
+  const [x, y, z] = text.split(':').slice(1).map(Number);
+  return Math.abs(Math.hypot(x, y, z) - 1) < ROUNDING ? [x, y, z] : null;
 }

@@ -1,8 +1,6 @@
-import type { Surface } from '../protocol/surface';
-import type { Vector } from './camera';
-
-/** A plane relative to the surface's origin: points with `normal` · point > `at` are cut away. */
-export interface Clip { normal: Vector; at: number }
+import { NO_SHELL, type Surface } from '../protocol/surface';
+import { dot, plus, type Vector } from './camera';
+import type { Clip } from './clip';
 
 /** What a ray hits: a shell, and the point relative to the surface's origin. */
 export interface Hit { shell: number; point: Vector }
@@ -24,17 +22,25 @@ function meets(boxes: Float32Array, shell: number, from: Vector, along: Vector):
   return first <= last;
 }
 
+/** The body that a shell bounds: itself, or the body around a cavity. */
+export function bodyOf({ outerOf }: Pick<Surface, 'outerOf'>, shell: number): number {
+  return outerOf[shell] === NO_SHELL ? shell : outerOf[shell];
+}
+
 /**
  * The nearest triangle that a ray hits, without the part that is cut away. `from` is relative to the surface's origin.
  * `isLine`: the ray also extends backwards, because a parallel camera has no position.
+ * `hasCutFace`: cut bodies are closed in the clip plane, which the ray then hits first.
  * Cost: linear in the triangles of the shells whose boxes the ray meets.
  */
-export function pickShell(surface: Surface, from: Vector, along: Vector, isLine: boolean, clip: Clip | null): Hit | null {
+export function pickShell(surface: Surface, from: Vector, along: Vector, isLine: boolean, clip: Clip | null,
+  hasCutFace = false): Hit | null {
   const { positions, triangles, triangleOffsets, boxes, outerOf } = surface;
   const [ox, oy, oz] = from;
   const [dx, dy, dz] = along;
   let best: Hit | null = null;
   let nearest = Infinity;
+  let isInside = false;
   for (let shell = 0; shell < outerOf.length; ++shell) {
     if (!meets(boxes, shell, from, along)) continue;
     for (let i = 3 * triangleOffsets[shell]; i < 3 * triangleOffsets[shell + 1]; i += 3) {
@@ -59,8 +65,11 @@ export function pickShell(surface: Surface, from: Vector, along: Vector, isLine:
       const point: Vector = [ox + at * dx, oy + at * dy, oz + at * dz];
       if (clip && point[0] * clip.normal[0] + point[1] * clip.normal[1] + point[2] * clip.normal[2] > clip.at) continue;
       nearest = at;
+      isInside = determinant < 0;
       best = { shell, point };
     }
   }
-  return best;
+  if (!best || !clip || !hasCutFace || !isInside) return best;
+  const share = (clip.at - dot(from, clip.normal)) / dot(along, clip.normal);
+  return { shell: bodyOf(surface, best.shell), point: plus(from, along, share) };
 }

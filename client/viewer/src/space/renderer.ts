@@ -1,8 +1,9 @@
 // Draws surfaces by three.js. Bundled as space.js, which the page loads when it shows a surface.
 import {
-  BufferAttribute, BufferGeometry, Color, ColorManagement, DataTexture, DoubleSide, FrontSide, BackSide,
-  LinearSRGBColorSpace, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera, Points, Scene, ShaderMaterial,
-  Vector2, Vector3, Vector4, WebGLRenderer, type Camera as ThreeCamera, type IUniform, type Side,
+  AlwaysDepth, BackSide, BufferAttribute, BufferGeometry, Color, ColorManagement, DataTexture, DoubleSide, EqualStencilFunc,
+  FrontSide, LinearSRGBColorSpace, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Points,
+  ReplaceStencilOp, Scene, ShaderMaterial, Vector2, Vector3, Vector4, WebGLRenderer, type Camera as ThreeCamera,
+  type IUniform, type Side,
 } from 'three';
 import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
@@ -14,7 +15,8 @@ import type { Surface } from '../protocol/surface';
 import { axesOf, distanceOf, FIELD_OF_VIEW, minus, plus, unitsPerPixel } from './camera';
 import type { SectionLines, SpaceDrawing, SpaceState } from './drawing';
 import {
-  COLOUR_MODE, EDGE_FRAGMENT, EDGE_VERTEX, POINT_FRAGMENT, POINT_VERTEX, SURFACE_FRAGMENT, SURFACE_VERTEX,
+  COLOUR_MODE, CUT_FACE_FRAGMENT, CUT_FACE_VERTEX, EDGE_FRAGMENT, EDGE_VERTEX, POINT_FRAGMENT, POINT_VERTEX,
+  SURFACE_FRAGMENT, SURFACE_VERTEX,
 } from './shaders';
 
 const TRANSLUCENT = 0.4;
@@ -24,6 +26,9 @@ const MAP_COLOURS = 256;
 /** Cuts nothing: no point is above an infinite height. */
 const NO_CLIP = 1e30;
 const SMALLEST_DOT = 1.5;
+const BORDER_WIDTH = 1;
+/** The border of a cut is smooth over this depth at most, in pixels: a silhouette's depth changes without limit. */
+const DEEPEST_BORDER = 8;
 
 // The shaders use sRGB throughout.
 ColorManagement.enabled = false;
@@ -53,6 +58,7 @@ function setNumbers(geometry: BufferGeometry, name: string, numbers: Float32Arra
 /** A section in the picture: its lines in front of the surface, and behind it, where they are faint. */
 class SectionPart {
   private readonly parts: readonly LineSegments2[];
+  private isBorder = false;
 
   /** The materials stay from frame to frame, so that their program is compiled once. */
   constructor(private readonly scene: Scene) {
@@ -65,7 +71,8 @@ class SectionPart {
     });
   }
 
-  show({ positions, colour }: SectionLines): void {
+  show({ positions, colour, isBorder }: SectionLines): void {
+    this.isBorder = isBorder;
     const geometry = new LineSegmentsGeometry();
     if (positions.length > 0) geometry.setPositions(positions);
     for (const part of this.parts) {
@@ -78,7 +85,7 @@ class SectionPart {
 
   setStyle(lineWidth: number, { width, height }: Size): void {
     for (const { material } of this.parts) {
-      material.linewidth = lineWidth;
+      material.linewidth = this.isBorder ? BORDER_WIDTH : lineWidth;
       material.resolution.set(width, height);
     }
   }
@@ -103,8 +110,8 @@ class Drawing implements SpaceDrawing {
   private readonly parallel = new OrthographicCamera();
   private readonly common = commonUniforms();
   private readonly surfaceUniforms: Uniforms = {
-    ...this.common, isFlat: { value: false }, isParallel: { value: false }, opacity: { value: 1 },
-    accent: { value: new Color() }, ambient: { value: 0.3 },
+    ...this.common, isFlat: { value: false }, isParallel: { value: false }, hasCutFace: { value: false }, deepest: { value: 0 },
+    opacity: { value: 1 }, accent: { value: new Color() }, ambient: { value: 0.3 },
   };
   private readonly pointUniforms: Uniforms = {
     ...this.common, mode: { value: COLOUR_MODE.tint }, colour: { value: new Color() }, diameter: { value: 1 },
@@ -118,32 +125,41 @@ class Drawing implements SpaceDrawing {
   private geometry = new BufferGeometry();
   private edgeGeometry = new BufferGeometry();
   private pointGeometry = new BufferGeometry();
-  /** Inside and outside of the surface. A translucent one is drawn in two steps. */
+  /** Inside and outside of the surface. One that is translucent or has a cut face is drawn in two steps. */
   private readonly inside: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
+  /**
+   * The depth of the clip plane where it cuts a body, so that the cut face hides what is in the body. The surface
+   * draws its colour: `inside` sets the stencil, and `outside` clears it, so it remains where the inside is in front.
+   */
+  private readonly cutFace = new Mesh(new PlaneGeometry(2, 2), new ShaderMaterial({
+    vertexShader: CUT_FACE_VERTEX, fragmentShader: CUT_FACE_FRAGMENT, side: DoubleSide, colorWrite: false,
+    depthFunc: AlwaysDepth, stencilWrite: true, stencilFunc: EqualStencilFunc, stencilRef: 1,
+    // Lines in the plane are wide, and must be in front of it.
+    polygonOffset: true, polygonOffsetFactor: 3, polygonOffsetUnits: 3,
+  }));
   private readonly edges: LineSegments;
   private readonly points: Points;
   private readonly sections: SectionPart[] = [];
 
   constructor(canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: false });
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: false, stencil: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     // Parts are drawn in the order of `add`. Sorting would compute the bounding sphere of each frame: 4 ms of 200,000 triangles.
     this.renderer.sortObjects = false;
-    const material = (side: Side) => new ShaderMaterial({
+    const material = (side: Side, stencilRef: number) => new ShaderMaterial({
       vertexShader: SURFACE_VERTEX, fragmentShader: SURFACE_FRAGMENT, uniforms: this.surfaceUniforms, side,
-      // Edges and sections lie in the surface, and must be in front of it.
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+      polygonOffsetFactor: 1, polygonOffsetUnits: 1, stencilRef, stencilZPass: ReplaceStencilOp,
     });
-    this.inside = new Mesh(this.geometry, material(BackSide));
-    this.outside = new Mesh(this.geometry, material(DoubleSide));
+    this.inside = new Mesh(this.geometry, material(BackSide, 1));
+    this.outside = new Mesh(this.geometry, material(DoubleSide, 0));
     this.edges = new LineSegments(this.edgeGeometry, new ShaderMaterial({
       vertexShader: EDGE_VERTEX, fragmentShader: EDGE_FRAGMENT, uniforms: this.edgeUniforms, transparent: true, depthWrite: false,
     }));
     this.points = new Points(this.pointGeometry, new ShaderMaterial({
       vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, uniforms: this.pointUniforms,
     }));
-    for (const one of [this.points, this.inside, this.outside, this.edges]) {
+    for (const one of [this.inside, this.outside, this.cutFace, this.points, this.edges]) {
       one.frustumCulled = false;
       one.matrixAutoUpdate = false;
       this.scene.add(one);
@@ -183,6 +199,7 @@ class Drawing implements SpaceDrawing {
     this.renderer.setClearColor(this.background.setRGB(...theme.background), 1);
     this.setUniforms(state);
     this.setParts(state);
+    this.placeCutFace(state);
     for (const section of this.sections) section.setStyle(lineWidth, size);
     this.renderer.render(this.scene, this.placed(isPerspective ? this.perspective : this.parallel, state));
   }
@@ -190,6 +207,7 @@ class Drawing implements SpaceDrawing {
   destroy(): void {
     this.show(null);
     this.setSections([]);
+    this.cutFace.geometry.dispose();
     this.ramp?.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
@@ -214,6 +232,7 @@ class Drawing implements SpaceDrawing {
     surfaceUniforms.isFlat.value = look.shading === 'flat';
     surfaceUniforms.isParallel.value = !look.isPerspective;
     surfaceUniforms.opacity.value = look.isTranslucent ? TRANSLUCENT : 1;
+    surfaceUniforms.deepest.value = DEEPEST_BORDER * unitsPerPixel(camera) / ratio;
     surfaceUniforms.ambient.value = theme.ambient;
     setColour(surfaceUniforms.accent, theme.accent);
     setColour(pointUniforms.colour, theme.particle);
@@ -237,11 +256,13 @@ class Drawing implements SpaceDrawing {
     this.common.ramp.value = this.ramp;
   }
 
-  private setParts({ look, hasSurface, hasEdges, hasParticles }: SpaceState): void {
+  private setParts({ look, hasSurface, hasEdges, hasParticles, clip, cutFace }: SpaceState): void {
     const { surface } = this;
     const hasTriangles = (surface?.triangles.length ?? 0) > 0;
-    this.inside.visible = hasSurface && hasTriangles && look.isTranslucent;
+    const hasTwoSteps = look.isTranslucent || cutFace !== null;
+    this.inside.visible = hasSurface && hasTriangles && hasTwoSteps;
     this.outside.visible = hasSurface && hasTriangles;
+    this.cutFace.visible = this.outside.visible && cutFace !== null;
     this.edges.visible = hasEdges && hasTriangles;
     this.points.visible = hasParticles && (surface?.particles?.length ?? 0) > 0;
     if (this.edges.visible && surface && !this.edgeGeometry.index) {
@@ -250,8 +271,22 @@ class Drawing implements SpaceDrawing {
     for (const material of [this.inside.material, this.outside.material]) {
       material.transparent = look.isTranslucent;
       material.depthWrite = !look.isTranslucent;
+      material.alphaToCoverage = clip !== null && !look.isTranslucent;
+      material.stencilWrite = cutFace !== null;
+      // Edges and sections lie in the surface, and must be in front of it. The offset shows silhouettes in cut faces.
+      material.polygonOffset = hasEdges || this.sections.length > 0;
     }
-    this.outside.material.side = look.isTranslucent ? FrontSide : DoubleSide;
+    this.outside.material.side = hasTwoSteps ? FrontSide : DoubleSide;
+  }
+
+  private placeCutFace({ clip, cutFace }: SpaceState): void {
+    this.surfaceUniforms.hasCutFace.value = cutFace !== null;
+    if (!clip || !cutFace) return;
+    const { cutFace: { position, quaternion, scale } } = this;
+    position.set(...cutFace.middle);
+    quaternion.setFromUnitVectors(new Vector3(0, 0, 1), new Vector3(...clip.normal));
+    scale.setScalar(cutFace.halfWidth);
+    this.cutFace.updateMatrix();
   }
 
   private placed(camera: PerspectiveCamera | OrthographicCamera, { camera: { view, size }, near, far, origin }: SpaceState): ThreeCamera {
@@ -278,7 +313,7 @@ class Drawing implements SpaceDrawing {
 
 /** Throws an Error with a sentence if the browser cannot draw. */
 export function createDrawing(canvas: HTMLCanvasElement): SpaceDrawing {
-  if (!canvas.getContext('webgl2', { antialias: true, alpha: false })) {
+  if (!canvas.getContext('webgl2', { antialias: true, alpha: false, stencil: true })) {
     throw new Error('This browser cannot draw surfaces, because WebGL 2 is missing.');
   }
   return new Drawing(canvas);

@@ -13,10 +13,11 @@ import {
   axesOf, type Box, type Camera, cornersOf, DEFAULT_VIEW, distanceOf, dot, fitBox, minus, plus, rayAt, type SpaceView,
   unionOf, type Vector,
 } from './camera';
-import type { SpaceDrawing, SpaceTheme, ValueColours } from './drawing';
+import { type Clip, clipOf, type CutFace, cutFaceOf } from './clip';
+import { SELECTED, type SpaceDrawing, type SpaceTheme, type ValueColours } from './drawing';
 import { DEFAULT_SPACE_LOOK, type SpaceLook } from './look';
-import { type Clip, pickShell } from './pick';
-import { checkSections, sectionLines } from './sections';
+import { bodyOf, pickShell } from './pick';
+import { checkSections, planeBorders, sectionLines } from './sections';
 import { shellsByPlace } from './shells';
 
 /** A frame with its decoded surface. */
@@ -28,7 +29,6 @@ export interface PickedShell { shell: number; point: Vector }
 const MAP_COLOURS = 256;
 /** The camera never shows what is nearer than this share of its distance. */
 const NEAREST = 1e-3;
-const SELECTED = 0xff000000;
 
 /** A frame with a surface, ready to draw. Throws an Error with a sentence if its sections contradict themselves. */
 export function spaceFrameOf(frame: Frame, surface: Surface): SpaceFrame {
@@ -129,6 +129,7 @@ export class SpaceScene {
     const box = this.shown && boxOf(this.shown.surface);
     if (this.shown) this.extent = box;
     if (box) this.view = fitBox(this.camera, box);
+    this.showSections();
   }
 
   /** While the view follows the content: shows the box of all frames so far. */
@@ -142,11 +143,12 @@ export class SpaceScene {
     const begin = performance.now();
     const { look, spaceLook, shown, size, camera } = this;
     const [near, far] = this.depths();
+    const { clip, cutFace } = this.cut();
     this.drawing?.draw({
       camera, look: spaceLook, theme: themeOf(look.dark), near, far,
       hasSurface: look.fill, hasEdges: look.edges, hasParticles: look.particles,
       spacing: shown?.frame.statistics.spacing ?? 0, lineWidth: look.lineWidth,
-      clip: this.clip(), values: this.values(),
+      clip, cutFace, values: this.values(),
       ratio: devicePixelRatio, origin: shown?.surface.origin ?? [0, 0, 0],
     });
     this.lastDrawMs = performance.now() - begin;
@@ -165,7 +167,8 @@ export class SpaceScene {
     if (!this.shown || !this.look.fill) return null;
     const { surface } = this.shown;
     const { from, along } = rayAt(this.camera, x, y);
-    const hit = pickShell(surface, minus(from, surface.origin), along, !this.spaceLook.isPerspective, this.clip());
+    const { clip, cutFace } = this.cut();
+    const hit = pickShell(surface, minus(from, surface.origin), along, !this.spaceLook.isPerspective, clip, cutFace !== null);
     return hit && { shell: hit.shell, point: plus(surface.origin, hit.point) };
   }
 
@@ -192,11 +195,13 @@ export class SpaceScene {
   }
 
   private showSections(): void {
-    const { shown } = this;
-    this.drawing?.setSections(shown ? sectionLines(shown.frame, this.outlines, this.look, shown.surface.origin) : []);
+    const { shown, outlines, look, extent, spaceLook: { hasPlanes } } = this;
+    const lines = shown ? sectionLines(shown.frame, outlines, look, shown.surface.origin) : [];
+    if (shown && extent && hasPlanes) lines.push(...planeBorders(outlines, look, extent, shown.surface.origin));
+    this.drawing?.setSections(lines);
   }
 
-  /** Writes the colour of each shell to its points. */
+  /** Writes the colour of each shell to its points. A cavity has the colour of its body, which is beside it in a cut. */
   private tint(): void {
     if (!this.shown || !this.drawing) return;
     const { pointOffsets, identities, outerOf, positions } = this.shown.surface;
@@ -206,22 +211,21 @@ export class SpaceScene {
     const selected = new Set(this.selected);
     const halves = new Uint32Array(identities.buffer, identities.byteOffset, 2 * identities.length);
     for (let shell = 0; shell < outerOf.length; ++shell) {
+      const body = bodyOf(this.shown.surface, shell);
       const rgba = colour === 'identity'
-        ? packed(identityColour(halves[2 * shell], halves[2 * shell + 1], dark)) : plain;
-      const alpha = selected.has(shell) ? SELECTED : 0;
-      tints.fill(((rgba & 0xffffff) | alpha) >>> 0, pointOffsets[shell], pointOffsets[shell + 1]);
+        ? packed(identityColour(halves[2 * body], halves[2 * body + 1], dark)) : plain;
+      const alpha = (selected.has(shell) ? SELECTED.shell : 0) + (selected.has(body) ? SELECTED.body : 0);
+      tints.fill(((rgba & 0xffffff) | alpha << 24) >>> 0, pointOffsets[shell], pointOffsets[shell + 1]);
     }
     this.drawing.setTints(new Uint8Array(tints.buffer));
   }
 
-  private clip(): Clip | null {
-    const { clipAxis, clipAt, isClipFlipped } = this.spaceLook;
-    if (clipAxis === 'none' || !this.extent || !this.shown) return null;
-    const axis = 'xyz'.indexOf(clipAxis);
-    const { low, high } = this.extent;
-    const sign = isClipFlipped ? -1 : 1;
-    const normal: Vector = [axis === 0 ? sign : 0, axis === 1 ? sign : 0, axis === 2 ? sign : 0];
-    return { normal, at: sign * (low[axis] + clipAt * (high[axis] - low[axis]) - this.shown.surface.origin[axis]) };
+  private cut(): { clip: Clip | null; cutFace: CutFace | null } {
+    const { extent, shown, spaceLook, camera } = this;
+    if (!extent || !shown) return { clip: null, cutFace: null };
+    const { origin } = shown.surface;
+    const clip = clipOf(spaceLook, camera.view, extent, origin);
+    return { clip, cutFace: cutFaceOf(clip, spaceLook, camera, extent, origin) };
   }
 
   private values(): ValueColours | null {

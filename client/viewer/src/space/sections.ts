@@ -1,8 +1,8 @@
 import { isolineColour } from '../draw/look_colours';
 import type { Look } from '../draw/look';
 import type { Frame } from '../protocol/frame';
-import { inSpace, type Outline } from '../protocol/sections';
-import { minus, type Vector } from './camera';
+import { inPlane, inSpace, type Outline, type SectionPlane } from '../protocol/sections';
+import { type Box, cornersOf, dot, minus, plus, type Vector } from './camera';
 import type { SectionLines } from './drawing';
 
 /** Throws an Error with a sentence if the rings of a section have other points than it. */
@@ -37,6 +37,35 @@ export function sectionLines(frame: Frame, outlines: readonly Outline[], look: L
         add(point + 1 < offsets[ring + 1] ? point + 1 : offsets[ring]);
       }
     }
-    return [{ positions, colour: isolineColour(k + 1, look.dark) }];
+    return [{ positions, colour: isolineColour(k + 1, look.dark), isBorder: false }];
+  });
+}
+
+/** The corners of a box's section with a plane, in order around it; empty if it has none. */
+export function cornersInPlane(box: Box, plane: SectionPlane): Vector[] {
+  const corners = cornersOf(box);
+  const heights = corners.map((corner) => dot(minus(corner, plane.origin), plane.normal));
+  const found: Vector[] = [];
+  for (let k = 0; k < corners.length; ++k) {
+    for (const other of [k | 1, k | 2, k | 4]) {
+      if (other === k || heights[k] < 0 === heights[other] < 0) continue;
+      found.push(plus(corners[k], minus(corners[other], corners[k]), heights[k] / (heights[k] - heights[other])));
+    }
+  }
+  const flat = found.map((corner) => inPlane(plane, corner));
+  const middle = [0, 1].map((axis) => flat.reduce((sum, point) => sum + point[axis], 0) / flat.length);
+  const angles = flat.map((point) => Math.atan2(point[1] - middle[1], point[0] - middle[0]));
+  return angles.map((_, k) => k).sort((a, b) => angles[a] - angles[b]).map((k) => found[k]);
+}
+
+/** The borders of the planes of the sections that the look draws, in a box. Points are relative to `origin`. */
+export function planeBorders(outlines: readonly Outline[], look: Look, box: Box, origin: Vector): SectionLines[] {
+  if (!look.sections) return [];
+  return outlines.flatMap(({ plane }, k) => {
+    if (k === 0 || !plane || look.hidden.includes(k)) return [];
+    const corners = cornersInPlane(box, plane);
+    const ends = corners.flatMap((corner, i) => [corner, corners[(i + 1) % corners.length]]);
+    const positions = Float32Array.from(ends.flatMap((end) => minus(end, origin)));
+    return [{ positions, colour: isolineColour(k, look.dark), isBorder: true }];
   });
 }

@@ -3,6 +3,9 @@
 /** `plain`: the colour of the tint; `values`: of the colour map. */
 export const COLOUR_MODE = { tint: 0, values: 1 } as const;
 
+/** Light on a cut face, whatever its direction: it must not look like a shadow. */
+const CUT_FACE_LIGHT = '0.8';
+
 const VALUE_COLOUR = `
 uniform sampler2D ramp;
 uniform vec2 range;
@@ -13,12 +16,14 @@ vec3 colourOf(float value) {
   return texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
 }`;
 
+/** `place` lies in its triangle also where a silhouette covers a pixel in part. */
 const CLIP = `
 uniform vec4 clip;
-varying vec3 place;
-bool isCut() { return dot(place, clip.xyz) > clip.w; }`;
+centroid varying vec3 place;
+float above() { return dot(place, clip.xyz) - clip.w; }
+bool isCutAway() { return above() > 0.0; }`;
 
-/** Alpha of a tint: 1 for selected shells. */
+/** Alpha of a tint: drawing.ts, SELECTED. */
 export const SURFACE_VERTEX = `
 attribute vec4 tint;
 attribute float value;
@@ -26,7 +31,7 @@ varying vec4 tintHere;
 varying float valueHere;
 varying vec3 normalHere;
 varying vec3 seen;
-varying vec3 place;
+centroid varying vec3 place;
 void main() {
   tintHere = tint;
   valueHere = value;
@@ -41,6 +46,8 @@ export const SURFACE_FRAGMENT = `
 uniform int mode;
 uniform bool isFlat;
 uniform bool isParallel;
+uniform bool hasCutFace;
+uniform float deepest;
 uniform float opacity;
 uniform vec3 accent;
 uniform float ambient;
@@ -50,20 +57,33 @@ varying vec3 normalHere;
 varying vec3 seen;
 ${CLIP}${VALUE_COLOUR}
 void main() {
-  if (isCut()) discard;
-  vec3 normal = isFlat ? normalize(cross(dFdx(seen), dFdy(seen)))
-                       : normalize(normalHere) * (gl_FrontFacing ? 1.0 : -1.0);
-  vec3 base = mode == ${COLOUR_MODE.values} ? colourOf(valueHere) : tintHere.rgb;
-  base = mix(base, accent, 0.62 * tintHere.a);
+  // The share of the pixel that stays: the border of a cut is smooth.
+  float height = above();
+  float width = min(fwidth(height), deepest);
+  float stays = width > 0.0 ? clamp(0.5 - height / width, 0.0, 1.0) : step(height, 0.0);
+  if (stays == 0.0) discard;
+#ifdef FLIP_SIDED
+  bool isInside = gl_FrontFacing;
+#else
+  bool isInside = !gl_FrontFacing;
+#endif
+  // Behind the clip plane, the first surface is seen from its inside where the plane cuts a body.
+  bool isCut = hasCutFace && isInside;
+  vec3 normal = isFlat ? normalize(cross(dFdx(seen), dFdy(seen))) : normalize(normalHere) * (isInside ? -1.0 : 1.0);
+  // Points in the cut face have no number.
+  vec3 base = mode == ${COLOUR_MODE.values} ? (isCut ? missing : colourOf(valueHere)) : tintHere.rgb;
+  float ofShell = step(0.5, tintHere.a);
+  float ofBody = step(0.16, tintHere.a - ofShell * 2.0 / 3.0);
+  base = mix(base, accent, 0.62 * (isCut ? ofBody : ofShell));
   // The inside of a body, which a clip plane shows.
-  if (!gl_FrontFacing) base *= 0.62;
+  if (isInside && !isCut) base *= 0.62;
   vec3 light = normalize(vec3(-0.35, 0.55, 1.0));
   vec3 eye = isParallel ? vec3(0.0, 0.0, 1.0) : normalize(-seen);
   // Falls off smoothly, so that shadows keep their shape.
   float wrapped = 0.5 * dot(normal, light) + 0.5;
-  float diffuse = wrapped * wrapped;
-  float shine = gl_FrontFacing ? 0.16 * pow(max(dot(normal, normalize(light + eye)), 0.0), 40.0) : 0.0;
-  gl_FragColor = vec4(base * (ambient + (1.06 - ambient) * diffuse) + shine, opacity);
+  float diffuse = isCut ? ${CUT_FACE_LIGHT} : wrapped * wrapped;
+  float shine = !isInside ? 0.16 * pow(max(dot(normal, normalize(light + eye)), 0.0), 40.0) : 0.0;
+  gl_FragColor = vec4(base * (ambient + (1.06 - ambient) * diffuse) + shine, opacity * stays);
 }`;
 
 export const POINT_VERTEX = `
@@ -72,7 +92,7 @@ uniform float diameter;
 uniform float smallest;
 uniform float distance;
 varying float valueHere;
-varying vec3 place;
+centroid varying vec3 place;
 void main() {
   valueHere = value;
   place = position;
@@ -90,13 +110,13 @@ ${CLIP}${VALUE_COLOUR}
 void main() {
   vec2 from = gl_PointCoord - 0.5;
   float square = 4.0 * dot(from, from);
-  if (isCut() || square > 1.0) discard;
+  if (isCutAway() || square > 1.0) discard;
   vec3 base = mode == ${COLOUR_MODE.values} ? colourOf(valueHere) : colour;
   gl_FragColor = vec4(base * (1.0 - 0.35 * square), 1.0);
 }`;
 
 export const EDGE_VERTEX = `
-varying vec3 place;
+centroid varying vec3 place;
 void main() {
   place = position;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
@@ -107,6 +127,17 @@ uniform vec3 colour;
 uniform float opacity;
 ${CLIP}
 void main() {
-  if (isCut()) discard;
+  if (isCutAway()) discard;
   gl_FragColor = vec4(colour, opacity);
+}`;
+
+export const CUT_FACE_VERTEX = `
+void main() {
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+/** Nothing but its depth is drawn. */
+export const CUT_FACE_FRAGMENT = `
+void main() {
+  gl_FragColor = vec4(0.0);
 }`;

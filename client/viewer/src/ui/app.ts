@@ -2,6 +2,7 @@ import { Gauges } from '../gauges/gauges';
 import { Gateway } from '../stream/gateway';
 import { NO_OPTIONS, optionsText, parseOptions } from '../input/options';
 import type { FrameSource } from '../input/source';
+import { axesOf } from '../space/camera';
 import { FileTrack } from '../stream/file_track';
 import { AS_STREAMED, type Settings } from '../stream/settings';
 import type { Track } from '../stream/track';
@@ -70,6 +71,9 @@ export class App {
     this.space = new SpacePanel(() => {
       this.stage.setSpaceLook(this.space.look);
       this.writeAddress();
+    }, () => {
+      const view = this.stage.chosen?.spaceView?.view;
+      return view ? axesOf(view).back : null;
     });
     this.settings = new SettingsPanel((settings) => this.settingsChanged(settings),
       (cells) => this.cellSizeFor(cells));
@@ -405,7 +409,7 @@ export class App {
     this.look.setAttributes(pane?.channels ?? [], this.track);
     this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true, isSpace);
     this.exports.offer(pane?.scene.hasWebgl ?? true, isSpace);
-    this.space.offer(isSpace);
+    this.space.offer(isSpace, (pane?.outlines.length ?? 0) > 1);
     this.settings.offer(pane?.hasSurfaces ?? false);
     this.gaugesPanel.offer(pane?.hasSurfaces ?? false);
     this.curves.setKind(pane?.hasSurfaces ? 'space' : 'plane');

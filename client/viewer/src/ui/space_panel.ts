@@ -1,3 +1,4 @@
+import type { Vector } from '../space/camera';
 import { CLIP_AXES, DEFAULT_SPACE_LOOK, parseSpaceLook, type SpaceLook, spaceLookText } from '../space/look';
 import { byId, input, select } from './dom';
 
@@ -5,7 +6,8 @@ import { byId, input, select } from './dom';
 export class SpacePanel {
   private chosen: SpaceLook = { ...DEFAULT_SPACE_LOOK };
 
-  constructor(private readonly changed: () => void) {
+  /** `direction`: of the chosen picture to its camera; null for none. */
+  constructor(private readonly changed: () => void, private readonly direction: () => Vector | null) {
     const form = byId('space-look', HTMLElement);
     form.addEventListener('change', () => this.read());
     input('clip-at').addEventListener('input', () => this.read());
@@ -14,8 +16,9 @@ export class SpacePanel {
 
   get look(): SpaceLook { return this.chosen; }
 
-  offer(isSpace: boolean): void {
+  offer(isSpace: boolean, hasSections: boolean): void {
     byId('space-look', HTMLElement).hidden = !isSpace;
+    input('planes').parentElement?.toggleAttribute('hidden', !hasSections);
   }
 
   /** The look in the page's address; empty if it is the default. */
@@ -28,28 +31,36 @@ export class SpacePanel {
   }
 
   private read(): void {
+    const clipAxis = CLIP_AXES.find((axis) => axis === select('clip-axis').value) ?? 'none';
+    const isHeld = clipAxis === 'view' && input('clip-held').checked;
     this.chosen = {
       shading: select('shading').value === 'flat' ? 'flat' : 'smooth',
       isTranslucent: input('translucent').checked,
       isPerspective: select('projection').value === 'perspective',
-      clipAxis: CLIP_AXES.find((axis) => axis === select('clip-axis').value) ?? 'none',
+      clipAxis,
+      clipHeld: isHeld ? this.chosen.clipHeld ?? this.direction() : null,
       clipAt: input('clip-at').valueAsNumber,
       isClipFlipped: input('clip-flipped').checked,
+      hasCutFaces: input('cut-faces').checked,
+      hasPlanes: input('planes').checked,
     };
     this.reflect();
     this.changed();
   }
 
   private reflect(): void {
-    const { shading, isTranslucent, isPerspective, clipAxis, clipAt, isClipFlipped } = this.chosen;
+    const { shading, isTranslucent, isPerspective, clipAxis, clipAt, clipHeld, isClipFlipped, hasCutFaces, hasPlanes } = this.chosen;
     select('shading').value = shading;
     input('translucent').checked = isTranslucent;
     select('projection').value = isPerspective ? 'perspective' : 'parallel';
     select('clip-axis').value = clipAxis;
     input('clip-at').valueAsNumber = clipAt;
+    input('clip-held').checked = clipHeld !== null;
     input('clip-flipped').checked = isClipFlipped;
-    for (const element of byId('space-look', HTMLElement).querySelectorAll('[data-clip]')) {
-      element.toggleAttribute('hidden', clipAxis === 'none');
+    input('cut-faces').checked = hasCutFaces;
+    input('planes').checked = hasPlanes;
+    for (const element of byId('space-look', HTMLElement).querySelectorAll<HTMLElement>('[data-clip]')) {
+      element.hidden = clipAxis === 'none' || (element.dataset.clip === 'view' && clipAxis !== 'view');
     }
   }
 }

@@ -1,0 +1,45 @@
+import {
+  axesOf, type Box, type Camera, cornersOf, distanceOf, dot, minus, plus, type SpaceView, type Vector,
+} from './camera';
+import type { SpaceLook } from './look';
+
+/** A plane relative to the surface's origin: points with `normal` · point > `at` are cut away. `normal` has length 1. */
+export interface Clip { normal: Vector; at: number }
+
+/** A square in the clip plane that covers every cut body. Relative to the surface's origin. */
+export interface CutFace { middle: Vector; halfWidth: number }
+
+/** The square covers bodies that rounding puts beside the box: by this share of its diagonal. */
+const ROUNDING = 1e-3;
+
+/** The direction along which the position of the clip plane counts. Null: no clip plane. */
+function directionOf({ clipAxis, clipHeld }: SpaceLook, view: SpaceView): Vector | null {
+  if (clipAxis === 'none') return null;
+  if (clipAxis !== 'view') return [Number(clipAxis === 'x'), Number(clipAxis === 'y'), Number(clipAxis === 'z')];
+  const along = clipHeld ?? axesOf(view).back;
+  return plus([0, 0, 0], along, 1 / Math.hypot(...along));
+}
+
+/** The clip plane in a box, for a surface with this origin. */
+export function clipOf(look: SpaceLook, view: SpaceView, box: Box, origin: Vector): Clip | null {
+  const along = directionOf(look, view);
+  if (!along) return null;
+  const heights = cornersOf(box).map((corner) => dot(minus(corner, origin), along));
+  const low = Math.min(...heights);
+  const at = low + look.clipAt * (Math.max(...heights) - low);
+  return look.isClipFlipped ? { normal: minus([0, 0, 0], along), at: -at } : { normal: along, at };
+}
+
+/**
+ * The cut face that a camera sees; null if it is on the side that stays, or if the look has none. Behind the cut
+ * face, the nearest surface is then seen from its inside exactly where the plane cuts a body.
+ */
+export function cutFaceOf(clip: Clip | null, look: SpaceLook, { view, isPerspective }: Camera, box: Box, origin: Vector): CutFace | null {
+  if (!clip || !look.hasCutFaces || look.isTranslucent) return null;
+  const { back } = axesOf(view);
+  const from = minus(plus(view.target, back, distanceOf(view)), origin);
+  if (isPerspective ? dot(from, clip.normal) <= clip.at : dot(back, clip.normal) <= 0) return null;
+  const middle = plus(minus(box.low, origin), minus(box.high, box.low), 0.5);
+  const halfWidth = (0.5 + ROUNDING) * Math.hypot(...minus(box.high, box.low));
+  return { middle: plus(middle, clip.normal, clip.at - dot(middle, clip.normal)), halfWidth };
+}
