@@ -108,7 +108,8 @@ TEST(Percolation, FaceMayLieAnywhere) {
   const Particles wave = Wave(0, 4, .2);
   const Result first = ReconstructOnce(In(BoxOf(kWidth, kHeight)), wave);
   ASSERT_EQ(first.rings.RingCount(), 1u);
-  EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()), 1e-6 * wave.size());
+  EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()),
+              1e-6 * static_cast<double>(wave.size()));
   for (const double x : {7.0, 20.0, 31.0, 59.0, -12.0}) {
     SCOPED_TRACE(x);
     const PeriodicBox box = BoxOf(kWidth, kHeight, x, 0);
@@ -181,7 +182,8 @@ TEST(Percolation, VoidAcrossTheFaceBecomesTwoNotches) {
         result.rings.outer_of, [](std::uint32_t outer) { return outer != kNoRing; });
     EXPECT_EQ(holes, x == 30 ? 1u : 0u);
     EXPECT_EQ(result.rings.RingCount(), x == 30 ? 3u : 2u);
-    EXPECT_NEAR(result.statistics.area, static_cast<double>(scene.size()), .01 * scene.size());
+    EXPECT_NEAR(result.statistics.area, static_cast<double>(scene.size()),
+                .01 * static_cast<double>(scene.size()));
   }
 }
 
@@ -213,7 +215,7 @@ void DriftingBodies::Drift(bool wraps) {
   for (int frame = 0; frame < 100; ++frame) {
     SCOPED_TRACE(frame);
     Particles scene = Wave(0);
-    for (double& at : scene.xy) at += &at - scene.xy.data() & 1 ? 0 : .9 * frame;
+    for (double& at : scene.xy) at += (&at - scene.xy.data()) % 2 == 0 ? .9 * frame : 0;
     scene.Add(support::Disc(4, 5 + .9 * frame, 42));
     scene = Wrapped(WithEverything(scene), box);
     scene.volumes.clear();

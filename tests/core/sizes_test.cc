@@ -105,10 +105,10 @@ void ExpectFieldAgrees(std::uint64_t seed, double ratio, const ReconstructionPar
     int i = static_cast<int>(random.Below(32)), j = static_cast<int>(random.Below(32));
     const auto& cells = stages.crossings.cells;
     if (random.Chance(.5) && !cells.empty()) {
-      const ActiveCell& cell = cells[random.Below(cells.size())];
-      tile = cell.tile;
-      i = cell.i;
-      j = cell.j;
+      const ActiveCell& active = cells[random.Below(cells.size())];
+      tile = active.tile;
+      i = active.i;
+      j = active.j;
     }
     const TileCoordinate& at = stages.bins.tiles[tile];
     const double truth = oracle.Value((32.0 * at.x + i) * cell, (32.0 * at.y + j) * cell);
