@@ -31,6 +31,18 @@ MemoryReplica::MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes,
 
 MemoryReplica::~MemoryReplica() { relay_.reset(); }
 
+ReconstructionParameters MemoryReplica::Parameters() {
+  ReconstructionParameters parameters{.sizes = Sizes::kOwn, .boundary = Boundary::kGrains};
+  parameters.sections = {{.phase = 1}, {.phase = 2}};
+  parameters.phase_attribute = "type";
+  parameters.box = PeriodicBox{.wraps = true};
+  parameters.box->axes[0] = PeriodicAxis{.origin = -1, .length = 40};
+  parameters.noise_filter = .5;
+  parameters.walls = {{.points = {0, 0, 1, 0}}};
+  parameters.wall_phases = {3};
+  return parameters;
+}
+
 void MemoryReplica::Open(const std::string& name, const std::string& token,
                          std::uint64_t next_sequence) {
   Stream& stream = streams_[name];
@@ -42,7 +54,7 @@ void MemoryReplica::Open(const std::string& name, const std::string& token,
   const auto opened = registry_.Open(*stream.machine,
                                      {.name = name,
                                       .labels = {{"made", "here"}},
-                                      .parameters = {.walls = {{.points = {0, 0, 1, 0}}}},
+                                      .parameters = Parameters(),
                                       .broadcaster = stream.broadcaster,
                                       .next_sequence = next_sequence},
                                      token);

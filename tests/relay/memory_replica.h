@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "partiemc/parameters.h"
 #include "relay/memory_bus.h"
 #include "server/closed_transport.h"
 #include "server/memory_watcher.h"
@@ -26,6 +27,9 @@ class MemoryReplica {
   explicit MemoryReplica(MemoryHub& hub, std::uint64_t history_bytes = std::uint64_t{8} << 20,
                          const std::string& address = {}, const TimeAndChance& surroundings = {});
   ~MemoryReplica();
+
+  /// The parameters of every stream: all features at once, so no stream could be reconstructed.
+  static ReconstructionParameters Parameters();
 
   // Producer's side. `token` identifies a resumed stream.
   void Open(const std::string& name, const std::string& token, std::uint64_t next_sequence = 1);

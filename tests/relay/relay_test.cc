@@ -17,6 +17,7 @@
 #include "server/relay/watched_result.h"
 #include "server/stream/stream_token.h"
 #include "support/random.h"
+#include "wire/codec.h"
 
 namespace partiemc::server {
 namespace {
@@ -97,9 +98,11 @@ TEST_F(RelayTest, BytesLabelsParametersAndLineageAreThoseOfTheReplicaThatHasIt) 
   ASSERT_TRUE(found.ok()) << found.status();
   EXPECT_EQ(found->stream.lineage(), LineageOf(token_));
   EXPECT_EQ(found->stream.summary().labels().at("made"), "here");
-  const auto& walls = found->stream.summary().parameters().walls();
-  ASSERT_EQ(walls.size(), 1);
-  EXPECT_THAT(walls[0].points(), ElementsAre(0, 0, 1, 0));
+  v1::ReconstructionParameters parameters;
+  wire::EncodeParameters(MemoryReplica::Parameters(), parameters);
+  EXPECT_EQ(found->stream.summary().parameters().ShortDebugString(), parameters.ShortDebugString());
+  EXPECT_EQ(parameters.walls_size(), 1);
+  EXPECT_EQ(parameters.sections_size(), 2);
   const Published newest = found->broadcaster->Newest();
   ASSERT_NE(newest.frame, nullptr);
   EXPECT_EQ(newest.sequence, 1u);
