@@ -81,25 +81,23 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
   }
 }
 
-void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
-                std::uint32_t* bits) {
+void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
+                std::uint64_t* within) {
   const Lanes d;
-  const Vector x = hn::Set(d, loops.x[self]), y = hn::Set(d, loops.y[self]),
-               z = hn::Set(d, loops.z[self]);
-  const Vector most = hn::Set(d, square);
-  for (std::size_t word = 0; word < words; ++word) {
-    std::uint32_t found = 0;
-    for (std::size_t k = 0; k < LoopWindows::kWordBits; k += kLanes) {
-      const std::size_t first = word * LoopWindows::kWordBits + k;
-      const Vector dx = hn::Sub(hn::Load(d, loops.x.data() + first), x);
-      const Vector dy = hn::Sub(hn::Load(d, loops.y.data() + first), y);
-      const Vector dz = hn::Sub(hn::Load(d, loops.z.data() + first), z);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vector x = hn::Set(d, places.x[k]), y = hn::Set(d, places.y[k]),
+                 z = hn::Set(d, places.z[k]);
+    std::uint64_t found = 0;
+    for (std::size_t window = 0; window < ends.count; window += kLanes) {
+      const Vector dx = hn::Sub(x, hn::Load(d, places.x.data() + window));
+      const Vector dy = hn::Sub(y, hn::Load(d, places.y.data() + window));
+      const Vector dz = hn::Sub(z, hn::Load(d, places.z.data() + window));
       const Vector to = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
       std::uint8_t part[8] = {};
-      hn::StoreMaskBits(d, hn::Lt(to, most), part);
-      found |= std::uint32_t{part[0]} << k;
+      hn::StoreMaskBits(d, hn::Lt(to, hn::Load(d, ends.square.data() + window)), part);
+      found |= std::uint64_t{part[0]} << window;
     }
-    bits[word] = found;
+    within[k] = found;
   }
 }
 
@@ -178,9 +176,9 @@ HWY_EXPORT(SumNormals);
 HWY_EXPORT(SumBends);
 HWY_EXPORT(SumPlanes);
 
-void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
-                std::uint32_t* bits) {
-  HWY_DYNAMIC_DISPATCH(FindWithin)(loops, words, self, square, bits);
+void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
+                std::uint64_t* within) {
+  HWY_DYNAMIC_DISPATCH(FindWithin)(places, count, ends, within);
 }
 Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges) {
   return HWY_DYNAMIC_DISPATCH(SumNormals)(loops, window, stops_at_edges);
