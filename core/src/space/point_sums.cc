@@ -1,6 +1,7 @@
 #include "space/point_sums.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <type_traits>
 
@@ -231,33 +232,46 @@ struct NodeRange {
   }
 };
 
+// Vectors of a row of nodes, of a part of it, or of two rows.
+using RowLanes = hn::CappedTag<float, 2 * kBrickSize>;
+constexpr int kRowLanes = static_cast<int>(hn::MaxLanes(RowLanes()));
+constexpr int kRowsAtOnce = std::max(1, kRowLanes / kBrickSize);
+
 template <bool kSized>
 void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius, float* nodes) {
-  const Lanes d;
-  float radius = kernel_radius, inverse = 1 / (radius * radius);
-  Vector inverse_square = hn::Set(d, inverse);
+  const RowLanes d;
+  alignas(64) constexpr float kColumnOf[] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+  alignas(64) constexpr float kRowOf[] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+  float radius = kernel_radius;
+  auto inverse = hn::Set(d, 1 / (radius * radius));
   for (std::uint32_t p = run.first; p < run.last; ++p) {
     if constexpr (kSized) {
       radius = kernel_radius * bins.size[p];
-      inverse = 1 / (radius * radius);
-      inverse_square = hn::Set(d, inverse);
+      inverse = hn::Set(d, 1 / (radius * radius));
     }
     const float x = bins.x[p] + run.shift_x;
     const float y = bins.y[p] + run.shift_y;
     const float z = bins.z[p] + run.shift_z;
     const NodeRange rows(y, radius), layers(z, radius);
-    const Vector weight = hn::Set(d, bins.weight.empty() ? 1.0f : bins.weight[p]);
-    for (int lane = 0; lane < kBrickSize; lane += kLanes) {
-      const Vector dx = hn::Sub(hn::Set(d, x), hn::Iota(d, static_cast<float>(lane)));
-      const Vector column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse_square));
-      for (int k = layers.first; k <= layers.last; ++k) {
-        const float dz = z - static_cast<float>(k);
-        for (int j = rows.first; j <= rows.last; ++j) {
-          const float dy = y - static_cast<float>(j);
-          const Vector t =
-              hn::Max(hn::Zero(d), hn::Sub(column, hn::Set(d, (dy * dy + dz * dz) * inverse)));
+    std::array<float, kBrickSize> dz_square;
+    for (int k = layers.first; k <= layers.last; ++k) {
+      const float dz = z - static_cast<float>(k);
+      dz_square[k] = dz * dz;
+    }
+    const auto weight = hn::Set(d, bins.weight.empty() ? 1.0f : bins.weight[p]);
+    for (int lane = 0; lane < kBrickSize; lane += kRowLanes) {
+      const auto dx = hn::Sub(hn::Set(d, x), hn::Load(d, kColumnOf + lane));
+      const auto column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse));
+      const auto row_of = hn::Load(d, kRowOf + lane);
+      for (int j = rows.first & ~(kRowsAtOnce - 1); j <= rows.last; j += kRowsAtOnce) {
+        const auto row = hn::Add(hn::Set(d, static_cast<float>(j)), row_of);
+        const auto dy = hn::Sub(hn::Set(d, y), row);
+        const auto dy_square = hn::Mul(dy, dy);
+        for (int k = layers.first; k <= layers.last; ++k) {
+          const auto across = hn::Add(dy_square, hn::Set(d, dz_square[k]));
+          const auto t = hn::Max(hn::Zero(d), hn::Sub(column, hn::Mul(across, inverse)));
           float* const at = nodes + (k * kBrickSize + j) * kBrickSize + lane;
-          const Vector kernel = hn::Mul(hn::Mul(t, t), t);
+          const auto kernel = hn::Mul(hn::Mul(t, t), t);
           hn::Store(hn::Add(hn::Load(d, at), hn::Mul(kernel, weight)), d, at);
         }
       }
