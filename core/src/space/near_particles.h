@@ -35,10 +35,11 @@ struct NearBlock {
   static_assert(kLanes <= kBinPadding);
 
   alignas(64) PerParticle<float> x, y, z;
-  alignas(64) PerParticle<float> weight;    ///< 1 if uniform; the size if particles have own sizes.
+  alignas(64) PerParticle<float> weight;    ///< Unset if uniform; the size with own sizes.
   alignas(64) PerParticle<float> per_size;  ///< 1 / size; unset without own sizes.
   int count = 0;
   bool has_sizes = false;
+  bool has_weights = true;  ///< Not uniform.
 
   /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Vectors
   /// also copy what follows them in the bins, which counts for nothing.
@@ -51,9 +52,7 @@ struct NearBlock {
     if (!bins.size.empty()) {
       std::copy_n(bins.size.data() + first, kLanes, weight.data() + count);
       for (int k = count; k < count + kLanes; ++k) per_size[k] = 1 / weight[k];
-    } else if (bins.weight.empty()) {
-      std::fill_n(weight.data() + count, kLanes, 1.0f);
-    } else {
+    } else if (has_weights) {
       std::copy_n(bins.weight.data() + first, kLanes, weight.data() + count);
     }
     count += static_cast<int>(added);
@@ -183,6 +182,7 @@ void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox&
                       NearBlock& block, Visit visit) {
   block.count = 0;
   block.has_sizes = !bins.size.empty();
+  block.has_weights = !bins.weight.empty();
   ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
     for (std::uint32_t p = run.first; p < run.last;) {
       if (block.count == NearBlock::kCapacity) {

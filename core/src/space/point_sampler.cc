@@ -84,8 +84,7 @@ PointSample PointSampler::Sample(const Vec3& point) {
   PartialSlopes partial;
   const QueryPoint at = QueryAt(point);
   ForEachBlock([&](const NearBlock& block) {
-    AddMoments(block, at, InverseSquare(scale_), moments);
-    AddSlopes(block, at, InverseSquare(scale_), partial);
+    AddMomentsAndSlopes(block, at, InverseSquare(scale_), moments, partial);
   });
   const Sums sums = Total(moments);
   const LevelSetAt level = LevelSetOf(sums, scale_);
