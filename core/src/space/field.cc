@@ -14,14 +14,17 @@
 namespace partiemc::space {
 namespace {
 
+/// Rows for the boxes of blocks.
+NearRows RowsOf(const Scale& scale) { return {1, static_cast<float>(scale.kernel_radius)}; }
+
 NearBox BoxOfBlock(int i, int j, int k) {
   const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
   return {{x, y, z}, {x + 1, y + 1, z + 1}};
 }
 
 void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
-                   const BrickBits& nodes, SpaceField& field) {
-  PointSampler sampler(bins, scale);
+                   const NearRows& rows, const BrickBits& nodes, SpaceField& field) {
+  PointSampler sampler(bins, scale, &rows);
   ForEachInBlocks(
       nodes, [&](int i, int j, int k) { sampler.MoveTo(brick, BoxOfBlock(i, j, k)); },
       [&](int i, int j, int k) {
@@ -31,8 +34,8 @@ void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t bric
       });
 }
 
-void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
-                 SpaceField& field) {
+void SampleBrick(const SpaceBins& bins, const Scale& scale, const NearRows& rows,
+                 std::uint32_t brick, SpaceField& field) {
   const auto radius = static_cast<float>(scale.kernel_radius);
   alignas(64) std::array<float, kBrickNodes> density{};
   const NearBox all{{0, 0, 0}, {7, 7, 7}};
@@ -60,7 +63,7 @@ void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
     }
   }
   field.exact[brick] = {};
-  EvaluateBrick(bins, scale, brick, open, field);
+  EvaluateBrick(bins, scale, brick, rows, open, field);
   for (int layer = 0; layer < kBrickSize; ++layer) {
     for (std::uint64_t bits = open[layer]; bits != 0; bits &= bits - 1) {
       const int bit = std::countr_zero(bits);
@@ -77,12 +80,14 @@ void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field) {
   field.values.resize(bricks);
   field.inside.resize(bricks);
   field.exact.resize(bricks);
+  const NearRows rows = RowsOf(scale);
   ParallelFor(static_cast<std::uint32_t>(bricks),
-              [&](std::uint32_t brick) { SampleBrick(bins, scale, brick, field); });
+              [&](std::uint32_t brick) { SampleBrick(bins, scale, rows, brick, field); });
 }
 
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field) {
+  const NearRows rows = RowsOf(scale);
   ParallelFor(static_cast<std::uint32_t>(nodes.size()), [&](std::uint32_t brick) {
     BrickBits missing;
     std::uint64_t any = 0;
@@ -91,7 +96,7 @@ void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<
       any |= missing[layer];
     }
     if (any == 0) return;
-    EvaluateBrick(bins, scale, brick, missing, field);
+    EvaluateBrick(bins, scale, brick, rows, missing, field);
     // The density sum of SampleBrick decided the side. At f_0 and f_1, the sums here may differ
     // from it by rounding, so values are adapted to the sides.
     for (int layer = 0; layer < kBrickSize; ++layer) {

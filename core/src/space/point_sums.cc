@@ -68,7 +68,8 @@ struct Moments {
   Vector k0, kw, kx, ky, kz, xx, xy, xz, yy, yz, zz;
 
   HWY_INLINE Moments(const PartialMoments& sums, int lane) {
-    const auto load = [&](int q) HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
+    const auto load = [&](int q)
+                          HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
     k0 = load(0), kw = load(1), kx = load(2), ky = load(3), kz = load(4);
     xx = load(5), xy = load(6), xz = load(7), yy = load(8), yz = load(9), zz = load(10);
   }
@@ -103,7 +104,8 @@ struct SlopesInLanes {
   Vector sx, sy, sz, xx, xy, xz, yy, yz, zz, wx, wy, wz;
 
   HWY_INLINE SlopesInLanes(const PartialSlopes& sums, int lane) {
-    const auto load = [&](int q) HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
+    const auto load = [&](int q)
+                          HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
     sx = load(0), sy = load(1), sz = load(2);
     xx = load(3), xy = load(4), xz = load(5), yy = load(6), yz = load(7), zz = load(8);
     wx = load(9), wy = load(10), wz = load(11);
@@ -133,8 +135,18 @@ struct SlopesInLanes {
   }
   HWY_INLINE void StoreTo(PartialSlopes& sums, int lane) const {
     constexpr bool kIsUniform = kOwn == Own::kNothing;
-    const Vector all[] = {sx, sy, sz, xx, xy, xz, yy, yz, zz,
-                          kIsUniform ? sx : wx, kIsUniform ? sy : wy, kIsUniform ? sz : wz};
+    const Vector all[] = {sx,
+                          sy,
+                          sz,
+                          xx,
+                          xy,
+                          xz,
+                          yy,
+                          yz,
+                          zz,
+                          kIsUniform ? sx : wx,
+                          kIsUniform ? sy : wy,
+                          kIsUniform ? sz : wz};
     for (int q = 0; q < 12; ++q) hn::Store(all[q], Lanes(), sums.lanes[q].data() + lane);
   }
 };
@@ -190,7 +202,8 @@ void AddMomentsAndSlopesOf(const NearBlock& block, const QueryPoint& point, floa
   };
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
     Moments<kOwn> of_moments(moments, lane);
-    for_each(lane, [&](const Offsets<kSized>& to, int p) HWY_ATTR { of_moments.Add(to, block, p); });
+    for_each(lane,
+             [&](const Offsets<kSized>& to, int p) HWY_ATTR { of_moments.Add(to, block, p); });
     of_moments.StoreTo(moments, lane);
     SlopesInLanes<kOwn> of_slopes(slopes, lane);
     for_each(lane, [&](const Offsets<kSized>& to, int p) HWY_ATTR { of_slopes.Add(to, block, p); });

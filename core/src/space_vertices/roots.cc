@@ -13,16 +13,21 @@ namespace {
 
 // A smaller squared gradient has no direction.
 constexpr double kWeakGradient = 1e-3;
+
+// Cells along a block.
+constexpr int kBlock = 2;
+
 class RootFinder {
  public:
-  RootFinder(const SpaceBins& bins, const Scale& scale, const RootConstants& constants)
-      : constants_(constants), sampler_(bins, scale) {}
+  RootFinder(const SpaceBins& bins, const Scale& scale, const NearRows& rows,
+             const RootConstants& constants)
+      : constants_(constants), sampler_(bins, scale, &rows) {}
 
   /// Moves to a block of 2 x 2 x 2 cells.
   void MoveTo(std::uint32_t brick, const Vec3& origin, int i, int j, int k) {
     const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
     origin_ = origin;
-    sampler_.MoveTo(brick, {{x, y, z}, {x + 2, y + 2, z + 2}});
+    sampler_.MoveTo(brick, {{x, y, z}, {x + kBlock, y + kBlock, z + kBlock}});
   }
 
   /// Takes one step, which ends at the sides of the cell with the lowest node `low`. If the
@@ -73,8 +78,9 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
                std::vector<Vec3>& normals, std::span<float> sizes) {
   const BrickDirectory& bricks = bins.bricks;
   normals.resize(positions.size());
+  const NearRows rows(kBlock, static_cast<float>(scale.kernel_radius));
   ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
-    RootFinder finder(bins, scale, constants);
+    RootFinder finder(bins, scale, rows, constants);
     const Vec3 origin = OriginOf(bricks[brick]);
     ForEachInBlocks(
         crossings.bricks[brick].active,
