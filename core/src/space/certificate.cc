@@ -233,16 +233,14 @@ void ClearMarks(std::size_t count, Certificate& certificate) {
 
 }  // namespace
 
-void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                       std::vector<std::uint8_t>& is_fixed) {
+void MarkFixedVertices(const SpaceCrossings& crossings, std::vector<std::uint8_t>& is_fixed) {
   is_fixed.assign(crossings.VertexCount(), 0);
   for (const ActiveCell& cell : crossings.cells) {
     const CellLoops& loops = LoopsOf(cell.corners);
     if (loops.loops < 2) continue;
     for (int loop = 0; loop < loops.loops; ++loop) is_fixed[cell.first_loop + loop] = 1;
-    for (int step = 0; step < loops.Steps(); ++step) {
-      is_fixed[EdgeVertexOf(bricks, crossings, cell, loops.edge[step])] = 1;
-    }
+    const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
+    for (int step = 0; step < loops.Steps(); ++step) is_fixed[edges[step]] = 1;
   }
 }
 

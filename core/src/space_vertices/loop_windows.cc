@@ -14,30 +14,17 @@ namespace {
 /// Links the loops of each cell with the loops of its neighbours.
 void LinkLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                LoopWindows& windows) {
-  windows.link_first.resize(windows.loop_count + 1);
-  std::uint32_t total = 0;
-  for (const ActiveCell& cell : crossings.cells) {
-    const CellLoops& loops = LoopsOf(cell.corners);
-    for (int loop = 0; loop < loops.loops; ++loop) {
-      windows.link_first[cell.first_loop - crossings.edge_count + loop] = total + loops.first[loop];
-    }
-    total += static_cast<std::uint32_t>(loops.Steps());
-  }
-  windows.link_first.back() = total;
-  windows.links.resize(total);
+  windows.links.resize(crossings.step_edges.size());
   ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
     const ActiveCell& cell = crossings.cells[index];
     const CellLoops& loops = LoopsOf(cell.corners);
-    std::uint32_t next = windows.link_first[cell.first_loop - crossings.edge_count];
+    std::uint32_t next = crossings.FirstStepOf(cell);
     for (int step = 0; step < loops.Steps(); ++step) {
       const int face = loops.face[step];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
-      const CellLoops& across = LoopsOf(other.corners);
-      // In the other cell, the curve runs in the opposite direction.
-      const int from = EdgeAcross(loops.edge[loops.Next(step)], face);
-      int reversed = 0;
-      while (across.edge[reversed] != from || across.face[reversed] != (face ^ 1)) ++reversed;
-      windows.links[next++] = other.first_loop - crossings.edge_count + across.loop_of[reversed];
+      const int edge = EdgeAcross(loops.edge[step], face);
+      windows.links[next++] =
+          other.first_loop - crossings.edge_count + LoopsOf(other.corners).loop_of_edge[edge];
     }
   });
 }
@@ -92,9 +79,11 @@ void Transpose(std::array<std::uint64_t, 64>& rows) {
 /// grow at once: each near loop has a set of windows, with one bit for each loop of the chunk.
 class ChunkSearch {
  public:
-  ChunkSearch(const LoopWindows& windows, std::span<const Vec3> centres,
-              std::span<const float> sizes, double reach, LoopWindows::Chunk& chunk)
-      : windows_(windows),
+  ChunkSearch(std::span<const std::uint32_t> first_step, std::span<const std::uint32_t> links,
+              std::span<const Vec3> centres, std::span<const float> sizes, double reach,
+              LoopWindows::Chunk& chunk)
+      : first_step_(first_step),
+        links_between_(links),
         centres_(centres),
         sizes_(sizes),
         square_(reach * reach),
@@ -142,9 +131,8 @@ class ChunkSearch {
     std::size_t links = 0;
     for (std::size_t k = 0; k < count_; ++k) {
       first_[k] = static_cast<std::uint16_t>(links);
-      for (std::uint32_t n = windows_.link_first[near_[k]]; n < windows_.link_first[near_[k] + 1];
-           ++n) {
-        const std::uint32_t to = windows_.links[n];
+      for (std::uint32_t n = first_step_[near_[k]]; n < first_step_[near_[k] + 1]; ++n) {
+        const std::uint32_t to = links_between_[n];
         const std::size_t slot = SlotOf(to);
         if (slots_[slot] == kFree) {
           if (count_ == LoopWindows::kMostNear || !(box.SquareTo(centres_[to]) < square)) continue;
@@ -232,7 +220,7 @@ class ChunkSearch {
   template <typename Value>
   using PerNear = std::array<Value, LoopWindows::kMostNear>;
 
-  const LoopWindows& windows_;
+  std::span<const std::uint32_t> first_step_, links_between_;
   std::span<const Vec3> centres_;
   std::span<const float> sizes_;
   const double square_;
@@ -259,7 +247,8 @@ void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   LinkLoops(bricks, crossings, windows);
   SplitLoops(crossings, windows);
   ParallelFor(windows.chunk_count, [&](std::size_t index) {
-    ChunkSearch(windows, centres, sizes, reach, windows.chunks[index]).Find();
+    ChunkSearch(crossings.first_step, windows.links, centres, sizes, reach, windows.chunks[index])
+        .Find();
   });
 }
 

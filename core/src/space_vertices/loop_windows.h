@@ -41,7 +41,7 @@ struct LoopWindows {
   std::size_t chunk_count = 0;
   std::size_t loop_count = 0;
 
-  std::vector<std::uint32_t> link_first, links;  ///< By loop: loops across its faces.
+  std::vector<std::uint32_t> links;  ///< By step of SpaceCrossings: the loop across its face.
 };
 
 /// Finds the window of each loop, the loops within `reach` cells, times its local size. `centres`

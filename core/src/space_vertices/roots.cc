@@ -57,14 +57,15 @@ class RootFinder {
 };
 
 /// The area normal of a loop, which is used if the gradient is weak.
-Vec3 NormalOfLoop(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                  const ActiveCell& cell, int loop, const std::vector<Vec3>& positions) {
+Vec3 NormalOfLoop(const SpaceCrossings& crossings, const ActiveCell& cell, int loop,
+                  const std::vector<Vec3>& positions) {
   const CellLoops& loops = LoopsOf(cell.corners);
+  const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
   const Vec3& centre = positions[cell.first_loop + loop];
   Vec3 sum;
   for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
-    const Vec3& a = positions[EdgeVertexOf(bricks, crossings, cell, loops.edge[step])];
-    const Vec3& b = positions[EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)])];
+    const Vec3& a = positions[edges[step]];
+    const Vec3& b = positions[edges[loops.Next(step)]];
     sum = sum + Cross(a - centre, b - centre);
   }
   const Vec3 normal = Normalised(sum);
@@ -90,7 +91,7 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
           const Vec3 low = origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k};
           for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
             const std::uint32_t v = cell.first_loop + loop;
-            normals[v] = NormalOfLoop(bricks, crossings, cell, loop, positions);
+            normals[v] = NormalOfLoop(crossings, cell, loop, positions);
             const double size = finder.Step(low, positions[v], normals[v]);
             if (!sizes.empty()) sizes[v] = static_cast<float>(size);
           }
