@@ -200,6 +200,7 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
       FaceChecker checker(bricks, crossings, cell_size, positions, nodes, brick);
       ForEachFace(bricks, nodes, certificate.changed, brick,
                   [&](const std::array<int, 3>& cell, int side) {
+                    if (checker.IsPlainlyValid(cell, side)) return;
                     const Face face = checker.FaceOf(cell, side);
                     QuadMode mode;
                     const bool is_valid = checker.FindMode(face, mode);
