@@ -69,7 +69,10 @@ struct NearBlock {
 
  private:
   static void Shift(const float* from, float by, float* to) {
-    for (int k = 0; k < kLanes; ++k) to[k] = from[k] + by;
+    // The local array cannot overlap, so that the compiler uses vectors.
+    std::array<float, kLanes> shifted;
+    for (int k = 0; k < kLanes; ++k) shifted[k] = from[k] + by;
+    std::copy_n(shifted.data(), kLanes, to);
   }
 };
 

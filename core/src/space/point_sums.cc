@@ -328,7 +328,7 @@ using RowLanes = hn::CappedTag<float, 2 * kBrickSize>;
 constexpr int kRowLanes = static_cast<int>(hn::MaxLanes(RowLanes()));
 constexpr int kRowsAtOnce = std::max(1, kRowLanes / kBrickSize);
 
-template <bool kSized>
+template <Own kOwn>
 void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius, float* nodes) {
   const RowLanes d;
   alignas(64) constexpr float kColumnOf[] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
@@ -336,7 +336,7 @@ void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius
   float radius = kernel_radius;
   auto inverse = hn::Set(d, 1 / (radius * radius));
   for (std::uint32_t p = run.first; p < run.last; ++p) {
-    if constexpr (kSized) {
+    if constexpr (kOwn == Own::kSize) {
       radius = kernel_radius * bins.size[p];
       inverse = hn::Set(d, 1 / (radius * radius));
     }
@@ -344,12 +344,13 @@ void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius
     const float y = bins.y[p] + run.shift_y;
     const float z = bins.z[p] + run.shift_z;
     const NodeRange rows(y, radius), layers(z, radius);
-    std::array<float, kBrickSize> dz_square;
-    for (int k = layers.first; k <= layers.last; ++k) {
-      const float dz = z - static_cast<float>(k);
-      dz_square[k] = dz * dz;
+    alignas(32) std::array<float, kBrickSize> dz_square;
+    for (int lane = 0; lane < kBrickSize; lane += kLanes) {
+      const Lanes of_layers;
+      const Vector dz =
+          hn::Sub(hn::Set(of_layers, z), hn::Iota(of_layers, static_cast<float>(lane)));
+      hn::Store(hn::Mul(dz, dz), of_layers, dz_square.data() + lane);
     }
-    const auto weight = hn::Set(d, bins.weight.empty() ? 1.0f : bins.weight[p]);
     for (int lane = 0; lane < kBrickSize; lane += kRowLanes) {
       const auto dx = hn::Sub(hn::Set(d, x), hn::Load(d, kColumnOf + lane));
       const auto column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse));
@@ -362,8 +363,11 @@ void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius
           const auto across = hn::Add(dy_square, hn::Set(d, dz_square[k]));
           const auto t = hn::Max(hn::Zero(d), hn::Sub(column, hn::Mul(across, inverse)));
           float* const at = nodes + (k * kBrickSize + j) * kBrickSize + lane;
-          const auto kernel = hn::Mul(hn::Mul(t, t), t);
-          hn::Store(hn::Add(hn::Load(d, at), hn::Mul(kernel, weight)), d, at);
+          auto kernel = hn::Mul(hn::Mul(t, t), t);
+          if constexpr (kOwn == Own::kWeight) {
+            kernel = hn::Mul(kernel, hn::Set(d, bins.weight[p]));
+          }
+          hn::Store(hn::Add(hn::Load(d, at), kernel), d, at);
         }
       }
     }
@@ -371,7 +375,9 @@ void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius
 }
 
 void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
-  const auto add = bins.size.empty() ? AddDensityOf<false> : AddDensityOf<true>;
+  const auto add = !bins.size.empty()     ? AddDensityOf<Own::kSize>
+                   : !bins.weight.empty() ? AddDensityOf<Own::kWeight>
+                                          : AddDensityOf<Own::kNothing>;
   add(bins, run, radius, nodes);
 }
 
