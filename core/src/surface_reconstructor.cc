@@ -160,7 +160,7 @@ void AddBodies(const Frame& frame, const space::Bodies& bodies, space::SurfaceSi
 void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
-  space::EmitMarchingCubes(bricks, b.crossings, b.mesh.triangles);
+  space::EmitMarchingCubes(b.crossings, b.mesh.triangles);
   b.thin.clear();
   for (Vec3& position : b.positions) position = cell_size * position;
   space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
@@ -200,7 +200,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   const SurfacePlacement placement = parameters.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
-  space::MarkFixedVertices(bricks, b.crossings, b.is_fixed);
+  space::MarkFixedVertices(b.crossings, b.is_fixed);
   if (placement == SurfacePlacement::kQef) {
     space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
     space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);

@@ -1,10 +1,15 @@
 #include "space/bins.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "base/parallel.h"
@@ -20,7 +25,10 @@ constexpr double kMostCells = 0x1p30;
 
 /// A coordinate in units of 2^-17 cells. Requires: within kMostCells cells.
 std::int64_t Quantised(double cells) {
-  return static_cast<std::int64_t>(std::floor(cells * (1 << kFractionBits) + .5));
+  const double value = cells * (1 << kFractionBits) + .5;
+  // std::floor is a call of the library where the instruction set has no instruction for it.
+  const auto whole = static_cast<std::int64_t>(value);
+  return whole - static_cast<std::int64_t>(static_cast<double>(whole) > value);
 }
 
 /// A position in its brick as a number: first the cell, then the fractions, so that keys sort by
@@ -194,8 +202,33 @@ bool HasLessAttributes(const Frame& frame, std::size_t a, std::size_t b) {
   return false;
 }
 
+/// The cells of all classes of a brick, one class after the other.
+class BrickCells {
+ public:
+  explicit BrickCells(const std::vector<SizeClass>& classes) : classes_(classes) {
+    for (std::size_t k = 0; k < classes.size(); ++k) {
+      first_[k + 1] = first_[k] + (1 << (kCellBits - 3 * classes[k].shift));
+    }
+  }
+
+  /// The first cell of a class, and the number of cells for the index after the last class.
+  int FirstOf(std::size_t of_class) const { return first_[of_class]; }
+
+  /// The cell of a particle, by the key by which particles are sorted.
+  int CellOf(std::uint64_t key) const {
+    const std::size_t of_class = key >> kClassShift;
+    const int shift = 3 * classes_[of_class].shift;
+    const int mask = (1 << (kCellBits - shift)) - 1;
+    return first_[of_class] + (static_cast<int>(key >> (kFractionsOfKey + shift)) & mask);
+  }
+
+ private:
+  const std::vector<SizeClass>& classes_;
+  std::array<int, kMostClasses + 1> first_{};
+};
+
 /// Sorts the particles of a brick, [first, last) of `sorted`, and finds the first particle of each
-/// cell.
+/// cell: counts the particles of each cell, moves them there, and sorts each cell.
 void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBins& bins,
                std::uint32_t brick) {
   const auto before = [&](const SpaceBins::Keyed& a, const SpaceBins::Keyed& b) {
@@ -205,19 +238,46 @@ void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBin
     }
     return !frame.attributes.empty() && HasLessAttributes(frame, a.source, b.source);
   };
-  std::sort(bins.sorted.begin() + first, bins.sorted.begin() + last, before);
-  std::size_t p = first;
-  for (std::size_t k = 0; k < bins.classes.size(); ++k) {
-    const int shift = bins.classes[k].shift, bits = kCellBits - 3 * shift;
-    const int count = 1 << bits;
-    auto& cells = bins.cells[brick * bins.classes.size() + k];
-    const std::uint64_t of_class = std::uint64_t{k} << bits;
-    for (int cell = 0; cell < count; ++cell) {
-      cells[cell] = static_cast<std::uint32_t>(p);
-      const std::uint64_t wanted = of_class + static_cast<std::uint64_t>(cell);
-      while (p < last && bins.sorted[p].key >> (kFractionsOfKey + 3 * shift) == wanted) ++p;
+  if (first == last) {
+    for (std::size_t k = 0; k < bins.classes.size(); ++k) {
+      bins.cells[brick * bins.classes.size() + k].fill(static_cast<std::uint32_t>(first));
     }
-    std::fill(cells.begin() + count, cells.end(), static_cast<std::uint32_t>(p));
+    return;
+  }
+  const BrickCells cells(bins.classes);
+  const int count = cells.FirstOf(bins.classes.size());
+  std::vector<SpaceBins::Keyed>& sorted = bins.sorted;
+  // By cell: the first particle that is not in its place, and the end.
+  std::array<std::uint32_t, kMostClasses * kBrickNodes> next, end;
+  std::fill_n(end.begin(), count, 0u);
+  for (std::size_t p = first; p < last; ++p) ++end[cells.CellOf(sorted[p].key)];
+  auto total = static_cast<std::uint32_t>(first);
+  for (int cell = 0; cell < count; ++cell) {
+    next[cell] = total;
+    end[cell] = total += end[cell];
+  }
+  for (std::size_t k = 0; k < bins.classes.size(); ++k) {
+    auto& of_class = bins.cells[brick * bins.classes.size() + k];
+    const auto begin = next.begin() + cells.FirstOf(k), stop = next.begin() + cells.FirstOf(k + 1);
+    const auto rest = std::copy(begin, stop, of_class.begin());
+    std::fill(rest, of_class.end(), stop == next.begin() + count ? total : *stop);
+  }
+  for (int cell = 0; cell < count; ++cell) {
+    while (next[cell] != end[cell]) {
+      SpaceBins::Keyed& here = sorted[next[cell]];
+      const int to = cells.CellOf(here.key);
+      if (to == cell) {
+        ++next[cell];
+      } else {
+        std::swap(here, sorted[next[to]++]);
+      }
+    }
+  }
+  for (int cell = 0; cell < count; ++cell) {
+    const std::size_t begin = cell == 0 ? first : end[cell - 1];
+    if (end[cell] - begin < 2) continue;
+    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(begin), sorted.begin() + end[cell],
+              before);
   }
 }
 

@@ -139,18 +139,50 @@ BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::ui
   return nearest;
 }
 
+/// The body of all parts of a brick and of the bricks around it; kNoIndex if they have several or
+/// none.
+std::uint32_t OnlyBodyAround(const BrickDirectory& bricks, const Bodies& bodies,
+                             std::uint32_t brick) {
+  std::uint32_t only = kNoIndex;
+  for (const std::uint32_t other : bricks.neighbours(brick)) {
+    if (other == kNoIndex) continue;
+    for (std::uint32_t part = bodies.first[other]; part < bodies.first[other + 1]; ++part) {
+      const std::uint32_t body = bodies.parts[part].body;
+      if (only != kNoIndex && only != body) return kNoIndex;
+      only = body;
+    }
+  }
+  return only;
+}
+
+/// The body of the inside node nearest to a particle; kNoIndex if no inside node is near. `only`:
+/// OnlyBodyAround of the brick.
+std::uint32_t BodyOfParticle(const SpaceBins& bins, const SpaceField& field, const Bodies& bodies,
+                             std::uint32_t brick, std::uint32_t only, std::uint32_t particle) {
+  if (only != kNoIndex) {
+    // Any inside node near the particle will do. Most particles have one at the lowest corner.
+    const BrickPlace corner{brick, static_cast<int>(bins.x[particle]),
+                            static_cast<int>(bins.y[particle]), static_cast<int>(bins.z[particle])};
+    if (field.IsInside(corner)) return only;
+  }
+  for (int layers = 0; layers <= kMostLayers; ++layers) {
+    const BrickPlace node = NearestInside(bins, field, brick, particle, layers);
+    if (node.brick != kNoIndex) return bodies.BodyOf(node);
+  }
+  return kNoIndex;
+}
+
 void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField& field,
                     double spacing, Bodies& bodies) {
   const double usual = spacing * spacing * spacing;
   bodies.body_of_particle.assign(bins.source.size(), kNoIndex);
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
+    const std::uint32_t only = OnlyBodyAround(bins.bricks, bodies, brick);
     for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
-      BrickPlace node{kNoIndex, 0, 0, 0};
-      for (int layers = 0; node.brick == kNoIndex && layers <= kMostLayers; ++layers) {
-        node = NearestInside(bins, field, brick, p, layers);
-      }
-      if (node.brick == kNoIndex) continue;
-      Body& body = bodies.bodies[bodies.body_of_particle[p] = bodies.BodyOf(node)];
+      const std::uint32_t index = BodyOfParticle(bins, field, bodies, brick, only, p);
+      bodies.body_of_particle[p] = index;
+      if (index == kNoIndex) continue;
+      Body& body = bodies.bodies[index];
       ++body.particles;
       body.volume += frame.volumes.empty() ? usual : frame.volumes[bins.source[p]];
     }

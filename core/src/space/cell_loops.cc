@@ -5,10 +5,10 @@
 namespace partiemc::space {
 namespace {
 
-CellLoops Trace(unsigned corners) {
+constexpr CellLoops Trace(unsigned corners) {
   // By crossing: the crossing at the end of the curve that starts here, and the face of this curve.
   constexpr int kNone = -1;
-  std::array<int, kMostCrossings> next, face_of;
+  std::array<int, kMostCrossings> next{}, face_of{};
   next.fill(kNone);
   CellLoops loops;
   for (int face = 0; face < 6; ++face) {
@@ -32,7 +32,7 @@ CellLoops Trace(unsigned corners) {
     for (int edge = start; next[edge] != kNone;) {
       loops.edge[step] = static_cast<std::uint8_t>(edge);
       loops.face[step] = static_cast<std::uint8_t>(face_of[edge]);
-      loops.loop_of[step] = loops.loops;
+      loops.loop_of[step] = loops.loop_of_edge[edge] = loops.loops;
       ++step;
       const int to = next[edge];
       next[edge] = kNone;
@@ -79,33 +79,35 @@ bool Triangulate(const CellLoops& loops, int base, int size, int first, int last
   return false;
 }
 
-struct Table {
-  std::array<CellLoops, 256> loops;
-  std::array<std::array<LoopTriangles, kMostLoops>, 256> triangles;
+using CaseTriangles = std::array<LoopTriangles, kMostLoops>;
 
-  Table() {
+const std::array<CaseTriangles, 256>& TheTriangles() {
+  static const std::array<CaseTriangles, 256> table = [] {
+    std::array<CaseTriangles, 256> triangles;
     for (unsigned corners = 0; corners < 256; ++corners) {
-      loops[corners] = Trace(corners);
-      for (int loop = 0; loop < loops[corners].loops; ++loop) {
-        const int first = loops[corners].first[loop];
-        const int size = loops[corners].first[loop + 1] - first;
-        Triangulate(loops[corners], first, size, 0, size - 1, triangles[corners][loop]);
+      const CellLoops& loops = LoopsOf(corners);
+      for (int loop = 0; loop < loops.loops; ++loop) {
+        const int first = loops.first[loop];
+        const int size = loops.first[loop + 1] - first;
+        Triangulate(loops, first, size, 0, size - 1, triangles[corners][loop]);
       }
     }
-  }
-};
-
-const Table& TheTable() {
-  static const Table table;
+    return triangles;
+  }();
   return table;
 }
 
 }  // namespace
 
-const CellLoops& LoopsOf(unsigned corners) { return TheTable().loops[corners]; }
+// Known when the program starts, so that no call has to check whether the table exists.
+constinit const std::array<CellLoops, 256> kCellLoops = [] {
+  std::array<CellLoops, 256> table;
+  for (unsigned corners = 0; corners < 256; ++corners) table[corners] = Trace(corners);
+  return table;
+}();
 
 const LoopTriangles& TrianglesOf(unsigned corners, int loop) {
-  return TheTable().triangles[corners][loop];
+  return TheTriangles()[corners][loop];
 }
 
 }  // namespace partiemc::space

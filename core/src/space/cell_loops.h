@@ -23,7 +23,8 @@ struct CellLoops {
   std::uint8_t loops = 0;
   std::array<std::uint8_t, kMostLoops + 1> first{};  ///< Loop m has steps [first[m], first[m + 1]).
   std::array<std::uint8_t, kMostCrossings> edge{}, face{};
-  std::array<std::uint8_t, kMostCrossings> loop_of{};  ///< By step.
+  std::array<std::uint8_t, kMostCrossings> loop_of{};       ///< By step.
+  std::array<std::uint8_t, kMostCrossings> loop_of_edge{};  ///< By edge, if it is crossed.
   /// One bit for each face: whether all four edges of the face are crossed.
   std::uint8_t ambiguous_faces = 0;
 
@@ -35,8 +36,10 @@ struct CellLoops {
   }
 };
 
+extern const std::array<CellLoops, 256> kCellLoops;
+
 /// The loops of the case whose bit c is set if corner c is inside.
-const CellLoops& LoopsOf(unsigned corners);
+inline const CellLoops& LoopsOf(unsigned corners) { return kCellLoops[corners]; }
 
 /// Triangles between the crossings of one loop, without a diagonal on a face of the cell. Corners
 /// are indices of steps, relative to the first step of the loop.

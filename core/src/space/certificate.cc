@@ -200,6 +200,7 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
       FaceChecker checker(bricks, crossings, cell_size, positions, nodes, brick);
       ForEachFace(bricks, nodes, certificate.changed, brick,
                   [&](const std::array<int, 3>& cell, int side) {
+                    if (checker.IsPlainlyValid(cell, side)) return;
                     const Face face = checker.FaceOf(cell, side);
                     QuadMode mode;
                     const bool is_valid = checker.FindMode(face, mode);
@@ -233,16 +234,14 @@ void ClearMarks(std::size_t count, Certificate& certificate) {
 
 }  // namespace
 
-void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                       std::vector<std::uint8_t>& is_fixed) {
+void MarkFixedVertices(const SpaceCrossings& crossings, std::vector<std::uint8_t>& is_fixed) {
   is_fixed.assign(crossings.VertexCount(), 0);
   for (const ActiveCell& cell : crossings.cells) {
     const CellLoops& loops = LoopsOf(cell.corners);
     if (loops.loops < 2) continue;
     for (int loop = 0; loop < loops.loops; ++loop) is_fixed[cell.first_loop + loop] = 1;
-    for (int step = 0; step < loops.Steps(); ++step) {
-      is_fixed[EdgeVertexOf(bricks, crossings, cell, loops.edge[step])] = 1;
-    }
+    const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
+    for (int step = 0; step < loops.Steps(); ++step) is_fixed[edges[step]] = 1;
   }
 }
 

@@ -49,8 +49,7 @@ struct Certificate {
 };
 
 /// Marks the vertices of cells with several loops, which have to stay at their anchors.
-void MarkFixedVertices(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                       std::vector<std::uint8_t>& is_fixed);
+void MarkFixedVertices(const SpaceCrossings& crossings, std::vector<std::uint8_t>& is_fixed);
 
 /// Finds a mode for each face. If no mode is valid, the vertices and nodes of the face move back
 /// towards their anchors (setbacks, moved_nodes.h). `positions` and `anchors` are the final

@@ -85,6 +85,30 @@ void FillCells(const BrickDirectory& bricks, const SpaceField& field, std::uint3
   }
 }
 
+/// Lists the steps of all loops.
+void ListSteps(const BrickDirectory& bricks, SpaceCrossings& crossings) {
+  crossings.first_step.resize(crossings.loop_count + 1);
+  std::uint32_t steps = 0;
+  for (const ActiveCell& cell : crossings.cells) {
+    const CellLoops& loops = LoopsOf(cell.corners);
+    for (int loop = 0; loop < loops.loops; ++loop) {
+      crossings.first_step[cell.first_loop - crossings.edge_count + loop] =
+          steps + loops.first[loop];
+    }
+    steps += static_cast<std::uint32_t>(loops.Steps());
+  }
+  crossings.first_step.back() = steps;
+  crossings.step_edges.resize(steps);
+  ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
+    const ActiveCell& cell = crossings.cells[index];
+    const CellLoops& loops = LoopsOf(cell.corners);
+    const std::uint32_t first = crossings.FirstStepOf(cell);
+    for (int step = 0; step < loops.Steps(); ++step) {
+      crossings.step_edges[first + step] = EdgeVertexOf(bricks, crossings, cell, loops.edge[step]);
+    }
+  });
+}
+
 }  // namespace
 
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
@@ -108,6 +132,7 @@ void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
     ActiveCell& cell = crossings.cells[k];
     cell.first_loop += crossings.edge_count + crossings.loop_first[cell.brick];
   });
+  ListSteps(bricks, crossings);
 }
 
 }  // namespace partiemc::space

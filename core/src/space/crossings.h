@@ -36,10 +36,22 @@ struct SpaceCrossings {
   std::vector<ActiveCell> cells;
   std::uint32_t edge_count = 0, loop_count = 0;
 
+  std::vector<std::uint32_t> first_step;  ///< By loop: its first step; then the number of steps.
+  std::vector<std::uint32_t> step_edges;  ///< By step: the vertex on its crossed edge.
+
   std::vector<BrickBits> near;            ///< Nodes of crossed edges.
   std::vector<std::uint32_t> loop_first;  ///< Scratch: by brick.
 
   std::uint32_t VertexCount() const { return edge_count + loop_count; }
+
+  /// The first step of a cell; the others follow in the order of CellLoops.
+  std::uint32_t FirstStepOf(const ActiveCell& cell) const {
+    return first_step[cell.first_loop - edge_count];
+  }
+  /// The vertices on the edges of a cell, by step.
+  const std::uint32_t* StepEdgesOf(const ActiveCell& cell) const {
+    return step_edges.data() + FirstStepOf(cell);
+  }
 
   /// The vertex on the edge from a node along an axis. Requires: the edge is crossed.
   std::uint32_t EdgeVertex(const BrickPlace& node, int axis) const {

@@ -43,41 +43,69 @@ double Along(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y
 
 }  // namespace
 
-const FaceChecker::Node& FaceChecker::CornerOf(const std::array<int, 3>& cell, int corner) {
-  const std::array<int, 3> at{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1),
-                              cell[2] + (corner >> 2)};
-  const auto index =
-      static_cast<std::size_t>(((at[2] + 1) * kNodesAlong + at[1] + 1) * kNodesAlong + at[0] + 1);
-  Node& node = node_[index];
-  if (has_node_[index]) return node;
+void FaceChecker::FindNode(const std::array<int, 3>& at, std::size_t index) {
   has_node_[index] = true;
+  const Vec3 origin = OriginOf(bricks_[brick_]);
+  Vec3 position{cell_size_ * (origin.x + at[0]), cell_size_ * (origin.y + at[1]),
+                cell_size_ * (origin.z + at[2])};
   const std::uint32_t moved = nodes_.IndexOf(Normalise(bricks_, brick_, at[0], at[1], at[2]));
-  const Vec3 position = NodeAt(bricks_, nodes_, cell_size_, brick_, at);
-  node = {position.x, position.y, position.z,
-          moved == kNoIndex ? kNoIndex : crossings_.VertexCount() + moved};
-  return node;
+  if (moved != kNoIndex) position = position + nodes_.moves[moved];
+  Include(position);
+  node_[index] = {position.x, position.y, position.z,
+                  moved == kNoIndex ? kNoIndex : crossings_.VertexCount() + moved};
 }
 
-Side FaceChecker::SideAt(const std::array<int, 3>& at) {
-  const auto index =
-      static_cast<std::size_t>(((at[2] + 1) * kCellsAlong + at[1] + 1) * kCellsAlong + at[0] + 1);
+void FaceChecker::FindCell(const std::array<int, 3>& at, std::size_t index) {
+  has_cell_[index] = true;
+  const BrickPlace place = Normalise(bricks_, brick_, at[0], at[1], at[2]);
+  const bool is_active = place.brick != kNoIndex &&
+                         (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
+  Vec3 apex;
   Cell& cell = cell_[index];
-  if (!has_cell_[index]) {
-    has_cell_[index] = true;
-    const BrickPlace place = Normalise(bricks_, brick_, at[0], at[1], at[2]);
-    const bool is_active = place.brick != kNoIndex &&
-                           (crossings_.bricks[place.brick].active[place.k] >> place.Bit() & 1) != 0;
-    Vec3 apex;
-    cell.active = is_active ? crossings_.CellAt(place) : kNoIndex;
-    if (is_active) {
-      apex = positions_[crossings_.cells[cell.active].first_loop];
-    } else {
-      for (int corner = 0; corner < 8; ++corner) apex = apex + CornerOf(at, corner).At();
-      apex = .125 * apex;
-    }
-    cell.x = apex.x, cell.y = apex.y, cell.z = apex.z;
+  cell.active = is_active ? crossings_.CellAt(place) : kNoIndex;
+  if (is_active) {
+    apex = positions_[crossings_.cells[cell.active].first_loop];
+  } else {
+    for (int corner = 0; corner < 8; ++corner) apex = apex + CornerOf(at, corner).At();
+    apex = .125 * apex;
   }
-  return {at, cell.active, {cell.x, cell.y, cell.z}};
+  Include(apex);
+  cell.x = apex.x, cell.y = apex.y, cell.z = apex.z;
+}
+
+bool FaceChecker::IsPlainlyValid(const std::array<int, 3>& cell, int face) {
+  const int axis = face / 2;
+  std::array<int, 3> low = cell, high = cell;
+  if ((face & 1) != 0) {
+    ++high[axis];
+  } else {
+    --low[axis];
+  }
+  const Cell &of_low = CellAt(low), &of_high = CellAt(high);
+  const std::array<int, 4> corners = CornersOfFace(2 * axis + 1);
+  if (of_low.active != kNoIndex) {
+    const ActiveCell& active = crossings_.cells[of_low.active];
+    if (LoopsOf(active.corners).loops > 1) return false;
+    if (of_high.active != kNoIndex) {
+      if (LoopsOf(crossings_.cells[of_high.active].corners).loops > 1) return false;
+      const unsigned all =
+          1u << corners[0] | 1u << corners[1] | 1u << corners[2] | 1u << corners[3];
+      const unsigned inside = active.corners & all;
+      if (inside != 0 && inside != all) return false;
+    }
+  } else if (of_high.active != kNoIndex &&
+             LoopsOf(crossings_.cells[of_high.active].corners).loops > 1) {
+    return false;
+  }
+  const Vec3 below{of_low.x, of_low.y, of_low.z}, above{of_high.x, of_high.y, of_high.z};
+  std::array<Vec3, 4> at;
+  for (int k = 0; k < 4; ++k) at[k] = CornerOf(low, corners[k]).At();
+  const auto is_between = [&](int a, int b, int c) {
+    const Vec3 normal = Cross(at[b] - at[a], at[c] - at[a]);
+    return Dot(normal, above - at[a]) > bound_ && Dot(normal, below - at[a]) < -bound_;
+  };
+  return (is_between(0, 1, 2) && is_between(0, 2, 3)) ||
+         (is_between(1, 2, 3) && is_between(0, 1, 3));
 }
 
 Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
@@ -101,6 +129,7 @@ Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
     if (((low.corners >> a ^ low.corners >> b) & 1) == 0) continue;
     const std::uint32_t v = EdgeVertexOf(bricks_, crossings_, low, EdgeBetween(a, b));
     of.around[of.count] = positions_[v];
+    Include(positions_[v]);
     of.is_vertex[of.count] = true;
     of.item[of.count++] = v;
     ++of.crossed;
@@ -109,8 +138,14 @@ Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
 }
 
 bool FaceChecker::IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const {
+  const Vec3 axis = above - below;
+  Vec3 from = face.around[0] - above;
   for (int k = 0; k < face.count; ++k) {
     const Vec3& next = face.around[k + 1 < face.count ? k + 1 : 0];
+    const Vec3 to = next - above;
+    const double determinant = Dot(Cross(to, axis), from);
+    from = to;
+    if (determinant > bound_) continue;
     if (SideOfPlane(face.around[k], next, below, above) <= 0) return false;
   }
   return true;
@@ -124,7 +159,9 @@ bool FaceChecker::CanTriangulate(const Face& face, std::span<const std::uint8_t>
         triangulation.begin(), triangulation.end(), [&](const std::array<std::uint8_t, 3>& t) {
           const Vec3 &a = face.around[polygon[t[0]]], &b = face.around[polygon[t[1]]],
                      &c = face.around[polygon[t[2]]];
-          return SideOfPlane(a, b, c, above) > 0 && SideOfPlane(a, b, c, below) < 0;
+          const Vec3 normal = Cross(b - a, c - a);
+          return (Dot(normal, above - a) > bound_ || SideOfPlane(a, b, c, above) > 0) &&
+                 (Dot(normal, below - a) < -bound_ || SideOfPlane(a, b, c, below) < 0);
         });
     if (is_valid) return true;
   }

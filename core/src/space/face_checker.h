@@ -2,9 +2,13 @@
 // (certificate.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bitset>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -50,10 +54,16 @@ class FaceChecker {
         cell_size_(cell_size),
         positions_(positions),
         nodes_(nodes),
-        brick_(brick) {}
+        brick_(brick),
+        centre_(cell_size * (OriginOf(bricks[brick]) + Vec3{kHalf, kHalf, kHalf})),
+        bound_(BoundOf(cell_size)) {}
 
   /// A face of the cell (i, j, k).
   Face FaceOf(const std::array<int, 3>& cell, int face);
+
+  /// Returns true for most valid faces without crossings, and false for all other faces. Cheaper
+  /// than FaceOf and FindMode.
+  bool IsPlainlyValid(const std::array<int, 3>& cell, int face);
 
   /// Returns whether any mode is valid, and sets `mode`.
   bool FindMode(const Face& face, QuadMode& mode) const;
@@ -92,11 +102,47 @@ class FaceChecker {
     double x, y, z;
     std::uint32_t active;
   };
+  static constexpr double kHalf = .5 * kBrickSize;
+  /// Points up to this distance from the centre of the brick, in cells along each axis, are near.
+  static constexpr double kNear = 16;
+
+  /// The largest error of the determinant of three differences of near points, each product of
+  /// which has eight roundings: 6 (2 kNear)^3 8 eps with eps = 2^-53, and a margin.
+  static double BoundOf(double cell_size) {
+    const double longest = 2 * kNear * cell_size;
+    return 0x1p-53 * 100 * (longest * longest * longest);
+  }
+  /// Takes note of a point. If it is not near, all predicates are exact from now on.
+  void Include(const Vec3& point) {
+    const Vec3 from = point - centre_;
+    const double farthest = std::max({std::abs(from.x), std::abs(from.y), std::abs(from.z)});
+    if (!(farthest <= kNear * cell_size_)) bound_ = std::numeric_limits<double>::infinity();
+  }
+
   static constexpr int kNodesAlong = kBrickSize + 3;  ///< From -1 on.
   static constexpr int kCellsAlong = kBrickSize + 2;  ///< From -1 on.
 
-  const Node& CornerOf(const std::array<int, 3>& cell, int corner);
-  Side SideAt(const std::array<int, 3>& cell);
+  static std::size_t IndexOf(const std::array<int, 3>& at, int along) {
+    return static_cast<std::size_t>(((at[2] + 1) * along + at[1] + 1) * along + at[0] + 1);
+  }
+  const Node& CornerOf(const std::array<int, 3>& cell, int corner) {
+    const std::array<int, 3> at{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1),
+                                cell[2] + (corner >> 2)};
+    const std::size_t index = IndexOf(at, kNodesAlong);
+    if (!has_node_[index]) FindNode(at, index);
+    return node_[index];
+  }
+  const Cell& CellAt(const std::array<int, 3>& at) {
+    const std::size_t index = IndexOf(at, kCellsAlong);
+    if (!has_cell_[index]) FindCell(at, index);
+    return cell_[index];
+  }
+  Side SideAt(const std::array<int, 3>& at) {
+    const Cell& cell = CellAt(at);
+    return {at, cell.active, {cell.x, cell.y, cell.z}};
+  }
+  void FindNode(const std::array<int, 3>& at, std::size_t index);
+  void FindCell(const std::array<int, 3>& at, std::size_t index);
   bool IsValidAcross(const Face& face, const Vec3& below, const Vec3& above) const;
   bool IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const;
   bool CanTriangulate(const Face& face, std::span<const std::uint8_t> polygon, const Vec3& below,
@@ -108,6 +154,8 @@ class FaceChecker {
   const std::vector<Vec3>& positions_;
   const MovedNodes& nodes_;
   const std::uint32_t brick_;
+  const Vec3 centre_;
+  double bound_;  // Of the errors of determinants.
   std::bitset<kNodesAlong * kNodesAlong * kNodesAlong> has_node_;
   std::bitset<kCellsAlong * kCellsAlong * kCellsAlong> has_cell_;
   std::array<Node, kNodesAlong * kNodesAlong * kNodesAlong> node_;

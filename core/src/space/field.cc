@@ -14,14 +14,25 @@
 namespace partiemc::space {
 namespace {
 
+/// Rows for the boxes of blocks.
+NearRows RowsOf(const Scale& scale) { return {1, static_cast<float>(scale.kernel_radius)}; }
+
+/// Rows for blocks, and for all nodes of a brick.
+struct FieldRows {
+  NearRows block, brick;
+
+  explicit FieldRows(const Scale& scale)
+      : block(RowsOf(scale)), brick(kBrickSize - 1, static_cast<float>(scale.kernel_radius)) {}
+};
+
 NearBox BoxOfBlock(int i, int j, int k) {
   const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
   return {{x, y, z}, {x + 1, y + 1, z + 1}};
 }
 
 void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
-                   const BrickBits& nodes, SpaceField& field) {
-  PointSampler sampler(bins, scale);
+                   const NearRows& rows, const BrickBits& nodes, SpaceField& field) {
+  PointSampler sampler(bins, scale, &rows);
   ForEachInBlocks(
       nodes, [&](int i, int j, int k) { sampler.MoveTo(brick, BoxOfBlock(i, j, k)); },
       [&](int i, int j, int k) {
@@ -31,13 +42,21 @@ void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t bric
       });
 }
 
-void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
-                 SpaceField& field) {
+/// Sums the density at the nodes of a brick.
+void SumDensity(const SpaceBins& bins, const Scale& scale, const NearRows& rows,
+                std::uint32_t brick, std::array<float, kBrickNodes>& density) {
   const auto radius = static_cast<float>(scale.kernel_radius);
-  alignas(64) std::array<float, kBrickNodes> density{};
+  density = {};
+  const auto add = [&](const NearRun& run) { AddDensity(bins, run, radius, density.data()); };
+  if (bins.size.empty() && rows.is_exact()) return rows.ForEachRun(bins, brick, {0, 0, 0}, add);
   const NearBox all{{0, 0, 0}, {7, 7, 7}};
-  ForEachNearRun(bins, brick, all, radius,
-                 [&](const NearRun& run) { AddDensity(bins, run, radius, density.data()); });
+  ForEachNearRun(bins, brick, all, radius, add);
+}
+
+void SampleBrick(const SpaceBins& bins, const Scale& scale, const FieldRows& rows,
+                 std::uint32_t brick, SpaceField& field) {
+  alignas(64) std::array<float, kBrickNodes> density;
+  SumDensity(bins, scale, rows.brick, brick, density);
   const float weight = bins.weight.empty() ? static_cast<float>(scale.uniform_weight) : 1.0f;
   const auto guard = static_cast<float>(scale.guard);
   const auto saturation = static_cast<float>(scale.saturation);
@@ -60,7 +79,7 @@ void SampleBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t brick,
     }
   }
   field.exact[brick] = {};
-  EvaluateBrick(bins, scale, brick, open, field);
+  EvaluateBrick(bins, scale, brick, rows.block, open, field);
   for (int layer = 0; layer < kBrickSize; ++layer) {
     for (std::uint64_t bits = open[layer]; bits != 0; bits &= bits - 1) {
       const int bit = std::countr_zero(bits);
@@ -77,12 +96,14 @@ void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field) {
   field.values.resize(bricks);
   field.inside.resize(bricks);
   field.exact.resize(bricks);
+  const FieldRows rows(scale);
   ParallelFor(static_cast<std::uint32_t>(bricks),
-              [&](std::uint32_t brick) { SampleBrick(bins, scale, brick, field); });
+              [&](std::uint32_t brick) { SampleBrick(bins, scale, rows, brick, field); });
 }
 
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field) {
+  const NearRows rows = RowsOf(scale);
   ParallelFor(static_cast<std::uint32_t>(nodes.size()), [&](std::uint32_t brick) {
     BrickBits missing;
     std::uint64_t any = 0;
@@ -91,7 +112,7 @@ void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<
       any |= missing[layer];
     }
     if (any == 0) return;
-    EvaluateBrick(bins, scale, brick, missing, field);
+    EvaluateBrick(bins, scale, brick, rows, missing, field);
     // The density sum of SampleBrick decided the side. At f_0 and f_1, the sums here may differ
     // from it by rounding, so values are adapted to the sides.
     for (int layer = 0; layer < kBrickSize; ++layer) {

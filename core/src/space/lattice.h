@@ -85,9 +85,12 @@ inline BrickPlace Normalise(const BrickDirectory& directory, std::uint32_t brick
   return {owner, i & (kBrickSize - 1), j & (kBrickSize - 1), k & (kBrickSize - 1)};
 }
 
-inline int CountBits(std::uint64_t bits) {
-  return partiemc::CountBits(static_cast<std::uint32_t>(bits)) +
-         partiemc::CountBits(static_cast<std::uint32_t>(bits >> 32));
+/// As partiemc::CountBits.
+constexpr int CountBits(std::uint64_t bits) {
+  bits -= bits >> 1 & 0x5555555555555555;
+  bits = (bits & 0x3333333333333333) + (bits >> 2 & 0x3333333333333333);
+  bits = (bits + (bits >> 4)) & 0x0f0f0f0f0f0f0f0f;
+  return static_cast<int>(bits * 0x0101010101010101 >> 56);
 }
 
 }  // namespace partiemc::space

@@ -87,15 +87,31 @@ inline double SpreadOf(const Sums& sums, const Scale& scale) {
   return LargestEigenvalue(sums.second) / (scale.kernel_radius * scale.kernel_radius * sums.kernel);
 }
 
+/// Whether the gap term of F is surely below `value`. Saves most eigenvalues near surfaces: with
+/// the notation of LargestEigenvalue, the eigenvalue is at most q + 2 p.
+inline bool IsGapBelow(const Sums& sums, const Scale& scale, double value) {
+  // Above the error of LargestEigenvalue and all rounding.
+  constexpr double kMargin = 1e-6;
+  const double limit = (value / scale.gap_slope + scale.gap_spread) *
+                       (scale.kernel_radius * scale.kernel_radius * sums.kernel);
+  const Symmetric& a = sums.second;
+  const double q = (a.xx + a.yy + a.zz) / 3, rest = (1 - kMargin) * limit - q;
+  const double x = a.xx - q, y = a.yy - q, z = a.zz - q;
+  const double square = x * x + y * y + z * z + 2 * (a.xy * a.xy + a.xz * a.xz + a.yz * a.yz);
+  return rest > 0 && 4 * square < 6 * (rest * rest);
+}
+
 inline LevelSetAt LevelSetOf(const Sums& sums, const Scale& scale) {
   if (!(sums.kernel > 0)) return {VoidValue(scale), Term::kGuard};
   const double phi = Length(sums.first) / sums.kernel - scale.reference_radius;
   const double guard = (scale.guard - sums.density) * scale.guard_slope;
-  const double gap = (SpreadOf(sums, scale) - scale.gap_spread) * scale.gap_slope;
   const double saturation = (scale.saturation - sums.density) * scale.guard_slope;
   LevelSetAt at{phi, Term::kPhi};
   if (guard > at.value) at = {guard, Term::kGuard};
-  if (gap > at.value) at = {gap, Term::kGap};
+  if (!IsGapBelow(sums, scale, at.value)) {
+    const double gap = (SpreadOf(sums, scale) - scale.gap_spread) * scale.gap_slope;
+    if (gap > at.value) at = {gap, Term::kGap};
+  }
   if (saturation < at.value) at = {saturation, Term::kSaturation};
   at.value *= sums.size;
   return at;

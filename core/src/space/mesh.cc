@@ -115,16 +115,13 @@ void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scrat
 
 }  // namespace
 
-void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                       std::vector<VertexTriangle>& triangles) {
+void EmitMarchingCubes(const SpaceCrossings& crossings, std::vector<VertexTriangle>& triangles) {
   triangles.clear();
   for (const ActiveCell& cell : crossings.cells) {
     const CellLoops& loops = LoopsOf(cell.corners);
     for (int loop = 0; loop < loops.loops; ++loop) {
       const int first = loops.first[loop], size = loops.first[loop + 1] - first;
-      const auto vertex = [&](int step) {
-        return EdgeVertexOf(bricks, crossings, cell, loops.edge[first + step]);
-      };
+      const auto vertex = [&](int step) { return crossings.StepEdgesOf(cell)[first + step]; };
       if (size > kLongestFlatLoop) {
         for (int step = 0; step < size; ++step) {
           triangles.push_back({cell.first_loop + loop, vertex(step), vertex((step + 1) % size)});

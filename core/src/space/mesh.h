@@ -43,8 +43,7 @@ struct MeshScratch {
 
 /// The triangles of marching cubes, cell by cell. Their corners are vertices on edges; in long
 /// loops, one corner is the vertex in the cell.
-void EmitMarchingCubes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                       std::vector<VertexTriangle>& triangles);
+void EmitMarchingCubes(const SpaceCrossings& crossings, std::vector<VertexTriangle>& triangles);
 
 /// Sets area, volume and centroid of a shell to those of its triangles.
 void MeasureShell(std::uint32_t shell, Surface& surface);

@@ -85,9 +85,7 @@ BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDi
   BrickBits changed{};
   const Vec3 origin = OriginOf(bricks[brick]);
   const double least = kLeastSquare * cell_size * cell_size;
-  ForEachMovedNode(nodes, brick, [&](std::uint32_t index, int i, int j, int k) {
-    const std::uint64_t bit = std::uint64_t{1} << (j * kBrickSize + i);
-    if ((which[k] & bit) == 0) return;
+  ForEachMovedNodeOf(nodes, brick, which, [&](std::uint32_t index, int i, int j, int k) {
     Vec3 sum;
     double total = 0;
     const Vec3 node = cell_size * (origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k});
@@ -118,7 +116,7 @@ BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDi
     const Vec3 move = total > 0 ? (share / total) * sum : Vec3{};
     if (move == nodes.moves[index]) return;
     nodes.moves[index] = move;
-    changed[k] |= bit;
+    changed[k] |= std::uint64_t{1} << (j * kBrickSize + i);
   });
   return changed;
 }

@@ -75,16 +75,25 @@ inline Vec3 NodeAt(const BrickDirectory& bricks, const MovedNodes& nodes, double
   return node == kNoIndex ? rest : rest + nodes.moves[node];
 }
 
+/// Calls visit(index, i, j, k) for each node of a brick that may move and is in `which`.
+template <typename Visit>
+void ForEachMovedNodeOf(const MovedNodes& nodes, std::uint32_t brick, const BrickBits& which,
+                        Visit visit) {
+  const MovedNodes::Brick& at = nodes.bricks[brick];
+  for (int k = 0; k < kBrickSize; ++k) {
+    for (std::uint64_t bits = at.nodes[k] & which[k]; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      const std::uint64_t below = at.nodes[k] & ((bits & (~bits + 1)) - 1);
+      visit(at.first + at.before[k] + static_cast<std::uint32_t>(CountBits(below)),
+            bit % kBrickSize, bit / kBrickSize, k);
+    }
+  }
+}
+
 /// Calls visit(index, i, j, k) for each node of a brick that may move.
 template <typename Visit>
 void ForEachMovedNode(const MovedNodes& nodes, std::uint32_t brick, Visit visit) {
-  std::uint32_t index = nodes.bricks[brick].first;
-  for (int k = 0; k < kBrickSize; ++k) {
-    for (std::uint64_t bits = nodes.bricks[brick].nodes[k]; bits != 0; bits &= bits - 1) {
-      const int bit = std::countr_zero(bits);
-      visit(index++, bit % kBrickSize, bit / kBrickSize, k);
-    }
-  }
+  ForEachMovedNodeOf(nodes, brick, nodes.bricks[brick].nodes, visit);
 }
 
 }  // namespace partiemc::space

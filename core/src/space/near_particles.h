@@ -35,10 +35,11 @@ struct NearBlock {
   static_assert(kLanes <= kBinPadding);
 
   alignas(64) PerParticle<float> x, y, z;
-  alignas(64) PerParticle<float> weight;    ///< 1 if uniform; the size if particles have own sizes.
+  alignas(64) PerParticle<float> weight;    ///< Unset if uniform; the size with own sizes.
   alignas(64) PerParticle<float> per_size;  ///< 1 / size; unset without own sizes.
   int count = 0;
   bool has_sizes = false;
+  bool has_weights = true;  ///< Not uniform.
 
   /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Vectors
   /// also copy what follows them in the bins, which counts for nothing.
@@ -51,9 +52,7 @@ struct NearBlock {
     if (!bins.size.empty()) {
       std::copy_n(bins.size.data() + first, kLanes, weight.data() + count);
       for (int k = count; k < count + kLanes; ++k) per_size[k] = 1 / weight[k];
-    } else if (bins.weight.empty()) {
-      std::fill_n(weight.data() + count, kLanes, 1.0f);
-    } else {
+    } else if (has_weights) {
       std::copy_n(bins.weight.data() + first, kLanes, weight.data() + count);
     }
     count += static_cast<int>(added);
@@ -70,7 +69,10 @@ struct NearBlock {
 
  private:
   static void Shift(const float* from, float by, float* to) {
-    for (int k = 0; k < kLanes; ++k) to[k] = from[k] + by;
+    // The local array cannot overlap, so that the compiler uses vectors.
+    std::array<float, kLanes> shifted;
+    for (int k = 0; k < kLanes; ++k) shifted[k] = from[k] + by;
+    std::copy_n(shifted.data(), kLanes, to);
   }
 };
 
@@ -130,6 +132,99 @@ void ForEachNearRunOf(const SpaceBins& bins, std::size_t of_class, std::uint32_t
   }
 }
 
+/// The rows of cells within a radius of a cube whose corners are nodes: ForEachNearRunOf without
+/// square roots, for bins of one size class.
+class NearRows {
+ public:
+  /// The rows near a cube of `side` cells.
+  NearRows(int side, float radius) : side_(side), low_(static_cast<int>(std::floor(-radius))) {
+    count_ = static_cast<int>(std::floor(static_cast<float>(side) + radius)) - low_ + 1;
+    is_exact_ = count_ <= kMost && IsExact(radius);
+    const float square = radius * radius;
+    for (int z = 0; is_exact_ && z < count_; ++z) {
+      for (int y = 0; y < count_; ++y) {
+        const float dy = DistanceOf(y), dz = DistanceOf(z);
+        const float rest = square - dy * dy - dz * dz;
+        Row& row = rows_[z][y] = {0, -1};
+        if (rest <= 0) continue;
+        const float half = std::sqrt(rest);
+        is_exact_ = is_exact_ && IsExact(half);
+        row = {static_cast<std::int8_t>(std::floor(-half)),
+               static_cast<std::int8_t>(std::floor(static_cast<float>(side) + half))};
+      }
+    }
+  }
+
+  int side() const { return side_; }
+  /// False if there are too many rows, or if a row ends so close to a cell that rounding decides,
+  /// which differs from place to place.
+  bool is_exact() const { return is_exact_; }
+
+  /// Calls visit(NearRun) for the rows near the cube with its lowest corner at node `at` of a
+  /// brick. Requires: the rows are exact.
+  template <typename Visit>
+  void ForEachRun(const SpaceBins& bins, std::uint32_t brick, const std::array<int, 3>& at,
+                  Visit visit) const {
+    std::array<int, 3> low, high;
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = at[axis] + low_;
+      high[axis] = low[axis] + count_ - 1;
+    }
+    constexpr int kSide = kBrickSize;
+    for (int bz = low[2] >> kBrickShift; bz <= high[2] >> kBrickShift; ++bz) {
+      for (int by = low[1] >> kBrickShift; by <= high[1] >> kBrickShift; ++by) {
+        for (int bx = low[0] >> kBrickShift; bx <= high[0] >> kBrickShift; ++bx) {
+          const std::uint32_t owner = bins.bricks.At(brick, bx, by, bz);
+          if (owner == kNoIndex) continue;
+          const auto& cells = bins.cells[owner];
+          if (cells.front() == cells.back()) continue;
+          NearRun run{0, 0, static_cast<float>(kSide * bx), static_cast<float>(kSide * by),
+                      static_cast<float>(kSide * bz)};
+          const int x = at[0] - kSide * bx;  // Relative to the owner.
+          const int last_z = std::min(high[2] - kSide * bz, kSide - 1);
+          const int last_y = std::min(high[1] - kSide * by, kSide - 1);
+          for (int z = std::max(low[2] - kSide * bz, 0); z <= last_z; ++z) {
+            const auto& rows = rows_[z + kSide * bz - low[2]];
+            for (int y = std::max(low[1] - kSide * by, 0); y <= last_y; ++y) {
+              const Row& row = rows[y + kSide * by - low[1]];
+              const int first = std::max(x + row.first, 0);
+              const int last = std::min(x + row.last, kSide - 1);
+              if (first > last) continue;
+              const int cell = (z * kSide + y) * kSide;
+              run.first = cells[cell + first];
+              run.last = cells[cell + last + 1];
+              if (run.first < run.last) visit(run);
+            }
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kMost = 16;
+
+  /// Cells [first, last] relative to the lowest corner.
+  struct Row {
+    std::int8_t first, last;
+  };
+
+  /// Whether a length is an integer, or farther from one than ForEachNearRunOf rounds.
+  static bool IsExact(float length) {
+    const float rest = std::abs(length - std::round(length));
+    return rest == 0 || rest > 1e-4f;
+  }
+  /// The distance of a row of cells from the cube along an axis.
+  float DistanceOf(int row) const {
+    const int at = low_ + row;
+    return static_cast<float>(std::max({0, at - side_, -(at + 1)}));
+  }
+
+  int side_, low_, count_;
+  bool is_exact_;
+  std::array<std::array<Row, kMost>, kMost> rows_;
+};
+
 /// Calls visit(NearRun) for runs that contain all particles within `radius`, times their own sizes,
 /// of the box, class by class, in the order of the bins. Runs may also contain other particles.
 template <typename Visit>
@@ -176,14 +271,14 @@ using NearPart = NearRegionOf<4096>;   ///< Of a part of a brick.
 bool SelectReaching(const NearBrick& region, const NearBox& box, float radius, NearPart& part);
 bool SelectReaching(const NearPart& region, const NearBox& box, float radius, NearBlock& block);
 
-/// Calls visit(const NearBlock&) for blocks with all particles within `radius`, times their own
-/// sizes, of the box.
-template <typename Visit>
-void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
-                      NearBlock& block, Visit visit) {
+/// Calls visit(const NearBlock&) for blocks with the particles of all runs that for_each_run(visit)
+/// visits.
+template <typename ForEachRun, typename Visit>
+void ForEachBlockOf(const SpaceBins& bins, ForEachRun for_each_run, NearBlock& block, Visit visit) {
   block.count = 0;
   block.has_sizes = !bins.size.empty();
-  ForEachNearRun(bins, brick, box, radius, [&](const NearRun& run) {
+  block.has_weights = !bins.weight.empty();
+  for_each_run([&](const NearRun& run) {
     for (std::uint32_t p = run.first; p < run.last;) {
       if (block.count == NearBlock::kCapacity) {
         visit(block);
@@ -195,6 +290,17 @@ void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox&
   if (block.count == 0) return;
   block.Pad();
   visit(block);
+}
+
+/// Calls visit(const NearBlock&) for blocks with all particles within `radius`, times their own
+/// sizes, of the box.
+template <typename Visit>
+void ForEachNearBlock(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius,
+                      NearBlock& block, Visit visit) {
+  const auto for_each_run = [&](auto visit_run) {
+    ForEachNearRun(bins, brick, box, radius, visit_run);
+  };
+  ForEachBlockOf(bins, for_each_run, block, visit);
 }
 
 template <int kMost>

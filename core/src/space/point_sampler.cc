@@ -29,8 +29,8 @@ void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
     return;
   }
   int blocks = 0;
-  ForEachNearBlock(bins_, brick_, box_, static_cast<float>(scale_.kernel_radius), block_,
-                   [&](const NearBlock&) { ++blocks; });
+  is_on_rows_ = IsOnRows();
+  CollectBlocks([&](const NearBlock&) { ++blocks; });
   is_whole_ = blocks <= 1;
 }
 
@@ -62,10 +62,34 @@ bool PointSampler::Select() {
   return SelectReaching(part_, box_, radius, block_);
 }
 
+// Whether the box is a cube of `rows_`. Sets its corner.
+bool PointSampler::IsOnRows() {
+  if (rows_ == nullptr || !rows_->is_exact()) return false;
+  const auto side = static_cast<float>(rows_->side());
+  for (int axis = 0; axis < 3; ++axis) {
+    corner_[axis] = static_cast<int>(box_.low[axis]);
+    const auto low = static_cast<float>(corner_[axis]);
+    if (box_.low[axis] != low || box_.high[axis] != low + side) return false;
+  }
+  return true;
+}
+
 template <typename Visit>
 void PointSampler::ForEachBlock(Visit visit) {
   if (is_whole_) {
     visit(block_);
+  } else {
+    CollectBlocks(visit);
+  }
+}
+
+template <typename Visit>
+void PointSampler::CollectBlocks(Visit visit) {
+  if (is_on_rows_) {
+    const auto for_each_run = [&](auto visit_run) {
+      rows_->ForEachRun(bins_, brick_, corner_, visit_run);
+    };
+    ForEachBlockOf(bins_, for_each_run, block_, visit);
   } else {
     ForEachNearBlock(bins_, brick_, box_, static_cast<float>(scale_.kernel_radius), block_, visit);
   }
@@ -84,8 +108,7 @@ PointSample PointSampler::Sample(const Vec3& point) {
   PartialSlopes partial;
   const QueryPoint at = QueryAt(point);
   ForEachBlock([&](const NearBlock& block) {
-    AddMoments(block, at, InverseSquare(scale_), moments);
-    AddSlopes(block, at, InverseSquare(scale_), partial);
+    AddMomentsAndSlopes(block, at, InverseSquare(scale_), moments, partial);
   });
   const Sums sums = Total(moments);
   const LevelSetAt level = LevelSetOf(sums, scale_);

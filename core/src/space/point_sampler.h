@@ -1,6 +1,9 @@
 // Evaluates the level set and its gradient at any point.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "frame/scale.h"
 #include "space/bins.h"
 #include "space/level_set.h"
@@ -20,7 +23,10 @@ struct PointSample {
 /// Collects the particles around a box once for all points in it. Not thread-safe; about 220 kB.
 class PointSampler {
  public:
-  PointSampler(const SpaceBins& bins, const Scale& scale) : bins_(bins), scale_(scale) {}
+  /// `rows`: rows for cubes of cells, which speed up moves to them, or none. Refers to its
+  /// arguments.
+  PointSampler(const SpaceBins& bins, const Scale& scale, const NearRows* rows = nullptr)
+      : bins_(bins), scale_(scale), rows_(rows) {}
 
   /// Sets the box that contains the points of later calls, in cells relative to `brick`.
   void MoveTo(std::uint32_t brick, const NearBox& box);
@@ -34,18 +40,24 @@ class PointSampler {
 
  private:
   bool Select();
+  bool IsOnRows();
   template <typename Visit>
   void ForEachBlock(Visit visit);
+  template <typename Visit>
+  void CollectBlocks(Visit visit);
   Sums Total(const PartialMoments& moments) const;
   Vec3 GradientOf(Term term, const Sums& sums, const Slopes& slopes, const QueryPoint& point);
   Vec3 GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point);
 
   const SpaceBins& bins_;
   const Scale& scale_;
+  const NearRows* const rows_;
   std::uint32_t brick_ = 0;
   NearBox box_;
   NearBlock block_;
-  bool is_whole_ = false;  // All particles around the box are in block_.
+  std::array<int, 3> corner_{};  // Of the box.
+  bool is_on_rows_ = false;      // The box is a cube of `rows_`.
+  bool is_whole_ = false;        // All particles around the box are in block_.
 
   // With own sizes, the particles around the brick, and around the part of it that has the box.
   NearBrick whole_;

@@ -1,6 +1,7 @@
 #include "space/point_sums.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <type_traits>
 
@@ -20,12 +21,16 @@ using Lanes = hn::CappedTag<float, NearBlock::kLanes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
+// What a particle has besides its position: nothing, its own weight, or its own size.
+enum class Own { kNothing, kWeight, kSize };
+
 // The offsets D of some particles of a block from a point, with own sizes divided by them, and t =
 // max(0, 1 - |D|^2 / R^2).
 template <bool kSized>
 struct Offsets {
   Vector x, y, z, t, per_size;
 
+  HWY_INLINE Offsets() = default;
   HWY_INLINE Offsets(const NearBlock& block, int k, Vector px, Vector py, Vector pz,
                      Vector inverse_square) {
     const Lanes d;
@@ -56,70 +61,153 @@ HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, f
   }
 }
 
-template <bool kSized>
+// Partial sums [lane, lane + kLanes) in registers.
+template <Own kOwn>
+struct Moments {
+  static constexpr bool kSized = kOwn == Own::kSize;
+  Vector k0, kw, kx, ky, kz, xx, xy, xz, yy, yz, zz;
+
+  HWY_INLINE Moments(const PartialMoments& sums, int lane) {
+    const auto load = [&](int q)
+                          HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
+    k0 = load(0), kw = load(1), kx = load(2), ky = load(3), kz = load(4);
+    xx = load(5), xy = load(6), xz = load(7), yy = load(8), yz = load(9), zz = load(10);
+  }
+  // `p`: the index of the first particle.
+  HWY_INLINE void Add(const Offsets<kSized>& to, const NearBlock& block, int p) {
+    const Vector k = hn::Mul(hn::Mul(to.t, to.t), to.t);
+    k0 = hn::Add(k0, k);
+    if constexpr (kOwn != Own::kNothing) {
+      kw = hn::Add(kw, hn::Mul(k, hn::LoadU(Lanes(), block.weight.data() + p)));
+    }
+    const Vector x = hn::Mul(k, to.x), y = hn::Mul(k, to.y), z = hn::Mul(k, to.z);
+    kx = hn::Add(kx, x);
+    ky = hn::Add(ky, y);
+    kz = hn::Add(kz, z);
+    xx = hn::Add(xx, hn::Mul(x, to.x));
+    xy = hn::Add(xy, hn::Mul(x, to.y));
+    xz = hn::Add(xz, hn::Mul(x, to.z));
+    yy = hn::Add(yy, hn::Mul(y, to.y));
+    yz = hn::Add(yz, hn::Mul(y, to.z));
+    zz = hn::Add(zz, hn::Mul(z, to.z));
+  }
+  HWY_INLINE void StoreTo(PartialMoments& sums, int lane) const {
+    const Vector weighted = kOwn == Own::kNothing ? k0 : kw;
+    const Vector all[] = {k0, weighted, kx, ky, kz, xx, xy, xz, yy, yz, zz};
+    for (int q = 0; q < 11; ++q) hn::Store(all[q], Lanes(), sums.lanes[q].data() + lane);
+  }
+};
+
+template <Own kOwn>
+struct SlopesInLanes {
+  static constexpr bool kSized = kOwn == Own::kSize;
+  Vector sx, sy, sz, xx, xy, xz, yy, yz, zz, wx, wy, wz;
+
+  HWY_INLINE SlopesInLanes(const PartialSlopes& sums, int lane) {
+    const auto load = [&](int q)
+                          HWY_ATTR { return hn::Load(Lanes(), sums.lanes[q].data() + lane); };
+    sx = load(0), sy = load(1), sz = load(2);
+    xx = load(3), xy = load(4), xz = load(5), yy = load(6), yz = load(7), zz = load(8);
+    wx = load(9), wy = load(10), wz = load(11);
+  }
+  HWY_INLINE void Add(const Offsets<kSized>& to, const NearBlock& block, int p) {
+    Vector square = hn::Mul(to.t, to.t);
+    if constexpr (kSized) {
+      wx = hn::Add(wx, hn::Mul(hn::Mul(square, to.t), to.per_size));
+      square = hn::Mul(square, to.per_size);
+    }
+    const Vector x = hn::Mul(square, to.x), y = hn::Mul(square, to.y), z = hn::Mul(square, to.z);
+    sx = hn::Add(sx, x);
+    sy = hn::Add(sy, y);
+    sz = hn::Add(sz, z);
+    xx = hn::Add(xx, hn::Mul(x, to.x));
+    xy = hn::Add(xy, hn::Mul(x, to.y));
+    xz = hn::Add(xz, hn::Mul(x, to.z));
+    yy = hn::Add(yy, hn::Mul(y, to.y));
+    yz = hn::Add(yz, hn::Mul(y, to.z));
+    zz = hn::Add(zz, hn::Mul(z, to.z));
+    if constexpr (kOwn == Own::kWeight) {
+      const Vector w = hn::LoadU(Lanes(), block.weight.data() + p);
+      wx = hn::Add(wx, hn::Mul(w, x));
+      wy = hn::Add(wy, hn::Mul(w, y));
+      wz = hn::Add(wz, hn::Mul(w, z));
+    }
+  }
+  HWY_INLINE void StoreTo(PartialSlopes& sums, int lane) const {
+    constexpr bool kIsUniform = kOwn == Own::kNothing;
+    const Vector all[] = {sx,
+                          sy,
+                          sz,
+                          xx,
+                          xy,
+                          xz,
+                          yy,
+                          yz,
+                          zz,
+                          kIsUniform ? sx : wx,
+                          kIsUniform ? sy : wy,
+                          kIsUniform ? sz : wz};
+    for (int q = 0; q < 12; ++q) hn::Store(all[q], Lanes(), sums.lanes[q].data() + lane);
+  }
+};
+
+template <Own kOwn>
 void AddMomentsOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
                   PartialMoments& sums) {
-  const Lanes d;
+  constexpr bool kSized = kOwn == Own::kSize;
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
-    const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
-    Vector k0 = load(0), kw = load(1), kx = load(2), ky = load(3), kz = load(4);
-    Vector xx = load(5), xy = load(6), xz = load(7), yy = load(8), yz = load(9), zz = load(10);
-    const auto add = [&](const Offsets<kSized>& to, int p) HWY_ATTR {
-      const Vector k = hn::Mul(hn::Mul(to.t, to.t), to.t);
-      k0 = hn::Add(k0, k);
-      kw = hn::Add(kw, hn::Mul(k, hn::LoadU(d, block.weight.data() + p)));
-      const Vector x = hn::Mul(k, to.x), y = hn::Mul(k, to.y), z = hn::Mul(k, to.z);
-      kx = hn::Add(kx, x);
-      ky = hn::Add(ky, y);
-      kz = hn::Add(kz, z);
-      xx = hn::Add(xx, hn::Mul(x, to.x));
-      xy = hn::Add(xy, hn::Mul(x, to.y));
-      xz = hn::Add(xz, hn::Mul(x, to.z));
-      yy = hn::Add(yy, hn::Mul(y, to.y));
-      yz = hn::Add(yz, hn::Mul(y, to.z));
-      zz = hn::Add(zz, hn::Mul(z, to.z));
-    };
+    Moments<kOwn> moments(sums, lane);
+    const auto add = [&](const Offsets<kSized>& to, int p) HWY_ATTR { moments.Add(to, block, p); };
     ForEachOffset<kSized>(block, point, inverse_square, lane, add);
-    const Vector all[] = {k0, kw, kx, ky, kz, xx, xy, xz, yy, yz, zz};
-    for (int q = 0; q < 11; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
+    moments.StoreTo(sums, lane);
   }
 }
 
-template <bool kSized>
-void AddSlopesOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
-                 PartialSlopes& sums) {
+// Many particles around a box are beyond the kernel of a point in it. Their vectors would add
+// zeros, so they are left out.
+template <Own kOwn>
+void AddMomentsAndSlopesOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                           PartialMoments& moments, PartialSlopes& slopes) {
+  constexpr bool kSized = kOwn == Own::kSize;
   const Lanes d;
+  const Vector px = hn::Set(d, point.x), py = hn::Set(d, point.y), pz = hn::Set(d, point.z);
+  const Vector inverse = hn::Set(d, inverse_square);
+  NearBlock::PerParticle<int> from;
+  alignas(64) NearBlock::PerParticle<float> x, y, z, t;
+  int count = 0;
+  for (int k = 0; k < block.count; k += NearBlock::kLanes) {
+    bool is_near = false;
+    for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
+      const Offsets<kSized> to(block, k + lane, px, py, pz, inverse);
+      hn::Store(to.x, d, x.data() + count + lane);
+      hn::Store(to.y, d, y.data() + count + lane);
+      hn::Store(to.z, d, z.data() + count + lane);
+      hn::Store(to.t, d, t.data() + count + lane);
+      is_near |= !hn::AllFalse(d, hn::Gt(to.t, hn::Zero(d)));
+    }
+    from[count / NearBlock::kLanes] = k;
+    count += is_near ? NearBlock::kLanes : 0;
+  }
+  const auto for_each = [&](int lane, auto add) HWY_ATTR {
+    for (int k = 0; k < count; k += NearBlock::kLanes) {
+      const int p = from[k / NearBlock::kLanes] + lane;
+      Offsets<kSized> to;
+      to.x = hn::Load(d, x.data() + k + lane);
+      to.y = hn::Load(d, y.data() + k + lane);
+      to.z = hn::Load(d, z.data() + k + lane);
+      to.t = hn::Load(d, t.data() + k + lane);
+      if constexpr (kSized) to.per_size = hn::LoadU(d, block.per_size.data() + p);
+      add(to, p);
+    }
+  };
   for (int lane = 0; lane < NearBlock::kLanes; lane += kLanes) {
-    const auto load = [&](int q) HWY_ATTR { return hn::Load(d, sums.lanes[q].data() + lane); };
-    Vector sx = load(0), sy = load(1), sz = load(2);
-    Vector xx = load(3), xy = load(4), xz = load(5), yy = load(6), yz = load(7), zz = load(8);
-    Vector wx = load(9), wy = load(10), wz = load(11);
-    const auto add = [&](const Offsets<kSized>& to, [[maybe_unused]] int p) HWY_ATTR {
-      Vector square = hn::Mul(to.t, to.t);
-      if constexpr (kSized) {
-        wx = hn::Add(wx, hn::Mul(hn::Mul(square, to.t), to.per_size));
-        square = hn::Mul(square, to.per_size);
-      }
-      const Vector x = hn::Mul(square, to.x), y = hn::Mul(square, to.y), z = hn::Mul(square, to.z);
-      sx = hn::Add(sx, x);
-      sy = hn::Add(sy, y);
-      sz = hn::Add(sz, z);
-      xx = hn::Add(xx, hn::Mul(x, to.x));
-      xy = hn::Add(xy, hn::Mul(x, to.y));
-      xz = hn::Add(xz, hn::Mul(x, to.z));
-      yy = hn::Add(yy, hn::Mul(y, to.y));
-      yz = hn::Add(yz, hn::Mul(y, to.z));
-      zz = hn::Add(zz, hn::Mul(z, to.z));
-      if constexpr (!kSized) {
-        const Vector w = hn::LoadU(d, block.weight.data() + p);
-        wx = hn::Add(wx, hn::Mul(w, x));
-        wy = hn::Add(wy, hn::Mul(w, y));
-        wz = hn::Add(wz, hn::Mul(w, z));
-      }
-    };
-    ForEachOffset<kSized>(block, point, inverse_square, lane, add);
-    const Vector all[] = {sx, sy, sz, xx, xy, xz, yy, yz, zz, wx, wy, wz};
-    for (int q = 0; q < 12; ++q) hn::Store(all[q], d, sums.lanes[q].data() + lane);
+    Moments<kOwn> of_moments(moments, lane);
+    for_each(lane,
+             [&](const Offsets<kSized>& to, int p) HWY_ATTR { of_moments.Add(to, block, p); });
+    of_moments.StoreTo(moments, lane);
+    SlopesInLanes<kOwn> of_slopes(slopes, lane);
+    for_each(lane, [&](const Offsets<kSized>& to, int p) HWY_ATTR { of_slopes.Add(to, block, p); });
+    of_slopes.StoreTo(slopes, lane);
   }
 }
 
@@ -154,14 +242,18 @@ void AddThirdsOf(const NearBlock& block, const QueryPoint& point, float inverse_
 
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums) {
-  const auto add = block.has_sizes ? AddMomentsOf<true> : AddMomentsOf<false>;
+  const auto add = block.has_sizes     ? AddMomentsOf<Own::kSize>
+                   : block.has_weights ? AddMomentsOf<Own::kWeight>
+                                       : AddMomentsOf<Own::kNothing>;
   add(block, point, inverse_square, sums);
 }
 
-void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
-               PartialSlopes& sums) {
-  const auto add = block.has_sizes ? AddSlopesOf<true> : AddSlopesOf<false>;
-  add(block, point, inverse_square, sums);
+void AddMomentsAndSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                         PartialMoments& moments, PartialSlopes& slopes) {
+  const auto add = block.has_sizes     ? AddMomentsAndSlopesOf<Own::kSize>
+                   : block.has_weights ? AddMomentsAndSlopesOf<Own::kWeight>
+                                       : AddMomentsAndSlopesOf<Own::kNothing>;
+  add(block, point, inverse_square, moments, slopes);
 }
 
 void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
@@ -231,34 +323,51 @@ struct NodeRange {
   }
 };
 
-template <bool kSized>
+// Vectors of a row of nodes, of a part of it, or of two rows.
+using RowLanes = hn::CappedTag<float, 2 * kBrickSize>;
+constexpr int kRowLanes = static_cast<int>(hn::MaxLanes(RowLanes()));
+constexpr int kRowsAtOnce = std::max(1, kRowLanes / kBrickSize);
+
+template <Own kOwn>
 void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius, float* nodes) {
-  const Lanes d;
-  float radius = kernel_radius, inverse = 1 / (radius * radius);
-  Vector inverse_square = hn::Set(d, inverse);
+  const RowLanes d;
+  alignas(64) constexpr float kColumnOf[] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+  alignas(64) constexpr float kRowOf[] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+  float radius = kernel_radius;
+  auto inverse = hn::Set(d, 1 / (radius * radius));
   for (std::uint32_t p = run.first; p < run.last; ++p) {
-    if constexpr (kSized) {
+    if constexpr (kOwn == Own::kSize) {
       radius = kernel_radius * bins.size[p];
-      inverse = 1 / (radius * radius);
-      inverse_square = hn::Set(d, inverse);
+      inverse = hn::Set(d, 1 / (radius * radius));
     }
     const float x = bins.x[p] + run.shift_x;
     const float y = bins.y[p] + run.shift_y;
     const float z = bins.z[p] + run.shift_z;
     const NodeRange rows(y, radius), layers(z, radius);
-    const Vector weight = hn::Set(d, bins.weight.empty() ? 1.0f : bins.weight[p]);
+    alignas(32) std::array<float, kBrickSize> dz_square;
     for (int lane = 0; lane < kBrickSize; lane += kLanes) {
-      const Vector dx = hn::Sub(hn::Set(d, x), hn::Iota(d, static_cast<float>(lane)));
-      const Vector column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse_square));
-      for (int k = layers.first; k <= layers.last; ++k) {
-        const float dz = z - static_cast<float>(k);
-        for (int j = rows.first; j <= rows.last; ++j) {
-          const float dy = y - static_cast<float>(j);
-          const Vector t =
-              hn::Max(hn::Zero(d), hn::Sub(column, hn::Set(d, (dy * dy + dz * dz) * inverse)));
+      const Lanes of_layers;
+      const Vector dz =
+          hn::Sub(hn::Set(of_layers, z), hn::Iota(of_layers, static_cast<float>(lane)));
+      hn::Store(hn::Mul(dz, dz), of_layers, dz_square.data() + lane);
+    }
+    for (int lane = 0; lane < kBrickSize; lane += kRowLanes) {
+      const auto dx = hn::Sub(hn::Set(d, x), hn::Load(d, kColumnOf + lane));
+      const auto column = hn::Sub(hn::Set(d, 1.0f), hn::Mul(hn::Mul(dx, dx), inverse));
+      const auto row_of = hn::Load(d, kRowOf + lane);
+      for (int j = rows.first & ~(kRowsAtOnce - 1); j <= rows.last; j += kRowsAtOnce) {
+        const auto row = hn::Add(hn::Set(d, static_cast<float>(j)), row_of);
+        const auto dy = hn::Sub(hn::Set(d, y), row);
+        const auto dy_square = hn::Mul(dy, dy);
+        for (int k = layers.first; k <= layers.last; ++k) {
+          const auto across = hn::Add(dy_square, hn::Set(d, dz_square[k]));
+          const auto t = hn::Max(hn::Zero(d), hn::Sub(column, hn::Mul(across, inverse)));
           float* const at = nodes + (k * kBrickSize + j) * kBrickSize + lane;
-          const Vector kernel = hn::Mul(hn::Mul(t, t), t);
-          hn::Store(hn::Add(hn::Load(d, at), hn::Mul(kernel, weight)), d, at);
+          auto kernel = hn::Mul(hn::Mul(t, t), t);
+          if constexpr (kOwn == Own::kWeight) {
+            kernel = hn::Mul(kernel, hn::Set(d, bins.weight[p]));
+          }
+          hn::Store(hn::Add(hn::Load(d, at), kernel), d, at);
         }
       }
     }
@@ -266,7 +375,9 @@ void AddDensityOf(const SpaceBins& bins, const NearRun& run, float kernel_radius
 }
 
 void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes) {
-  const auto add = bins.size.empty() ? AddDensityOf<false> : AddDensityOf<true>;
+  const auto add = !bins.size.empty()     ? AddDensityOf<Own::kSize>
+                   : !bins.weight.empty() ? AddDensityOf<Own::kWeight>
+                                          : AddDensityOf<Own::kNothing>;
   add(bins, run, radius, nodes);
 }
 
@@ -278,7 +389,7 @@ HWY_AFTER_NAMESPACE();
 namespace partiemc::space {
 
 HWY_EXPORT(AddMoments);
-HWY_EXPORT(AddSlopes);
+HWY_EXPORT(AddMomentsAndSlopes);
 HWY_EXPORT(AddThirds);
 HWY_EXPORT(AddDensity);
 HWY_EXPORT(SelectBlock);
@@ -288,9 +399,9 @@ void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_s
                 PartialMoments& sums) {
   HWY_DYNAMIC_DISPATCH(AddMoments)(block, point, inverse_square, sums);
 }
-void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
-               PartialSlopes& sums) {
-  HWY_DYNAMIC_DISPATCH(AddSlopes)(block, point, inverse_square, sums);
+void AddMomentsAndSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                         PartialMoments& moments, PartialSlopes& slopes) {
+  HWY_DYNAMIC_DISPATCH(AddMomentsAndSlopes)(block, point, inverse_square, moments, slopes);
 }
 void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
                PartialThirds& sums) {

@@ -37,8 +37,8 @@ struct QueryPoint {
 /// Each function adds the terms of the particles of a block to partial sums.
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums);
-void AddSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
-               PartialSlopes& sums);
+void AddMomentsAndSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
+                         PartialMoments& moments, PartialSlopes& slopes);
 void AddThirds(const NearBlock& block, const QueryPoint& point, float inverse_square, const Vec3& v,
                PartialThirds& sums);
 

@@ -27,13 +27,13 @@ inline constexpr std::uint64_t kBytesPerParticle = 60;
 inline constexpr std::uint64_t kBytesPerBrick = 6'000;
 inline constexpr std::uint64_t kBytesPerEdge = 300;
 inline constexpr std::uint64_t kBytesPerLoop = 450;
-inline constexpr std::uint64_t kBytesPerWindow = 1'100;
+inline constexpr std::uint64_t kBytesPerWindow = 870;
 
 /// Bytes of own sizes, on top. Windows in local sizes reach more loops.
 inline constexpr std::uint64_t kBytesPerSizedParticle = 16;
 inline constexpr std::uint64_t kBytesPerCellsOfClass = 2'060;  ///< Per brick and further class.
 inline constexpr std::uint64_t kBytesPerSizedVertex = 4;
-inline constexpr std::uint64_t kBytesPerSizedWindow = 700;
+inline constexpr std::uint64_t kBytesPerSizedWindow = 500;
 
 /// Bytes of identities: runs of nodes, of which two edges along x make one or two; histories of two
 /// frames and their relations.

@@ -11,12 +11,11 @@ namespace {
 
 /// Calls visit(from, to) for each curve of a loop, from one crossing to the next.
 template <typename Visit>
-void ForEachCurve(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                  const ActiveCell& cell, int loop, Visit visit) {
+void ForEachCurve(const SpaceCrossings& crossings, const ActiveCell& cell, int loop, Visit visit) {
   const CellLoops& loops = LoopsOf(cell.corners);
+  const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
   for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
-    visit(EdgeVertexOf(bricks, crossings, cell, loops.edge[step]),
-          EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)]));
+    visit(edges[step], edges[loops.Next(step)]);
   }
 }
 
@@ -54,9 +53,9 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
     });
   });
   ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
-    const CellLoops& loops = LoopsOf(cell.corners);
+    const int first = LoopsOf(cell.corners).first[loop];
     volumes.body_of[crossings.edge_count + index] =
-        volumes.body_of[EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.first[loop]])];
+        volumes.body_of[crossings.StepEdgesOf(cell)[first]];
   });
 }
 
@@ -73,7 +72,7 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
     const Vec3 a = positions[vertex] - origin;
     double area = 0;
     BodyVolumes::Part part;
-    ForEachCurve(bricks, crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
+    ForEachCurve(crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
       const Vec3 b = positions[from] - origin, c = positions[to] - origin;
       const double volume = Dot(a, Cross(b, c)) / 6;
       area += Length(Cross(b - a, c - a)) / 2;

@@ -24,10 +24,7 @@ std::array<std::uint32_t, 4> LoopsAround(const BrickDirectory& bricks,
     const ActiveCell& cell =
         crossings.cells[crossings.CellAt(Normalise(bricks, node.brick, at[0], at[1], at[2]))];
     const int edge = EdgeAt(axis, (k & 1) << b | (k >> 1) << c);
-    const CellLoops& loops = LoopsOf(cell.corners);
-    int step = 0;
-    while (loops.edge[step] != edge) ++step;
-    around[k] = cell.first_loop + loops.loop_of[step];
+    around[k] = cell.first_loop + LoopsOf(cell.corners).loop_of_edge[edge];
   }
   return around;
 }

@@ -2,7 +2,7 @@
 //
 // In the window of loop i, loop j has the weight area_j B(d, s_i reach), where d = |c_j - c_i|,
 // B(d, r) = max(0, 1 - d^2 / r^2)^2, and s_i is the local size. `kAtEdges` multiplies this weight
-// by max(0, n_i . n_j)^32. Lengths are in cells.
+// by max(0, n_i . n_j)^32, where cosines below 1/8 count as 0. Lengths are in cells.
 #pragma once
 
 #include <cstddef>

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cstddef>
+#include <cstdint>
 
 #include "base/parallel.h"
 #include "space_vertices/window_sums.h"
@@ -13,30 +14,17 @@ namespace {
 /// Links the loops of each cell with the loops of its neighbours.
 void LinkLoops(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                LoopWindows& windows) {
-  windows.link_first.resize(windows.loop_count + 1);
-  std::uint32_t total = 0;
-  for (const ActiveCell& cell : crossings.cells) {
-    const CellLoops& loops = LoopsOf(cell.corners);
-    for (int loop = 0; loop < loops.loops; ++loop) {
-      windows.link_first[cell.first_loop - crossings.edge_count + loop] = total + loops.first[loop];
-    }
-    total += static_cast<std::uint32_t>(loops.Steps());
-  }
-  windows.link_first.back() = total;
-  windows.links.resize(total);
+  windows.links.resize(crossings.step_edges.size());
   ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
     const ActiveCell& cell = crossings.cells[index];
     const CellLoops& loops = LoopsOf(cell.corners);
-    std::uint32_t next = windows.link_first[cell.first_loop - crossings.edge_count];
+    std::uint32_t next = crossings.FirstStepOf(cell);
     for (int step = 0; step < loops.Steps(); ++step) {
       const int face = loops.face[step];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
-      const CellLoops& across = LoopsOf(other.corners);
-      // In the other cell, the curve runs in the opposite direction.
-      const int from = EdgeAcross(loops.edge[loops.Next(step)], face);
-      int reversed = 0;
-      while (across.edge[reversed] != from || across.face[reversed] != (face ^ 1)) ++reversed;
-      windows.links[next++] = other.first_loop - crossings.edge_count + across.loop_of[reversed];
+      const int edge = EdgeAcross(loops.edge[step], face);
+      windows.links[next++] =
+          other.first_loop - crossings.edge_count + LoopsOf(other.corners).loop_of_edge[edge];
     }
   });
 }
@@ -75,12 +63,27 @@ struct Box {
   }
 };
 
-/// Finds the windows of the loops of a chunk: those within reach to which links lead.
+/// Exchanges the rows and the columns of a matrix of bits.
+void Transpose(std::array<std::uint64_t, 64>& rows) {
+  std::uint64_t mask = 0xffffffff;
+  for (std::size_t by = 32; by != 0; by >>= 1, mask ^= mask << by) {
+    for (std::size_t row = 0; row < 64; row = (row + by + 1) & ~by) {
+      const std::uint64_t swapped = ((rows[row] >> by) ^ rows[row + by]) & mask;
+      rows[row] ^= swapped << by;
+      rows[row + by] ^= swapped;
+    }
+  }
+}
+
+/// Finds the windows of the loops of a chunk: those within reach to which links lead. All windows
+/// grow at once: each near loop has a set of windows, with one bit for each loop of the chunk.
 class ChunkSearch {
  public:
-  ChunkSearch(const LoopWindows& windows, std::span<const Vec3> centres,
-              std::span<const float> sizes, double reach, LoopWindows::Chunk& chunk)
-      : windows_(windows),
+  ChunkSearch(std::span<const std::uint32_t> first_step, std::span<const std::uint32_t> links,
+              std::span<const Vec3> centres, std::span<const float> sizes, double reach,
+              LoopWindows::Chunk& chunk)
+      : first_step_(first_step),
+        links_between_(links),
         centres_(centres),
         sizes_(sizes),
         square_(reach * reach),
@@ -88,142 +91,151 @@ class ChunkSearch {
 
   void Find() {
     FindNear();
-    FindLinks();
     LoadPlaces();
-    const std::size_t words = chunk_.Words();
-    chunk_.self.clear();
-    chunk_.bits.assign((chunk_.end - chunk_.begin) * words, 0);
-    for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
-      chunk_.self.push_back(static_cast<std::uint16_t>(IndexOf(loop)));
-      FindWindow(chunk_.self.back(), SquareOf(loop),
-                 chunk_.bits.data() + (loop - chunk_.begin) * words);
-    }
+    FindWithin(places_, count_, ends_, within_.data());
+    GrowWindows();
+    SortNear();
+    StoreWindows();
   }
 
  private:
   static constexpr std::size_t kSlots = 4096;
   static_assert(kSlots >= 2 * LoopWindows::kMostNear);
   static constexpr std::uint16_t kFree = 0xffff;
+  static_assert(LoopWindows::kMostLoopsOfChunk <= 64, "a word has a bit for each loop of a chunk");
 
   /// The slot of a loop, or the free slot where it belongs.
   std::size_t SlotOf(std::uint32_t loop) const {
     std::size_t slot = (loop * 0x9e3779b1u) >> 20;
-    while (slots_[slot] != kFree && chunk_.near[slots_[slot]] != loop) slot = (slot + 1) % kSlots;
+    while (slots_[slot] != kFree && near_[slots_[slot]] != loop) slot = (slot + 1) % kSlots;
     return slot;
   }
-  std::uint16_t IndexOf(std::uint32_t loop) const { return slots_[SlotOf(loop)]; }
 
   /// The squared reach of the window of a loop.
   double SquareOf(std::uint32_t loop) const {
     return sizes_.empty() ? square_ : square_ * double{sizes_[loop]} * double{sizes_[loop]};
   }
 
-  /// Finds the loops within reach of the box around the chunk.
+  /// Finds the loops within reach of the box around the chunk, first the loops of the chunk, and
+  /// the links between them.
   void FindNear() {
-    std::vector<std::uint32_t>& near = chunk_.near;
-    near.clear();
+    count_ = 0;
     slots_.fill(kFree);
     Box box{centres_[chunk_.begin], centres_[chunk_.begin]};
     double square = SquareOf(chunk_.begin);
     for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
       box.Include(centres_[loop]);
       square = std::max(square, SquareOf(loop));
-      Add(loop);
+      Add(loop, SlotOf(loop));
     }
-    for (std::size_t k = 0; k < near.size(); ++k) {
-      for (std::uint32_t n = windows_.link_first[near[k]]; n < windows_.link_first[near[k] + 1];
-           ++n) {
-        const std::uint32_t to = windows_.links[n];
-        if (near.size() < LoopWindows::kMostNear && box.SquareTo(centres_[to]) < square) Add(to);
+    std::size_t links = 0;
+    for (std::size_t k = 0; k < count_; ++k) {
+      first_[k] = static_cast<std::uint16_t>(links);
+      for (std::uint32_t n = first_step_[near_[k]]; n < first_step_[near_[k] + 1]; ++n) {
+        const std::uint32_t to = links_between_[n];
+        const std::size_t slot = SlotOf(to);
+        if (slots_[slot] == kFree) {
+          if (count_ == LoopWindows::kMostNear || !(box.SquareTo(centres_[to]) < square)) continue;
+          Add(to, slot);
+        }
+        links_[links++] = slots_[slot];
       }
     }
-    std::sort(near.begin(), near.end());
-    slots_.fill(kFree);
-    for (std::size_t k = 0; k < near.size(); ++k) {
-      slots_[SlotOf(near[k])] = static_cast<std::uint16_t>(k);
-    }
+    first_[count_] = static_cast<std::uint16_t>(links);
   }
-  void Add(std::uint32_t loop) {
-    std::uint16_t& slot = slots_[SlotOf(loop)];
-    if (slot != kFree) return;
-    slot = static_cast<std::uint16_t>(chunk_.near.size());
-    chunk_.near.push_back(loop);
-  }
-
-  /// Finds the links between near loops.
-  void FindLinks() {
-    chunk_.first.clear();
-    chunk_.links.clear();
-    for (const std::uint32_t loop : chunk_.near) {
-      const std::size_t first = chunk_.links.size();
-      chunk_.first.push_back(static_cast<std::uint16_t>(first));
-      for (std::uint32_t n = windows_.link_first[loop]; n < windows_.link_first[loop + 1]; ++n) {
-        const std::uint16_t to = IndexOf(windows_.links[n]);
-        if (to == kFree) continue;
-        const std::uint32_t word = to / kWordBits, bit = std::uint32_t{1} << to % kWordBits;
-        std::size_t k = first;
-        while (k < chunk_.links.size() && chunk_.links[k].word != word) ++k;
-        if (k == chunk_.links.size()) chunk_.links.push_back({word, 0});
-        chunk_.links[k].bits |= bit;
-      }
-    }
-    chunk_.first.push_back(static_cast<std::uint16_t>(chunk_.links.size()));
+  void Add(std::uint32_t loop, std::size_t slot) {
+    slots_[slot] = static_cast<std::uint16_t>(count_);
+    near_[count_++] = loop;
   }
 
   void LoadPlaces() {
     const Vec3 origin = centres_[chunk_.begin];
-    std::size_t k = 0;
-    for (const std::uint32_t loop : chunk_.near) {
-      const Vec3 at = centres_[loop] - origin;
+    for (std::size_t k = 0; k < count_; ++k) {
+      const Vec3 at = centres_[near_[k]] - origin;
       places_.x[k] = static_cast<float>(at.x);
       places_.y[k] = static_cast<float>(at.y);
-      places_.z[k++] = static_cast<float>(at.z);
+      places_.z[k] = static_cast<float>(at.z);
     }
-    constexpr float kFar = 1e9f;
-    for (; k % kWordBits != 0; ++k) places_.x[k] = places_.y[k] = places_.z[k] = kFar;
+    ends_.count = chunk_.end - chunk_.begin;
+    ends_.square.fill(0);
+    for (std::uint32_t loop = chunk_.begin; loop < chunk_.end; ++loop) {
+      ends_.square[loop - chunk_.begin] = static_cast<float>(SquareOf(loop));
+    }
   }
 
-  /// Sets the bits of the window of a near loop. Requires: they are 0.
-  void FindWindow(std::uint16_t loop, double square, std::uint32_t* found) {
-    const std::size_t words = chunk_.Words();
-    FindWithin(places_, words, loop, static_cast<float>(square), within_.data());
-    std::fill_n(done_.begin(), words, 0u);
-    found[loop / kWordBits] |= std::uint32_t{1} << loop % kWordBits;
-    // Alternate directions reach all loops in few passes.
-    for (bool is_up = true, has_new = true; has_new; is_up = !is_up) {
-      has_new = false;
-      for (std::size_t k = 0; k < words; ++k) {
-        const std::size_t word = is_up ? k : words - 1 - k;
-        while (const std::uint32_t fresh = found[word] & ~done_[word]) {
-          has_new = true;
-          done_[word] |= fresh;
-          Follow(word, fresh, found);
+  /// Follows the links until no window grows.
+  void GrowWindows() {
+    std::fill_n(found_.begin(), count_, std::uint64_t{0});
+    for (std::size_t k = 0; k < ends_.count; ++k) found_[k] = std::uint64_t{1} << k;
+    // Near loops are in the order of their steps from the chunk. Alternate directions reach all in
+    // few passes.
+    for (bool is_up = true, has_grown = true; has_grown; is_up = !is_up) {
+      has_grown = false;
+      for (std::size_t n = 0; n < count_; ++n) {
+        const std::size_t k = is_up ? n : count_ - 1 - n;
+        const std::uint64_t missing = within_[k] & ~found_[k];
+        if (missing == 0) continue;
+        std::uint64_t beside = 0;
+        for (std::size_t link = first_[k]; link < first_[k + 1]; ++link) {
+          beside |= found_[links_[link]];
         }
+        found_[k] |= beside & missing;
+        has_grown = has_grown || (beside & missing) != 0;
       }
     }
   }
 
-  /// Follows the links from loops of a word.
-  void Follow(std::size_t word, std::uint32_t from, std::uint32_t* found) {
-    for (; from != 0; from &= from - 1) {
-      const std::size_t loop = kWordBits * word + static_cast<std::size_t>(std::countr_zero(from));
-      for (std::size_t n = chunk_.first[loop]; n < chunk_.first[loop + 1]; ++n) {
-        const LoopWindows::Link& link = chunk_.links[n];
-        found[link.word] |= link.bits & within_[link.word];
+  /// Sorts the near loops; sets `chunk_.near`, `chunk_.self` and `sorted_`.
+  void SortNear() {
+    for (std::size_t k = 0; k < count_; ++k) sorted_[k] = std::uint64_t{near_[k]} << 32 | k;
+    std::sort(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(count_));
+    chunk_.near.resize(count_);
+    chunk_.self.resize(ends_.count);
+    for (std::size_t k = 0; k < count_; ++k) {
+      chunk_.near[k] = static_cast<std::uint32_t>(sorted_[k] >> 32);
+      const std::size_t from = IndexOf(sorted_[k]);
+      if (from < ends_.count) chunk_.self[from] = static_cast<std::uint16_t>(k);
+    }
+  }
+  static std::size_t IndexOf(std::uint64_t sorted) { return sorted & 0xffffffff; }
+
+  void StoreWindows() {
+    const std::size_t words = chunk_.Words();
+    chunk_.bits.resize(ends_.count * words);
+    for (std::size_t word = 0; word < words; word += 2) {
+      std::array<std::uint64_t, 64> rows{};
+      const std::size_t first = word * LoopWindows::kWordBits;
+      for (std::size_t k = first; k < std::min(first + 64, count_); ++k) {
+        rows[k - first] = found_[IndexOf(sorted_[k])];
+      }
+      Transpose(rows);
+      for (std::size_t loop = 0; loop < ends_.count; ++loop) {
+        std::uint32_t* const to = chunk_.bits.data() + loop * words + word;
+        to[0] = static_cast<std::uint32_t>(rows[loop]);
+        if (word + 1 < words) to[1] = static_cast<std::uint32_t>(rows[loop] >> 32);
       }
     }
   }
 
-  static constexpr std::size_t kWordBits = LoopWindows::kWordBits;
+  template <typename Value>
+  using PerNear = std::array<Value, LoopWindows::kMostNear>;
 
-  const LoopWindows& windows_;
+  std::span<const std::uint32_t> first_step_, links_between_;
   std::span<const Vec3> centres_;
   std::span<const float> sizes_;
   const double square_;
   LoopWindows::Chunk& chunk_;
+
   std::array<std::uint16_t, kSlots> slots_;
-  NearLoops places_;  // Centres only.
-  std::array<std::uint32_t, LoopWindows::kMostNear / kWordBits> within_, done_;
+  std::size_t count_ = 0;  // Near loops, in the order in which links lead to them.
+  PerNear<std::uint32_t> near_;
+  // The links of near loop k are [first_[k], first_[k + 1]).
+  std::array<std::uint16_t, LoopWindows::kMostNear + 1> first_;
+  std::array<std::uint16_t, LoopWindows::kMostNear * kMostCrossings> links_;
+  NearPlaces places_;
+  WindowEnds ends_;
+  PerNear<std::uint64_t> within_, found_;
+  PerNear<std::uint64_t> sorted_;  // Near loops and their indices.
 };
 
 }  // namespace
@@ -235,7 +247,8 @@ void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   LinkLoops(bricks, crossings, windows);
   SplitLoops(crossings, windows);
   ParallelFor(windows.chunk_count, [&](std::size_t index) {
-    ChunkSearch(windows, centres, sizes, reach, windows.chunks[index]).Find();
+    ChunkSearch(crossings.first_step, windows.links, centres, sizes, reach, windows.chunks[index])
+        .Find();
   });
 }
 

@@ -25,21 +25,12 @@ struct LoopWindows {
 
   static constexpr std::size_t kWordBits = 32;
 
-  /// Loops that are linked with a loop: bits of one word.
-  struct Link {
-    std::uint32_t word, bits;
-  };
-
   /// The windows of consecutive loops of a brick, as bits for the loops near them.
   struct Chunk {
     std::uint32_t begin = 0, end = 0;  ///< The loops.
     std::vector<std::uint32_t> near;   ///< The union of the windows and more; sorted.
     std::vector<std::uint32_t> bits;   ///< By loop: bit k % 32 of word k / 32 is loop near[k].
     std::vector<std::uint16_t> self;   ///< By loop: its index in `near`.
-
-    /// Scratch: the links of near loop k are [first[k], first[k + 1]).
-    std::vector<std::uint16_t> first;
-    std::vector<Link> links;
 
     std::size_t Words() const { return (near.size() + kWordBits - 1) / kWordBits; }
     std::span<const std::uint32_t> Of(std::uint32_t loop) const {
@@ -50,7 +41,7 @@ struct LoopWindows {
   std::size_t chunk_count = 0;
   std::size_t loop_count = 0;
 
-  std::vector<std::uint32_t> link_first, links;  ///< By loop: loops across its faces.
+  std::vector<std::uint32_t> links;  ///< By step of SpaceCrossings: the loop across its face.
 };
 
 /// Finds the window of each loop, the loops within `reach` cells, times its local size. `centres`

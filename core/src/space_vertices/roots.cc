@@ -13,16 +13,21 @@ namespace {
 
 // A smaller squared gradient has no direction.
 constexpr double kWeakGradient = 1e-3;
+
+// Cells along a block.
+constexpr int kBlock = 2;
+
 class RootFinder {
  public:
-  RootFinder(const SpaceBins& bins, const Scale& scale, const RootConstants& constants)
-      : constants_(constants), sampler_(bins, scale) {}
+  RootFinder(const SpaceBins& bins, const Scale& scale, const NearRows& rows,
+             const RootConstants& constants)
+      : constants_(constants), sampler_(bins, scale, &rows) {}
 
   /// Moves to a block of 2 x 2 x 2 cells.
   void MoveTo(std::uint32_t brick, const Vec3& origin, int i, int j, int k) {
     const auto x = static_cast<float>(i), y = static_cast<float>(j), z = static_cast<float>(k);
     origin_ = origin;
-    sampler_.MoveTo(brick, {{x, y, z}, {x + 2, y + 2, z + 2}});
+    sampler_.MoveTo(brick, {{x, y, z}, {x + kBlock, y + kBlock, z + kBlock}});
   }
 
   /// Takes one step, which ends at the sides of the cell with the lowest node `low`. If the
@@ -52,14 +57,15 @@ class RootFinder {
 };
 
 /// The area normal of a loop, which is used if the gradient is weak.
-Vec3 NormalOfLoop(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                  const ActiveCell& cell, int loop, const std::vector<Vec3>& positions) {
+Vec3 NormalOfLoop(const SpaceCrossings& crossings, const ActiveCell& cell, int loop,
+                  const std::vector<Vec3>& positions) {
   const CellLoops& loops = LoopsOf(cell.corners);
+  const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
   const Vec3& centre = positions[cell.first_loop + loop];
   Vec3 sum;
   for (int step = loops.first[loop]; step < loops.first[loop + 1]; ++step) {
-    const Vec3& a = positions[EdgeVertexOf(bricks, crossings, cell, loops.edge[step])];
-    const Vec3& b = positions[EdgeVertexOf(bricks, crossings, cell, loops.edge[loops.Next(step)])];
+    const Vec3& a = positions[edges[step]];
+    const Vec3& b = positions[edges[loops.Next(step)]];
     sum = sum + Cross(a - centre, b - centre);
   }
   const Vec3 normal = Normalised(sum);
@@ -73,8 +79,9 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
                std::vector<Vec3>& normals, std::span<float> sizes) {
   const BrickDirectory& bricks = bins.bricks;
   normals.resize(positions.size());
+  const NearRows rows(kBlock, static_cast<float>(scale.kernel_radius));
   ParallelFor(static_cast<std::uint32_t>(bricks.size()), [&](std::uint32_t brick) {
-    RootFinder finder(bins, scale, constants);
+    RootFinder finder(bins, scale, rows, constants);
     const Vec3 origin = OriginOf(bricks[brick]);
     ForEachInBlocks(
         crossings.bricks[brick].active,
@@ -84,7 +91,7 @@ void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& 
           const Vec3 low = origin + Vec3{1.0 * i, 1.0 * j, 1.0 * k};
           for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
             const std::uint32_t v = cell.first_loop + loop;
-            normals[v] = NormalOfLoop(bricks, crossings, cell, loop, positions);
+            normals[v] = NormalOfLoop(crossings, cell, loop, positions);
             const double size = finder.Step(low, positions[v], normals[v]);
             if (!sizes.empty()) sizes[v] = static_cast<float>(size);
           }

@@ -136,22 +136,15 @@ void EmitQuads(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   for (std::uint32_t index = 0; index < crossings.cells.size(); ++index) {
     const ActiveCell& cell = crossings.cells[index];
     const CellLoops& loops = LoopsOf(cell.corners);
+    const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
     for (int step = 0; step < loops.Steps(); ++step) {
       const int face = loops.face[step];
       if ((face & 1) == 0) continue;
-      const int to_edge = loops.edge[loops.Next(step)];
       const ActiveCell& other = crossings.cells[CellAcross(bricks, crossings, cell, face)];
-      const CellLoops& across = LoopsOf(other.corners);
-      // In the other cell, the curve runs in the opposite direction.
-      int reversed = 0;
-      while (across.edge[reversed] != EdgeAcross(to_edge, face) ||
-             across.face[reversed] != (face ^ 1)) {
-        ++reversed;
-      }
-      const std::uint32_t from = EdgeVertexOf(bricks, crossings, cell, loops.edge[step]);
-      const std::uint32_t to = EdgeVertexOf(bricks, crossings, cell, to_edge);
+      const int edge = EdgeAcross(loops.edge[step], face);
+      const std::uint32_t from = edges[step], to = edges[loops.Next(step)];
       const std::uint32_t low = cell.first_loop + loops.loop_of[step];
-      const std::uint32_t high = other.first_loop + across.loop_of[reversed];
+      const std::uint32_t high = other.first_loop + LoopsOf(other.corners).loop_of_edge[edge];
       if (certificate.modes[index][face / 2] == QuadMode::kAlongFace) {
         triangles.push_back({low, from, to});
         triangles.push_back({high, to, from});

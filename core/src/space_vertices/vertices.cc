@@ -24,11 +24,12 @@ void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
   ParallelFor(static_cast<std::uint32_t>(crossings.cells.size()), [&](std::uint32_t index) {
     const ActiveCell& cell = crossings.cells[index];
     const CellLoops& loops = LoopsOf(cell.corners);
+    const std::uint32_t* const edges = crossings.StepEdgesOf(cell);
     for (int loop = 0; loop < loops.loops; ++loop) {
       Vec3 sum;
       const int first = loops.first[loop], last = loops.first[loop + 1];
       for (int step = first; step < last; ++step) {
-        sum = sum + positions[EdgeVertexOf(bricks, crossings, cell, loops.edge[step])];
+        sum = sum + positions[edges[step]];
       }
       positions[cell.first_loop + loop] = (1.0 / (last - first)) * sum;
     }

@@ -1,5 +1,8 @@
 #include "space_vertices/window_sums.h"
 
+#include <algorithm>
+#include <bit>
+
 // Highway compiles the rest of this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "space_vertices/window_sums.cc"
@@ -27,6 +30,31 @@ double TotalOf(const Partial<kQuantities>& sums, int quantity) {
          ((double{part[1]} + double{part[5]}) + (double{part[3]} + double{part[7]}));
 }
 
+// Calls visit(index, byte) for the bytes of a window that are not 0. Finds them 64 at a time,
+// because a branch for each byte is hard to predict.
+template <class Visit>
+HWY_INLINE void ForEachByte(std::span<const std::uint32_t> words, Visit visit) {
+  constexpr std::size_t kPerWord = LoopWindows::kWordBits / kAtOnce, kWordsAtOnce = 64 / kPerWord;
+  for (std::size_t first = 0; first < words.size(); first += kWordsAtOnce) {
+    std::uint64_t not_zero = 0;
+    for (std::size_t k = first; k < std::min(first + kWordsAtOnce, words.size()); ++k) {
+      // The highest bit of each byte: whether any bit is set. Then these bits side by side.
+      const std::uint32_t low = (words[k] & 0x7f7f7f7fu) + 0x7f7f7f7fu;
+      const std::uint32_t any = ((low | words[k]) & 0x80808080u) >> 7;
+      not_zero |= std::uint64_t{any * 0x10204080u >> 28} << kPerWord * (k - first);
+    }
+    for (; not_zero != 0; not_zero &= not_zero - 1) {
+      const std::size_t byte =
+          kPerWord * first + static_cast<std::size_t>(std::countr_zero(not_zero));
+      visit(byte, static_cast<std::uint8_t>(words[byte / kPerWord] >> kAtOnce * (byte % kPerWord)));
+    }
+  }
+}
+
+// Smaller cosines count as 0. Their 32nd power is below 1.3e-29, and denormal floats, with which
+// processors take a hundred times as long, begin at 1.2e-38.
+constexpr float kLeastCosine = .125f;
+
 // The loop of a window and some near loops.
 struct Pairs {
   Vector x, y, z;                         // c_j - c_i
@@ -41,7 +69,9 @@ struct Pairs {
                    hn::Mul(normal_z, self_z));
   }
   HWY_INLINE void StopAtEdges() {
-    Vector power = hn::Max(hn::Zero(Lanes()), Cosine());
+    const Lanes d;
+    const Vector cosine = Cosine();
+    Vector power = hn::IfThenElseZero(hn::Gt(cosine, hn::Set(d, kLeastCosine)), cosine);
     for (int k = 0; k < 5; ++k) power = hn::Mul(power, power);
     weight = hn::Mul(weight, power);
   }
@@ -59,12 +89,8 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
   pairs.self_x = hn::Set(d, loops.normal_x[self]);
   pairs.self_y = hn::Set(d, loops.normal_y[self]);
   pairs.self_z = hn::Set(d, loops.normal_z[self]);
-  constexpr std::size_t kPerWord = LoopWindows::kWordBits / kAtOnce;
-  for (std::size_t byte = 0; byte < kPerWord * window.bits.size(); ++byte) {
-    const auto bits =
-        static_cast<std::uint8_t>(window.bits[byte / kPerWord] >>
-                                  (kAtOnce * (byte % kPerWord) + static_cast<unsigned>(lane)));
-    if (bits == 0) continue;
+  ForEachByte(window.bits, [&](std::size_t byte, std::uint8_t all) HWY_ATTR {
+    const auto bits = static_cast<std::uint8_t>(all >> lane);
     const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
     pairs.x = hn::Sub(hn::Load(d, loops.x.data() + k), x);
     pairs.y = hn::Sub(hn::Load(d, loops.y.data() + k), y);
@@ -78,28 +104,26 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
     pairs.weight = hn::IfThenElseZero(hn::LoadMaskBits(d, &bits),
                                       hn::Mul(hn::Mul(t, t), hn::Load(d, loops.area.data() + k)));
     add(pairs, k);
-  }
+  });
 }
 
-void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
-                std::uint32_t* bits) {
+void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
+                std::uint64_t* within) {
   const Lanes d;
-  const Vector x = hn::Set(d, loops.x[self]), y = hn::Set(d, loops.y[self]),
-               z = hn::Set(d, loops.z[self]);
-  const Vector most = hn::Set(d, square);
-  for (std::size_t word = 0; word < words; ++word) {
-    std::uint32_t found = 0;
-    for (std::size_t k = 0; k < LoopWindows::kWordBits; k += kLanes) {
-      const std::size_t first = word * LoopWindows::kWordBits + k;
-      const Vector dx = hn::Sub(hn::Load(d, loops.x.data() + first), x);
-      const Vector dy = hn::Sub(hn::Load(d, loops.y.data() + first), y);
-      const Vector dz = hn::Sub(hn::Load(d, loops.z.data() + first), z);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vector x = hn::Set(d, places.x[k]), y = hn::Set(d, places.y[k]),
+                 z = hn::Set(d, places.z[k]);
+    std::uint64_t found = 0;
+    for (std::size_t window = 0; window < ends.count; window += kLanes) {
+      const Vector dx = hn::Sub(x, hn::Load(d, places.x.data() + window));
+      const Vector dy = hn::Sub(y, hn::Load(d, places.y.data() + window));
+      const Vector dz = hn::Sub(z, hn::Load(d, places.z.data() + window));
       const Vector to = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
       std::uint8_t part[8] = {};
-      hn::StoreMaskBits(d, hn::Lt(to, most), part);
-      found |= std::uint32_t{part[0]} << k;
+      hn::StoreMaskBits(d, hn::Lt(to, hn::Load(d, ends.square.data() + window)), part);
+      found |= std::uint64_t{part[0]} << window;
     }
-    bits[word] = found;
+    within[k] = found;
   }
 }
 
@@ -178,9 +202,9 @@ HWY_EXPORT(SumNormals);
 HWY_EXPORT(SumBends);
 HWY_EXPORT(SumPlanes);
 
-void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
-                std::uint32_t* bits) {
-  HWY_DYNAMIC_DISPATCH(FindWithin)(loops, words, self, square, bits);
+void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
+                std::uint64_t* within) {
+  HWY_DYNAMIC_DISPATCH(FindWithin)(places, count, ends, within);
 }
 Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges) {
   return HWY_DYNAMIC_DISPATCH(SumNormals)(loops, window, stops_at_edges);

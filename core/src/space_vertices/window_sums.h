@@ -12,21 +12,30 @@
 
 namespace partiemc::space {
 
-/// The loops near a chunk of LoopWindows. About 64 kB.
-struct NearLoops {
+/// The centres of the loops near a chunk of LoopWindows, from a common origin.
+struct NearPlaces {
   static constexpr std::size_t kMost = LoopWindows::kMostNear;
 
-  alignas(64) std::array<float, kMost> x, y,
-      z;  ///< Centres, from a common origin.
+  alignas(64) std::array<float, kMost> x, y, z;
+};
+
+/// The loops near a chunk of LoopWindows. About 64 kB.
+struct NearLoops : NearPlaces {
   std::array<float, kMost> area;
   std::array<float, kMost> normal_x, normal_y, normal_z;
   std::array<float, kMost> base;  ///< Of SumPlanes.
 };
 
-/// Sets bit k % 32 of word k / 32 if the squared distance of near loops k and `self` is below
-/// `square`. Reads 32 * `words` centres.
-void FindWithin(const NearLoops& loops, std::size_t words, std::size_t self, float square,
-                std::uint32_t* bits);
+/// The squared reaches of the windows of the first `count` near loops, and 0 after them.
+struct WindowEnds {
+  std::size_t count = 0;
+  alignas(64) std::array<float, LoopWindows::kMostLoopsOfChunk> square;
+};
+
+/// Finds the near loops within windows: sets bit w of within[k] if the squared distance between the
+/// near loops k and w is below the square of window w. Cost: `count` times the windows.
+void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
+                std::uint64_t* within);
 
 /// A loop and its window: one bit for each near loop.
 struct Window {

@@ -108,11 +108,12 @@ TEST(PointSums, HaveTheBitsOfScalarLoops) {
   for (int trial = 0; trial < support::Tries(200); ++trial) {
     space::NearBlock block;
     block.count = static_cast<int>(random.Below(space::NearBlock::kCapacity));
+    block.has_weights = trial % 2 == 0;
     for (int p = 0; p < block.count; ++p) {
       block.x[p] = coordinate();
       block.y[p] = coordinate();
       block.z[p] = coordinate();
-      block.weight[p] = coordinate();
+      block.weight[p] = block.has_weights ? coordinate() : 1;
     }
     block.Pad();
     const space::QueryPoint point{coordinate(), coordinate(), coordinate()};
@@ -124,9 +125,11 @@ TEST(PointSums, HaveTheBitsOfScalarLoops) {
       space::PartialSlopes slopes;
       space::PartialThirds thirds;
       AddMoments(block, point, kInverse, moments);
-      AddSlopes(block, point, kInverse, slopes);
+      space::PartialMoments again;
+      AddMomentsAndSlopes(block, point, kInverse, again, slopes);
       AddThirds(block, point, kInverse, v, thirds);
       EXPECT_EQ(moments.lanes, expected.moments.lanes);
+      EXPECT_EQ(again.lanes, expected.moments.lanes);
       EXPECT_EQ(slopes.lanes, expected.slopes.lanes);
       EXPECT_EQ(thirds.lanes, expected.thirds.lanes);
     });

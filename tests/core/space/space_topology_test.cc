@@ -128,7 +128,7 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
     space::PlaceOnCrossings(signs.bins.bricks, signs.field, signs.crossings, space::kEdgeMargin,
                             positions);
     space::MeshScratch scratch;
-    space::EmitMarchingCubes(signs.bins.bricks, signs.crossings, scratch.triangles);
+    space::EmitMarchingCubes(signs.crossings, scratch.triangles);
     space::AverageNormals(positions, scratch.triangles, normals);
     Surface surface;
     space::AssembleSurface(
@@ -156,7 +156,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
   const space::BrickDirectory& bricks = signs.bins.bricks;
   space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
   std::vector<std::uint8_t> is_fixed;
-  space::MarkFixedVertices(bricks, signs.crossings, is_fixed);
+  space::MarkFixedVertices(signs.crossings, is_fixed);
   std::vector<Vec3> positions = anchors;
   const auto move = [&](double part) {
     for (std::size_t v = 0; v < positions.size(); ++v) {
