@@ -9,8 +9,9 @@ namespace partiemc {
 /// The invalid index.
 inline constexpr std::uint32_t kNoIndex = 0xffffffff;
 
-/// Counts the set bits, such as of a row of nodes or cells. Unlike std::popcount, the function is inlined also on processors without an
-/// instruction for it; the library call there costs more than this sum.
+/// Counts the set bits, such as of a row of nodes or cells. Unlike std::popcount, the function is
+/// inlined also on processors without an instruction for it; the library call there costs more than
+/// this sum.
 constexpr int CountBits(std::uint32_t bits) {
   bits -= bits >> 1 & 0x55555555u;
   bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
