@@ -1,10 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { hex, theme } from '../src/draw/colours';
+import { contactMarks } from '../src/draw/contacts';
 import { DEFAULT_LOOK, type Look } from '../src/draw/look';
 import { isolineColour } from '../src/draw/look_colours';
 import { rampStops } from '../src/draw/ramp';
 import { legendOf } from '../src/draw/scene';
+import { toCss } from '../src/draw/view';
 import { marksOf } from '../src/export/marks';
 import { svg } from '../src/export/svg';
 import type { Frame } from '../src/protocol/frame';
@@ -170,7 +172,7 @@ test('caption, scale and legend are on the picture', () => {
 
 test('axes and a measurement are on the picture, clear of caption and legend', () => {
   const legend = { name: 'p', min: 0, max: 1, stops: rampStops(DEFAULT_LOOK) };
-  const drawn = { axes: true, points: [[8.5, 5.5], [9.5, 5.5]] as [number, number][], text: 'distance 1' };
+  const drawn = { axes: true, contacts: [], points: [[8.5, 5.5], [9.5, 5.5]] as [number, number][], text: 'distance 1' };
   const marks = marksOf('dam', SIZE, VIEW, legend, false, drawn);
   const text = svg(FRAME, NOTHING, VIEW, SIZE, legend, [], marks);
   assert.ok(text.includes('<polyline points="425,275 475,275"'), 'the measured line');
@@ -182,6 +184,22 @@ test('axes and a measurement are on the picture, clear of caption and legend', (
   const at = (content: string) => marks.find((mark) => mark.kind === 'text' && mark.text === content) as { x: number; y: number };
   assert.ok(at('dam').y < SIZE.height - 20 && at('dam').x > 50, 'the caption is above the axis');
   assert.ok(at('p').x > 50, 'the legend is beside the axis');
+});
+
+test('contacts are on the picture with their angles, unless there are many', () => {
+  const { rings, origin } = FRAME;
+  const contacts = Uint32Array.of(0, 2);
+  const wet = { ...FRAME, rings: { ...rings, contacts, contactAngles: Float32Array.of(Math.PI / 2, 1) } };
+  const marks = contactMarks(wet, VIEW, SIZE);
+  assert.deepEqual(marks.map(({ text }) => text), ['90°', '57°']);
+  const expected = toCss(VIEW, SIZE, origin[0] + rings.points[4], origin[1] + rings.points[5]);
+  assert.deepEqual([marks[1].x, marks[1].y], expected);
+  const drawn = marksOf('dam', SIZE, VIEW, null, true, { axes: false, contacts: marks, points: [], text: '' });
+  assert.equal(drawn.filter(({ kind }) => kind === 'circle').length, 2);
+  const repeated = new Uint32Array(2000);
+  const many = contactMarks({ ...wet, rings: { ...rings, contacts: repeated, contactAngles: new Float32Array(2000) } }, VIEW, SIZE);
+  assert.deepEqual([many.length, many[0].text], [1000, '']);
+  assert.deepEqual(contactMarks(wet, { ...VIEW, x: VIEW.x + 1e6 }, SIZE), [], 'outside the picture');
 });
 
 test('without a channel there is no legend', () => {

@@ -5,6 +5,7 @@ import { toCss, type Size, type View } from '../draw/view';
 import { axisMarks } from '../ui/axes';
 import { number } from '../ui/format';
 import type { Point } from '../ui/measure';
+import type { Overlaid } from '../ui/overlay';
 
 type Align = 'left' | 'centre' | 'right';
 
@@ -16,10 +17,7 @@ export type Mark =
   | { kind: 'line'; points: Point[]; width: number; colour: string }
   | { kind: 'circle'; x: number; y: number; radius: number; width: number; colour: string };
 
-/** What lies over the picture on the page: axes, and a measurement with its result. */
-export interface Drawn { axes: boolean; points: readonly Point[]; text: string }
-
-const NOTHING_DRAWN: Drawn = { axes: false, points: [], text: '' };
+const NOTHING: Overlaid = { axes: false, contacts: [], points: [], text: '' };
 
 const FONT_PIXELS = 12;
 const FONT = 'system-ui, sans-serif';
@@ -34,6 +32,9 @@ const TICK = 7;
 /** Colours of measurements, as `--accent` of the page. */
 const MEASURE_LIGHT = '#0b5cad';
 const MEASURE_DARK = '#6bb5ff';
+/** Colours of contacts, as `--contact` of the page. */
+const CONTACT_LIGHT = '#a3470f';
+const CONTACT_DARK = '#ff9d5c';
 /** Names of alignments in SVG and of a canvas. */
 const ANCHORS = { left: 'start', centre: 'middle', right: 'end' } as const;
 const ALIGNS = { left: 'left', centre: 'center', right: 'right' } as const;
@@ -42,8 +43,8 @@ const HALO = 3;
 /** Rectangles of the legend's bar per colour. */
 const STEPS_PER_STOP = 10;
 
-/** The axes and the measurement on the page. */
-function drawnMarks({ axes, points, text }: Drawn, size: Size, view: View, dark: boolean): Mark[] {
+/** The axes, contacts and measurement on the page. */
+function overlaidMarks({ axes, contacts, points, text }: Overlaid, size: Size, view: View, dark: boolean): Mark[] {
   const ink = hex(theme(dark).outline);
   const halo = hex(theme(dark).background);
   const colour = dark ? MEASURE_DARK : MEASURE_LIGHT;
@@ -61,6 +62,10 @@ function drawnMarks({ axes, points, text }: Drawn, size: Size, view: View, dark:
     line(0, at, TICK, 0);
     label(TICK + 4, at + 4, content, 'left');
   }
+  for (const { x: px, y: py, text: angle } of contacts) {
+    marks.push({ kind: 'circle', x: px, y: py, radius: 4, width: 2, colour: dark ? CONTACT_DARK : CONTACT_LIGHT });
+    if (angle !== '') label(px + 8, py + 18, angle, 'left');
+  }
   if (points.length === 0) return marks;
   const places = points.map(([px, py]): Point => toCss(view, size, px, py));
   marks.push({ kind: 'line', points: places, width: 2, colour });
@@ -75,7 +80,7 @@ function drawnMarks({ axes, points, text }: Drawn, size: Size, view: View, dark:
  * picture. Axes move caption, scale and legend inward.
  */
 export function marksOf(
-  caption: string, size: Size, view: View, legend: Legend | null, dark: boolean, drawn: Drawn = NOTHING_DRAWN,
+  caption: string, size: Size, view: View, legend: Legend | null, dark: boolean, overlaid: Overlaid = NOTHING,
 ): Mark[] {
   const ink = hex(theme(dark).outline);
   const paper = hex(theme(dark).background);
@@ -85,10 +90,10 @@ export function marksOf(
     ({ kind: 'box', x, y, width, height, colour });
   const length = scaleLength(view);
   const right = size.width - MARGIN;
-  const left = MARGIN + (drawn.axes ? AXIS_WIDTH : 0);
-  const bottom = size.height - MARGIN - (drawn.axes ? AXIS_HEIGHT : 0);
+  const left = MARGIN + (overlaid.axes ? AXIS_WIDTH : 0);
+  const bottom = size.height - MARGIN - (overlaid.axes ? AXIS_HEIGHT : 0);
   const marks = [
-    ...drawnMarks(drawn, size, view, dark),
+    ...overlaidMarks(overlaid, size, view, dark),
     text(left, bottom, caption),
     text(right, bottom - 8, number(length, 2), 'right'),
     box(right - length * view.scale, bottom - 2, length * view.scale, 2, ink),

@@ -113,11 +113,11 @@ export class ExportPanel {
     download(this.name(pane, 'webm'), await running.stop());
   }
 
-  /** Caption, scale, legend, axes and measurement of the picture. */
+  /** Caption, scale, legend, axes, contacts and measurement of the picture. */
   private marks(pane: Pane) {
-    const { dark, axes } = this.look();
-    const { scene, caption, measured } = pane;
-    return pane.spaceMarks(dark) ?? marksOf(caption, scene.size, scene.view, scene.legend(), dark, { axes, ...measured });
+    const { dark } = this.look();
+    const { scene, caption, overlaid } = pane;
+    return pane.spaceMarks(dark) ?? marksOf(caption, scene.size, scene.view, scene.legend(), dark, overlaid);
   }
 
   private name(pane: Pane, suffix: string): string {

@@ -1,6 +1,7 @@
+import type { ContactMark } from '../draw/contacts';
 import { toCss, type Size, type View } from '../draw/view';
 import { axisMarks } from './axes';
-import type { Measurement } from './measure';
+import type { Point } from './measure';
 
 const SPACE = 'http://www.w3.org/2000/svg';
 
@@ -11,22 +12,33 @@ function element(name: string, attributes: Record<string, string | number>, text
   return one;
 }
 
-/** Axes and measurements over the picture. */
+/** What lies over the picture: axes, contacts with walls, and a measurement with its result. */
+export interface Overlaid { axes: boolean; contacts: readonly ContactMark[]; points: readonly Point[]; text: string }
+
+/** Draws what lies over the picture. */
 export class Overlay {
   readonly element = element('svg', { class: 'overlay', 'aria-hidden': 'true' });
   /** What is drawn, as text. */
   private drawn = '';
 
-  draw(view: View, size: Size, hasAxes: boolean, measurement: Measurement, text: string): void {
-    const { points } = measurement;
-    const drawn = hasAxes || points.length > 0 ? JSON.stringify([view, size, hasAxes, points, text]) : '';
+  draw(view: View, size: Size, overlaid: Overlaid): void {
+    const { axes, contacts, points } = overlaid;
+    const isEmpty = !axes && contacts.length === 0 && points.length === 0;
+    const drawn = isEmpty ? '' : JSON.stringify([view, size, overlaid]);
     if (drawn === this.drawn) return;
     this.drawn = drawn;
-    this.element.replaceChildren(...hasAxes ? axes(view, size) : [], ...measured(view, size, measurement, text));
+    this.element.replaceChildren(
+      ...axes ? axisElements(view, size) : [], ...contacts.flatMap(contact), ...measured(view, size, overlaid),
+    );
   }
 }
 
-function axes(view: View, size: Size): SVGElement[] {
+function contact({ x, y, text }: ContactMark): SVGElement[] {
+  const circle = element('circle', { class: 'contact', cx: x, cy: y, r: 4 });
+  return text === '' ? [circle] : [circle, element('text', { class: 'angle', x: x + 8, y: y + 18 }, text)];
+}
+
+function axisElements(view: View, size: Size): SVGElement[] {
   if (size.width === 0 || size.height === 0) return [];
   const { x, y } = axisMarks(view, size);
   const bottom = size.height;
@@ -42,7 +54,7 @@ function axes(view: View, size: Size): SVGElement[] {
   ];
 }
 
-function measured(view: View, size: Size, { points }: Measurement, text: string): SVGElement[] {
+function measured(view: View, size: Size, { points, text }: Overlaid): SVGElement[] {
   const places = points.map(([x, y]) => toCss(view, size, x, y));
   if (places.length === 0) return [];
   const [x, y] = places[places.length - 1];

@@ -1,5 +1,6 @@
 import { Output } from '@proto/v1/reconstruction_pb';
 import { attachNavigation, Scene, type Legend, type Look } from '../draw';
+import { contactMarks } from '../draw/contacts';
 import { boundsOf } from '../draw/view';
 import type { Drawn } from '../export/canvas_copy';
 import type { Mark } from '../export/marks';
@@ -20,7 +21,7 @@ import { number } from './format';
 import type { Point } from './measure';
 import { Numbers } from './numbers';
 import { OutlinePointer } from './outline_pointer';
-import { Overlay } from './overlay';
+import { Overlay, type Overlaid } from './overlay';
 import { PaneNotice } from './pane_notice';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
@@ -260,9 +261,9 @@ export class Pane {
     return chosen < this.outlines.length ? chosen : 0;
   }
 
-  /** The measurement over the picture, for exports. */
-  get measured(): { points: readonly Point[]; text: string } {
-    return { points: this.pointer.measurement.points, text: this.pointer.measuredText };
+  get overlaid(): Overlaid {
+    const { frame, look, scene: { view, size }, pointer: { measurement: { points }, measuredText: text } } = this;
+    return { axes: look?.axes ?? false, contacts: frame && look?.outline ? contactMarks(frame, view, size) : [], points, text };
   }
 
   /** Name, frame, time and settings, for exports. */
@@ -295,7 +296,7 @@ export class Pane {
       this.pointer.pick();
       this.scene.draw();
       this.scaleBar.show(this.scene.view);
-      this.overlay.draw(this.scene.view, this.scene.size, this.look?.axes ?? false, this.pointer.measurement, this.pointer.measuredText);
+      this.overlay.draw(this.scene.view, this.scene.size, this.overlaid);
     }
     this.pointer.updateReadout(pace.isDueFor(this.track));
   }
@@ -431,9 +432,8 @@ export class Pane {
     if (isSpace === this.isSpace) return;
     if (isSpace) this.space ??= this.newSpacePicture(this.pictureOfSpace);
     if (this.space) this.space.element.hidden = !isSpace;
-    for (const element of [this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout]) {
-      element.toggleAttribute('hidden', isSpace);
-    }
+    const ofOutlines = [this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout];
+    for (const element of ofOutlines) element.toggleAttribute('hidden', isSpace);
     if (!isSpace) this.scene.resize();
   }
 

@@ -1,0 +1,20 @@
+import type { Frame } from '../protocol/frame';
+import { toCss, type Size, type View } from './view';
+
+/** A point where the outline leaves a wall, on a picture in CSS pixels, and its text. */
+export interface ContactMark { x: number; y: number; text: string }
+
+/** With more contacts in the picture, none has a text. */
+const MOST_TEXTS = 24;
+const MOST_MARKS = 1000;
+
+/** The contacts in a picture. The text is the angle of the fluid between the wall and the outline. */
+export function contactMarks({ rings, origin }: Frame, view: View, size: Size): ContactMark[] {
+  const marks: ContactMark[] = [];
+  rings.contacts.forEach((point, k) => {
+    const [x, y] = toCss(view, size, origin[0] + rings.points[2 * point], origin[1] + rings.points[2 * point + 1]);
+    if (x < 0 || y < 0 || x > size.width || y > size.height || marks.length === MOST_MARKS) return;
+    marks.push({ x, y, text: `${Math.round(rings.contactAngles[k] * 180 / Math.PI)}°` });
+  });
+  return marks.length > MOST_TEXTS ? marks.map(({ x, y }) => ({ x, y, text: '' })) : marks;
+}

@@ -1,0 +1,62 @@
+// Contacts of outlines with walls. Leaves a screenshot in build/screenshots.
+import assert from 'node:assert/strict';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { launch, screenshots, until, Viewer, World } from './support.mjs';
+
+let world, browser, viewer;
+
+/** Rows of particles on the floor y = 0, shorter from row to row: the angle is about 45 degrees. */
+function heap() {
+  const lines = ['x,y'];
+  for (let row = 0; row < 20; ++row) {
+    for (let column = row; column < 60 - row; ++column) lines.push([column / 20, (row + 0.5) / 20].join());
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+before(async () => {
+  mkdirSync(screenshots, { recursive: true });
+  world = await World.start();
+  browser = await launch();
+  const file = path.join(world.folder, 'heap.csv');
+  writeFileSync(file, heap());
+  world.replayOf(file, 'heap', '--wall', '0,0,1,0', '--loop', '--rate', '8', '--spacing', '.05');
+  viewer = await Viewer.open(browser, world.url, { hash: '#stream=heap' });
+  await viewer.shows(2);
+  await viewer.button('Pause').click();
+});
+after(async () => {
+  const errors = viewer?.errors;
+  await viewer?.close();
+  await browser?.close();
+  await world?.close();
+  assert.deepEqual(errors, []);
+});
+
+const contacts = () => viewer.pane().locator('.overlay .contact').count();
+const angles = () => viewer.pane().locator('.overlay .angle').allTextContents();
+
+test('contacts are marked with their angles, also in exports', async () => {
+  await until('both contacts', async () => await contacts() === 2);
+  const shown = await angles();
+  for (const angle of shown) assert.match(angle, /^(3|4|5)\d°$/);
+  const mean = shown.reduce((sum, angle) => sum + parseInt(angle, 10), 0) / 2;
+  const [, told] = (await viewer.value('contact-angles')).match(/^([\d.]+)°, mean of 2$/);
+  assert.ok(Math.abs(Number(told) - mean) <= 0.5, `${told} and ${shown}`);
+  await viewer.page.screenshot({ path: path.join(screenshots, 'contacts.png') });
+  const [download] = await Promise.all([viewer.page.waitForEvent('download'), viewer.button('SVG').click()]);
+  const file = path.join(screenshots, 'contacts.svg');
+  await download.saveAs(file);
+  const exported = readFileSync(file, 'utf8');
+  assert.equal(exported.match(/<circle /g).length, 2);
+  for (const angle of shown) assert.ok(exported.includes(`>${angle}</text>`), angle);
+});
+
+test('without the outline there are no contacts', async () => {
+  await viewer.page.getByLabel('Outline', { exact: true }).uncheck();
+  await until('they are gone', async () => await contacts() === 0);
+  await viewer.page.getByLabel('Outline', { exact: true }).check();
+  await until('they are back', async () => await contacts() === 2);
+});
