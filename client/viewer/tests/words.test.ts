@@ -1,11 +1,11 @@
 import { create } from '@bufbuild/protobuf';
-import { Fill, Placement, ReconstructionParametersSchema } from '@proto/v1/reconstruction_pb';
+import { Boundary, Fill, Placement, ReconstructionParametersSchema, Sizes } from '@proto/v1/reconstruction_pb';
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { digestText } from '../src/protocol/digest';
 import { Backoff } from '../src/stream/backoff';
 import { Credit, FIRST_CREDITS } from '../src/stream/credit';
-import { AS_STREAMED, isAsStreamed, parametersOf, parseSettings, settingsText } from '../src/stream/settings';
+import { AS_STREAMED, isAsStreamed, parametersOf, parseSettings, parseWalls, settingsText } from '../src/stream/settings';
 import { describe, mayRetry, parseStatus } from '../src/stream/status';
 import { addressText, parseAddress } from '../src/ui/address';
 import { count, number } from '../src/ui/format';
@@ -84,6 +84,22 @@ test('only the placement that is cut at walls keeps them', () => {
   assert.deepEqual(wallsOf(Placement.UNSPECIFIED).map(({ points }) => points), [[0, 0, 1, 0]]);
   assert.equal(wallsOf(Placement.VIRTUAL_PLANE).length, 1);
   assert.deepEqual(wallsOf(Placement.QEF), []);
+});
+
+test('walls and sizes of the settings replace those of the stream', () => {
+  const base = create(ReconstructionParametersSchema, { walls: [{ points: [0, 0, 1, 0] }], sizes: Sizes.OWN });
+  const chosen = { ...AS_STREAMED, walls: [[0, -1, 2.5, -1], [0, 0, 4, 0, 4, 3]], sizes: 'grains' };
+  const text = settingsText(chosen);
+  assert.equal(text, 'sizes:grains;walls:0,-1,2.5,-1/0,0,4,0,4,3');
+  assert.deepEqual(parseSettings(text), chosen);
+  const parameters = parametersOf(chosen, base, 1);
+  assert.deepEqual(parameters.walls.map(({ points }) => points), chosen.walls);
+  assert.deepEqual([parameters.sizes, parameters.boundary], [Sizes.OWN, Boundary.GRAINS]);
+  assert.equal(parametersOf({ ...AS_STREAMED, sizes: 'equal' }, base, 1).sizes, Sizes.EQUAL);
+  assert.equal(parametersOf(AS_STREAMED, base, 1).sizes, Sizes.OWN);
+  for (const wrong of ['1,2,3', '1,2,3,4,5', '1,2,3,x', '1,2']) assert.throws(() => parseWalls(wrong), /two points or more/);
+  assert.equal(parseWalls('  '), null);
+  assert.deepEqual(parseSettings('walls:1,2;sizes:large'), AS_STREAMED);
 });
 
 test('a status becomes a sentence with a remedy', () => {

@@ -1,7 +1,7 @@
 import { create } from '@bufbuild/protobuf';
 import {
-  CoordinateFormat, Fill, Output, OutputsSchema, Placement, ReconstructionParametersSchema,
-  SectionSchema, SlicePlaneSchema, type ReconstructionParameters,
+  Boundary, CoordinateFormat, Fill, Output, OutputsSchema, Placement, ReconstructionParametersSchema,
+  SectionSchema, Sizes, SlicePlaneSchema, WallSchema, type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
 import type { SpaceChoice } from '../input/options';
 import type { Method } from './track';
@@ -10,6 +10,10 @@ import type { Method } from './track';
 export interface Settings {
   placement: Placement;
   fill: Fill;
+  /** A name of SIZES. */
+  sizes: string | null;
+  /** Points x0, y0, x1, y1, ... of each wall, in world units. */
+  walls: number[][] | null;
   kernelRadius: number | null;
   referenceRadius: number | null;
   cellSize: number | null;
@@ -19,7 +23,7 @@ export interface Settings {
 }
 
 export const AS_STREAMED: Readonly<Settings> = {
-  placement: Placement.UNSPECIFIED, fill: Fill.UNSPECIFIED, kernelRadius: null,
+  placement: Placement.UNSPECIFIED, fill: Fill.UNSPECIFIED, sizes: null, walls: null, kernelRadius: null,
   referenceRadius: null, cellSize: null, surfaceOffset: null, share: 100,
 };
 
@@ -49,6 +53,27 @@ export const FILLS: Record<string, Fill> = {
   polygon: Fill.POLYGON,
 };
 
+/** Sizes of the particles, and what the outline runs around. */
+export const SIZES: Record<string, { sizes: Sizes; boundary: Boundary }> = {
+  equal: { sizes: Sizes.EQUAL, boundary: Boundary.BULK },
+  own: { sizes: Sizes.OWN, boundary: Boundary.BULK },
+  grains: { sizes: Sizes.OWN, boundary: Boundary.GRAINS },
+};
+
+/** Walls as text: the coordinates of a wall have commas between them, walls have spaces. */
+export function wallsText(walls: readonly number[][] | null): string {
+  return walls?.map((points) => points.join(',')).join(' ') ?? '';
+}
+
+/** The inverse of wallsText; null without walls. Throws if a wall does not have two points or more. */
+export function parseWalls(text: string): number[][] | null {
+  const walls = text.split(/\s+/).filter((wall) => wall !== '').map((wall) => wall.split(',').map(numberOf));
+  if (walls.some((points) => points.length < 4 || points.length % 2 !== 0 || points.includes(null))) {
+    throw new Error('Each wall must have two points or more: 0,0,1,0 is the line through (0, 0) and (1, 0).');
+  }
+  return walls.length > 0 ? walls as number[][] : null;
+}
+
 /** Name of a placement or fill on the command line. */
 export function nameOf(names: Record<string, number>, value: number): string {
   return Object.keys(names).find((name) => names[name] === value) ?? '';
@@ -63,6 +88,8 @@ export function settingsText(settings: Settings): string {
   const parts: [string, string | number | null][] = [
     ['placement', nameOf(PLACEMENTS, settings.placement)],
     ['fill', nameOf(FILLS, settings.fill)],
+    ['sizes', settings.sizes],
+    ['walls', wallsText(settings.walls).replaceAll(' ', '/')],
     ['kernel', settings.kernelRadius],
     ['reference', settings.referenceRadius],
     ['cell', settings.cellSize],
@@ -83,6 +110,14 @@ export function settingsPhrase(settings: Settings): string {
   return settingsText(settings).replaceAll(';', ', ').replaceAll(':', ' ') || 'as streamed';
 }
 
+function wallsIn(address: string): number[][] | null {
+  try {
+    return parseWalls(address.replaceAll('/', ' '));
+  } catch {
+    return null;
+  }
+}
+
 /** The inverse of settingsText. Ignores unknown names and values. */
 export function parseSettings(text: string): Settings {
   const values = new Map(text.split(';').map((part) => {
@@ -90,9 +125,12 @@ export function parseSettings(text: string): Settings {
     return [part.slice(0, at), part.slice(at + 1)] as const;
   }));
   const share = numberOf(values.get('share'));
+  const sizes = values.get('sizes');
   return {
     placement: PLACEMENTS[values.get('placement') ?? ''] ?? Placement.UNSPECIFIED,
     fill: FILLS[values.get('fill') ?? ''] ?? Fill.UNSPECIFIED,
+    sizes: sizes !== undefined && sizes in SIZES ? sizes : null,
+    walls: wallsIn(values.get('walls') ?? ''),
     kernelRadius: numberOf(values.get('kernel')),
     referenceRadius: numberOf(values.get('reference')),
     cellSize: numberOf(values.get('cell')),
@@ -134,6 +172,8 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
   const placement = settings.placement || (base?.placement ?? Placement.UNSPECIFIED);
   const sameField = (settings.placement === 0 || settings.placement === base?.placement) &&
     settings.kernelRadius === null;
+  const sizes = settings.sizes === null ? undefined : SIZES[settings.sizes];
+  const walls = settings.walls?.map((points) => create(WallSchema, { points })) ?? base?.walls;
   const farthest = placement === Placement.FARTHEST_PARTICLE;
   const canHaveWalls = placement === Placement.VIRTUAL_PLANE || placement === Placement.UNSPECIFIED;
   return create(ReconstructionParametersSchema, {
@@ -141,8 +181,8 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     fill: settings.fill || (base?.fill ?? Fill.UNSPECIFIED),
     spacing: base?.spacing ?? (spacing || undefined),
     spacingRule: base?.spacingRule,
-    sizes: base?.sizes,
-    boundary: base?.boundary,
+    sizes: sizes?.sizes ?? base?.sizes,
+    boundary: sizes?.boundary ?? base?.boundary,
     noiseFilter: base?.noiseFilter,
     kernelRadius: settings.kernelRadius ?? base?.kernelRadius,
     cellSize: settings.cellSize ?? base?.cellSize,
@@ -162,7 +202,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     output: base?.output,
     surface: base?.surface,
     // Other placements cannot be cut at walls.
-    walls: canHaveWalls ? base?.walls : undefined,
+    walls: canHaveWalls ? walls : undefined,
     wallPhases: canHaveWalls ? base?.wallPhases : undefined,
     phaseAttribute: base?.phaseAttribute,
     // Farthest-particle cannot be wrapped.

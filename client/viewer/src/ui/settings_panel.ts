@@ -1,5 +1,7 @@
 import { Placement } from '@proto/v1/reconstruction_pb';
-import { AS_STREAMED, FILLS, nameOf, PLACEMENTS, SHARES, type Settings } from '../stream/settings';
+import {
+  AS_STREAMED, FILLS, nameOf, parseWalls, PLACEMENTS, SHARES, SIZES, wallsText, type Settings,
+} from '../stream/settings';
 import { block, byId, button, input, select, setText } from './dom';
 
 const NUMBERS = {
@@ -21,6 +23,7 @@ export class SettingsPanel {
               private readonly cellSize: (cells: number) => number | null) {
     for (const name of Object.keys(PLACEMENTS)) select('placement').add(new Option(name, name));
     for (const name of Object.keys(FILLS)) select('fill').add(new Option(name, name));
+    for (const name of Object.keys(SIZES)) select('sizes').add(new Option(name, name));
     for (const share of SHARES) select('share').add(new Option(`${share} %`, String(share)));
     const form = byId('settings', HTMLFormElement);
     form.addEventListener('submit', (event) => event.preventDefault());
@@ -36,6 +39,9 @@ export class SettingsPanel {
     this.valid = settings;
     select('placement').value = nameOf(PLACEMENTS, settings.placement);
     select('fill').value = nameOf(FILLS, settings.fill);
+    select('sizes').value = settings.sizes ?? '';
+    input('walls').value = wallsText(settings.walls);
+    input('walls').setCustomValidity('');
     for (const name of Object.keys(NUMBERS) as NumberName[]) {
       input(NUMBERS[name]).value = settings[name] === null ? '' : String(settings[name]);
     }
@@ -49,7 +55,7 @@ export class SettingsPanel {
     if (hasSurfaces === this.isBlocked) return;
     this.isBlocked = hasSurfaces;
     const controls = [
-      select('placement'), select('fill'), select('share'), ...Object.values(NUMBERS).map(input),
+      select('placement'), select('fill'), select('sizes'), input('walls'), select('share'), ...Object.values(NUMBERS).map(input),
       ...GRIDS.map((cells) => button(`grid-${cells}`)), button('reset-settings'),
     ];
     for (const control of controls) block(control, hasSurfaces ? OF_OUTLINES : '');
@@ -65,6 +71,7 @@ export class SettingsPanel {
 
   private read(): void {
     this.offerOffset();
+    const walls = this.readWalls();
     // If a field is invalid, its last valid value is used. The browser shows the limits of the field.
     byId('settings', HTMLFormElement).reportValidity();
     const numberIn = (name: NumberName) => {
@@ -75,6 +82,8 @@ export class SettingsPanel {
     this.valid = {
       placement: PLACEMENTS[select('placement').value] ?? 0,
       fill: FILLS[select('fill').value] ?? 0,
+      sizes: select('sizes').value || null,
+      walls,
       kernelRadius: numberIn('kernelRadius'),
       referenceRadius: numberIn('referenceRadius'),
       cellSize: numberIn('cellSize'),
@@ -82,6 +91,18 @@ export class SettingsPanel {
       share: Number(select('share').value),
     };
     this.changed({ ...this.valid });
+  }
+
+  /** The walls of the field, or the last valid ones. Marks an invalid field. */
+  private readWalls(): number[][] | null {
+    const field = input('walls');
+    field.setCustomValidity('');
+    try {
+      return parseWalls(field.value);
+    } catch (error) {
+      field.setCustomValidity((error as Error).message);
+      return this.valid.walls;
+    }
   }
 
   /** The surface offset applies to one placement only. */

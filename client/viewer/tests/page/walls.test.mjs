@@ -22,7 +22,7 @@ before(async () => {
   browser = await launch();
   const file = path.join(world.folder, 'heap.csv');
   writeFileSync(file, heap());
-  world.replayOf(file, 'heap', '--wall', '0,0,1,0', '--loop', '--rate', '8', '--spacing', '.05');
+  world.replayOf(file, 'heap', '--wall', '0,0,1,0', '--echo-particles', '--loop', '--rate', '8', '--spacing', '.05');
   viewer = await Viewer.open(browser, world.url, { hash: '#stream=heap' });
   await viewer.shows(2);
   await viewer.button('Pause').click();
@@ -59,4 +59,23 @@ test('without the outline there are no contacts', async () => {
   await until('they are gone', async () => await contacts() === 0);
   await viewer.page.getByLabel('Outline', { exact: true }).check();
   await until('they are back', async () => await contacts() === 2);
+});
+
+test('walls of the settings cut the outline elsewhere', async () => {
+  const area = async () => Number((await viewer.value('area')).replaceAll(',', ''));
+  const before = await area();
+  const walls = viewer.page.getByLabel('Walls', { exact: true });
+  await walls.fill('0,0,1');
+  await walls.blur();
+  assert.equal(await walls.evaluate((field) => field.validity.valid), false);
+  assert.equal(await area(), before, 'an invalid wall changes nothing');
+  await walls.fill('0,0.3,1,0.3');
+  await walls.blur();
+  await until('less is left', async () => await area() < 0.8 * before);
+  await until('the contacts moved', async () => await contacts() === 2);
+  assert.match(decodeURIComponent(new URL(viewer.page.url()).hash), /walls:0,0\.3,1,0\.3/);
+  await viewer.page.getByLabel('Sizes', { exact: true }).selectOption('own');
+  await until('the reason is told', async () => /must be absent unless sizes are equal/.test(await viewer.pane().textContent()));
+  await viewer.button('As streamed').click();
+  await until('as before', async () => await area() === before);
 });
