@@ -1,4 +1,4 @@
-// Contacts of outlines with walls. Leaves a screenshot in build/screenshots.
+// Contacts of outlines with walls, and the settings of walls and sizes. Leaves a screenshot in build/screenshots.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -78,4 +78,16 @@ test('walls of the settings cut the outline elsewhere', async () => {
   await until('the reason is told', async () => /must be absent unless sizes are equal/.test(await viewer.pane().textContent()));
   await viewer.button('As streamed').click();
   await until('as before', async () => await area() === before);
+});
+
+test('grains of a file have outlines of their own', async () => {
+  const file = path.join(world.folder, 'grains.csv');
+  writeFileSync(file, 'x,y,volume\n0,0,1\n4,0,4\n0,5,1\n');
+  await viewer.drop(file);
+  // The volume of a grain is its squared diameter.
+  const discs = (1 + 4 + 1) * Math.PI / 4;
+  const area = async () => Number(await viewer.value('area'));
+  await until('all equal', async () => await area() > 0 && Math.abs(await area() - discs) > 0.2);
+  await viewer.page.getByLabel('Sizes', { exact: true }).selectOption('grains');
+  await until('the discs', async () => Math.abs(await area() - discs) < 0.05 * discs);
 });
