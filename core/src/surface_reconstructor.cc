@@ -399,7 +399,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     size.edges = b.crossings.edge_count;
     if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
     AddBodies(frame, b.bodies, size);
-    return Reserve(size, control.memory);
+    absl::Status reserved = Reserve(size, control.memory);
+    if (reserved.ok()) space::ListSteps(bricks, b.crossings);
+    return reserved;
   });
   if (!status.ok()) return status;
   in_stage(Stage::kField, [&] { space::EvaluateNodes(b.bins, scale, b.crossings.near, b.field); });

@@ -272,7 +272,9 @@ absl::Status CheckMeasures(const Surface& surface) {
     }
     const Vec3 centroid{said.centroid_x, said.centroid_y, said.centroid_z};
     const Vec3 error = volume * (centroid - origin) - moment;
-    if (!(Length(error) <= bound * size))
+    // The squares of these products would overflow for large spacings.
+    const double most = std::max({std::abs(error.x), std::abs(error.y), std::abs(error.z)});
+    if (!(most == 0 || most * Length((1 / most) * error) <= bound * size))
       return Broken("S5: shell ", shell, " has another centroid");
   }
   return absl::OkStatus();

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "base/bits.h"
+#include "base/cancellation.h"
 #include "base/parallel.h"
 
 namespace partiemc {
@@ -61,6 +62,7 @@ void SortById(const Frame& frame, NoiseFilterScratch& s) {
   for (const std::uint64_t id : ids) different |= id ^ ids[0];
   for (int shift = 0; shift < 64; shift += kDigit) {
     if ((different >> shift & kMask) == 0) continue;
+    ThrowIfCancelled();
     std::array<std::uint32_t, kMask + 2> first{};  // By digit: its first place.
     for (const std::uint64_t id : ids) ++first[(id >> shift & kMask) + 1];
     std::partial_sum(first.begin(), first.end(), first.begin());

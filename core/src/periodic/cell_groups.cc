@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <bit>
 
+#include "base/cancellation.h"
+
 namespace partiemc {
 namespace {
+
+// Number of items between two checks whether the frame is cancelled.
+constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 bool AreEqual(const GridCell& a, const GridCell& b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
@@ -42,6 +47,7 @@ std::size_t CellGroups::Find(std::span<const GridCell> cells) {
   Resize(cells.size(), number_of_);
   count_ = 0;
   for (std::uint32_t item = 0; item < cells.size(); ++item) {
+    if (item % kItemsPerCheck == 0) ThrowIfCancelled();
     // Consecutive items often share a cell.
     if (item > 0 && AreEqual(cells[item], cells[item - 1])) {
       number_of_[item] = number_of_[item - 1];
@@ -82,6 +88,7 @@ void CellGroups::Sort(std::span<const GridCell> cells) {
   }
   Resize(cells.size(), items_);
   for (std::uint32_t item = 0; item < cells.size(); ++item) {
+    if (item % kItemsPerCheck == 0) ThrowIfCancelled();
     items_[groups_[place_of_[number_of_[item]]].last++] = item;
   }
 }

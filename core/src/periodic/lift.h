@@ -45,9 +45,12 @@ struct LiftScratch {
   std::vector<Attribute> attributes;
 };
 
-/// Bytes of a LiftScratch, at most.
-inline constexpr std::uint64_t kBytesPerLiftedParticle = 84;
-inline constexpr std::uint64_t kBytesPerLiftCell = 200;
+/// Bytes of a LiftScratch without copies, at most: `cell_of`, `wrapped` and `positions` in space;
+/// `cells`, `sets`, `low` and `high`.
+inline constexpr std::uint64_t kBytesPerLiftedParticle = 60 + kBytesPerGroupedItem;
+inline constexpr std::uint64_t kBytesPerLiftCell = sizeof(LiftCell) + sizeof(std::uint32_t) +
+                                                   sizeof(Image) + 2 * sizeof(Vec3) +
+                                                   kBytesPerCellGroup;
 
 struct LiftInput {
   const Frame& frame;

@@ -332,6 +332,7 @@ std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossin
   std::uint32_t refused = 0;
   for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
     FaceChecker checker(bricks, crossings, cell_size, positions, certificate.nodes, brick);
+    checker.UseExactSigns();
     ForEachFace(bricks, certificate.nodes, all, brick,
                 [&](const std::array<int, 3>& cell, int side) {
                   const Face face = checker.FaceOf(cell, side);

@@ -85,7 +85,8 @@ void FillCells(const BrickDirectory& bricks, const SpaceField& field, std::uint3
   }
 }
 
-/// Lists the steps of all loops.
+}  // namespace
+
 void ListSteps(const BrickDirectory& bricks, SpaceCrossings& crossings) {
   crossings.first_step.resize(crossings.loop_count + 1);
   std::uint32_t steps = 0;
@@ -109,8 +110,6 @@ void ListSteps(const BrickDirectory& bricks, SpaceCrossings& crossings) {
   });
 }
 
-}  // namespace
-
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings) {
   const auto count = static_cast<std::uint32_t>(bricks.size());
@@ -132,7 +131,6 @@ void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
     ActiveCell& cell = crossings.cells[k];
     cell.first_loop += crossings.edge_count + crossings.loop_first[cell.brick];
   });
-  ListSteps(bricks, crossings);
 }
 
 }  // namespace partiemc::space

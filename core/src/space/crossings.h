@@ -36,6 +36,7 @@ struct SpaceCrossings {
   std::vector<ActiveCell> cells;
   std::uint32_t edge_count = 0, loop_count = 0;
 
+  // After ListSteps:
   std::vector<std::uint32_t> first_step;  ///< By loop: its first step; then the number of steps.
   std::vector<std::uint32_t> step_edges;  ///< By step: the vertex on its crossed edge.
 
@@ -73,6 +74,11 @@ struct SpaceCrossings {
 /// count, sum, fill. Cost: linear in nodes.
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings);
+
+/// Lists the steps of all loops. Requires: FindCrossings has found the loops. The stages after the
+/// field require it. Apart from FindCrossings, so that its memory is reserved first. Cost: linear
+/// in cells.
+void ListSteps(const BrickDirectory& bricks, SpaceCrossings& crossings);
 
 /// The vertex on an edge of a cell.
 inline std::uint32_t EdgeVertexOf(const BrickDirectory& bricks, const SpaceCrossings& crossings,

@@ -1,6 +1,7 @@
 #include "space_vertices/window_sums.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 // Highway compiles the rest of this file once for each instruction set.
@@ -90,7 +91,8 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
   pairs.self_y = hn::Set(d, loops.normal_y[self]);
   pairs.self_z = hn::Set(d, loops.normal_z[self]);
   ForEachByte(window.bits, [&](std::size_t byte, std::uint8_t all) HWY_ATTR {
-    const auto bits = static_cast<std::uint8_t>(all >> lane);
+    // LoadMaskBits may read eight bytes.
+    const std::array<std::uint8_t, 8> bits{static_cast<std::uint8_t>(all >> lane)};
     const std::size_t k = byte * kAtOnce + static_cast<std::size_t>(lane);
     pairs.x = hn::Sub(hn::Load(d, loops.x.data() + k), x);
     pairs.y = hn::Sub(hn::Load(d, loops.y.data() + k), y);
@@ -101,7 +103,7 @@ HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int la
     pairs.normal_x = hn::Load(d, loops.normal_x.data() + k);
     pairs.normal_y = hn::Load(d, loops.normal_y.data() + k);
     pairs.normal_z = hn::Load(d, loops.normal_z.data() + k);
-    pairs.weight = hn::IfThenElseZero(hn::LoadMaskBits(d, &bits),
+    pairs.weight = hn::IfThenElseZero(hn::LoadMaskBits(d, bits.data()),
                                       hn::Mul(hn::Mul(t, t), hn::Load(d, loops.area.data() + k)));
     add(pairs, k);
   });

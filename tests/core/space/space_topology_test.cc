@@ -81,12 +81,13 @@ struct Signs {
   space::SpaceCrossings crossings;
   space::Bodies bodies;
 
-  /// `value_at(x, y, z)`: negative inside, for 0 <= x, y, z < 16.
+  /// `value_at(x, y, z)`: negative inside, for 0 <= x, y, z < 16, counted from the brick
+  /// (first, first, first).
   template <typename ValueAt>
-  explicit Signs(const ValueAt& value_at) {
+  explicit Signs(const ValueAt& value_at, std::int32_t first = 0) {
     for (int z = 0; z < 2; ++z) {
       for (int y = 0; y < 2; ++y) {
-        for (int x = 0; x < 2; ++x) bins.bricks.Insert({z, y, x});
+        for (int x = 0; x < 2; ++x) bins.bricks.Insert({first + z, first + y, first + x});
       }
     }
     bins.bricks.Seal();
@@ -97,27 +98,30 @@ struct Signs {
       const auto [bz, by, bx] = bins.bricks[brick];
       for (int node = 0; node < space::kBrickNodes; ++node) {
         const space::BrickPlace at{brick, node % 8, node / 8 % 8, node / 64};
-        const double value = value_at(8 * bx + at.i, 8 * by + at.j, 8 * bz + at.k);
+        const double value =
+            value_at(8 * (bx - first) + at.i, 8 * (by - first) + at.j, 8 * (bz - first) + at.k);
         field.values[brick][node] = static_cast<float>(value);
         field.inside[brick][at.k] |= std::uint64_t{value < 0} << at.Bit();
       }
     }
     FindCrossings(bins.bricks, field, crossings);
+    ListSteps(bins.bricks, crossings);
     FindBodies({}, bins, field, 1, bodies);
   }
 };
 
 /// Random values at the inner nodes.
-Signs RandomSigns(std::uint64_t seed) {
+Signs RandomSigns(std::uint64_t seed, std::int32_t first = 0) {
   Random random(seed);
   const double density = random.Uniform(.05, .95);
   const bool is_even = random.Chance(.2);
-  return Signs([&](int x, int y, int z) {
+  const auto value_at = [&](int x, int y, int z) {
     const bool is_inner = x > 3 && x < 12 && y > 3 && y < 12 && z > 3 && z < 12;
     const bool is_inside = is_inner && random.Chance(density);
     const double size = is_even ? 1 : random.Chance(.1) ? 0 : random.Unit();
     return is_inside ? -size - 1e-3 : size;
-  });
+  };
+  return Signs(value_at, first);
 }
 
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
@@ -149,19 +153,21 @@ struct Moved {
 constexpr double kAnyDistance = 1e9;
 
 /// Moves vertices at random, certifies, drops vertices on edges, and checks the surface. Without
-/// the certificate all quads are cut along faces, and no vertex is dropped.
+/// the certificate all quads are cut along faces, and no vertex is dropped. `amount` and the
+/// distance are in cells.
 Moved MoveVertices(const Signs& signs, double amount, double share, Random& random,
-                   double thinning_distance, bool is_certified = true) {
+                   double thinning_distance, bool is_certified = true, double cell = 1) {
   std::vector<Vec3> anchors, normals;
   const space::BrickDirectory& bricks = signs.bins.bricks;
   space::PlaceOnCrossings(bricks, signs.field, signs.crossings, space::kAnchorMargin, anchors);
   std::vector<std::uint8_t> is_fixed;
   space::MarkFixedVertices(signs.crossings, is_fixed);
+  for (Vec3& anchor : anchors) anchor = cell * anchor;
   std::vector<Vec3> positions = anchors;
   const auto move = [&](double part) {
     for (std::size_t v = 0; v < positions.size(); ++v) {
       if (is_fixed[v] != 0 || !random.Chance(part)) continue;
-      const auto along = [&] { return random.Uniform(-amount, amount); };
+      const auto along = [&] { return cell * random.Uniform(-amount, amount); };
       const double x = along(), y = along();
       positions[v] = positions[v] + Vec3{x, y, along()};
     }
@@ -170,22 +176,24 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
   space::Certificate certificate;
   certificate.modes.resize(signs.crossings.cells.size());
   if (is_certified) {
-    EXPECT_TRUE(space::Certify(bricks, signs.crossings, 1, anchors, positions, certificate));
+    EXPECT_TRUE(space::Certify(bricks, signs.crossings, cell, anchors, positions, certificate));
     // Rounds look at bricks around moved vertices only: no face has been missed.
     const auto refused = [&] {
-      return space::CountRefusedFaces(bricks, signs.crossings, 1, positions, certificate);
+      return space::CountRefusedFaces(bricks, signs.crossings, cell, positions, certificate);
     };
     EXPECT_EQ(refused(), 0u);
     move(.02);
     if (amount > 0) {
       EXPECT_GT(refused(), 0u);
     }
-    EXPECT_TRUE(space::CertifyAgain(bricks, signs.crossings, 1, anchors, positions, certificate));
+    EXPECT_TRUE(
+        space::CertifyAgain(bricks, signs.crossings, cell, anchors, positions, certificate));
     EXPECT_EQ(refused(), 0u);
   }
   space::MeshScratch scratch;
   std::vector<space::ThinQuad> thin;
-  space::FindThinEdges(bricks, signs.crossings, 1, certificate, positions, thinning_distance, thin);
+  space::FindThinEdges(bricks, signs.crossings, cell, certificate, positions,
+                       cell * thinning_distance, thin);
   space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
   space::AverageNormals(positions, scratch.triangles, normals);
   Surface surface;
@@ -225,6 +233,20 @@ TEST(Certificate, KeepsMovedVerticesApart) {
   EXPECT_GT(intersections, static_cast<int>(frames));
   EXPECT_GT(dropped, 10 * frames);
   EXPECT_GT(dropped_anyhow, 2 * dropped);
+}
+
+TEST(Certificate, HoldsForAnyCellAndFarFromTheOrigin) {
+  for (const double cell : {1e-60, .37, 1e60}) {
+    for (const std::int32_t first : {0, 1 << 20, -(1 << 26)}) {
+      SCOPED_TRACE(::testing::Message() << "cell " << cell << ", first brick " << first);
+      for (std::uint64_t seed = 0; seed < 3; ++seed) {
+        Random random(seed);
+        const Signs signs = RandomSigns(seed, first);
+        const Moved moved = MoveVertices(signs, .3, 1, random, .1, true, cell);
+        ASSERT_TRUE(moved.status.ok()) << moved.status.message() << ", seed " << seed;
+      }
+    }
+  }
 }
 
 /// The surface of vertices at their anchors, moved along x by `shift(anchor)`.

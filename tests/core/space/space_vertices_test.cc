@@ -49,6 +49,7 @@ struct Anchored {
     EXPECT_TRUE(BinParticles(particles.AsFrame(), scale, {}, bins).ok());
     SampleField(bins, scale, field);
     FindCrossings(bins.bricks, field, crossings);
+    ListSteps(bins.bricks, crossings);
     EvaluateNodes(bins, scale, crossings.near, field);
     FindBodies(particles.AsFrame(), bins, field, 1, bodies);
     PlaceOnCrossings(bins.bricks, field, crossings, kAnchorMargin, anchors);
