@@ -58,7 +58,7 @@ class FaceChecker {
         centre_(cell_size * (OriginOf(bricks[brick]) + Vec3{kHalf, kHalf, kHalf})),
         bound_(BoundOf(cell_size)) {}
 
-  /// From now on all signs are those of the exact predicates, not of bounds of rounding.
+  /// Takes every sign from the exact predicates.
   void UseExactSigns() { bound_ = std::numeric_limits<double>::infinity(); }
 
   /// A face of the cell (i, j, k).
