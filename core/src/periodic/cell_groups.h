@@ -36,7 +36,7 @@ class CellGroups {
 
   /// In lexicographic order of the cells.
   std::span<const Group> groups() const { return groups_; }
-  /// The items of the first group, of the second, ...; those of a group in ascending order.
+  /// All items, group after group. The items of a group ascend.
   std::span<const std::uint32_t> items() const { return items_; }
   /// The index of the group of a cell; kNone if the cell is not occupied.
   std::uint32_t GroupOf(const GridCell& cell) const;

@@ -263,8 +263,8 @@ struct NearRegionOf {
   bool Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius);
 };
 
-using NearBrick = NearRegionOf<8192>;  ///< Of a whole brick.
-using NearPart = NearRegionOf<4096>;   ///< Of a part of a brick.
+using NearBrick = NearRegionOf<8192>;  ///< Holds what is near a brick.
+using NearPart = NearRegionOf<4096>;   ///< Holds what is near a part of it.
 
 /// Replaces a part or a block by the particles of a region whose kernels reach the box. `radius`:
 /// the kernel radius of size 1. Returns false if there are more than fit.

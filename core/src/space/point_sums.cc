@@ -21,7 +21,7 @@ using Lanes = hn::CappedTag<float, NearBlock::kLanes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// What a particle has besides its position: nothing, its own weight, or its own size.
+// A particle has nothing besides its position, or its own weight, or its own size.
 enum class Own { kNothing, kWeight, kSize };
 
 // The offsets D of some particles of a block from a point, with own sizes divided by them, and t =

@@ -4,7 +4,7 @@ import { toCss, type Size, type View } from './view';
 /** A point where the outline leaves a wall, on a picture in CSS pixels, and its text. */
 export interface ContactMark { x: number; y: number; text: string }
 
-/** With more contacts in the picture, none has a text. */
+/** Texts of more contacts would cover the picture. */
 const MOST_TEXTS = 24;
 const MOST_MARKS = 1000;
 
