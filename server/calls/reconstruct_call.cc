@@ -105,6 +105,7 @@ RequestKind ReconstructCall::OnRequestRead(std::size_t slot) {
     case ReconstructRequest::kOpenFieldNumber:
       return RequestKind::kOpen;
     case ReconstructRequest::kFrameFieldNumber:
+      if (frames_->joined() != nullptr) machine_->PartArrives();
       frames_->OnFrame(slot, requests_[slot]);
       return RequestKind::kFrame;
     case 0:

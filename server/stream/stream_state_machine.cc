@@ -46,16 +46,22 @@ void StreamStateMachine::Start(absl::Status admission) {
   if (!admission.ok()) End(std::move(admission));
 }
 
+void StreamStateMachine::PartArrives() {
+  const Event event(*this);
+  part_arrives_ = true;
+}
+
 void StreamStateMachine::ReadDone(RequestKind kind, std::uint64_t bytes) {
   const Event event(*this);
   const bool had_permit = state_.reading == Reading::kNext;
   state_.reading = Reading::kIdle;
   counts_.last_activity = std::chrono::steady_clock::now();
+  const std::uint64_t read_before = read_;
   TakeRequest(kind, bytes);
+  part_arrives_ = false;
   if (!had_permit) return;
   const absl::Status room = budget_.reads().Came(*this, bytes);
-  const bool is_frame = kind == RequestKind::kFrame && state_.phase == Phase::kServing;
-  if (!room.ok() && is_frame && handler_.DropFrame((read_ - 1) % window_, room)) {
+  if (!room.ok() && read_ != read_before && handler_.DropFrame((read_ - 1) % window_, room)) {
     SetSlotBytes(read_ - 1, 0);
   }
 }
@@ -64,7 +70,7 @@ void StreamStateMachine::TakeRequest(RequestKind kind, std::uint64_t bytes) {
   if (state_.phase == Phase::kOpening) {
     if (kind == RequestKind::kOpen) return OpenLater(bytes);
     End(ProtocolError(Name(kind), "the first must be `open`"));
-  } else if (state_.phase == Phase::kServing) {
+  } else if (state_.phase == Phase::kServing || (part_arrives_ && state_.phase == Phase::kEnding)) {
     switch (kind) {
       case RequestKind::kFrame:
         last_bytes_ = std::max<std::uint64_t>(bytes, 1);
@@ -387,7 +393,7 @@ bool StreamStateMachine::IsAllSaid() const {
     case Phase::kAbandoned:
       return true;
     case Phase::kEnding:
-      return written_ == read_;
+      return written_ == read_ && !part_arrives_;
     case Phase::kClosing:
       return written_ == computed_;
     default:

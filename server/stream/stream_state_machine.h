@@ -147,6 +147,10 @@ class StreamStateMachine final : public SerializedCall,
   /// once.
   void Start(absl::Status admission = absl::OkStatus());
 
+  /// The pending read has completed with a part, and the caller is about to give it to the
+  /// assembler. ReadDone follows. Until then LeftOut does not end this stream, so that the part
+  /// gets its response even if it completes the last frame.
+  void PartArrives();
   /// The pending read has completed with a request of this kind and size.
   void ReadDone(RequestKind kind, std::uint64_t bytes);
   /// The pending read has completed without a request: the client will send no more.
@@ -224,6 +228,7 @@ class StreamStateMachine final : public SerializedCall,
   std::uint64_t read_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t computed_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t written_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool part_arrives_ ABSL_GUARDED_BY(mutex_) = false;  // Between PartArrives and ReadDone.
   // Bytes that each slot holds in the memory budget.
   std::vector<std::uint64_t> slot_bytes_ ABSL_GUARDED_BY(mutex_);
   // Bytes that the next ReturnMemory gives back to the budget.

@@ -77,7 +77,9 @@ class Rank final : private StreamTransport, private StreamHandler {
     const std::size_t slot = TakeReadSlot();
     slots_[slot] = {.sequence = next_++, .came = world_.now, .refusal = absl::OkStatus()};
     const std::uint64_t sequence = slots_[slot].sequence;
-    if (machine_->state().phase == Phase::kServing) ++taken_;
+    if (part_ != 0) machine_->PartArrives();
+    const Phase phase = machine_->state().phase;
+    if (phase == Phase::kServing || (part_ != 0 && phase == Phase::kEnding)) ++taken_;
     if (part_ == 0) {
       assembler_->LeaderSent(sequence);
     } else {
@@ -177,7 +179,7 @@ class Rank final : private StreamTransport, private StreamHandler {
   std::vector<Slot> slots_;
   std::optional<std::size_t> read_slot_;
   std::optional<Outgoing> writing_;
-  // A part that comes when the call is already ending is not taken: the end is its answer.
+  // A part that comes when the call is closing after an error is not taken: the end is its answer.
   std::uint64_t taken_ = 0, answered_ = 0;
   bool finished_ = false, cut_ = false;
   std::shared_ptr<StreamStateMachine> machine_;
