@@ -163,7 +163,8 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
   space::EmitMarchingCubes(b.crossings, b.mesh.triangles);
   b.thin.clear();
   for (Vec3& position : b.positions) position = cell_size * position;
-  space::AverageNormals(b.positions, b.mesh.triangles, b.normals);
+  space::NormalsFromTriangles(space::NormalWeights::kArea, b.positions, b.mesh.triangles,
+                              b.normals);
 }
 
 // The certificate and the cuts of the quads change the volumes of small bodies, so volumes are
@@ -413,6 +414,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     }
     absl::Status placed = PlaceMovedVertices(parameters_, scale, b);
     if (!placed.ok() || placement == SurfacePlacement::kQef) return placed;
+    space::NormalsFromTriangles(space::NormalWeights::kSphere, b.positions, b.mesh.triangles,
+                                b.normals);
     space::ReplaceDrops(
         {frame, b.bins, scale, b.bodies, b.certificate.nodes, b.virtual_plane.volumes.body_of},
         {.most_particles = parameters_.max_drop_particles,

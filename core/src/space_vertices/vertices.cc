@@ -1,6 +1,7 @@
 #include "space_vertices/vertices.h"
 
 #include <algorithm>
+#include <array>
 
 #include "base/parallel.h"
 
@@ -36,13 +37,24 @@ void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
   });
 }
 
-void AverageNormals(const std::vector<Vec3>& positions,
-                    const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals) {
+void NormalsFromTriangles(NormalWeights weights, const std::vector<Vec3>& positions,
+                          const std::vector<VertexTriangle>& triangles,
+                          std::vector<Vec3>& normals) {
   normals.assign(positions.size(), Vec3{});
   for (const VertexTriangle& triangle : triangles) {
-    const Vec3& a = positions[triangle[0]];
-    const Vec3 product = Cross(positions[triangle[1]] - a, positions[triangle[2]] - a);
-    for (const std::uint32_t v : triangle) normals[v] = normals[v] + product;
+    std::array<Vec3, 3> sides;  // Side k leads from corner k to the next corner.
+    for (int k = 0; k < 3; ++k) {
+      sides[k] = positions[triangle[(k + 1) % 3]] - positions[triangle[k]];
+    }
+    const Vec3 product = Cross(sides[0], positions[triangle[2]] - positions[triangle[0]]);
+    for (int k = 0; k < 3; ++k) {
+      Vec3 weighted = product;
+      if (weights == NormalWeights::kSphere) {
+        const Vec3 &next = sides[k], &last = sides[(k + 2) % 3];
+        weighted = (1 / Dot(next, next)) * ((1 / Dot(last, last)) * product);
+      }
+      normals[triangle[k]] = normals[triangle[k]] + weighted;
+    }
   }
   for (Vec3& normal : normals) {
     normal = Normalised(normal);

@@ -34,8 +34,18 @@ inline Vec3 ClampedToCell(const Vec3& point, const Vec3& low) {
 void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
                       const SpaceCrossings& crossings, double margin, std::vector<Vec3>& positions);
 
-/// Per vertex: the normalised sum of the area normals of its triangles.
-void AverageNormals(const std::vector<Vec3>& positions,
-                    const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals);
+/// The weights of the triangles around a vertex in its normal.
+enum class NormalWeights {
+  kArea,  ///< The area of the triangle.
+  /// sin(a) / (l m) for the angle a between the sides of the lengths l and m at the vertex. The
+  /// normal is exact where the vertices lie on a sphere (Max, Journal of Graphics Tools 4(2),
+  /// 1999).
+  kSphere,
+};
+
+/// Per vertex: the normalised weighted sum of the normals of its triangles; (0, 0, 1) without
+/// triangles.
+void NormalsFromTriangles(NormalWeights weights, const std::vector<Vec3>& positions,
+                          const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals);
 
 }  // namespace partiemc::space

@@ -133,7 +133,7 @@ TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
                             positions);
     space::MeshScratch scratch;
     space::EmitMarchingCubes(signs.crossings, scratch.triangles);
-    space::AverageNormals(positions, scratch.triangles, normals);
+    space::NormalsFromTriangles(space::NormalWeights::kArea, positions, scratch.triangles, normals);
     Surface surface;
     space::AssembleSurface(
         {signs.bins.bricks, signs.field, signs.crossings, signs.bodies, positions, normals, {}},
@@ -195,7 +195,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
   space::FindThinEdges(bricks, signs.crossings, cell, certificate, positions,
                        cell * thinning_distance, thin);
   space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
-  space::AverageNormals(positions, scratch.triangles, normals);
+  space::NormalsFromTriangles(space::NormalWeights::kArea, positions, scratch.triangles, normals);
   Surface surface;
   space::AssembleSurface(
       {bricks, signs.field, signs.crossings, signs.bodies, positions, normals, thin}, scratch,
@@ -264,7 +264,7 @@ Surface ThinSurface(const Signs& signs, double thinning_distance, const Shift& s
   space::FindThinEdges(bricks, signs.crossings, 1, certificate, positions, thinning_distance, thin);
   space::MeshScratch scratch;
   space::EmitQuads(bricks, signs.crossings, certificate, thin, scratch.triangles);
-  space::AverageNormals(positions, scratch.triangles, normals);
+  space::NormalsFromTriangles(space::NormalWeights::kArea, positions, scratch.triangles, normals);
   Surface surface;
   space::AssembleSurface(
       {bricks, signs.field, signs.crossings, signs.bodies, positions, normals, thin}, scratch,
