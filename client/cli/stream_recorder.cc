@@ -1,8 +1,10 @@
 #include "client/cli/stream_recorder.h"
 
+#include <cstdint>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "client/output/text.h"
 #include "partiemc/status.h"
@@ -19,6 +21,12 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
   } else {
     AppendAll(flags, " ", flag, " ", value);
   }
+}
+
+// The value of --phases and of --wall for particles.
+std::string PhasesOf(const std::string& attribute, const std::vector<std::int32_t>& phases) {
+  const std::vector<double> numbers(phases.begin(), phases.end());
+  return Concat(attribute, "=", NumberList(numbers));
 }
 
 // The value of --slice.
@@ -82,7 +90,16 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
   for (const Wall& wall : parameters.walls) AppendAll(flags, " --wall ", NumberList(wall.points));
-  // A recording has no phases, so it gives the outline of all particles, without walls of theirs.
+  if (!parameters.wall_phases.empty()) {
+    AppendAll(flags, " --wall ", PhasesOf(parameters.phase_attribute, parameters.wall_phases));
+  }
+  std::vector<std::int32_t> phases;
+  for (const Section& section : parameters.sections) {
+    if (section.phase) phases.push_back(*section.phase);
+  }
+  if (!phases.empty()) {
+    AppendAll(flags, " --phases ", PhasesOf(parameters.phase_attribute, phases));
+  }
   std::string isovalues;
   for (const Section& section : parameters.sections) {
     // Every slice has the same isolines.
@@ -121,6 +138,11 @@ absl::Status StreamRecorder::Add(WatchedFrame& frame) {
   frame_.ids.swap(frame.particle_ids);
   frame_.volumes.swap(frame.particle_volumes);
   frame_.velocities.swap(frame.particle_velocities);
+  frame_.attributes.resize(frame.particle_attributes.size());
+  for (std::size_t k = 0; k < frame_.attributes.size(); ++k) {
+    const auto& [name, components, values] = frame.particle_attributes[k];
+    frame_.attributes[k] = {.name = name, .components = components, .values = values};
+  }
   const absl::Status status = writer_->Add(frame_);
   frame_.positions.swap(frame.particles);
   frame_.ids.swap(frame.particle_ids);

@@ -55,6 +55,14 @@ void TakeParticles(const Frame& echoed, const ReconstructionParameters& paramete
   Project(echoed.velocities, components, axes, frame.particle_velocities);
   frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
   frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
+  frame.particle_attributes.resize(echoed.attributes.size());
+  for (std::size_t k = 0; k < echoed.attributes.size(); ++k) {
+    const Attribute& from = echoed.attributes[k];
+    AttributeValues& to = frame.particle_attributes[k];
+    to.name = from.name;
+    to.components = from.components;
+    to.values.assign(from.values.begin(), from.values.end());
+  }
 }
 
 }  // namespace
@@ -203,13 +211,18 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.particle_ids.clear();
   frame.particle_volumes.clear();
   frame.particle_velocities.clear();
+  frame.particle_attributes.clear();
   if (result.particles().empty()) return absl::OkStatus();
   particles_.set_position_format(result.particle_format());
   particles_.mutable_positions()->swap(*result.mutable_particles());
   particles_.mutable_ids()->swap(*result.mutable_particle_ids());
   particles_.mutable_volumes()->swap(*result.mutable_particle_volumes());
   particles_.mutable_velocities()->swap(*result.mutable_particle_velocities());
-  const auto particles = wire::DecodeFrame(particles_);
+  particles_.mutable_scalars()->Swap(result.mutable_particle_scalars());
+  std::vector<std::string> names;
+  for (const v1::NamedScalar& scalar : particles_.scalars()) names.push_back(scalar.name());
+  wire::AttributeViews views;
+  const auto particles = wire::DecodeFrame(particles_, names, views);
   if (!particles.ok()) return Broken("sent particles that cannot be read");
   TakeParticles(*particles, stream_.parameters, frame);
   return absl::OkStatus();

@@ -6,7 +6,6 @@
 #include <grpcpp/support/proto_buffer_reader.h>
 
 #include <algorithm>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -43,41 +42,45 @@ struct Span {
   std::size_t offset = 0, length = 0;
 };
 
-std::optional<Span> FindIn(CodedInputStream& input, std::span<const int> path) {
-  std::optional<Span> found;
+// Adds what Find returns. Returns false if the message is malformed.
+bool FindIn(CodedInputStream& input, std::span<const int> path, std::vector<Span>& found) {
   std::uint32_t length = 0;
   while (const std::uint32_t tag = input.ReadTag()) {
     if (tag != LengthTag(path.front())) {
-      if (!WireFormatLite::SkipField(&input, tag)) return std::nullopt;
+      if (!WireFormatLite::SkipField(&input, tag)) return false;
       continue;
     }
-    if (!input.ReadVarint32(&length)) return std::nullopt;
+    if (!input.ReadVarint32(&length)) return false;
     if (path.size() == 1) {
-      found = Span{static_cast<std::size_t>(input.CurrentPosition()), length};
-      if (!input.Skip(static_cast<int>(length))) return std::nullopt;
+      found.push_back({static_cast<std::size_t>(input.CurrentPosition()), length});
+      if (!input.Skip(static_cast<int>(length))) return false;
       continue;
     }
     const auto outer = input.PushLimit(static_cast<int>(length));
-    if (const auto inner = FindIn(input, path.subspan(1))) found = inner;
+    if (!FindIn(input, path.subspan(1), found)) return false;
     input.PopLimit(outer);
   }
-  return found;
+  return true;
 }
 
-// The contents of field `path` of the message in `bytes`: the first number is a field of the
-// message, the next one of the message in that field. Of several the last, as for a parser.
-std::optional<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
+// The contents of field `path` of the message in `bytes`, in order: the first number is a field of
+// the message, the next one of the message in that field. Empty if the message is malformed.
+std::vector<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
+  std::vector<Span> found;
   grpc::ProtoBufferReader reader(&bytes);
-  if (!reader.status().ok()) return std::nullopt;
+  if (!reader.status().ok()) return found;
   CodedInputStream input(&reader);
-  return FindIn(input, path);
+  if (!FindIn(input, path, found)) found.clear();
+  return found;
 }
 
 }  // namespace
 
 WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
   constexpr int kPath[] = {v1::ReconstructResponse::kFrameFieldNumber};
-  if (const auto frame = Find(response, kPath)) Append(response, frame->offset, frame->length);
+  // Of several frames the last one counts, as for a parser.
+  const std::vector<Span> frames = Find(response, kPath);
+  if (!frames.empty()) Append(response, frames.back().offset, frames.back().length);
 }
 
 void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame) {
@@ -89,6 +92,7 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
       {From::kIdsFieldNumber, To::kParticleIdsFieldNumber},
       {From::kVolumesFieldNumber, To::kParticleVolumesFieldNumber},
       {From::kVelocitiesFieldNumber, To::kParticleVelocitiesFieldNumber},
+      {From::kScalarsFieldNumber, To::kParticleScalarsFieldNumber},
   };
   AppendOwn(Written([&](CodedOutputStream& out) {
     out.WriteTag(VarintTag(To::kParticleFormatFieldNumber));
@@ -96,13 +100,14 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
   }));
   for (const auto& [from, to] : kArrays) {
     const int path[] = {v1::ReconstructRequest::kFrameFieldNumber, from};
-    const auto array = Find(request, path);
-    if (!array || array->length == 0) continue;
-    AppendOwn(Written([&, field = to](CodedOutputStream& out) {
-      out.WriteTag(LengthTag(field));
-      out.WriteVarint64(array->length);
-    }));
-    Append(request, array->offset, array->length);
+    for (const Span& array : Find(request, path)) {
+      if (array.length == 0) continue;
+      AppendOwn(Written([&, field = to](CodedOutputStream& out) {
+        out.WriteTag(LengthTag(field));
+        out.WriteVarint64(array.length);
+      }));
+      Append(request, array.offset, array.length);
+    }
   }
 }
 

@@ -23,8 +23,8 @@ class WatchedBytes {
   /// Copies a serialised ReconstructedFrame, which may be malformed.
   explicit WatchedBytes(const std::string& frame) { AppendOwn(frame); }
 
-  /// Adds positions, ids, volumes and velocities of the frame in `request`. Shares the memory of
-  /// `request`. Requires: `frame` is the parsed frame of `request`.
+  /// Adds positions, ids, volumes, velocities and scalars of the frame in `request`. Shares the
+  /// memory of `request`. Requires: `frame` is the parsed frame of `request`.
   void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
 
   /// Size of the serialised ReconstructedFrame.

@@ -73,6 +73,11 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   request.mutable_frame()->set_ids(std::string(1'500'000, 'i'));
   request.mutable_frame()->set_volumes("volumes");
   request.mutable_frame()->set_velocities(std::string(10, 'v'));
+  for (const char* name : {"type", "heat"}) {
+    v1::NamedScalar& scalar = *request.mutable_frame()->add_scalars();
+    scalar.set_name(name);
+    scalar.set_values(std::string(400'000, *name));
+  }
   grpc::ByteBuffer sent = ToBytes(request);
   WatchedBytes bytes(answer);
   bytes.EchoParticles(sent, request.frame());
@@ -82,6 +87,11 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   EXPECT_TRUE(seen.particle_ids() == request.frame().ids());
   EXPECT_EQ(seen.particle_volumes(), "volumes");
   EXPECT_EQ(seen.particle_velocities(), std::string(10, 'v'));
+  ASSERT_EQ(seen.particle_scalars_size(), 2);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_TRUE(seen.particle_scalars(k).SerializeAsString() ==
+                request.frame().scalars(k).SerializeAsString());
+  }
   EXPECT_GE(bytes.memory(), bytes.size());
   EXPECT_LE(bytes.memory(), answer.Length() + sent.Length() + 100);  // No slice is counted twice.
   seen.clear_particle_format();
@@ -89,6 +99,7 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   seen.clear_particle_ids();
   seen.clear_particle_volumes();
   seen.clear_particle_velocities();
+  seen.clear_particle_scalars();
   EXPECT_TRUE(seen.SerializeAsString() == frame.SerializeAsString());
 }
 

@@ -36,11 +36,13 @@ test('outline, mesh and particles of a message have the same channels', () => {
     particleFormat: PositionFormat.FLOAT32_3,
     particles: bytesOf(new Float32Array(6)),
     particleVelocities: inSpace,
+    particleScalars: [{ name: 'type', values: bytesOf(Float32Array.of(1, 2)) }],
   }), 0);
   assert.deepEqual(numbers(frame.rings.attributes.get('velocity y')), [4, -2]);
   assert.deepEqual(numbers(frame.mesh?.attribute('velocity y')), [4, -2]);
   assert.deepEqual(numbers(frame.particleAttributes?.get('velocity')), [3, 3]);
   assert.deepEqual(numbers(frame.particleAttributes?.get('velocity z')), [2, -3]);
+  assert.deepEqual(numbers(frame.particleAttributes?.get('type')), [1, 2]);
 });
 
 test('particles of a file have their scalars and velocity', () => {

@@ -37,6 +37,9 @@ RecordedFrame BlockFrame(int index) {
     frame.velocities.push_back(static_cast<float>(-y));
     frame.velocities.push_back(static_cast<float>(x));
   }
+  ParticleAttribute& type = frame.attributes.emplace_back();
+  type.name = "type";
+  for (int k = 0; k < 400; ++k) type.values.push_back(k % 20 < 8 ? 1.0f : 2.0f);
   return frame;
 }
 
@@ -129,8 +132,23 @@ TEST_F(Record, TellsTheWallsOfTheStream) {
             Column(Content(Path("made.csv")), "rings_digest"));
 }
 
+TEST_F(Record, HoldsThePhasesOfTheStream) {
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles", "--phases",
+                                               "type=1,2", "--fill", "none"}));
+  const Ran ran = Watch({"--record", Path("seen.pemc")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_THAT(ran.out, HasSubstr(" --phases type=1,2"));
+  const Ran again = RunPartiemc(ToldCommand(ran.out, {"--stats", Path("again.csv")}));
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+  const auto digests = Column(Content(Path("made.csv")), "rings_digest");
+  EXPECT_THAT(digests, SizeIs(3 * kFrames));  // The outline and two phases.
+  EXPECT_EQ(Column(Content(Path("again.csv")), "rings_digest"), digests);
+}
+
 TEST_F(Record, HoldsEverythingThatWasSent) {
-  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles"}));
+  Program producer(PARTIEMC_PROGRAM,
+                   Producer({"--rate", "20", "--echo-particles", "--attributes", "type"}));
   EXPECT_EQ(Watch({"--record", Path("seen.pemc"), "--quiet"}).exit_code, 0);
   EXPECT_EQ(producer.Wait(), 0);
   const auto reader = RecordingReader::Open(Path("seen.pemc"), "");
@@ -146,6 +164,7 @@ TEST_F(Record, HoldsEverythingThatWasSent) {
     EXPECT_EQ(seen.ids, made.ids);
     EXPECT_EQ(seen.volumes, made.volumes);
     EXPECT_EQ(seen.velocities, made.velocities);
+    EXPECT_EQ(seen.attributes, made.attributes);
   }
   EXPECT_FALSE((*reader)->Next(seen).value());
 }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "partiemc/attribute_values.h"
 #include "partiemc/client/credentials.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/client/stream.h"
@@ -90,6 +91,9 @@ struct WatchedFrame {
   /// one entry per particle, or is empty.
   std::vector<std::uint64_t> particle_ids;
   std::vector<float> particle_volumes, particle_velocities;
+  /// The attributes that the producer sends with its particles (ParticleFrame.scalars), such as
+  /// phases: `components` values per particle.
+  std::vector<AttributeValues> particle_attributes;
   std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
   /// Set for the first frame after a loss: one line with the lost address, the cause, the address
   /// where the watch continues, and the duration. Otherwise empty.

@@ -46,6 +46,6 @@ export function rowsOf(frame: Particles, chosen: Uint32Array): Particles {
     ids: rows(frame.ids, 8, chosen),
     volumes: rows(frame.volumes, 4, chosen),
     velocities: rows(frame.velocities, velocityBytes, chosen),
-    scalars: frame.scalars?.map((scalar) => ({ ...scalar, values: rows(scalar.values, 4, chosen) })),
+    scalars: frame.scalars?.map((scalar) => ({ ...scalar, values: rows(scalar.values, 4 * (scalar.components ?? 1), chosen) })),
   };
 }

@@ -1,11 +1,12 @@
 import {
-  CoordinateFormat, type Mesh as MeshMessage, Output, Plane, PositionFormat, type ReconstructedFrame,
+  CoordinateFormat, type Mesh as MeshMessage, Output, Plane, type ReconstructedFrame,
   type Rings as RingsMessage,
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
 import { AttributeChannels, type Channels } from './channels';
 import { checkNesting, countCheck, lost, offsetsOf } from './checks';
 import { bareRings, type Frame, type Mesh, type Rings, type Statistics } from './frame';
+import { type Particles, particleChannels } from './particles';
 import { relativePositions } from './positions';
 import { surfaceMessageOf } from './surface';
 
@@ -160,13 +161,21 @@ function decodeSection(section: ReconstructedFrame, { sequence, time }: Reconstr
   return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }
 
-/** The server echoes velocities, and no other attributes of the particles. */
-function echoedVelocities({ particleFormat, particleVelocities }: ReconstructedFrame): Channels | null {
-  if (particleVelocities.length === 0) return null;
-  const inSpace = particleFormat === PositionFormat.FLOAT32_3 || particleFormat === PositionFormat.FLOAT64_3;
-  return new AttributeChannels([
-    { name: 'velocity', values: particleVelocities, components: inSpace ? 3 : 2 },
-  ]);
+/** The echoed particles, as they were sent. */
+export function echoedParticles(message: ReconstructedFrame): Particles {
+  return {
+    time: message.time, positionFormat: message.particleFormat, positions: message.particles,
+    ids: message.particleIds, volumes: message.particleVolumes, velocities: message.particleVelocities,
+    scalars: message.particleScalars.map(({ name, values, components }) =>
+      ({ name, values, components: Math.max(components, 1) })),
+  };
+}
+
+/** Numbers of the echoed particles to colour by; null without them. */
+function echoedChannels(message: ReconstructedFrame): Channels | null {
+  if (message.particles.length === 0) return null;
+  const channels = particleChannels(echoedParticles(message));
+  return [...channels.keys()].length > 0 ? channels : null;
 }
 
 /** Decodes a result. `plane`: the plane of echoed particles with three components. */
@@ -182,7 +191,7 @@ export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
     particles: message.particles.length > 0
       ? relativePositions(message.particleFormat, message.particles, plane, relative.origin)
       : null,
-    particleAttributes: echoedVelocities(message),
+    particleAttributes: echoedChannels(message),
     statistics: decodeStatistics(message),
     ringsDigest: message.ringsDigest,
     meshDigest: message.meshDigest,
@@ -200,7 +209,7 @@ export function decodeSpaceFrame(message: ReconstructedFrame): Frame {
     isolines: [],
     mesh: null,
     particles: null,
-    particleAttributes: echoedVelocities(message),
+    particleAttributes: echoedChannels(message),
     statistics: decodeStatistics(message),
     ringsDigest: 0n,
     meshDigest: null,

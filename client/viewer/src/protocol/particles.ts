@@ -10,7 +10,7 @@ export interface Particles {
   ids?: Uint8Array;
   volumes?: Uint8Array;
   velocities?: Uint8Array;
-  scalars?: { name: string; values: Uint8Array }[];
+  scalars?: { name: string; values: Uint8Array; components?: number }[];
 }
 
 /** Numbers of the particles to colour by: their scalars and their velocity. */

@@ -7,7 +7,7 @@ import type { Gateway } from './gateway';
 import { History, type Entry } from './history';
 import { PlayoutClock } from './playout_clock';
 import { Player, type Range } from './player';
-import { decodeResult } from '../protocol/decode';
+import { decodeResult, echoedParticles } from '../protocol/decode';
 import type { Particles } from '../protocol/particles';
 import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf } from './settings';
@@ -87,11 +87,7 @@ export class WatchTrack implements Track {
 
   async particlesOf(sequence: number): Promise<Particles | null> {
     const frame = this.entryAt(sequence)?.message();
-    if (!frame || frame.particles.length === 0) return null;
-    return {
-      time: frame.time, positionFormat: frame.particleFormat, positions: frame.particles,
-      ids: frame.particleIds, volumes: frame.particleVolumes, velocities: frame.particleVelocities,
-    };
+    return frame && frame.particles.length > 0 ? echoedParticles(frame) : null;
   }
 
   refresh(): void {
