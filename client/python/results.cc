@@ -4,12 +4,14 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -231,15 +233,19 @@ void DefineMesh(py::module_& module) {
           "(T,) uint8: 0 in the band along the rings, 1 inside.");
 }
 
+py::dict ByName(const std::vector<AttributeValues>& attributes, const py::object& owner) {
+  py::dict by_name;
+  for (const AttributeValues& one : attributes) {
+    by_name[py::str(one.name)] =
+        View<float>(one.values, static_cast<std::size_t>(one.components), owner);
+  }
+  return by_name;
+}
+
 py::dict AttributesOf(const py::object& self) {
-  py::dict attributes;
   const PythonResult& from = self.cast<const PythonResult&>();
   const Result& result = from.frame.result;
-  for (const AttributeValues& one : from.in_space ? result.surface.attributes : result.attributes) {
-    attributes[py::str(one.name)] =
-        View<float>(one.values, static_cast<std::size_t>(one.components), self);
-  }
-  return attributes;
+  return ByName(from.in_space ? result.surface.attributes : result.attributes, self);
 }
 
 // Coordinates of a particle.
@@ -322,17 +328,41 @@ py::tuple ToState(PythonResult& result) {
   }
   const py::bytes particles(reinterpret_cast<const char*>(result.particles.data()),
                             result.particles.size() * sizeof(double));
+  py::list attributes;
+  for (const AttributeValues& one : result.particle_attributes) {
+    attributes.append(py::make_tuple(one.name, one.components,
+                                     py::bytes(reinterpret_cast<const char*>(one.values.data()),
+                                               one.values.size() * sizeof(float))));
+  }
   return py::make_tuple(py::bytes(bytes), sections, particles, result.dropped, result.gap,
-                        result.rejoined, result.in_space);
+                        result.rejoined, result.in_space, attributes);
+}
+
+AttributeValues AttributeFromState(const py::handle& state) {
+  const auto [name, components, bytes] =
+      state.cast<std::tuple<std::string, int, std::string_view>>();
+  if (components < 1 || components > 3 ||
+      bytes.size() % (static_cast<std::size_t>(components) * sizeof(float)) != 0) {
+    throw py::value_error("pickle: the state of a partiemc Result is damaged");
+  }
+  AttributeValues attribute{.name = name, .components = components};
+  attribute.values.resize(bytes.size() / sizeof(float));
+  std::copy(bytes.begin(), bytes.end(), reinterpret_cast<char*>(attribute.values.data()));
+  return attribute;
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
-  // Without surfaces, the state had 6 parts.
-  if (state.size() != 6 && state.size() != 7) {
+  // Without surfaces, the state had 6 parts; without attributes of particles 7.
+  if (state.size() < 6 || state.size() > 8) {
     throw py::value_error("pickle: not the state of a partiemc Result");
   }
   auto result = std::make_shared<PythonResult>();
-  result->in_space = state.size() == 7 && state[6].cast<bool>();
+  result->in_space = state.size() >= 7 && state[6].cast<bool>();
+  if (state.size() == 8) {
+    for (const py::handle& attribute : state[7]) {
+      result->particle_attributes.push_back(AttributeFromState(attribute));
+    }
+  }
   v1::ReconstructedFrame message;
   const auto particles = state[2].cast<std::string_view>();
   if (!message.ParseFromString(state[0].cast<std::string>()) ||
@@ -452,6 +482,13 @@ void DefineResults(py::module_& module) {
           },
           "(N, 2) float64, or (N, 3) with output='surface': particles of a watched frame; N is 0 "
           "unless its producer echoes them.")
+      .def_property_readonly(
+          "particle_attributes",
+          [](const py::object& self) {
+            return ByName(self.cast<const PythonResult&>().particle_attributes, self);
+          },
+          "Attributes of `particles`, by name: (N,) or (N, k) float32. Empty unless the producer "
+          "sends attributes and echoes its particles.")
       .def_property_readonly(
           "level_error",
           [](const PythonResult& r) {

@@ -29,6 +29,7 @@ struct PythonResult {
   // Set for watched frames:
   std::optional<SurfaceLevel> level;  ///< Absent: the surface is exact.
   std::vector<double> particles;
+  std::vector<AttributeValues> particle_attributes;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
   /// Sections as Python objects, filled at the first access. Their results are then moved out of

@@ -63,6 +63,7 @@ class Watch {
     result->in_space = watcher_->stream().parameters.output == Output::kSurface;
     result->level = frame.level;
     result->particles = std::move(frame.particles);
+    result->particle_attributes = std::move(frame.particle_attributes);
     result->dropped = frame.dropped;
     result->gap = frame.gap;
     result->rejoined = std::move(frame.rejoined);

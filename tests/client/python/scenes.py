@@ -55,9 +55,10 @@ def assert_equal(case, one, other, but=()):
             mine, its = (getattr(getattr(each, part), name) for each in (one, other))
             case.assertEqual((mine.dtype, mine.shape, mine.tobytes()), (its.dtype, its.shape, its.tobytes()),
                              f"{part}.{name}")
-    mine, its = ({name: (values.shape, values.tobytes()) for name, values in each.items()}
-                 for each in (one.attributes, other.attributes))
-    case.assertEqual(mine, its)
+    for name in ("attributes", "particle_attributes"):
+        mine, its = ({key: (values.shape, values.tobytes()) for key, values in getattr(each, name).items()}
+                     for each in (one, other))
+        case.assertEqual(mine, its, name)
     case.assertEqual(one.particles.shape, other.particles.shape)
     case.assertEqual(one.particles.tobytes(), other.particles.tobytes())
     case.assertEqual(len(one.sections), len(other.sections))

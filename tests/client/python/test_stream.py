@@ -435,16 +435,21 @@ class Streams(unittest.TestCase):
 
     def test_watchers_see_what_the_producer_gets(self):
         with partiemc.connect(self.address, spacing=1, name="watched", labels={"run": "7"},
-                              echo_particles=True) as stream:
+                              attributes=["heat"], echo_particles=True) as stream:
             one, = [each for each in partiemc.streams(self.address) if each["name"] == "watched"]
             self.assertEqual((one["labels"], one["frames"]), ({"run": "7"}, 0))
             with partiemc.watch(self.address, "watched", mode="every") as watch:
                 self.assertEqual(watch.parameters["spacing"], 1)
                 self.assertIsNone(watch.receive(wait=0.01))
                 for k in range(3):
-                    stream.send(block(0.3 * k), k)
+                    attributes = {"heat": block(0.3 * k)[:, 0].astype("f4"), "spin": block(k).astype("f4")}
+                    stream.send(block(0.3 * k), k, attributes=attributes)
                     made, seen = stream.receive(), next(watch)
                     self.assertEqual((digests(seen), seen.time), (digests(made), k))
+                    self.assertEqual(made.particle_attributes, {})
+                    self.assertEqual(list(seen.particle_attributes), ["heat", "spin"])
+                    for name, values in attributes.items():
+                        numpy.testing.assert_array_equal(seen.particle_attributes[name], values)
                     self.assertTrue((seen.particles == block(0.3 * k)).all())
                     self.assertIs(seen.particles.base, seen)
                     self.assertEqual((seen.dropped, seen.gap, seen.rejoined), (0, 0, ""))
@@ -452,6 +457,8 @@ class Streams(unittest.TestCase):
                     again = pickle.loads(pickle.dumps(seen))
                     self.assertEqual((digests(again), again.particles.tolist()),
                                      (digests(seen), seen.particles.tolist()))
+                    self.assertEqual({name: values.tolist() for name, values in again.particle_attributes.items()},
+                                     {name: values.tolist() for name, values in attributes.items()})
                 stream.finish()
                 self.assertEqual(list(watch), [])
                 self.assertEqual(watch.end, "FINISHED")
