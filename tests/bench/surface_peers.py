@@ -1,16 +1,23 @@
 #!/usr/bin/env python3
-"""Compares surfaces in space with splashsurf: processor time, triangles and error on the same particles.
+"""Compares surfaces in space with peers: processor time, triangles and error on the same particles.
 
-Needs the package partiemc (PYTHONPATH) and pysplashsurf (0.14, from PyPI, in a virtual environment
-that sees the system's packages). Run on a machine that does nothing else:
+Needs the package partiemc (PYTHONPATH). A peer that is missing is named, and its rows are left out:
+  splashsurf 0.14  pysplashsurf from PyPI, in a virtual environment that sees the system's packages
+  VTK              apt-get install python3-vtk9
+  OpenVDB          apt-get install libopenvdb-dev libtbb-dev, then
+      g++ -std=c++20 -O3 -march=native tests/bench/openvdb_peer.cc -lopenvdb -ltbb -o build/openvdb_peer
+Run on a machine that does nothing else:
 
     RAYON_NUM_THREADS=1 python3 tests/bench/surface_peers.py --particles 100000,1000000
 """
 
 import argparse
 import math
+import pathlib
 import resource
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,12 +26,8 @@ from numpy.typing import NDArray
 
 import partiemc
 
-try:
-    import pysplashsurf
-except ImportError:
-    sys.exit("surface_peers.py: pysplashsurf is missing; install it from PyPI in a virtual environment")
-
 Points = NDArray[np.float64]
+Triangles = NDArray[np.int64]
 
 # Lattice of particles: every position is moved by at most this, in spacings.
 SHAKE = 0.1
@@ -40,11 +43,20 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """Least processor time in ms, vertices, and triangles as three indices each."""
+
+    ms: float
+    points: Points
+    triangles: Triangles
+
+
+@dataclass(frozen=True)
 class Method:
-    """Reconstructs positions; returns vertices and the number of triangles."""
+    """Reconstructs positions a number of times, always from nothing."""
 
     name: str
-    run: Callable[[Points], tuple[Points, int]]
+    run: Callable[[Points, int], Outcome]
 
 
 def lattice(low: Points, high: Points, random: np.random.Generator) -> Points:
@@ -95,50 +107,193 @@ def drops(count: int, random: np.random.Generator) -> Scene:
 SCENES = {"ball": ball, "sheet": sheet, "drops": drops}
 
 
-def ours(placement: str, cell_size: float) -> Method:
-    sequence = partiemc.Reconstructor(output="surface", placement=placement, spacing=1.0,
-                                      cell_size=cell_size, threads=1)
-
-    def run(positions: Points) -> tuple[Points, int]:
-        sequence.reset()  # Every run is a first frame.
-        surface = sequence.reconstruct(positions).surface
-        return surface.points, len(surface.triangles)
-
-    return Method(f"{placement} {cell_size:g}", run)
-
-
-def splashsurf(cell_size: float, is_smoothed: bool) -> Method:
-    """`cell_size` in spacings; the pipeline takes it in particle radii, of which a spacing has two."""
-    smoothing = {"mesh_smoothing_iters": 25, "mesh_smoothing_weights": True, "mesh_cleanup": True,
-                 "normals_smoothing_iters": 10, "compute_normals": True} if is_smoothed else {}
-
-    def run(positions: Points) -> tuple[Points, int]:
-        mesh, _ = pysplashsurf.reconstruction_pipeline(
-            positions, particle_radius=0.5, smoothing_length=2.0, cube_size=2 * cell_size,
-            iso_surface_threshold=0.6, multi_threading=False, **smoothing)
-        surface = mesh.mesh if hasattr(mesh, "mesh") else mesh
-        return np.asarray(surface.vertices), len(surface.triangles)
-
-    return Method(f"splashsurf {cell_size:g}{' smoothed' if is_smoothed else ''}", run)
-
-
 def processor_ms() -> float:
     used = resource.getrusage(resource.RUSAGE_SELF)
     return 1000 * (used.ru_utime + used.ru_stime)
 
 
-def measure(method: Method, scene: Scene, runs: int) -> tuple[float, int, float, float]:
-    """Least processor time in ms, triangles; mean and standard deviation of vertices, in spacings.
+def in_process(name: str, reconstruct: Callable[[Points], tuple[Points, Triangles]]) -> Method:
+    def run(positions: Points, runs: int) -> Outcome:
+        least = math.inf
+        for _ in range(runs):  # The first run also reserves memory.
+            before = processor_ms()
+            points, triangles = reconstruct(positions)
+            least = min(least, processor_ms() - before)
+        return Outcome(least, points, triangles)
 
-    The standard deviation leaves out an offset that is the same everywhere.
-    """
-    least = math.inf
-    for _ in range(runs + 1):  # The first run also reserves memory.
-        before = processor_ms()
-        points, triangles = method.run(scene.positions)
-        least = min(least, processor_ms() - before)
-    distance = scene.distance(points)
-    return least, triangles, float(np.abs(distance).mean()), float(distance.std())
+    return Method(name, run)
+
+
+def ours(placement: str, cell_size: float) -> Method:
+    sequence = partiemc.Reconstructor(output="surface", placement=placement, spacing=1.0,
+                                      cell_size=cell_size, threads=1)
+
+    def reconstruct(positions: Points) -> tuple[Points, Triangles]:
+        sequence.reset()  # Every run is a first frame.
+        surface = sequence.reconstruct(positions).surface
+        return surface.points, surface.triangles
+
+    return in_process(f"{placement} {cell_size:g}", reconstruct)
+
+
+def splashsurf_methods() -> list[Method]:
+    try:
+        import pysplashsurf
+    except ImportError:
+        print("surface_peers.py: no splashsurf: pysplashsurf from PyPI is missing", file=sys.stderr)
+        return []
+
+    def method(cell_size: float, is_smoothed: bool) -> Method:
+        """`cell_size` in spacings; the pipeline takes it in particle radii, of which a spacing has two."""
+        smoothing = {"mesh_smoothing_iters": 25, "mesh_smoothing_weights": True, "mesh_cleanup": True,
+                     "normals_smoothing_iters": 10, "compute_normals": True} if is_smoothed else {}
+
+        def reconstruct(positions: Points) -> tuple[Points, Triangles]:
+            mesh, _ = pysplashsurf.reconstruction_pipeline(
+                positions, particle_radius=0.5, smoothing_length=2.0, cube_size=2 * cell_size,
+                iso_surface_threshold=0.6, multi_threading=False, **smoothing)
+            surface = mesh.mesh if hasattr(mesh, "mesh") else mesh
+            return np.asarray(surface.vertices), np.asarray(surface.triangles)
+
+        return in_process(f"splashsurf {cell_size:g}{' smoothed' if is_smoothed else ''}", reconstruct)
+
+    return [method(0.5, True), method(0.5, False), method(1.0, True)]
+
+
+def vtk_methods() -> list[Method]:
+    """A density on a volume around the particles, and its isosurface at half of the value in the bulk."""
+    try:
+        import vtkmodules.vtkFiltersPoints as points_filters
+        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkPoints, vtkSMPTools
+        from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
+        from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D, vtkWindowedSincPolyDataFilter
+        from vtkmodules.vtkImagingHybrid import vtkGaussianSplatter
+    except ImportError:
+        print("surface_peers.py: no VTK: the package python3-vtk9 is missing", file=sys.stderr)
+        return []
+    vtkSMPTools.SetBackend("Sequential")
+
+    def box(positions: Points, cell_size: float) -> tuple[Points, list[int]]:
+        """Origin and numbers of nodes."""
+        low = np.floor(positions.min(axis=0)) - 4
+        size = np.ceil(positions.max(axis=0)) + 4 - low
+        return low, [int(cells) + 1 for cells in size / cell_size]
+
+    def sums(particles: vtkPolyData, positions: Points, cell_size: float, kernel_name: str) -> vtkImageData:
+        """The sum of h^3 W at the nodes, 1 in the bulk; kernels of a smoothing length of one spacing."""
+        volume = vtkImageData()
+        low, nodes = box(positions, cell_size)
+        volume.SetOrigin(low)
+        volume.SetSpacing(cell_size, cell_size, cell_size)
+        volume.SetDimensions(nodes)
+        kernel = getattr(points_filters, f"vtkSPH{kernel_name}Kernel")()
+        kernel.SetSpatialStep(1)
+        kernel.SetDimension(3)
+        interpolator = points_filters.vtkSPHInterpolator()
+        interpolator.SetKernel(kernel)
+        interpolator.SetInputData(volume)
+        interpolator.SetSourceData(particles)
+        interpolator.Update()
+        interpolator.GetOutput().GetPointData().SetActiveScalars(interpolator.GetShepardSumArrayName())
+        return interpolator.GetOutput()
+
+    # Width and reach of Gaussians, in spacings.
+    width, reach = 0.9, 2.5
+    radii = (np.arange(1000) + 0.5) * reach / 1000
+    bulk_of_gaussians = float((4 * np.pi * radii**2 * np.exp(-radii**2 / (2 * width**2))).sum() * reach / 1000)
+
+    def splats(particles: vtkPolyData, positions: Points, cell_size: float) -> vtkImageData:
+        splatter = vtkGaussianSplatter()
+        splatter.SetInputData(particles)
+        low, nodes = box(positions, cell_size)
+        sides = cell_size * (np.array(nodes) - 1)
+        splatter.SetSampleDimensions(nodes)
+        splatter.SetModelBounds(np.stack([low, low + sides], axis=1).ravel())
+        splatter.SetRadius(reach / sides.max())
+        splatter.SetExponentFactor(-reach**2 / (2 * width**2))
+        splatter.SetAccumulationModeToSum()
+        splatter.ScalarWarpingOff()
+        splatter.NormalWarpingOff()
+        splatter.CappingOff()
+        splatter.Update()
+        return splatter.GetOutput()
+
+    def method(kernel_name: str, cell_size: float, is_smoothed: bool) -> Method:
+        def reconstruct(positions: Points) -> tuple[Points, Triangles]:
+            particles = vtkPolyData()
+            points = vtkPoints()
+            points.SetData(numpy_to_vtk(positions))
+            particles.SetPoints(points)
+            contour = vtkFlyingEdges3D()
+            if kernel_name == "Gaussian":
+                contour.SetInputData(splats(particles, positions, cell_size))
+                contour.SetValue(0, bulk_of_gaussians / 2)
+            else:
+                contour.SetInputData(sums(particles, positions, cell_size, kernel_name))
+                contour.SetValue(0, 0.5)
+            contour.ComputeScalarsOff()
+            contour.ComputeNormalsOff()
+            last = contour
+            if is_smoothed:
+                last = vtkWindowedSincPolyDataFilter()
+                last.SetInputConnection(contour.GetOutputPort())
+                last.SetNumberOfIterations(20)
+                last.SetPassBand(0.1)
+                last.NormalizeCoordinatesOn()
+            last.Update()
+            surface = last.GetOutput()
+            return (vtk_to_numpy(surface.GetPoints().GetData()),
+                    vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3))
+
+        return in_process(f"VTK {kernel_name} {cell_size:g}{' smoothed' if is_smoothed else ''}", reconstruct)
+
+    return [method("Quintic", 1, False), method("Quintic", 1, True), method("Cubic", 1, False),
+            method("Cubic", 1, True), method("Gaussian", 1, False), method("Gaussian", 1, True),
+            method("Cubic", 0.5, True)]
+
+
+def openvdb_methods(program: pathlib.Path) -> list[Method]:
+    """A level set of spheres, meshed by VolumeToMesh. See openvdb_peer.cc for the settings."""
+    if not program.exists():
+        print(f"surface_peers.py: no OpenVDB: {program} is missing; --help has the command that builds it",
+              file=sys.stderr)
+        return []
+
+    def method(name: str, *settings: object) -> Method:
+        def run(positions: Points, runs: int) -> Outcome:
+            with tempfile.TemporaryDirectory() as folder:
+                particles, mesh = pathlib.Path(folder, "particles"), pathlib.Path(folder, "mesh")
+                positions.tofile(particles)
+                command = [program, particles, mesh, runs, *settings]
+                ms = float(subprocess.run([str(word) for word in command], check=True,
+                                          stdout=subprocess.PIPE, text=True).stdout)
+                data = mesh.read_bytes()
+            point_count, triangle_count = (int(count) for count in np.frombuffer(data, "u8", 2))
+            points = np.frombuffer(data, "f4", 3 * point_count, 16).reshape(-1, 3)
+            triangles = np.frombuffer(data, "u4", 3 * triangle_count, 16 + points.nbytes).reshape(-1, 3)
+            return Outcome(ms, points, triangles)
+
+        return Method(f"OpenVDB {name}", run)
+
+    # Spheres of one spacing leave no holes. Smoothed ones are moved inwards by .45, and averaged spheres have a radius
+    # of .65, because this gives the ball the smallest mean deviation. Raw spheres would get holes if they were moved.
+    return [method("union 1", "union", 1, 1, 0, 0, 0, 0),
+            method("union 1 smoothed", "union", 1, 1, 0, 1, 0, -0.45),
+            method("union 0.5", "union", 0.5, 1, 0, 0, 0, 0),
+            method("union 0.5 smoothed", "union", 0.5, 1, 0, 1, 0, -0.45),
+            method("average 1", "average", 1, 0.65, 2.5, 0, 0, 0),
+            method("average 1 smoothed", "average", 1, 0.65, 2.5, 0, 1, 0),
+            method("average 0.5", "average", 0.5, 0.65, 2.5, 0, 0, 0)]
+
+
+def is_closed(triangles: Triangles) -> bool:
+    """True if every edge has exactly two triangles, in opposite directions."""
+    corners = triangles.astype(np.int64)
+    begin, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    base = int(corners.max()) + 1
+    edges = np.sort(begin * base + end)
+    return bool((np.diff(edges) > 0).all()) and np.array_equal(edges, np.sort(end * base + begin))
 
 
 def main() -> None:
@@ -146,20 +301,30 @@ def main() -> None:
     parser.add_argument("--particles", default="100000", help="numbers of particles (default 100000)")
     parser.add_argument("--scenes", default=",".join(SCENES), help="of ball, sheet, drops (default all)")
     parser.add_argument("--runs", type=int, default=3, help="runs of each method, the least counts (default 3)")
+    parser.add_argument("--methods", default="", help="parts of names, such as VTK,average; the first method is always\n"
+                        "measured (default all)")
+    parser.add_argument("--openvdb", type=pathlib.Path, default=pathlib.Path("build/openvdb_peer"),
+                        help="program built from openvdb_peer.cc (default build/openvdb_peer)")
     options = parser.parse_args()
-    print("| scene | particles | method | processor time, ms | ratio | triangles | mean deviation, h | its sd |")
-    print("|---|---|---|---|---|---|---|---|")
+    methods = [ours("virtual-plane", 1.0), ours("marching-squares", 1.0), ours("virtual-plane", 0.5),
+               *splashsurf_methods(), *vtk_methods(), *openvdb_methods(options.openvdb)]
+    methods = methods[:1] + [method for method in methods[1:]
+                             if any(part in method.name for part in options.methods.split(","))]
+    print("| scene | particles | method | processor time, ms | ratio | triangles | mean deviation, h | its sd "
+          "| closed |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for count in (int(number) for number in options.particles.split(",")):
         for name in options.scenes.split(","):
             scene = SCENES[name](count, np.random.default_rng(1))
-            methods = [ours("virtual-plane", 1.0), ours("marching-squares", 1.0), ours("virtual-plane", 0.5),
-                       splashsurf(0.5, True), splashsurf(0.5, False), splashsurf(1.0, True)]
             first = None
             for method in methods:
-                ms, triangles, mean, sd = measure(method, scene, options.runs)
-                first = first or ms
-                print(f"| {scene.name} | {len(scene.positions)} | {method.name} | {ms:.0f} | {ms / first:.1f} "
-                      f"| {triangles} | {mean:.4f} | {sd:.4f} |", flush=True)
+                outcome = method.run(scene.positions, options.runs)
+                first = first or outcome.ms
+                # The standard deviation leaves out an offset that is the same everywhere.
+                distance = scene.distance(outcome.points.astype(np.float64))
+                print(f"| {scene.name} | {len(scene.positions)} | {method.name} | {outcome.ms:.0f} "
+                      f"| {outcome.ms / first:.1f} | {len(outcome.triangles)} | {np.abs(distance).mean():.4f} "
+                      f"| {distance.std():.4f} | {'yes' if is_closed(outcome.triangles) else 'no'} |", flush=True)
 
 
 if __name__ == "__main__":
