@@ -71,12 +71,34 @@ void PrintTo(const AllocationCase& tested, std::ostream* out) {
        << (tested.has_phases ? ", phases" : "");
 }
 
+// Computes `frames` frames again and again; expects that the last round allocates nothing.
+// `compute(k, workspace)` computes frame k.
+template <class Compute>
+void ExpectWarm(std::size_t frames, int rounds, int threads, const Compute& compute) {
+  tbb::global_control control(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  Workspace workspace;
+  std::size_t before = 0;
+  for (int round = 0; round < rounds; ++round) {
+    before = allocations;
+    for (std::size_t k = 0; k < frames; ++k) {
+      arena.execute([&] {
+        const absl::Status status = compute(k, workspace);
+        ASSERT_TRUE(status.ok()) << status;
+      });
+    }
+    if (round == 0) {
+      EXPECT_GT(allocations, before) << "nothing is counted";
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u) << "in " << frames << " frames";
+}
+
 class WarmFrame : public testing::TestWithParam<AllocationCase> {};
 
 TEST_P(WarmFrame, AllocatesNothing) {
   const AllocationCase& tested = GetParam();
-  tbb::global_control control(tbb::global_control::max_allowed_parallelism, tested.threads);
-  tbb::task_arena arena(tested.threads);
   ReconstructionParameters parameters{.placement = tested.placement,
                                       .fill = tested.fill,
                                       .sizes = tested.sizes,
@@ -113,29 +135,19 @@ TEST_P(WarmFrame, AllocatesNothing) {
   if (tested.has_phases) frames[2].phases = StripedPhases(frames[2]);
   const std::vector<float> values = NoisyValues(2 * frames[0].size() + 4000);
   State state;
-  Workspace workspace;
   Result result;
-  std::size_t before = 0;
   // Until the offset of the area, which moves by little a frame, comes back to where it was.
   constexpr int kRounds = 24;
-  for (int round = 0; round < kRounds; ++round) {
-    before = allocations;
-    for (const Particles& frame : frames) {
-      arena.execute([&] {
-        const std::array<Attribute, 3> attributes = {
-            {{"pressure", 1, std::span(values).first(frame.size())},
-             {"velocity", 2, std::span(values).first(2 * frame.size())},
-             {"phase", 1, frame.phases}}};
-        Frame next = frame.AsFrame();
-        if (tested.ids) next.attributes = std::span(attributes).first(tested.has_phases ? 3 : 2);
-        ASSERT_TRUE(reconstructor->Reconstruct(next, state, workspace, result).ok());
-      });
-    }
-    if (round == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  ExpectWarm(frames.size(), kRounds, tested.threads, [&](std::size_t k, Workspace& workspace) {
+    const std::size_t count = frames[k].size();
+    const std::array<Attribute, 3> attributes = {
+        {{"pressure", 1, std::span(values).first(count)},
+         {"velocity", 2, std::span(values).first(2 * count)},
+         {"phase", 1, frames[k].phases}}};
+    Frame next = frames[k].AsFrame();
+    if (tested.ids) next.attributes = std::span(attributes).first(tested.has_phases ? 3 : 2);
+    return reconstructor->Reconstruct(next, state, workspace, result);
+  });
   EXPECT_GT(result.rings.RingCount(), 1u);
 }
 
@@ -154,27 +166,15 @@ TEST(WarmSlice, AllocatesNothing) {
   }
   const std::vector<Attribute> attributes = {{"pressure", 1, pressure}};
   State state;
-  Workspace workspace;
   Result result;
-  std::size_t before = 0;
-  tbb::task_arena arena(1);
-  for (int frame = 0; frame < 6; ++frame) {
-    before = allocations;
-    arena.execute([&] {
-      ASSERT_TRUE(reconstructor
-                      ->Reconstruct({.positions = std::span<const double>(xyz),
-                                     .components = 3,
-                                     .volumes = volumes,
-                                     .ids = ids,
-                                     .attributes = attributes},
-                                    state, workspace, result)
-                      .ok());
-    });
-    if (frame == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u);
+  ExpectWarm(1, 6, 1, [&](std::size_t, Workspace& workspace) {
+    return reconstructor->Reconstruct({.positions = std::span<const double>(xyz),
+                                       .components = 3,
+                                       .volumes = volumes,
+                                       .ids = ids,
+                                       .attributes = attributes},
+                                      state, workspace, result);
+  });
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
 
@@ -197,24 +197,10 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
     frames.push_back(frame);
   }
   State state;
-  Workspace workspace;
   Result result;
-  std::size_t before = 0;
-  tbb::task_arena arena(1);
-  for (int round = 0; round < 12; ++round) {
-    before = allocations;
-    for (const Particles& frame : frames) {
-      arena.execute([&] {
-        const absl::Status status =
-            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
-        ASSERT_TRUE(status.ok()) << status;
-      });
-    }
-    if (round == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  ExpectWarm(frames.size(), 12, 1, [&](std::size_t k, Workspace& workspace) {
+    return reconstructor->Reconstruct(frames[k].AsFrame(), state, workspace, result);
+  });
   if (!GetParam()) {
     EXPECT_EQ(result.rings.RingCount(), 2u);
   }
@@ -248,24 +234,10 @@ TEST_P(WarmFrameAtWalls, AllocatesNothing) {
     frames.push_back(frame);
   }
   State state;
-  Workspace workspace;
   Result result;
-  std::size_t before = 0;
-  tbb::task_arena arena(1);
-  for (int round = 0; round < 40; ++round) {
-    before = allocations;
-    for (const Particles& frame : frames) {
-      arena.execute([&] {
-        const absl::Status status =
-            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
-        ASSERT_TRUE(status.ok()) << status;
-      });
-    }
-    if (round == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  ExpectWarm(frames.size(), 40, 1, [&](std::size_t k, Workspace& workspace) {
+    return reconstructor->Reconstruct(frames[k].AsFrame(), state, workspace, result);
+  });
   EXPECT_GE(result.rings.contacts.size(), 2u);
 }
 
@@ -285,26 +257,13 @@ TEST(WarmFilteredFrame, AllocatesNothing) {
     frames.push_back(support::Permuted(frame, random));
   }
   State state;
-  Workspace workspace;
   Result result;
-  std::size_t before = 0;
-  tbb::task_arena arena(1);
-  for (int round = 0; round < 40; ++round) {
-    before = allocations;
-    for (const Particles& frame : frames) {
-      arena.execute([&] {
-        const absl::Status status =
-            reconstructor->Reconstruct(frame.AsFrame(), state, workspace, result);
-        ASSERT_TRUE(status.ok()) << status;
-      });
-    }
-    if (round == 0) {
-      EXPECT_GT(allocations, before) << "nothing is counted";
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u) << "in " << frames.size() << " frames";
+  ExpectWarm(frames.size(), 40, 1, [&](std::size_t k, Workspace& workspace) {
+    return reconstructor->Reconstruct(frames[k].AsFrame(), state, workspace, result);
+  });
   EXPECT_EQ(state.noise.ids.size(), frames[3].size());
 }
+
 std::vector<AllocationCase> Cases() {
   std::vector<AllocationCase> cases;
   for (const Placement placement : AllPlacements()) {
@@ -338,6 +297,7 @@ INSTANTIATE_TEST_SUITE_P(PlacementsAndFills, WarmFrame, testing::ValuesIn(Cases(
                                   (tested.param.boundary == Boundary::kGrains ? "_grains" : "") +
                                   (tested.param.has_phases ? "_phases" : "");
                          });
+
 struct MemoryCase {
   std::string name;
   Particles particles;

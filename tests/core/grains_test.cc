@@ -21,6 +21,7 @@
 #include "support/particles.h"
 #include "support/reconstruct.h"
 #include "support/ring_stream.h"
+#include "support/sized_scenes.h"
 #include "support/stages.h"
 
 namespace partiemc {
@@ -36,20 +37,6 @@ using support::RefusalOf;
 using support::Stages;
 
 const ReconstructionParameters kGrains{.sizes = Sizes::kOwn, .boundary = Boundary::kGrains};
-
-// A random scene whose diameters are from 1 to `ratio`.
-Particles RandomGrains(std::uint64_t seed, double ratio) {
-  Random random(seed);
-  Particles particles = support::RandomScene(seed);
-  particles.volumes.clear();
-  const bool is_bidisperse = random.Chance(.3);
-  for (std::size_t k = 0; k < particles.size(); ++k) {
-    const double power = is_bidisperse ? std::floor(random.Uniform(0, 2)) : random.Unit();
-    const double diameter = std::pow(ratio, power);
-    particles.volumes.push_back(static_cast<float>(diameter * diameter));
-  }
-  return particles;
-}
 
 // F by its equations (core/SIZES.md, "Grains"), as a sum over all particles in world units.
 class GrainOracle {
@@ -99,7 +86,7 @@ TEST(Grains, FieldAgreesWithSumsOverAllParticles) {
     parameters.spacing = 1;
     parameters.cell_size = seed % 2 == 0 ? 1 : 1.3;
     Stages stages;
-    stages.Run(support::Snapped(RandomGrains(seed, std::array{1.0, 3.0, 9.9}[seed % 3]),
+    stages.Run(support::Snapped(support::RandomSizes(seed, 1, std::array{1.0, 3.0, 9.9}[seed % 3]),
                                 parameters.cell_size / 2),
                parameters);
     const GrainOracle oracle(stages.particles);
@@ -146,7 +133,7 @@ TEST(Grains, ResultsKeepTheGuaranteesInRandomFrames) {
     if (random.Chance(.1)) parameters.placement = Placement::kMarchingSquares;
     if (random.Chance(.2)) parameters.cell_size = random.Uniform(.7, 1.4);
     const double ratio = std::array{1.0, 1.5, 3.0, 7.0}[random.Below(4)];
-    const Particles grains = RandomGrains(seed, ratio);
+    const Particles grains = support::RandomSizes(seed, 1, ratio);
     const Result result = ReconstructOnce(parameters, grains);
     const absl::Status status = Validate(result, parameters.fill);
     EXPECT_TRUE(status.ok()) << status;
@@ -157,7 +144,7 @@ TEST(Grains, ResultsKeepTheGuaranteesInRandomFrames) {
 }
 
 TEST(Grains, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
-  const Particles grains = RandomGrains(7, 9);
+  const Particles grains = support::RandomSizes(7, 1, 9);
   const std::uint64_t expected = DigestRings(ReconstructOnce(kGrains, grains).rings);
   for (const std::size_t threads : {1u, 2u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -168,7 +155,7 @@ TEST(Grains, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
 }
 
 TEST(Grains, LargerUnitsScaleTheOutline) {
-  const Particles grains = RandomGrains(3, 5);
+  const Particles grains = support::RandomSizes(3, 1, 5);
   const Rings rings = ReconstructOnce(kGrains, grains).rings;
   const Rings others = ReconstructOnce(kGrains, support::Scaled(grains, 1.0 / 64)).rings;
   ASSERT_EQ(rings.points.size(), others.points.size());

@@ -34,17 +34,7 @@ const ReconstructionParameters kOwn{.spacing = 1.0, .sizes = Sizes::kOwn};
 
 // A random scene whose sizes are within a factor of `ratio` of each other.
 Particles RandomSizes(std::uint64_t seed, double ratio) {
-  Random random(seed);
-  Particles particles = support::RandomScene(seed);
-  particles.volumes.clear();
-  const double low = 1 / std::sqrt(ratio);
-  const bool is_bidisperse = random.Chance(.3);
-  for (std::size_t k = 0; k < particles.size(); ++k) {
-    const double power = is_bidisperse ? std::floor(random.Uniform(0, 2)) : random.Unit();
-    const double size = low * std::pow(ratio, power);
-    particles.volumes.push_back(static_cast<float>(size * size));
-  }
-  return particles;
+  return support::RandomSizes(seed, 1 / std::sqrt(ratio), ratio);
 }
 
 // F by its equations (core/SIZES.md), as a sum over all particles in world units.

@@ -105,19 +105,23 @@ TEST(Walls, AFullTankHasTheOutlineOfItsWalls) {
   }
 }
 
-TEST(Walls, AnObstacleLeavesItsOwnHole) {
-  const Wall square{{7.3, 4.1, 7.3, 8.2, 12.6, 8.2, 12.6, 4.1}};
+// The rings of the column in the tank, without the particles that an obstacle replaces.
+Rings ColumnAround(const Wall& obstacle) {
   ReconstructionParameters parameters = kTank;
-  parameters.walls.push_back(square);
+  parameters.walls.push_back(obstacle);
   Particles particles;
   const Particles column = Column();
   for (std::size_t k = 0; k < column.size(); ++k) {
-    if (HeightAbove(square, column.x(k), column.y(k)) > 0) {
+    if (HeightAbove(obstacle, column.x(k), column.y(k)) > 0) {
       particles.Add(column.x(k), column.y(k));
     }
   }
-  const Result result = ReconstructOnce(parameters, particles);
-  const Rings& rings = result.rings;
+  return ReconstructOnce(parameters, particles).rings;
+}
+
+TEST(Walls, AnObstacleLeavesItsOwnHole) {
+  const Wall square{{7.3, 4.1, 7.3, 8.2, 12.6, 8.2, 12.6, 4.1}};
+  const Rings rings = ColumnAround(square);
   ASSERT_EQ(rings.RingCount(), 2u);
   const std::size_t hole = rings.outer_of[0] == kNoRing ? 1 : 0;
   EXPECT_NEAR(rings.measures[hole].area, -5.3 * 4.1, 1e-12);
@@ -226,17 +230,7 @@ TEST(Walls, LinesAndCornersOnTheLatticeAreExact) {
     for (const double y : {3.0, 3.5, 4.0}) {
       SCOPED_TRACE(testing::Message() << x << ", " << y);
       const Wall square{{x, y, x, y + 5, x + 7, y + 5, x + 7, y}};
-      ReconstructionParameters parameters = kTank;
-      parameters.walls.push_back(square);
-      Particles particles;
-      const Particles column = Column();
-      for (std::size_t k = 0; k < column.size(); ++k) {
-        if (HeightAbove(square, column.x(k), column.y(k)) > 0) {
-          particles.Add(column.x(k), column.y(k));
-        }
-      }
-      const Result result = ReconstructOnce(parameters, particles);
-      const Rings& rings = result.rings;
+      const Rings rings = ColumnAround(square);
       ASSERT_EQ(rings.RingCount(), 2u);
       const std::size_t hole = rings.outer_of[0] == kNoRing ? 1 : 0;
       EXPECT_EQ(rings.measures[hole].area, -35);

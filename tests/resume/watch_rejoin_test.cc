@@ -113,8 +113,7 @@ class WatchTakenOver : public testing::Test {
     const auto stub = v1::ReconstructionService::NewStub(channel_);
     for (v1::ListStreamsResponse list;
          list.streams_size() != 1 || list.streams(0).watchers() == 0;) {
-      grpc::ClientContext context;
-      server::SetDeadline(context);
+      server::TimedContext context;
       ASSERT_TRUE(stub->ListStreams(&context, {}, &list).ok());
     }
   }

@@ -47,8 +47,7 @@ class CallRefused : public ErrorTable {
   // Expects this end of a ReconstructFrame call with a good frame.
   void ExpectOfCall(grpc::StatusCode code, const std::string& reason) {
     Serve();
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     v1::ReconstructFrameResponse response;
     const auto status = stub_->ReconstructFrame(&context, CallRequest(), &response);
     Expect(status, ReasonOf(context), code, reason);
@@ -81,8 +80,7 @@ class CallRefused : public ErrorTable {
   // Expects this end of GetServerInfo on a server that requires a token.
   void ExpectOfCaller(const std::string& authorization, const std::string& reason) {
     WantToken();
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     if (!authorization.empty()) context.AddMetadata("authorization", authorization);
     v1::GetServerInfoResponse response;
     const auto status = stub_->GetServerInfo(&context, {}, &response);
@@ -335,8 +333,7 @@ TEST_F(CallRefused, MALFORMED) {
   Serve();
   grpc::GenericStub stub(channel_);
   for (const std::string method : {"ReconstructFrame", "ListStreams", "GetServerInfo"}) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     grpc::CompletionQueue queue;
     const grpc::Slice slice("\x07");
     const auto call = stub.PrepareUnaryCall(
@@ -354,15 +351,13 @@ TEST_F(CallRefused, MALFORMED) {
 
 TEST_F(CallRefused, PAGE_TOKEN) {
   Serve();
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ListStreamsRequest request;
   request.set_page_token("elsewhere");
   v1::ListStreamsResponse response;
   const auto status = stub_->ListStreams(&context, request, &response);
   Expect(status, ReasonOf(context), StatusCode::INVALID_ARGUMENT, "PAGE_TOKEN");
-  grpc::ClientContext second;
-  SetDeadline(second);
+  TimedContext second;
   request.clear_page_token();
   request.set_page_size(-1);
   const auto negative = stub_->ListStreams(&second, request, &response);
@@ -371,8 +366,7 @@ TEST_F(CallRefused, PAGE_TOKEN) {
 
 TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {
   WantToken();
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   grpc::GenericStub stub(channel_);
   grpc::CompletionQueue queue;
   const auto call = stub.PrepareCall(

@@ -19,11 +19,7 @@ std::shared_ptr<grpc::Channel> Through(const support::ChaosProxy& proxy) {
 }
 
 std::uint32_t OpenStreams(Server& server) {
-  const auto stub = v1::ReconstructionService::NewStub(Connect(server, Transport::kTcp));
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::GetServerInfoResponse info;
-  EXPECT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
+  const v1::GetServerInfoResponse info = InfoOf(Connect(server, Transport::kTcp));
   return info.open_streams() + info.load().watchers();
 }
 
@@ -36,8 +32,7 @@ TEST(DeadPeer, TheNameOfAProducerThatVanishedIsFree) {
   support::ChaosProxy proxy(server->address().ToString());
   StreamClient vanishing(Through(proxy));
   ASSERT_TRUE(vanishing.SendAndReceive(OpenRequest("tank")).has_opened());
-  WatchClient watcher(Through(proxy));
-  ASSERT_TRUE(watcher.Open("tank", v1::WATCH_MODE_LATEST, 1));
+  WatchClient watcher(Through(proxy), "tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(watcher.Receive().has_opened());
   ASSERT_EQ(OpenStreams(*server), 2u);
   proxy.HalfOpen();

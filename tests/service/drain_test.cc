@@ -309,11 +309,7 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
 TEST_F(Drain, IdleConnectionsAreNotWaitedFor) {
   Serve("3600");
   const auto idle = Channel();
-  const auto stub = v1::ReconstructionService::NewStub(idle);
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::GetServerInfoResponse info;
-  ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
+  InfoOf(idle);
   Terminate();
   ExpectGoodEnd();
 }
@@ -366,8 +362,7 @@ TEST_F(Drain, CallsOfOneFrameThatGoOnAreAnswered) {
     clients.emplace_back([&] {
       const auto stub = v1::ReconstructionService::NewStub(Channel());
       for (;;) {
-        grpc::ClientContext context;
-        SetDeadline(context);
+        TimedContext context;
         v1::ReconstructFrameResponse response;
         const auto status = stub->ReconstructFrame(&context, request, &response);
         if (!status.ok()) {

@@ -33,8 +33,7 @@ std::string Stream(const ServingProcess& server, const char* token) {
   const auto stub = v1::ReconstructionService::NewStub(Channel(server));
   std::string stream_token;
   for (int call = 0; call < 2; ++call) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     context.AddMetadata("authorization", std::string("Bearer ") + token);
     const auto stream = stub->Reconstruct(&context);
     v1::ReconstructRequest open = OpenRequest("tank");

@@ -98,8 +98,7 @@ TEST_F(NoMemory, ACallThatCannotBeParsedEndsWithAReasonAndTheNextIsAnswered) {
   v1::ReconstructFrameRequest request;
   *request.mutable_frame() = LargeFrame();
   const auto call = [&](v1::ReconstructFrameResponse& response) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     return stub->ReconstructFrame(&context, request, &response);
   };
 

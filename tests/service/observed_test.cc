@@ -118,11 +118,7 @@ TEST_F(Observed, CountersEqualWhatTheClientDid) {
     refused.Send(BlobRequest(1, 1, 0));
     ASSERT_EQ(refused.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   }
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::GetServerInfoResponse info;
-  ASSERT_TRUE(
-      v1::ReconstructionService::NewStub(channel_)->GetServerInfo(&context, {}, &info).ok());
+  const v1::GetServerInfoResponse info = InfoOf(channel_);
 
   Samples samples = Scrape(*server_);
   EXPECT_EQ(samples["partiemc_frames_total"], 3);
@@ -169,8 +165,8 @@ TEST_F(Observed, EveryGaugeHasMovedAndIsAtZeroAfterEverythingHasClosed) {
   {
     StreamClient watched(channel_);
     ASSERT_TRUE(watched.SendAndReceive(OpenRequest("watched")).has_opened());
-    WatchClient watcher(channel_);  // Has credit for one frame, so that the next ones wait.
-    watcher.Open("watched", v1::WATCH_MODE_LATEST, 1);
+    // Has credit for one frame, so that the next ones wait.
+    WatchClient watcher(channel_, "watched", v1::WATCH_MODE_LATEST, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     std::vector<std::unique_ptr<StreamClient>> busy;
     for (int i = 0; i < 8; ++i) {

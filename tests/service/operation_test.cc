@@ -45,8 +45,7 @@ v1::ReconstructFrameRequest UnaryRequest(unsigned seed, std::uint64_t index) {
 }
 
 TEST_F(Operation, ReconstructFrameGivesTheFirstFrameOfAStream) {
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ReconstructFrameResponse response;
   const auto status = stub_->ReconstructFrame(&context, UnaryRequest(1, 0), &response);
   ASSERT_TRUE(status.ok()) << status.error_message();
@@ -59,8 +58,7 @@ TEST_F(Operation, ReconstructFrameGivesTheFirstFrameOfAStream) {
 TEST_F(Operation, ReconstructFrameRefusesABadFrameWithItsReason) {
   auto request = UnaryRequest(1, 0);
   request.mutable_frame()->mutable_positions()->pop_back();
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ReconstructFrameResponse response;
   const auto status = stub_->ReconstructFrame(&context, request, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
@@ -72,8 +70,7 @@ TEST_F(Operation, ACallThatIsRefusedIsLoggedOnceWithItsReason) {
   const CapturedLog log;
   auto request = UnaryRequest(1, 0);
   request.mutable_frame()->mutable_positions()->pop_back();
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ReconstructFrameResponse response;
   ASSERT_FALSE(stub_->ReconstructFrame(&context, request, &response).ok());
   EXPECT_EQ(log.Count("call refused"), 1u);
@@ -81,10 +78,7 @@ TEST_F(Operation, ACallThatIsRefusedIsLoggedOnceWithItsReason) {
 }
 
 TEST_F(Operation, TheServerTellsWhatItIsAndWhatItAllows) {
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::GetServerInfoResponse info;
-  ASSERT_TRUE(stub_->GetServerInfo(&context, {}, &info).ok());
+  const v1::GetServerInfoResponse info = InfoOf(channel_);
   EXPECT_EQ(info.version(), PARTIEMC_VERSION);
   EXPECT_GE(info.method_version(), 1u);
   EXPECT_EQ(info.limits().max_particles_per_frame(), 20'000u);
@@ -111,8 +105,7 @@ TEST_F(Operation, OpenStreamsAreListedPageByPageWithTheirCounts) {
   v1::ListStreamsRequest request;
   request.set_page_size(1);
   do {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     v1::ListStreamsResponse page;
     ASSERT_TRUE(stub_->ListStreams(&context, request, &page).ok());
     ASSERT_LE(page.streams_size(), 1);
@@ -127,8 +120,7 @@ TEST_F(Operation, OpenStreamsAreListedPageByPageWithTheirCounts) {
   EXPECT_EQ(streams[0].last_sequence(), 1u);
   EXPECT_EQ(streams[1].stream_name(), "second");
 
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   request.set_page_token("nonsense");
   v1::ListStreamsResponse page;
   EXPECT_EQ(stub_->ListStreams(&context, request, &page).error_code(),
@@ -138,8 +130,7 @@ TEST_F(Operation, OpenStreamsAreListedPageByPageWithTheirCounts) {
 TEST_F(Operation, HealthIsToldForTheServerAndForTheServiceByName) {
   const auto stub = health::Health::NewStub(channel_);
   for (const char* service : {"", "partiemc.v1.ReconstructionService"}) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     health::HealthCheckRequest request;
     request.set_service(service);
     health::HealthCheckResponse response;
@@ -159,8 +150,7 @@ TEST_F(Operation, TheHealthCheckOfTheProgramTellsARunningServerFromNone) {
 TEST_F(Operation, ReflectionListsTheService) {
   grpc::GenericStub stub(channel_);
   grpc::CompletionQueue queue;
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   const auto call = stub.PrepareCall(
       &context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
   const auto done = [&] {
@@ -243,8 +233,7 @@ TEST_F(Operation, AClientThatNeverReceivesHoldsUpADrainForNoLongerThanTheGrace) 
   });
   v1::ListStreamsResponse streams;
   while (streams.streams_size() == 0 || streams.streams(0).frames() == 0) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     ASSERT_TRUE(stub_->ListStreams(&context, {}, &streams).ok());
   }
   // Must return; otherwise the test's deadline fails it.

@@ -31,14 +31,7 @@ class Overload : public ::testing::TestWithParam<Transport> {
     server_ = StartServer(options);
     channel_ = Connect(*server_, GetParam());
   }
-  v1::GetServerInfoResponse Info() {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::GetServerInfoResponse info;
-    EXPECT_TRUE(
-        v1::ReconstructionService::NewStub(channel_)->GetServerInfo(&context, {}, &info).ok());
-    return info;
-  }
+  v1::GetServerInfoResponse Info() { return InfoOf(channel_); }
 
   ServerLimits limits_ = TestOptions().limits;
   std::unique_ptr<Server> server_;
@@ -106,8 +99,7 @@ TEST_P(Overload, ACallThatTheBudgetHasNoRoomForIsRefusedAtOnceWithTheWayOut) {
   v1::ReconstructFrameRequest request;
   *request.mutable_parameters() = OpenRequest().open().parameters();
   *request.mutable_frame() = BlobRequest(0, 1, 0).frame();
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ReconstructFrameResponse response;
   const auto status =
       v1::ReconstructionService::NewStub(channel_)->ReconstructFrame(&context, request, &response);

@@ -21,12 +21,7 @@ class PartRefused : public ErrorTable {
 
   // Waits until parts of at least these bytes have arrived.
   void WaitUntilHeld(std::uint64_t bytes) {
-    ASSERT_TRUE(Eventually([&] {
-      grpc::ClientContext context;
-      SetDeadline(context);
-      v1::GetServerInfoResponse info;
-      return stub_->GetServerInfo(&context, {}, &info).ok() && info.load().memory_held() >= bytes;
-    }));
+    ASSERT_TRUE(Eventually([&] { return InfoOf(channel_).load().memory_held() >= bytes; }));
   }
   void ExpectError(const v1::ReconstructResponse& answer, const std::string& reason) {
     ASSERT_TRUE(answer.has_error()) << answer.ShortDebugString().substr(0, 200);

@@ -18,14 +18,7 @@ class Parts : public ::testing::Test {
  protected:
   void SetUp() override { server_ = StartServer(TestOptions()); }
 
-  v1::GetServerInfoResponse Info() {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::GetServerInfoResponse info;
-    const auto stub = v1::ReconstructionService::NewStub(Connect(*server_, Transport::kTcp));
-    EXPECT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
-    return info;
-  }
+  v1::GetServerInfoResponse Info() { return InfoOf(Connect(*server_, Transport::kTcp)); }
 
   std::unique_ptr<Server> server_;
   const std::vector<Digests> expected_ = LocalDigests(1, 12);
@@ -253,8 +246,7 @@ TEST_F(Parts, WatchersGetTheParticlesOfAllParts) {
   StreamClient zero(Connect(*server_, Transport::kTcp)), one(Connect(*server_, Transport::kTcp));
   ASSERT_TRUE(zero.SendAndReceive(open).has_opened());
   ASSERT_TRUE(one.SendAndReceive(OpenPart("echoing", 1, 2)).has_opened());
-  WatchClient watcher(Connect(*server_, Transport::kTcp));
-  ASSERT_TRUE(watcher.Open("echoing", v1::WATCH_MODE_EVERY, 4));
+  WatchClient watcher(Connect(*server_, Transport::kTcp), "echoing", v1::WATCH_MODE_EVERY, 4);
   ASSERT_TRUE(watcher.Receive().has_opened());
   zero.Send(PartRequest(0, 2, 1, 1, 0, true));
   one.Send(PartRequest(1, 2, 1, 1, 0, true));

@@ -77,8 +77,7 @@ class ResumeProtocol : public ::testing::TestWithParam<Transport> {
 
   // The name of the only stream.
   static std::string ListedName(const std::shared_ptr<grpc::Channel>& channel) {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     v1::ListStreamsResponse streams;
     EXPECT_TRUE(
         v1::ReconstructionService::NewStub(channel)->ListStreams(&context, {}, &streams).ok());

@@ -47,8 +47,7 @@ Security::End Security::Ask(const std::shared_ptr<grpc::Channel>& channel,
 
 Security::End Security::Call(const std::shared_ptr<grpc::Channel>& channel,
                              const std::string& method, const std::string& authorization) {
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   if (!authorization.empty()) context.AddMetadata("authorization", authorization);
   grpc::GenericStub stub(channel);
   grpc::CompletionQueue queue;

@@ -100,6 +100,15 @@ std::string ReasonOf(const grpc::ClientContext& context) {
   return reason == metadata.end() ? "" : std::string(reason->second.data(), reason->second.size());
 }
 
+v1::GetServerInfoResponse InfoOf(const std::shared_ptr<grpc::Channel>& channel) {
+  TimedContext context;
+  v1::GetServerInfoResponse info;
+  const auto status =
+      v1::ReconstructionService::NewStub(channel)->GetServerInfo(&context, {}, &info);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return info;
+}
+
 v1::ReconstructRequest BlobRequest(std::uint64_t sequence, unsigned seed, std::uint64_t index) {
   v1::ReconstructRequest request;
   v1::ParticleFrame& frame = *request.mutable_frame();
@@ -118,10 +127,7 @@ v1::ReconstructRequest OpenRequest(const std::string& name) {
 }
 
 StreamClient::StreamClient(const std::shared_ptr<grpc::Channel>& channel)
-    : stub_(v1::ReconstructionService::NewStub(channel)) {
-  SetDeadline(context_);
-  stream_ = stub_->Reconstruct(&context_);
-}
+    : stub_(v1::ReconstructionService::NewStub(channel)), stream_(stub_->Reconstruct(&context_)) {}
 
 StreamClient::~StreamClient() {
   if (finished_) return;
@@ -149,10 +155,7 @@ grpc::Status StreamClient::Finish() {
 }
 
 WatchClient::WatchClient(const std::shared_ptr<grpc::Channel>& channel)
-    : stub_(v1::ReconstructionService::NewStub(channel)) {
-  SetDeadline(context_);
-  rpc_ = stub_->WatchStream(&context_);
-}
+    : stub_(v1::ReconstructionService::NewStub(channel)), rpc_(stub_->WatchStream(&context_)) {}
 
 WatchClient::~WatchClient() {
   if (finished_) return;
@@ -192,8 +195,7 @@ grpc::Status WatchClient::Finish() {
 
 StreamEnd SendBytes(const std::shared_ptr<grpc::Channel>& channel,
                     const std::vector<std::string>& requests) {
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   grpc::CompletionQueue queue;
   const auto wait = [&queue] {
     void* tag = nullptr;

@@ -38,8 +38,16 @@ std::shared_ptr<grpc::Channel> Connect(Server& server, Transport transport);
 /// Sets a deadline, so that a hanging call fails its test.
 void SetDeadline(grpc::ClientContext& context);
 
+/// The context of a call with this deadline.
+struct TimedContext final : grpc::ClientContext {
+  TimedContext() { SetDeadline(*this); }
+};
+
 /// The reason of the call's end; empty if there is none.
 std::string ReasonOf(const grpc::ClientContext& context);
+
+/// Version, limits and load of a server; fails the test if it does not answer.
+v1::GetServerInfoResponse InfoOf(const std::shared_ptr<grpc::Channel>& channel);
 
 /// A request with frame `index` of the moving blob of `seed`, numbered `sequence`.
 v1::ReconstructRequest BlobRequest(std::uint64_t sequence, unsigned seed, std::uint64_t index);
@@ -68,7 +76,7 @@ class StreamClient {
   std::string reason() const { return ReasonOf(context_); }
 
  private:
-  grpc::ClientContext context_;
+  TimedContext context_;
   std::unique_ptr<v1::ReconstructionService::Stub> stub_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::ReconstructRequest, v1::ReconstructResponse>>
       stream_;
@@ -79,6 +87,13 @@ class StreamClient {
 class WatchClient {
  public:
   explicit WatchClient(const std::shared_ptr<grpc::Channel>& channel);
+  /// Opens the watch, too.
+  WatchClient(const std::shared_ptr<grpc::Channel>& channel, const std::string& stream_name,
+              v1::WatchMode mode, std::uint32_t credits,
+              std::optional<std::uint64_t> from_sequence = std::nullopt)
+      : WatchClient(channel) {
+    Open(stream_name, mode, credits, from_sequence);
+  }
   /// Cancels an unfinished watch.
   ~WatchClient();
 
@@ -96,7 +111,7 @@ class WatchClient {
   std::string reason() const { return ReasonOf(context_); }
 
  private:
-  grpc::ClientContext context_;
+  TimedContext context_;
   std::unique_ptr<v1::ReconstructionService::Stub> stub_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::WatchStreamRequest, v1::WatchStreamResponse>> rpc_;
   bool finished_ = false;

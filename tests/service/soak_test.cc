@@ -112,8 +112,7 @@ std::uint64_t Produce(const std::string& address, unsigned stream, std::mt19937&
 // One watch of a random stream: reads some frames, or spends some time without reading.
 std::uint64_t Watch(const std::string& address, std::mt19937& random) {
   const auto stub = v1::ReconstructionService::NewStub(NewChannel(address));
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   const auto call = stub->WatchStream(&context);
   v1::WatchStreamRequest request;
   request.mutable_open()->set_stream_name(

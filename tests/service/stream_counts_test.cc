@@ -123,8 +123,7 @@ class StreamCosts : public ::testing::Test {
   // True if the newest result of the stream "first" was kept, seen by a late watcher. The watch
   // ends with the stream, by the producer's half-close.
   bool LateWatcherGetsOne(StreamClient& producer) {
-    WatchClient watcher(channel_);
-    watcher.Open("first", v1::WATCH_MODE_LATEST, 1);
+    WatchClient watcher(channel_, "first", v1::WATCH_MODE_LATEST, 1);
     EXPECT_TRUE(watcher.Receive().has_opened());
     producer.HalfClose();
     EXPECT_TRUE(producer.Finish().ok());
@@ -133,14 +132,7 @@ class StreamCosts : public ::testing::Test {
     return next.has_frame();
   }
 
-  v1::GetServerInfoResponse Info() {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::GetServerInfoResponse info;
-    EXPECT_TRUE(
-        v1::ReconstructionService::NewStub(channel_)->GetServerInfo(&context, {}, &info).ok());
-    return info;
-  }
+  v1::GetServerInfoResponse Info() { return InfoOf(channel_); }
   // A client may see the end of its stream before the server has released it.
   void ExpectNoneIsOpen() {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);

@@ -93,8 +93,7 @@ TEST_F(Surfaces, OfASingleCallAreThoseOfAFirstFrame) {
   wire::EncodeFrame(MergingBalls(3).AsFrame(0), *request.mutable_frame());
   wire::EncodeOutputs({.normals = true}, *request.mutable_outputs());
   v1::ReconstructFrameResponse response;
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   const auto stub = v1::ReconstructionService::NewStub(Connect(*server_, Transport::kTcp));
   const grpc::Status status = stub->ReconstructFrame(&context, request, &response);
   ASSERT_TRUE(status.ok()) << status.error_message();

@@ -68,8 +68,7 @@ TEST_F(Security, AStreamIsOpenedWithATokenAndGoesOnWhenItIsTakenBack) {
   Write("tokens", kToken);
   server_ = StartServer(Options(false, false, true));
   const auto channel = Connect(*server_, Transport::kTcp);
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   context.AddMetadata("authorization", std::string("Bearer ") + kToken);
   const auto stub = v1::ReconstructionService::NewStub(channel);
   const auto stream = stub->Reconstruct(&context);
@@ -142,8 +141,7 @@ TEST_F(Security, NoSecretIsEverInTheLog) {
   const Client client{.authority = authority_.certificate()};
   const auto channel = Channel(client);
   for (const char* token : {kToken, kOtherToken, ""}) Ask(channel, token);
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   context.AddMetadata("authorization", std::string("Bearer ") + kOtherToken);
   v1::ReconstructionService::NewStub(channel)->Reconstruct(&context)->Finish();
   Ask({.authority = stranger_.certificate(), .token = kToken});

@@ -43,8 +43,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
     }
   }
   std::unique_ptr<WatchClient> Watch(std::uint32_t credits, std::optional<std::uint64_t> from) {
-    auto watcher = std::make_unique<WatchClient>(channel_);
-    watcher->Open("tank", GetParam(), credits, from);
+    auto watcher = std::make_unique<WatchClient>(channel_, "tank", GetParam(), credits, from);
     const auto answer = watcher->Receive();
     EXPECT_TRUE(answer.has_opened());
     opened_ = answer.opened();
@@ -76,14 +75,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
     for (std::uint64_t k = first; k <= last; ++k) sequences.push_back(k);
     return sequences;
   }
-  v1::GetServerInfoResponse Info() {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::GetServerInfoResponse info;
-    EXPECT_TRUE(
-        v1::ReconstructionService::NewStub(channel_)->GetServerInfo(&context, {}, &info).ok());
-    return info;
-  }
+  v1::GetServerInfoResponse Info() { return InfoOf(channel_); }
 
   ServerOptions options_ = TestOptions();
   std::unique_ptr<Server> server_;
@@ -96,8 +88,7 @@ class WatchHistory : public ::testing::TestWithParam<v1::WatchMode> {
 
 TEST_P(WatchHistory, ALateOneGetsAllThatIsHeldAsTheFirstOneGotIt) {
   Serve();
-  WatchClient first(channel_);
-  first.Open("tank", v1::WATCH_MODE_EVERY, kMany);
+  WatchClient first(channel_, "tank", v1::WATCH_MODE_EVERY, kMany);
   ASSERT_TRUE(first.Receive().has_opened());
   ProduceUntil(25);
   const auto made = Frames(first, 25);
@@ -224,8 +215,7 @@ TEST_P(WatchHistory, AStreamThatIsResumedKeepsIt) {
   open.mutable_open()->mutable_resume()->set_stream_token(opened.stream_token());
   open.mutable_open()->mutable_resume()->set_checkpoint(checkpoint);
   ASSERT_EQ(resumed.SendAndReceive(open).opened().next_sequence(), 7u);
-  WatchClient watcher(channel_);
-  watcher.Open("pond", GetParam(), kMany, 0);
+  WatchClient watcher(channel_, "pond", GetParam(), kMany, 0);
   const auto answer = watcher.Receive();
   EXPECT_EQ(answer.opened().oldest_sequence(), 1u);
   EXPECT_EQ(answer.opened().newest_sequence(), 6u);

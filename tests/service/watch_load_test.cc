@@ -130,8 +130,7 @@ void Served::StartProducer(const Sequence& sequence, const std::string& name) {
 }
 
 v1::StreamSummary Served::Listed() {
-  grpc::ClientContext context;
-  SetDeadline(context);
+  TimedContext context;
   v1::ListStreamsResponse streams;
   EXPECT_TRUE(stub_->ListStreams(&context, {}, &streams).ok());
   return streams.streams_size() == 1 ? streams.streams(0) : v1::StreamSummary();

@@ -62,8 +62,7 @@ class WatchRefused : public ErrorTable {
   void ExpectOfOpen(const std::string& name, v1::WatchMode mode, std::uint32_t credits,
                     StatusCode code, const std::string& reason) {
     OpenProducer();
-    WatchClient watcher(channel_);
-    watcher.Open(name, mode, credits);
+    WatchClient watcher(channel_, name, mode, credits);
     Expect(watcher, code, reason);
   }
   // Expects this end of a watcher in mode `every` with one credit, while the producer runs.
@@ -71,8 +70,7 @@ class WatchRefused : public ErrorTable {
     options_.limits.max_watcher_bytes = max_watcher_bytes;
     options_.limits.history_bytes = 0;  // It would wait in the history.
     OpenProducer();
-    WatchClient watcher(channel_);
-    watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);
+    WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     for (std::uint64_t k = 1; k <= 40; ++k) {
       ASSERT_TRUE(producer_->SendAndReceive(BlobRequest(k, 1, k)).has_frame());
@@ -159,11 +157,9 @@ TEST_F(WatchRefused, NO_SUCH_STREAM) {
 
 TEST_F(WatchRefused, TOO_MANY_WATCHERS) {
   OpenProducer();
-  WatchClient first(channel_);
-  first.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient first(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(first.Receive().has_opened());
-  WatchClient second(channel_);
-  second.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient second(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   Expect(second, StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS");
 }
 

@@ -43,8 +43,7 @@ class Watch : public ::testing::TestWithParam<Transport> {
     return producer_->SendAndReceive(BlobRequest(index + 1, 1, index)).frame();
   }
   std::uint32_t ListedWatchers() {
-    grpc::ClientContext context;
-    SetDeadline(context);
+    TimedContext context;
     v1::ListStreamsResponse streams;
     EXPECT_TRUE(
         v1::ReconstructionService::NewStub(channel_)->ListStreams(&context, {}, &streams).ok());
@@ -71,8 +70,7 @@ std::string WithoutTimes(v1::ReconstructedFrame frame) {
 
 TEST_P(Watch, EveryReceivesTheProducersBytesThenTheEnd) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_EVERY, 3);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 3);
   const auto opened = watcher.Receive();
   ASSERT_TRUE(opened.has_opened());
   EXPECT_EQ(opened.opened().labels().at("run"), "7");
@@ -99,8 +97,7 @@ TEST_P(Watch, WhoComesLateGetsTheNewestFrameAtOnceAlthoughNobodyWatchedIt) {
   v1::ReconstructedFrame made;
   for (std::uint64_t i = 0; i < 5; ++i) made = Produce(i);
   for (int k = 0; k < 3; ++k) {  // Repeated after the previous one has left.
-    WatchClient watcher(channel_);
-    watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     const auto seen = watcher.Receive();
     EXPECT_EQ(WithoutTimes(seen.frame().frame()), WithoutTimes(made));
@@ -110,8 +107,7 @@ TEST_P(Watch, WhoComesLateGetsTheNewestFrameAtOnceAlthoughNobodyWatchedIt) {
 
 TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(watcher.Receive().has_opened());
   Produce(0);
   EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
@@ -145,8 +141,7 @@ TEST_P(Watch, LatestWithoutCreditDropsAndTellsHowManyAlsoAtTheEnd) {
 
 TEST_P(Watch, ShowsTheLastFrameIfItsCreditComesAfterTheEnd) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(watcher.Receive().has_opened());
   Produce(0);
   EXPECT_EQ(watcher.Receive().frame().frame().sequence(), 1u);
@@ -164,8 +159,7 @@ TEST_P(Watch, ShowsTheLastFrameIfItsCreditComesAfterTheEnd) {
 
 TEST_P(Watch, EchoesParticlesToWatchersButNotToTheProducer) {
   OpenProducer(/*echo_particles=*/true);
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 9);
   ASSERT_TRUE(watcher.Receive().has_opened());
   for (std::uint64_t i = 0; i < 4; ++i) {
     const v1::ReconstructRequest request = BlobRequest(i + 1, 1, i);
@@ -182,8 +176,7 @@ TEST_P(Watch, EchoesParticlesToWatchersButNotToTheProducer) {
 
 TEST_P(Watch, AFrameErrorIsNotShownAndNoDrop) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_EVERY, 9);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 9);
   ASSERT_TRUE(watcher.Receive().has_opened());
   Produce(0);
   auto bad = BlobRequest(2, 1, 1);
@@ -198,8 +191,7 @@ TEST_P(Watch, AFrameErrorIsNotShownAndNoDrop) {
 
 TEST_P(Watch, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_LATEST, 2);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 2);
   watcher.HalfClose();
   ASSERT_TRUE(watcher.Receive().has_opened());
   Produce(0);
@@ -212,8 +204,7 @@ TEST_P(Watch, AHalfClosedWatchGoesOnForAsLongAsItHasCredit) {
 
 TEST_P(Watch, AProducerThatIsGoneIsTold) {
   OpenProducer();
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_LATEST, 2);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 2);
   ASSERT_TRUE(watcher.Receive().has_opened());
   producer_->Cancel();
   EXPECT_EQ(watcher.Receive().ended().reason(), "PRODUCER_LOST");
@@ -222,8 +213,7 @@ TEST_P(Watch, AProducerThatIsGoneIsTold) {
 
 TEST_P(Watch, ALineageStaysThroughAResumeIsNoOtherStreamsAndTellsNoToken) {
   const auto lineage = [&](const std::string& name) {
-    WatchClient watcher(channel_);
-    watcher.Open(name, v1::WATCH_MODE_LATEST, 1);
+    WatchClient watcher(channel_, name, v1::WATCH_MODE_LATEST, 1);
     return watcher.Receive().opened().lineage();
   };
   const auto opened = producer_->SendAndReceive(OpenRequest("tank")).opened();
@@ -242,15 +232,15 @@ TEST_P(Watch, ALineageStaysThroughAResumeIsNoOtherStreamsAndTellsNoToken) {
 
 TEST_P(Watch, WhatCannotBeWatchedIsRefusedWithItsReason) {
   OpenProducer();
-  WatchClient unknown(channel_), mode(channel_), credits(channel_), early(channel_);
-  unknown.Open("tonk", v1::WATCH_MODE_LATEST, 1);
+  WatchClient unknown(channel_, "tonk", v1::WATCH_MODE_LATEST, 1);
   ExpectRefused(unknown, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM",
                 "open.stream_name: \"tonk\"; must be the name of an open stream");
-  mode.Open("tank", static_cast<v1::WatchMode>(9), 1);
+  WatchClient mode(channel_, "tank", static_cast<v1::WatchMode>(9), 1);
   ExpectRefused(mode, grpc::StatusCode::INVALID_ARGUMENT, "UNSUPPORTED", "open.mode: 9; must be");
-  credits.Open("tank", v1::WATCH_MODE_LATEST, 0);
+  WatchClient credits(channel_, "tank", v1::WATCH_MODE_LATEST, 0);
   ExpectRefused(credits, grpc::StatusCode::INVALID_ARGUMENT, "OUT_OF_RANGE",
                 "open.credits: 0; must be at least 1");
+  WatchClient early(channel_);
   early.Credit(1);
   ExpectRefused(early, grpc::StatusCode::INVALID_ARGUMENT, "PROTOCOL",
                 "request: no `open`; the first must be `open`");
@@ -267,8 +257,7 @@ TEST_P(Watch, BrokenRulesEndAWatchAndAreTold) {
   for (const auto& [request, reason] :
        {std::pair(second_open, "PROTOCOL"), std::pair(empty, "PROTOCOL"),
         std::pair(no_frames, "OUT_OF_RANGE")}) {
-    WatchClient watcher(channel_);
-    watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     watcher.Send(request);
     EXPECT_EQ(watcher.Receive().ended().reason(), reason);
@@ -283,8 +272,7 @@ TEST_P(Watch, ACallThatNeverOpensGivesUpItsPlace) {
   const auto server = StartServer(options);
   WatchClient silent(Connect(*server, GetParam()));
   ExpectRefused(silent, grpc::StatusCode::DEADLINE_EXCEEDED, "IDLE", "sends no `open` for 0.02 s");
-  WatchClient next(Connect(*server, GetParam()));
-  next.Open("tonk", v1::WATCH_MODE_LATEST, 1);
+  WatchClient next(Connect(*server, GetParam()), "tonk", v1::WATCH_MODE_LATEST, 1);
   ExpectRefused(next, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM", "tonk");
 }
 
@@ -292,38 +280,31 @@ TEST_P(Watch, RefusesOneWatcherTooManyUntilASlotIsFree) {
   OpenProducer();
   std::vector<std::unique_ptr<WatchClient>> watchers;
   for (int k = 0; k < 4; ++k) {
-    watchers.push_back(std::make_unique<WatchClient>(channel_));
-    watchers.back()->Open("tank", v1::WATCH_MODE_LATEST, 1);
+    watchers.push_back(std::make_unique<WatchClient>(channel_, "tank", v1::WATCH_MODE_LATEST, 1));
     ASSERT_TRUE(watchers.back()->Receive().has_opened());
   }
   EXPECT_EQ(ListedWatchers(), 4u);
-  WatchClient fifth(channel_);
-  fifth.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient fifth(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   ExpectRefused(fifth, grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_WATCHERS",
                 "watchers: 4 watch; must be at most 4");
   watchers.pop_back();
   for (bool in = false; !in;) {  // The server sees it a little later.
-    WatchClient again(channel_);
-    again.Open("tank", v1::WATCH_MODE_LATEST, 1);
+    WatchClient again(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
     in = again.Receive().has_opened();
   }
 }
 
 TEST_P(Watch, TheLoadTellsWatchersAndWhatTheyHaveNotTaken) {
-  const auto stub = v1::ReconstructionService::NewStub(channel_);
   const auto wait_for = [&](auto expected) {
-    v1::GetServerInfoResponse info;
-    do {
-      grpc::ClientContext context;
-      SetDeadline(context);
-      ASSERT_TRUE(stub->GetServerInfo(&context, {}, &info).ok());
-      EXPECT_EQ(info.load().memory_budget(), TestOptions().limits.FrameBudget());
-    } while (!expected(info.load()));
+    EXPECT_TRUE(Eventually([&] {
+      const v1::ServerLoad load = InfoOf(channel_).load();
+      EXPECT_EQ(load.memory_budget(), TestOptions().limits.FrameBudget());
+      return expected(load);
+    }));
   };
   OpenProducer();
   {
-    WatchClient watcher(channel_);
-    watcher.Open("tank", v1::WATCH_MODE_EVERY, 1);
+    WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 1);
     ASSERT_TRUE(watcher.Receive().has_opened());
     std::uint64_t bytes = 0;
     for (std::uint64_t i = 0; i < 3; ++i) bytes += Produce(i).ByteSizeLong();
@@ -339,9 +320,8 @@ TEST_P(Watch, TheLoadTellsWatchersAndWhatTheyHaveNotTaken) {
 
 TEST_P(Watch, ADrainDeliversWhatIsDoneAndSaysGoodbye) {
   OpenProducer();
-  WatchClient idle(channel_), without_credit(channel_);
-  idle.Open("tank", v1::WATCH_MODE_EVERY, 9);
-  without_credit.Open("tank", v1::WATCH_MODE_EVERY, 1);
+  WatchClient idle(channel_, "tank", v1::WATCH_MODE_EVERY, 9);
+  WatchClient without_credit(channel_, "tank", v1::WATCH_MODE_EVERY, 1);
   ASSERT_TRUE(idle.Receive().has_opened());
   ASSERT_TRUE(without_credit.Receive().has_opened());
   Produce(0);

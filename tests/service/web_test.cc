@@ -28,8 +28,7 @@ TEST_F(WebGatewayTest, AWatcherGetsTheSameBytesOverBothDoors) {
             "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");
   EXPECT_EQ(web_watcher.handshake().headers.at("sec-websocket-protocol"), "partiemc.v1");
   EXPECT_FALSE(web_watcher.handshake().headers.contains("sec-websocket-extensions"));
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_EVERY, 3);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 3);
   web_watcher.SendMessage(OpenWatch(v1::WATCH_MODE_EVERY, 3));
   const auto opened = web_watcher.Receive<v1::WatchStreamResponse>();
   EXPECT_EQ(opened.SerializeAsString(), watcher.Receive().SerializeAsString());
@@ -228,8 +227,7 @@ TEST_F(WebGatewayTest, AProducerThatIsGoneLeavesItsStreamAndItsWatchersAreTold) 
   auto producer = std::make_unique<WebSocketClient>(web(), "/v1/reconstruct");
   producer->SendMessage(OpenRequest("tank"));
   ASSERT_TRUE(producer->Receive<v1::ReconstructResponse>().has_opened());
-  WatchClient watcher(channel_);
-  watcher.Open("tank", v1::WATCH_MODE_LATEST, 1);
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 1);
   ASSERT_TRUE(watcher.Receive().has_opened());
   producer->pipe().Reset();
   EXPECT_EQ(watcher.Receive().ended().reason(), "PRODUCER_LOST");

@@ -159,6 +159,19 @@ Particles Filled(const Body& body, Random& random, const DrawSize& draw) {
   return particles;
 }
 
+Particles RandomSizes(std::uint64_t seed, double smallest, double ratio) {
+  Random random(seed);
+  Particles particles = RandomScene(seed);
+  particles.volumes.clear();
+  const bool is_bidisperse = random.Chance(.3);
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const double power = is_bidisperse ? std::floor(random.Uniform(0, 2)) : random.Unit();
+    const double size = smallest * std::pow(ratio, power);
+    particles.volumes.push_back(static_cast<float>(size * size));
+  }
+  return particles;
+}
+
 Particles Shaken(Particles particles, Random& random, double noise) {
   for (std::size_t k = 0; k < particles.xy.size(); ++k) {
     const double size = std::sqrt(double{particles.volumes[k / 2]});

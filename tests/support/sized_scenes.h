@@ -1,6 +1,7 @@
 // Bodies of particles of different sizes, whose boundary is known.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -28,6 +29,9 @@ using DrawSize = std::function<double(Random& random, double x, double y)>;
 /// apart until pairs are about (h_i + h_j) / 2 apart, and the outermost particles half their size
 /// from the boundary. Volumes are h_i^2.
 Particles Filled(const Body& body, Random& random, const DrawSize& draw);
+
+/// A random scene whose sizes are from `smallest` to `ratio` times as much.
+Particles RandomSizes(std::uint64_t seed, double smallest, double ratio);
 
 /// Moves particles at random. The standard deviation along each axis is `noise` times their size.
 Particles Shaken(Particles particles, Random& random, double noise);

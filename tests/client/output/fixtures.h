@@ -1,4 +1,4 @@
-// Hand-made results.
+// Hand-made results and their files.
 #pragma once
 
 #include <atomic>
@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <numbers>
 #include <string>
 #include <vector>
 
-#include "client/output/frame_record.h"
+#include "client/output/frame_writer.h"
+#include "gtest/gtest.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::client {
@@ -78,6 +80,47 @@ inline Result SquareWithHoleAndIsland() {
     statistics.perimeter += measures.perimeter;
   }
   return result;
+}
+
+/// A square whose bottom lies on a wall.
+inline Result SquareOnFloor() {
+  Result result;
+  AddRing(result.rings, {0, 0, 2, 0, 2, 2, 0, 2}, kNoRing);
+  result.rings.normals.clear();
+  result.rings.wetted = {0};
+  result.rings.contacts = {0, 1};
+  result.rings.contact_angles = {std::numbers::pi_v<float> / 2, std::numbers::pi_v<float> / 4};
+  return result;
+}
+
+/// The square with hole and island, with a linear field and a vector at every point.
+inline Result WithAttributes() {
+  Result result = SquareWithHoleAndIsland();
+  AttributeValues height{"height", 1, {}}, place{"a,b", 2, {}};
+  for (std::size_t k = 0; k < result.mesh.points.size(); k += 2) {
+    height.values.push_back(static_cast<float>(result.mesh.points[k + 1]));
+    place.values.push_back(static_cast<float>(result.mesh.points[k]));
+    place.values.push_back(static_cast<float>(result.mesh.points[k + 1]));
+  }
+  result.attributes = {height, place};
+  return result;
+}
+
+/// The bytes of a frame's file; fails the test if it is refused.
+inline std::string Encode(FrameFormat format, const FrameRecord& frame,
+                          const FrameWriterOptions& options = {}) {
+  auto bytes = EncodeFrame(format, frame, options);
+  EXPECT_TRUE(bytes.ok()) << bytes.status();
+  return bytes.value_or("");
+}
+
+/// How often a word stands in a text.
+inline std::size_t CountOf(const std::string& text, const std::string& word) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
+    ++count;
+  }
+  return count;
 }
 
 }  // namespace partiemc::client
