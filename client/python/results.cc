@@ -182,11 +182,12 @@ void DefineRings(py::module_& module) {
           "wall.")
       .def_property_readonly(
           "contacts", [](R r) { return View<std::uint32_t>(r.part.contacts, 1, r.owner); },
-          "(K,) uint32, ascending: points where an outline meets a wall.")
+          "(K,) uint32, ascending: points where an outline meets a wall, or a phase two others, or "
+          "one and the outside.")
       .def_property_readonly(
           "contact_angles", [](R r) { return View<float>(r.part.contact_angles, 1, r.owner); },
           "(K,) float32, radians: the angle of the fluid at each contact, between the wall and the "
-          "outline.")
+          "outline, or of the phase.")
       .def_property_readonly(
           "identities", [](R r) { return Column<std::uint64_t>(r, &RingMeasures::identity); },
           "(R,) uint64: constant from frame to frame; 0: not tracked.")

@@ -360,7 +360,7 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
   AddMesh(task.parameters, phase.crossings.interior, size);
   absl::Status status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
-  WritePhaseRings(b.phases, label, b.placed_phase, result.rings);
+  WritePhaseRings(b.phases, last.scale, label, b.placed_phase, result.rings);
   InStage(task.observer, Stage::kIdentities, [&] {
     ContinueRings({last.frame,
                    task.parameters.plane,

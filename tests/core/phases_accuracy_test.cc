@@ -52,6 +52,10 @@ struct KnownScene {
   double junction_x, junction_y;                     // Measured unless NaN.
   double most_at_rest, most_with_noise;              // Bounds of the mean deviation.
   double most_apart = 0, most_apart_with_noise = 0;  // Bounds of the junction's distance.
+  // Angles of the phases at the junction or, without one, at the contacts; and bounds of their mean
+  // errors. In degrees.
+  std::vector<double> angles = {};
+  double most_turned = 0, most_turned_with_noise = 0;
 };
 
 PhaseScene TwoPhases(const Distance& second) {
@@ -65,6 +69,10 @@ std::vector<KnownScene> AllScenes(std::uint64_t seed) {
   const auto nowhere = std::nan("");
   const Distance line = Line(x, y, angle);
   scenes.push_back({"line", TwoPhases(line), line, nowhere, nowhere, .05, .055});
+  const double tilt = std::asin(line(0, 0) / kRadius) * 180 / std::numbers::pi;
+  scenes.back().angles = {90 + tilt, 90 - tilt};
+  scenes.back().most_turned = 4;
+  scenes.back().most_turned_with_noise = 6;
   const Distance large = Drop(x, y, 9);
   scenes.push_back({"drop of 254", TwoPhases(large), large, nowhere, nowhere, .05, .055});
   const Distance small = Drop(x, y, std::sqrt(30 / std::numbers::pi));
@@ -81,7 +89,10 @@ std::vector<KnownScene> AllScenes(std::uint64_t seed) {
                     .05,
                     .055,
                     .1,
-                    .15});
+                    .15,
+                    {120, 120, 120},
+                    4,
+                    6});
   // Phase 2 has one half, phases 1 and 3 share the other one.
   const Distance across = Line(x, y, angle + std::numbers::pi / 2);
   scenes.push_back({"T",
@@ -95,7 +106,10 @@ std::vector<KnownScene> AllScenes(std::uint64_t seed) {
                     .05,
                     .055,
                     .15,
-                    .2});
+                    .2,
+                    {90, 180, 90},
+                    4,
+                    6});
   return scenes;
 }
 
@@ -103,6 +117,8 @@ struct Figures {
   double deviation = 0, length = 0;
   double area = 0;      // The largest relative error of a phase's area.
   double junction = 0;  // Distance of the junction.
+  double turned = 0;    // Error of angles, in degrees.
+  int angles = 0;
 };
 
 // The point at which most phases meet, nearest to (x, y).
@@ -120,6 +136,21 @@ double DistanceOfJunction(const Result& result, double x, double y) {
     if (is_shared) nearest = std::min(nearest, std::hypot(px - x, py - y));
   }
   return nearest;
+}
+
+void MeasureAngles(const KnownScene& known, const Result& result, Figures& figures) {
+  for (std::size_t phase = 0; phase < known.angles.size(); ++phase) {
+    const Rings& rings = result.sections[phase].rings;
+    for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+      const double x = rings.points[2 * rings.contacts[k]];
+      const double y = rings.points[2 * rings.contacts[k] + 1];
+      const bool is_junction = std::hypot(x - known.junction_x, y - known.junction_y) < 3;
+      if (!is_junction && !std::isnan(known.junction_x)) continue;
+      const double angle = rings.contact_angles[k] * 180 / std::numbers::pi;
+      figures.turned += std::abs(angle - known.angles[phase]);
+      ++figures.angles;
+    }
+  }
 }
 
 void Measure(const KnownScene& known, double noise, Random& random, Figures& figures) {
@@ -155,11 +186,13 @@ void Measure(const KnownScene& known, double noise, Random& random, Figures& fig
   if (!std::isnan(known.junction_x)) {
     figures.junction += DistanceOfJunction(result, known.junction_x, known.junction_y);
   }
+  MeasureAngles(known, result, figures);
 }
 
 TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
   constexpr int kSeeds = 8;
-  std::printf("%-14s %8s %8s %8s %8s %10s\n", "", "rest", "area", "noise", "area", "junctions");
+  std::printf("%-14s %8s %8s %8s %8s %10s %12s\n", "", "rest", "area", "noise", "area", "junctions",
+              "angles");
   std::vector<Figures> rest(5), noisy(5);
   std::vector<KnownScene> scenes;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -174,14 +207,22 @@ TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
     const KnownScene& scene = scenes[k];
     const double at_rest = rest[k].deviation / rest[k].length;
     const double with_noise = noisy[k].deviation / noisy[k].length;
-    std::printf("%-14s %8.4f %8.5f %8.4f %8.5f %5.3f %5.3f\n", scene.name.c_str(), at_rest,
-                rest[k].area, with_noise, noisy[k].area, rest[k].junction / kSeeds,
-                noisy[k].junction / kSeeds);
+    const double turned = rest[k].turned / std::max(rest[k].angles, 1);
+    const double turned_with_noise = noisy[k].turned / std::max(noisy[k].angles, 1);
+    std::printf("%-14s %8.4f %8.5f %8.4f %8.5f %5.3f %5.3f %5.2f %5.2f\n", scene.name.c_str(),
+                at_rest, rest[k].area, with_noise, noisy[k].area, rest[k].junction / kSeeds,
+                noisy[k].junction / kSeeds, turned, turned_with_noise);
     EXPECT_LE(at_rest, scene.most_at_rest) << scene.name;
     EXPECT_LE(with_noise, scene.most_with_noise) << scene.name;
     EXPECT_LE(std::max(rest[k].area, noisy[k].area), .005) << scene.name;
     EXPECT_LE(rest[k].junction / kSeeds, scene.most_apart) << scene.name;
     EXPECT_LE(noisy[k].junction / kSeeds, scene.most_apart_with_noise) << scene.name;
+    if (scene.angles.empty()) continue;
+    const int all = kSeeds * (scene.name == "line" ? 4 : 3);  // Both phases have two contacts.
+    EXPECT_EQ(rest[k].angles, all) << scene.name;
+    EXPECT_EQ(noisy[k].angles, all) << scene.name;
+    EXPECT_LE(turned, scene.most_turned) << scene.name;
+    EXPECT_LE(turned_with_noise, scene.most_turned_with_noise) << scene.name;
   }
 }
 

@@ -52,8 +52,9 @@ struct Rings {
   /// (ReconstructionParameters::walls), except where the repair has moved an end of it off the
   /// wall.
   std::vector<std::uint32_t> wetted;
-  /// Points, ascending, where an outline meets a wall, and the angle of the fluid there, between
-  /// the wall and the outline, in radians.
+  /// Points, ascending, where an outline meets a wall, or the outline of a phase a third region:
+  /// another phase or the outside of the body. The angle of the fluid or phase there, between wall
+  /// and outline or between both sides of the ring, in radians.
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

@@ -6,6 +6,7 @@
 
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
+#include "phases/junction_angles.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 
@@ -121,6 +122,8 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
     MatchPhaseAreas(p.rings, p.interfaces, kAreaLimit * input.scale.spacing, p.areas, p.points);
     MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
   }
+  p.is_junction.assign(p.points.position.size(), 0);
+  for (const JunctionScratch::ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
   ToWorld(placed, body, input.scale.cell_size, p);
   if (!RepairPhases(body, p.rings, p.world_roots, p.repair, p.world)) return false;
   std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
@@ -133,7 +136,8 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   return true;
 }
 
-void WritePhaseRings(const Phases& p, PhaseLabel label, PlacedVertices& placed, Rings& rings) {
+void WritePhaseRings(const Phases& p, const Scale& scale, PhaseLabel label, PlacedVertices& placed,
+                     Rings& rings) {
   const PhaseRings& phase = p.rings[label - 1u];
   rings.Clear();
   rings.offsets = phase.offsets;
@@ -155,6 +159,10 @@ void WritePhaseRings(const Phases& p, PhaseLabel label, PlacedVertices& placed, 
         normal = {sign * p.points.normal[point].x, sign * p.points.normal[point].y};
       }
       rings.normals.insert(rings.normals.end(), {normal.x, normal.y});
+      if (p.is_junction[point] == 0) continue;
+      rings.contacts.push_back(phase.offsets[ring] + static_cast<std::uint32_t>(k));
+      rings.contact_angles.push_back(
+          JunctionAngle({points, p.world, p.is_junction}, k, scale.spacing * scale.cell_size));
     }
   }
   MeasureRings(rings);

@@ -35,6 +35,7 @@ struct Phases {
   Interfaces interfaces;
   PhaseTraceScratch trace;
   JunctionScratch junctions;
+  std::vector<std::uint8_t> is_junction;  ///< By shared point: whether interfaces end there.
   PhaseAreaScratch areas;
   PhaseRepairScratch repair;
 };
@@ -80,7 +81,8 @@ inline std::uint64_t InterfacePointsOf(const Phases& phases) {
                                Phases& phases, Rings& body);
 
 /// Writes the rings of a phase, in world units, without identities, and their placement for the
-/// stages identities and mesh.
-void WritePhaseRings(const Phases& phases, PhaseLabel label, PlacedVertices& placed, Rings& rings);
+/// stages identities and mesh. Junctions are contacts of the rings.
+void WritePhaseRings(const Phases& phases, const Scale& scale, PhaseLabel label,
+                     PlacedVertices& placed, Rings& rings);
 
 }  // namespace partiemc

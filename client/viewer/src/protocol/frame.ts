@@ -22,9 +22,9 @@ export interface Rings {
   cuts: Uint32Array;
   /** Vertices, ascending, whose segment to the next one lies on a wall. */
   wetted: Uint32Array;
-  /** Vertices, ascending, where an outline meets a wall. */
+  /** Vertices, ascending, where an outline meets a wall, or where three phases meet. */
   contacts: Uint32Array;
-  /** Of each contact: the angle of the fluid between the wall and the outline, in radians. */
+  /** Of each contact: the angle of the fluid or phase there, in radians. */
   contactAngles: Float32Array;
   normals: Float32Array | null;
   /** Numbers per vertex. */

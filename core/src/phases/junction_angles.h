@@ -1,0 +1,24 @@
+// The angles of the phases where interfaces meet.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace partiemc {
+
+/// A ring of a phase: `points` are numbers of shared points, `world` has their positions in world
+/// units, and `is_junction` tells which of them are ends of interfaces.
+struct PhaseRing {
+  std::span<const std::uint32_t> points;
+  std::span<const double> world;
+  std::span<const std::uint8_t> is_junction;
+};
+
+/// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in
+/// [0, 2 pi). Each side of the ring has a parabola that begins at the junction, fitted by least
+/// squares to the points from 1.5 to 6 spacings away (along the ring, before the next junction).
+/// Shorter sides have a chord. Cost: linear in these points.
+float JunctionAngle(const PhaseRing& ring, std::size_t k, double spacing);
+
+}  // namespace partiemc
