@@ -121,8 +121,7 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
   two.Stop();
   std::printf(
       "%s%s: at most %.1f MiB of %.0f planned, in a group: %s (%.0f MiB); p99 %.2f -> %.2f ms "
-      "(%.2f "
-      "times); %lu honest frames\n",
+      "(%.2f times); %lu honest frames\n",
       options.attack.empty() ? "all" : options.attack.c_str(),
       options.first ? ", honest threads first" : "", peak, planned_mib_,
       group_.available() ? "yes" : "no", group_.PeakMib(), undisturbed, disturbed,

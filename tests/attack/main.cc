@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
                    "Attack another server, to see what the attackers' own work costs");
   app.add_flag("--first", options.first,
                "Run the server and the honest clients before all other threads (SCHED_RR), because "
-               "attackers on machines of their own take none of their processor time. Requires "
+               "real attackers take no processor time of the server's machine. Requires "
                "root, CAP_SYS_NICE or a limit of real-time priorities above 0")
       ->excludes(elsewhere);
   app.add_option("--server", options.server, "Attack this program, such as an earlier build");

@@ -1,5 +1,4 @@
-// Which threads of a test run first on shared processors: attackers and what is measured share
-// them.
+// Scheduling policies of a test's threads: attackers share the processors with the measured server.
 #pragma once
 
 #include <string>
