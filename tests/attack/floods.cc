@@ -1,7 +1,5 @@
 #include "attack/floods.h"
 
-#include <sched.h>
-
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -9,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "attack/processor_share.h"
 #include "attack/requests.h"
 
 namespace partiemc::attack {
@@ -203,11 +202,6 @@ void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
 }
 
 }  // namespace
-
-void YieldProcessors() {
-  const sched_param parameters{};
-  sched_setscheduler(0, SCHED_IDLE, &parameters);  // 0: the calling thread.
-}
 
 std::span<const Flood> Floods() { return kFloods; }
 

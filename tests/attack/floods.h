@@ -45,9 +45,6 @@ struct FloodOutcome {
   std::uint64_t refused = 0;      ///< Refused attempts to connect.
 };
 
-/// From now on the calling thread runs only on idle processors (SCHED_IDLE).
-void YieldProcessors();
-
 /// Floods until the time or the bytes are used up. Replaces each lost connection.
 FloodOutcome RunFlood(const Flood& flood, const FloodSettings& settings);
 

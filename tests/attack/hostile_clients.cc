@@ -17,6 +17,7 @@
 
 #include "attack/floods.h"
 #include "attack/http2_client.h"
+#include "attack/processor_share.h"
 #include "attack/requests.h"
 #include "attack/sender.h"
 

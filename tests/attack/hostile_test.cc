@@ -1,7 +1,8 @@
 // All attacks at once beside two honest streams, in a cgroup of the size that the server prints,
 // and a flood without tokens. A minute and ten seconds by default; on demand
 //   attack_test --gtest_filter='Hostile*' --minutes 60 --flood-seconds 60 --slowdown 3
-// and one attack alone: --attack unknown-fields.
+// one attack alone: --attack unknown-fields. The attackers share the processors with the server;
+// with --first they cannot take processor time from it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,6 +21,7 @@
 #include "attack/hostile_clients.h"
 #include "attack/memory_group.h"
 #include "attack/options.h"
+#include "attack/processor_share.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::attack {
@@ -118,9 +120,10 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
   one.Stop();
   two.Stop();
   std::printf(
-      "%s: at most %.1f MiB of %.0f planned, in a group: %s (%.0f MiB); p99 %.2f -> %.2f ms (%.2f "
-      "times); %lu honest frames\n",
-      options.attack.empty() ? "all" : options.attack.c_str(), peak, planned_mib_,
+      "%s%s: at most %.1f MiB of %.0f planned, in a group: %s (%.0f MiB); p99 %.2f -> %.2f ms "
+      "(%.2f times); %lu honest frames\n",
+      options.attack.empty() ? "all" : options.attack.c_str(),
+      options.first ? ", honest threads first" : "", peak, planned_mib_,
       group_.available() ? "yes" : "no", group_.PeakMib(), undisturbed, disturbed,
       disturbed / undisturbed, static_cast<unsigned long>(one.frames() + two.frames()));
   ASSERT_TRUE(server_.Lives()) << server_.Output();
@@ -143,6 +146,7 @@ TEST_F(Hostile, AFloodWithoutATokenTakesLittle) {
   std::vector<std::thread> threads;
   for (std::uint64_t k = 0; k < 4; ++k) {
     threads.emplace_back([&, k] {
+      if (options.first) YieldProcessors();
       Hostility hostility{
           server_.address(), web_, "", support::Random(options.seed + k), stop, calls};
       FloodWithoutToken(hostility, 10'000, 25);

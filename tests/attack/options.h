@@ -15,6 +15,9 @@ struct Options {
   /// --elsewhere: all attacks hit another server of this machine, which shows the cost of the
   /// attackers' processor time.
   bool elsewhere = false;
+  /// --first: the server and the honest clients run before all other threads of the machine, so
+  /// that the attackers cannot take their processor time.
+  bool first = false;
   std::string server;      ///< --server: attacks this program; empty: the one built with the tests.
   std::uint64_t seed = 1;  ///< --seed: seed of random choices.
   /// --slowdown: limit of the honest streams' p99 relative to the undisturbed run. The default
