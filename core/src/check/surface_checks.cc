@@ -242,8 +242,27 @@ absl::Status CheckNormals(const Surface& surface) {
   return absl::OkStatus();
 }
 
+absl::Status CheckCuts(const Surface& surface) {
+  for (std::size_t k = 0; k < surface.cuts.size(); ++k) {
+    const std::uint32_t t = surface.cuts[k];
+    if (t >= surface.TriangleCount() || (k > 0 && t <= surface.cuts[k - 1])) {
+      return Broken("S5: triangle ", t, " of the cuts is not in order, or beyond the ",
+                    surface.TriangleCount(), " triangles");
+    }
+    const Triangle triangle = TriangleAt(surface, t);
+    bool is_on_plane = false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto at = [&](int corner) { return surface.points[3 * triangle[corner] + axis]; };
+      is_on_plane = is_on_plane || (at(0) == at(1) && at(1) == at(2));
+    }
+    if (!is_on_plane) return Broken("S5: triangle ", t, " of the cuts is not on a face of a box");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckMeasures(const Surface& surface) {
   constexpr double kTolerance = 1e-6;
+  std::size_t cut = 0;
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
     double area = 0, volume = 0, size = 0;
@@ -255,7 +274,12 @@ absl::Status CheckMeasures(const Surface& surface) {
       const Vec3 b = Vec3At(surface.points, triangle[1]) - origin;
       const Vec3 c = Vec3At(surface.points, triangle[2]) - origin;
       const double part = Dot(a, Cross(b, c)) / 6;
-      area += Length(Cross(b - a, c - a)) / 2;
+      const bool is_cut = cut < surface.cuts.size() && surface.cuts[cut] == t;
+      if (is_cut) {
+        ++cut;
+      } else {
+        area += Length(Cross(b - a, c - a)) / 2;
+      }
       volume += part;
       moment = moment + (part / 4) * (a + b + c);
       size = std::max({size, Length(a), Length(b), Length(c)});
@@ -291,7 +315,7 @@ absl::Status Validate(const Surface& surface) {
   for (const auto check : {CheckLinks, CheckConnected}) {
     if (absl::Status status = check(surface, sides); !status.ok()) return status;
   }
-  for (const auto check : {CheckCollisions, CheckNesting, CheckNormals, CheckMeasures}) {
+  for (const auto check : {CheckCollisions, CheckNesting, CheckNormals, CheckCuts, CheckMeasures}) {
     if (absl::Status status = check(surface); !status.ok()) return status;
   }
   return absl::OkStatus();
