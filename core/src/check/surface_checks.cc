@@ -265,7 +265,7 @@ absl::Status CheckMeasures(const Surface& surface) {
   std::size_t cut = 0;
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
-    double area = 0, volume = 0, size = 0;
+    double area = 0, volume = 0, size = 0, cut_area = 0;
     Vec3 moment;
     for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
          ++t) {
@@ -275,11 +275,8 @@ absl::Status CheckMeasures(const Surface& surface) {
       const Vec3 c = Vec3At(surface.points, triangle[2]) - origin;
       const double part = Dot(a, Cross(b, c)) / 6;
       const bool is_cut = cut < surface.cuts.size() && surface.cuts[cut] == t;
-      if (is_cut) {
-        ++cut;
-      } else {
-        area += Length(Cross(b - a, c - a)) / 2;
-      }
+      (is_cut ? cut_area : area) += Length(Cross(b - a, c - a)) / 2;
+      cut += is_cut ? 1 : 0;
       volume += part;
       moment = moment + (part / 4) * (a + b + c);
       size = std::max({size, Length(a), Length(b), Length(c)});
@@ -289,7 +286,7 @@ absl::Status CheckMeasures(const Surface& surface) {
       return Broken("S5: shell ", shell, " has area ", ShortestNumber(area), ", not ",
                     ShortestNumber(said.area));
     }
-    const double bound = kTolerance * (std::abs(volume) + kTolerance * area * size);
+    const double bound = kTolerance * (std::abs(volume) + kTolerance * (area + cut_area) * size);
     if (!(std::abs(said.volume - volume) <= bound)) {
       return Broken("S5: shell ", shell, " has volume ", ShortestNumber(volume), ", not ",
                     ShortestNumber(said.volume));

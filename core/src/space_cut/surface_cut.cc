@@ -18,13 +18,19 @@ namespace {
 
 // By how many steps planes move, one try after another. A step is in spacings and in last bits of
 // the coordinate.
-constexpr std::array kShifts = {0., 1., 2., 3., 5., 8., 13., 21., 55., 144., 377., 987.};
+constexpr std::array kShifts = {0.,  1.,   2.,   3.,   5.,    8.,    13.,   21.,
+                                55., 144., 377., 987., 2584., 6765., 17711.};
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 64;
-// Points closer to a plane than this part of a step are too close. A vertex on the plane is one
-// step away after the first move.
-constexpr double kClearance = .25;
-// The volume of a piece is above this part of the volume of a cube around it, or is unknown.
-constexpr double kLeastVolume = 1e-14;
+// Moved alike along two axes, planes would follow diagonal edges of bodies on a lattice.
+constexpr std::array kShiftAlong = {1., 1.37, 1.71};
+// Points closer to a plane than this part of a step are too close. The vertices of a flat face are
+// up to 1e-7 spacings away from a plane, so many may be near a plane in the face.
+constexpr double kClearance = 1. / 256;
+// A piece is dust if its volume is below this part of the volume of a cube around it, or its size
+// below this part of its distance from the origin: rounding hides its volume or its centroid.
+constexpr double kLeastVolume = 1e-14, kLeastSize = 1e-9;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool IsCut(const SurfaceCutInput& input, std::size_t shell) {
   return input.is_cut.empty() || input.is_cut[shell] != 0;
@@ -81,7 +87,7 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() *
                                              farthest[static_cast<std::size_t>(plane.axis)];
-    plane.at += shift * step;
+    plane.at += shift * kShiftAlong[static_cast<std::size_t>(plane.axis)] * step;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
@@ -100,25 +106,25 @@ class Assembly {
            SurfacePieces& pieces)
       : input_(input), from_(from), s_(s), to_(s.surface), pieces_(pieces) {}
 
-  /// Returns false if a piece is too thin to have a volume.
-  bool Run() {
+  void Run() {
     AddWholeTriangles();
     FindPieces();
+    if (DropDust()) FindPieces();
     CopyPoints();
     CopyTriangles();
-    if (!Measure()) return false;
+    Measure();
     Nest();
     WriteParents();
-    return true;
   }
 
  private:
   // Whole shells are pieces as well, so that all shells are in the order of their points.
   void AddWholeTriangles();
   void FindPieces();
+  bool DropDust();
   void CopyPoints();
   void CopyTriangles();
-  bool Measure();
+  void Measure();
   void Nest();
   void NameLargest();
   void WriteParents();
@@ -175,6 +181,58 @@ void Assembly::FindPieces() {
   }
 }
 
+/// Removes the triangles of pieces that are dust. Returns whether there are any.
+bool Assembly::DropDust() {
+  CutMesh& mesh = s_.mesh;
+  struct Size {
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+    Vec3 origin;
+    double volume = 0;
+    bool is_dust = false;
+  };
+  std::vector<Size> sizes(pieces_.sources.size());
+  for (std::size_t point = 0; point < s_.piece_of.size(); ++point) {
+    if (s_.piece_of[point] == kNoIndex) continue;
+    const Vec3 at = Vec3At(mesh.points, point);
+    Size& size = sizes[s_.piece_of[point]];
+    size.origin = at;
+    size.low = {std::min(size.low.x, at.x), std::min(size.low.y, at.y), std::min(size.low.z, at.z)};
+    size.high = {std::max(size.high.x, at.x), std::max(size.high.y, at.y),
+                 std::max(size.high.z, at.z)};
+  }
+  for (std::size_t k = 0; k < mesh.triangles.size(); k += 3) {
+    Size& size = sizes[s_.piece_of[mesh.triangles[k]]];
+    const Vec3 a = Vec3At(mesh.points, mesh.triangles[k]) - size.origin;
+    const Vec3 b = Vec3At(mesh.points, mesh.triangles[k + 1]) - size.origin;
+    const Vec3 c = Vec3At(mesh.points, mesh.triangles[k + 2]) - size.origin;
+    size.volume += Dot(a, Cross(b, c)) / 6;
+  }
+  bool any = false;
+  for (std::size_t piece = 0; piece < sizes.size(); ++piece) {
+    Size& size = sizes[piece];
+    const double across = Length(size.high - size.low);
+    size.is_dust =
+        pieces_.has_cuts[piece] != 0 && !(size.volume > kLeastVolume * across * across * across &&
+                                          across > kLeastSize * Length(size.origin));
+    any = any || size.is_dust;
+  }
+  if (!any) return false;
+  std::size_t kept = 0, caps = 0, whole = 0;
+  for (std::size_t t = 0; t < mesh.shell_of.size(); ++t) {
+    if (t == Cut()) caps = kept;
+    if (t == first_whole_) whole = kept;
+    if (sizes[s_.piece_of[mesh.triangles[3 * t]]].is_dust) continue;
+    std::copy_n(mesh.triangles.begin() + 3 * t, 3, mesh.triangles.begin() + 3 * kept);
+    mesh.shell_of[kept++] = mesh.shell_of[t];
+  }
+  if (first_whole_ == mesh.shell_of.size()) whole = kept;
+  mesh.cap_offsets.front() = static_cast<std::uint32_t>(caps);
+  first_whole_ = whole;
+  mesh.triangles.resize(3 * kept);
+  mesh.shell_of.resize(kept);
+  return true;
+}
+
 /// Turns counts at index k + 1 into offsets, and copies them.
 void SumUp(std::vector<std::uint32_t>& offsets, std::vector<std::uint32_t>& next) {
   for (std::size_t k = 1; k < offsets.size(); ++k) offsets[k] += offsets[k - 1];
@@ -225,7 +283,7 @@ void Assembly::CopyTriangles() {
   std::sort(to_.cuts.begin(), to_.cuts.end());
 }
 
-bool Assembly::Measure() {
+void Assembly::Measure() {
   to_.measures.assign(pieces_.sources.size(), {});
   for (std::uint32_t piece = 0; piece < pieces_.sources.size(); ++piece) {
     ShellMeasures& measures = to_.measures[piece];
@@ -234,21 +292,8 @@ bool Assembly::Measure() {
       continue;
     }
     MeasureShell(piece, to_);
-    const auto points =
-        std::span(to_.points)
-            .subspan(3 * std::size_t{to_.point_offsets[piece]},
-                     3 * std::size_t{to_.point_offsets[piece + 1] - to_.point_offsets[piece]});
-    Vec3 low = Vec3At(points, 0), high = low;
-    for (std::size_t k = 0; k < points.size() / 3; ++k) {
-      const Vec3 at = Vec3At(points, k);
-      low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
-      high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
-    }
-    const double size = Length(high - low);
-    if (!(measures.volume > kLeastVolume * size * size * size)) return false;
   }
   NameLargest();
-  return true;
 }
 
 /// Gives the largest piece of each body that is cut its particles and its identity; the other
@@ -328,7 +373,7 @@ bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePiece
   for (const double shift : kShifts) {
     FillMesh(input, surface, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
-    if (!Assembly(input, surface, s, pieces).Run()) continue;
+    Assembly(input, surface, s, pieces).Run();
     s.surface.statistics = surface.statistics;
     std::swap(s.surface.attributes, surface.attributes);
     std::swap(s.surface, surface);

@@ -11,7 +11,8 @@
 namespace partiemc::space {
 
 struct SurfaceCutInput {
-  /// Shells lose their parts beyond each of these planes.
+  /// Shells lose their parts beyond each of these planes. Two planes with the same axis are at
+  /// least a millionth of the spacing apart.
   std::span<const AxisPlane> planes;
   /// By shell: whether it is cut. The cavities of a shell that is cut are cut, too. Empty: all are.
   std::span<const std::uint8_t> is_cut;
@@ -45,11 +46,14 @@ struct SurfacePieces {
 /// outer shell; other parts are whole shells, with their measures. The parts of a shell take its
 /// place, those without a point of the given surface come last.
 ///
+/// Parts that are dust are dropped: smaller than 1e-9 of their distance from the origin, or thinner
+/// than rounding. Their measures would have no correct digits.
+///
 /// The largest part of a body has the particles, identity and parents of its outer shell; other
 /// parts have none.
 ///
 /// Where a vertex lies on a plane, or rounding leaves a decision open, all planes with the same
-/// axis move by the same amount: by up to some millionths of the spacing (kShifts in
+/// axis move by the same amount: by up to .00002 spacings (kShifts in
 /// surface_cut.cc). Returns false, with `surface` unchanged, if this does not help, which is a bug.
 /// Requires: S1 to S5; `surface.attributes` without values.
 /// Deterministic. Cost: linear in the surface, plus CutAtPlane and CapPlanes; ShellsAround if a
