@@ -202,6 +202,38 @@ TEST(SurfaceCut, ShellsThatAreNotCutKeepTheirBits) {
   EXPECT_LT(part.measures[0].volume, .5 * both.measures[0].volume);
 }
 
+TEST(SurfaceCut, FlatLayerIsCutAtFourFaces) {
+  // The faces pass through lattice nodes, and the top is flat up to rounding.
+  for (const double shift : {0.0, 1e5}) {
+    SpaceParticles layer;
+    Random random(1);
+    layer.Add(testing::Box(Vec3{shift, 0, 0}, Vec3{shift + 24, 24, 4}, 0, random));
+    for (const auto placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                                 SurfacePlacement::kVirtualPlane}) {
+      const Surface surface = SurfaceOf(layer, placement);
+      const std::vector<AxisPlane> planes = {
+          {0, shift + 7, true}, {0, shift + 16, false}, {1, 7, true}, {1, 16, false}};
+      const Surface part = Part(surface, planes);
+      ASSERT_EQ(part.ShellCount(), 1u);
+      ExpectCutsOn(part, planes);
+      EXPECT_NEAR(part.measures[0].area, 2 * 81, 1e-2);
+      // The nine parts between and beside the planes are the whole.
+      double sum = 0;
+      for (int column = 0; column < 3; ++column) {
+        for (int row = 0; row < 3; ++row) {
+          std::vector<AxisPlane> sides;
+          if (column > 0) sides.push_back({0, column == 1 ? shift + 7 : shift + 16, true});
+          if (column < 2) sides.push_back({0, column == 0 ? shift + 7 : shift + 16, false});
+          if (row > 0) sides.push_back({1, row == 1 ? 7. : 16., true});
+          if (row < 2) sides.push_back({1, row == 0 ? 7. : 16., false});
+          sum += VolumeOf(Part(surface, sides));
+        }
+      }
+      EXPECT_NEAR(sum, VolumeOf(surface), 1e-5 * sum);
+    }
+  }
+}
+
 TEST(SurfaceCut, PartsOfRandomSurfacesMakeTheWhole) {
   for (std::uint64_t seed = 1; seed <= testing::Frames(60); ++seed) {
     SCOPED_TRACE(seed);
