@@ -92,8 +92,8 @@ struct PlaneCutScratch {
 /// S1 to S3 of partiemc/surface.h before the cuts, it has them afterwards:
 ///   - each point of a cap has one edge that arrives and one that leaves, and the triangulation is
 ///     exact, so that caps are flat, simple, and touch each other only in common edges;
-///   - all other points are strictly on the kept side, so that other triangles touch a plane only
-///     with edges and points of the cap;
+///   - all other points are strictly on the kept side, so other triangles touch a plane only with
+///     edges and points of the cap;
 ///   - clipped triangles are compared with each other and with their neighbours.
 /// Returns false, with `mesh` in any state, if a check fails. Cost: n log n in clipped triangles,
 /// triangles near the planes, and points of the caps.
