@@ -13,7 +13,7 @@
 namespace partiemc {
 
 struct ShellMeasures {
-  double area = 0;    ///< World units squared.
+  double area = 0;    ///< World units squared, without the triangles of Surface::cuts.
   double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
   double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the enclosed volume.
   std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
@@ -29,6 +29,7 @@ struct SurfaceStatistics {
   std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
   std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
+  std::uint64_t cut_bodies = 0;          ///< Bodies that were cut at faces of the periodic box.
 
   friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
 };
@@ -42,7 +43,8 @@ struct SurfaceStatistics {
 ///      shell around an outer shell, if any, is a cavity, and the next shell around a cavity is the
 ///      outer shell that `outer_of` gives;
 ///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
-///      centroids are those of the triangles.
+///      centroids are those of the triangles. Each triangle of `cuts` has one coordinate that is
+///      the same at its three corners.
 struct Surface {
   std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.
@@ -56,6 +58,9 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
+  /// Triangles, ascending, that lie on faces of the periodic box, where a body was cut
+  /// (SurfaceParameters::box). They close the surface; areas do not count them.
+  std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.
   std::vector<AttributeValues> attributes;

@@ -41,6 +41,7 @@ void Surface::Clear() {
   measures.clear();
   parents.clear();
   parent_offsets.assign(1, 0);
+  cuts.clear();
   for (AttributeValues& attribute : attributes) attribute.values.clear();
   statistics = {};
 }

@@ -242,11 +242,30 @@ absl::Status CheckNormals(const Surface& surface) {
   return absl::OkStatus();
 }
 
+absl::Status CheckCuts(const Surface& surface) {
+  for (std::size_t k = 0; k < surface.cuts.size(); ++k) {
+    const std::uint32_t t = surface.cuts[k];
+    if (t >= surface.TriangleCount() || (k > 0 && t <= surface.cuts[k - 1])) {
+      return Broken("S5: triangle ", t, " of the cuts is not in order, or beyond the ",
+                    surface.TriangleCount(), " triangles");
+    }
+    const Triangle triangle = TriangleAt(surface, t);
+    bool is_on_plane = false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto at = [&](int corner) { return surface.points[3 * triangle[corner] + axis]; };
+      is_on_plane = is_on_plane || (at(0) == at(1) && at(1) == at(2));
+    }
+    if (!is_on_plane) return Broken("S5: triangle ", t, " of the cuts is not on a face of a box");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckMeasures(const Surface& surface) {
   constexpr double kTolerance = 1e-6;
+  std::size_t cut = 0;
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
-    double area = 0, volume = 0, size = 0;
+    double area = 0, volume = 0, size = 0, cut_area = 0;
     Vec3 moment;
     for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
          ++t) {
@@ -255,7 +274,9 @@ absl::Status CheckMeasures(const Surface& surface) {
       const Vec3 b = Vec3At(surface.points, triangle[1]) - origin;
       const Vec3 c = Vec3At(surface.points, triangle[2]) - origin;
       const double part = Dot(a, Cross(b, c)) / 6;
-      area += Length(Cross(b - a, c - a)) / 2;
+      const bool is_cut = cut < surface.cuts.size() && surface.cuts[cut] == t;
+      (is_cut ? cut_area : area) += Length(Cross(b - a, c - a)) / 2;
+      cut += is_cut ? 1 : 0;
       volume += part;
       moment = moment + (part / 4) * (a + b + c);
       size = std::max({size, Length(a), Length(b), Length(c)});
@@ -265,7 +286,7 @@ absl::Status CheckMeasures(const Surface& surface) {
       return Broken("S5: shell ", shell, " has area ", ShortestNumber(area), ", not ",
                     ShortestNumber(said.area));
     }
-    const double bound = kTolerance * (std::abs(volume) + kTolerance * area * size);
+    const double bound = kTolerance * (std::abs(volume) + kTolerance * (area + cut_area) * size);
     if (!(std::abs(said.volume - volume) <= bound)) {
       return Broken("S5: shell ", shell, " has volume ", ShortestNumber(volume), ", not ",
                     ShortestNumber(said.volume));
@@ -291,7 +312,7 @@ absl::Status Validate(const Surface& surface) {
   for (const auto check : {CheckLinks, CheckConnected}) {
     if (absl::Status status = check(surface, sides); !status.ok()) return status;
   }
-  for (const auto check : {CheckCollisions, CheckNesting, CheckNormals, CheckMeasures}) {
+  for (const auto check : {CheckCollisions, CheckNesting, CheckNormals, CheckCuts, CheckMeasures}) {
     if (absl::Status status = check(surface); !status.ok()) return status;
   }
   return absl::OkStatus();

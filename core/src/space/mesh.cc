@@ -141,13 +141,19 @@ void MeasureShell(std::uint32_t shell, Surface& surface) {
   const Vec3 origin = Vec3At(surface.points, surface.point_offsets[shell]);
   double area = 0, volume = 0;
   Vec3 moment;
+  auto cut =
+      std::lower_bound(surface.cuts.begin(), surface.cuts.end(), surface.triangle_offsets[shell]);
   for (std::size_t t = surface.triangle_offsets[shell]; t < surface.triangle_offsets[shell + 1];
        ++t) {
     const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]) - origin;
     const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]) - origin;
     const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]) - origin;
     const double part = Dot(a, Cross(b, c)) / 6;
-    area += Length(Cross(b - a, c - a)) / 2;
+    if (cut != surface.cuts.end() && *cut == t) {
+      ++cut;
+    } else {
+      area += Length(Cross(b - a, c - a)) / 2;
+    }
     volume += part;
     moment = moment + (part / 4) * (a + b + c);
   }

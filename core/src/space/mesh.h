@@ -45,7 +45,8 @@ struct MeshScratch {
 /// loops, one corner is the vertex in the cell.
 void EmitMarchingCubes(const SpaceCrossings& crossings, std::vector<VertexTriangle>& triangles);
 
-/// Sets area, volume and centroid of a shell to those of its triangles.
+/// Sets area, volume and centroid of a shell to those of its triangles. The area does not count the
+/// triangles of `cuts`.
 void MeasureShell(std::uint32_t shell, Surface& surface);
 
 /// Sorts `scratch.triangles` and their vertices by shell and measures the shells. Shells are

@@ -237,6 +237,9 @@ TEST(SurfaceChecks, FindsWrongSizesNormalsMeasures) {
   spoil([](Surface& surface) { surface.measures[1].volume *= -1; });
   spoil([](Surface& surface) { surface.measures[0].centroid_y += .01; });
   spoil([](Surface& surface) { surface.measures[0].volume = std::nan(""); });
+  spoil([](Surface& surface) { surface.cuts = {0}; });  // Its area counts it.
+  spoil([](Surface& surface) { surface.cuts = {1, 0}; });
+  spoil([](Surface& surface) { surface.cuts = {0xffffffff}; });
   spoil([](Surface& surface) { surface.point_offsets.back() = 0; });
   spoil([](Surface& surface) { surface.triangle_offsets.clear(); });
 }
