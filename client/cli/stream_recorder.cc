@@ -82,6 +82,10 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
   for (const Wall& wall : parameters.walls) AppendAll(flags, " --wall ", NumberList(wall.points));
+  for (const WallPlane& wall : parameters.wall_planes) {
+    AppendAll(flags, " --wall-plane ", std::string(1, "xyz"[wall.axis]), "=",
+              ShortestNumber(wall.position), wall.is_fluid_above ? "" : ",below");
+  }
   // A recording has no phases, so it gives the outline of all particles, without walls of theirs.
   std::string isovalues;
   for (const Section& section : parameters.sections) {

@@ -148,7 +148,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(25, BlobParameters());
+  std::vector<ReconstructionParameters> others(29, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -175,6 +175,10 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[22].walls = {{.points = {-100, -100, 100, -100, 0, 100}}};
   others[23].wall_phases = {1};
   others[24].wall_phases = {1, 2};
+  others[25].wall_planes = {{0, 1, true}};
+  others[26].wall_planes = {{1, 1, true}};
+  others[27].wall_planes = {{0, 1, false}};
+  others[28].wall_planes = {{0, 2, true}};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);

@@ -81,11 +81,23 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() *
                                              farthest[static_cast<std::size_t>(plane.axis)];
-    plane.at += shift * step;
+    plane.at += (input.are_walls && !plane.keeps_above ? -shift : shift) * step;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
   return CapPlanes(s.plane, s.mesh);
+}
+
+/// Moves the points of caps to the given planes.
+void ReturnToPlanes(const SurfaceCutInput& input, CutMesh& mesh) {
+  for (std::size_t cap = 0; cap < input.planes.size(); ++cap) {
+    const AxisPlane& plane = input.planes[cap];
+    for (std::size_t k = 3 * std::size_t{mesh.cap_offsets[cap]};
+         k < 3 * std::size_t{mesh.cap_offsets[cap + 1]}; ++k) {
+      mesh.points[3 * std::size_t{mesh.triangles[k]} + static_cast<std::size_t>(plane.axis)] =
+          plane.at;
+    }
+  }
 }
 
 std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t point) {
@@ -328,7 +340,10 @@ bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePiece
   for (const double shift : kShifts) {
     FillMesh(input, surface, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
+    const bool has_returned = input.are_walls && shift != 0;
+    if (has_returned) ReturnToPlanes(input, s.mesh);
     if (!Assembly(input, surface, s, pieces).Run()) continue;
+    if (has_returned && !Validate(s.surface).ok()) continue;
     s.surface.statistics = surface.statistics;
     std::swap(s.surface.attributes, surface.attributes);
     std::swap(s.surface, surface);
