@@ -148,7 +148,7 @@ TEST(Checkpoint, AnythingCutOffOrAppendedIsRefused) {
 
 TEST(Checkpoint, IsBoundToEveryParameter) {
   const std::string checkpoint = CheckpointAfter(1);
-  std::vector<ReconstructionParameters> others(29, BlobParameters());
+  std::vector<ReconstructionParameters> others(25, BlobParameters());
   others[0].spacing = kBlobSpacing * 1.0001;
   others[1].placement = Placement::kQef;
   others[2].fill = Fill::kNone;
@@ -175,10 +175,6 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   others[22].walls = {{.points = {-100, -100, 100, -100, 0, 100}}};
   others[23].wall_phases = {1};
   others[24].wall_phases = {1, 2};
-  others[25].wall_planes = {{0, 1, true}};
-  others[26].wall_planes = {{1, 1, true}};
-  others[27].wall_planes = {{0, 1, false}};
-  others[28].wall_planes = {{0, 2, true}};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const auto session = Session::Open(others[k], kLimits);
     const auto refused = ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr);
@@ -190,6 +186,22 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   default_told.clean = true;  // The default of `virtual-plane`.
   const auto session = Session::Open(default_told, kLimits);
   EXPECT_TRUE(ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr).ok());
+}
+
+TEST(Checkpoint, IsBoundToTheWallsOfASurface) {
+  std::vector<ReconstructionParameters> all(5, BlobParameters());
+  for (ReconstructionParameters& parameters : all) parameters.output = Output::kSurface;
+  all[1].wall_planes = {{0, 1, true}};
+  all[2].wall_planes = {{1, 1, true}};
+  all[3].wall_planes = {{0, 1, false}};
+  all[4].wall_planes = {{0, 2, true}};
+  for (std::size_t of = 0; of < all.size(); ++of) {
+    const std::string checkpoint = Serialize(1, State{}, all[of], Terms(), nullptr);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const auto parsed = ParseCheckpoint(checkpoint, all[k], Terms(), nullptr);
+      EXPECT_EQ(ReasonOf(parsed.status()) == kReasonCheckpointMismatch, k != of) << of << " " << k;
+    }
+  }
 }
 
 TEST(Checkpoint, DistinguishesParametersWithTheSameValue) {

@@ -20,6 +20,9 @@ namespace {
 // the coordinate.
 constexpr std::array kShifts = {0., 1., 2., 3., 5., 8., 13., 21., 55., 144., 377., 987.};
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 64;
+// Planes of different axes move by different factors. If a vertex lies on two planes, an edge
+// from it along their diagonal would meet both again after equal moves.
+constexpr std::array kFactors = {1., 1.3179, .7236};
 // Points closer to a plane than this part of a step are too close. A vertex on the plane is one
 // step away after the first move.
 constexpr double kClearance = .25;
@@ -81,7 +84,8 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() *
                                              farthest[static_cast<std::size_t>(plane.axis)];
-    plane.at += (input.are_walls && !plane.keeps_above ? -shift : shift) * step;
+    const double move = shift * step * kFactors[static_cast<std::size_t>(plane.axis)];
+    plane.at += input.are_walls && !plane.keeps_above ? -move : move;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
@@ -337,13 +341,16 @@ void Assembly::WriteParents() {
 
 bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePieces& pieces,
                 Surface& surface) {
-  for (const double shift : kShifts) {
+  // With walls, the second half of the tries leaves the points where the cuts are.
+  const std::size_t tries = input.are_walls ? 2 * kShifts.size() : kShifts.size();
+  for (std::size_t attempt = 0; attempt < tries; ++attempt) {
+    const double shift = kShifts[attempt % kShifts.size()];
     FillMesh(input, surface, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
-    const bool has_returned = input.are_walls && shift != 0;
-    if (has_returned) ReturnToPlanes(input, s.mesh);
+    const bool returns = input.are_walls && shift != 0 && attempt < kShifts.size();
+    if (returns) ReturnToPlanes(input, s.mesh);
     if (!Assembly(input, surface, s, pieces).Run()) continue;
-    if (has_returned && !Validate(s.surface).ok()) continue;
+    if (returns && !Validate(s.surface).ok()) continue;
     s.surface.statistics = surface.statistics;
     std::swap(s.surface.attributes, surface.attributes);
     std::swap(s.surface, surface);

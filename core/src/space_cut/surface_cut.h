@@ -21,6 +21,7 @@ struct SurfaceCutInput {
   double spacing = 1;  ///< World units.
   /// Planes move to the side that is kept, and the points on a plane that has moved return to the
   /// given plane: all points are exactly on walls or before them. Validate checks the surface then.
+  /// If it always fails, the points stay on the plane that has moved.
   bool are_walls = false;
 };
 
