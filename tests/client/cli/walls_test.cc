@@ -132,7 +132,7 @@ TEST(WallsReplay, BlockFillsItsTankInSpace) {
       Replayed(folder.Path("block.csv"),
                {"--local", "--surface", "--wall-plane", "z=0", "--wall-plane", "x=10,below",
                 "--wall-plane", "x=0,above", "--wall-plane", "y=0", "--wall-plane", "y=9,below",
-                "--format", "obj", "--output", folder.Path("out")});
+                "--format", "obj", "--output-dir", folder.Path("out")});
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
   for (const std::string text : {"w=0", "z", "z=", "z=1,2", "z=x", "z=0,beside", ""}) {
     const Ran wrong = Replayed(folder.Path("block.csv"), {"--local", "--wall-plane", text});
