@@ -94,6 +94,10 @@ std::vector<Wall> WallsOf(const partiemc_options& options) {
 absl::Status CheckWalls(const partiemc_options& options) {
   const bool has_walls = options.wall_count == 0 || (options.walls && options.wall_sizes);
   const bool has_phases = options.wall_phase_count == 0 || options.wall_phases;
+  if (options.wall_plane_count != 0 && options.wall_planes == nullptr) {
+    return absl::InvalidArgumentError(
+        "wall_planes: NULL; must be an array of wall_plane_count walls");
+  }
   if (has_walls && has_phases) return absl::OkStatus();
   return absl::InvalidArgumentError(
       has_walls ? "wall_phases: NULL; must be an array of wall_phase_count phases"
@@ -136,6 +140,10 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& op
   parameters.walls = WallsOf(options);
   parameters.wall_phases.assign(options.wall_phases,
                                 options.wall_phases + options.wall_phase_count);
+  for (std::size_t k = 0; k < options.wall_plane_count; ++k) {
+    const partiemc_wall_plane& from = options.wall_planes[k];
+    parameters.wall_planes.push_back({from.axis, from.position, from.fluid_below == 0});
+  }
   absl::Status named;
   if (options.output != nullptr) named.Update(SetByName(options.output, parameters.output));
   if (options.placement != nullptr)

@@ -67,10 +67,17 @@ std::string AsFlag(const absl::Status& status) {
     const std::size_t index = std::strtoul(line.c_str() + kWalls.size(), nullptr, 10);
     line.replace(0, std::min(line.find(':'), line.size()), absl::StrCat("wall number ", index + 1));
   }
+  constexpr std::string_view kPlanes = "wall_planes[";
+  if (line.starts_with(kPlanes)) {
+    const std::size_t index = std::strtoul(line.c_str() + kPlanes.size(), nullptr, 10);
+    line.replace(0, std::min(line.find(':'), line.size()),
+                 absl::StrCat("wall-plane number ", index + 1));
+  }
   for (const auto& [field, flag] :
        {std::pair("isovalue:", "isolines:"), std::pair("sections:", "slice and isolines:"),
-        std::pair("walls:", "wall:"), std::pair("wall_phases", "wall"),
-        std::pair("phase:", "phases:"), std::pair("min_component_volume:", "min-volume:")}) {
+        std::pair("walls:", "wall:"), std::pair("wall_planes:", "wall-plane:"),
+        std::pair("wall_phases", "wall"), std::pair("phase:", "phases:"),
+        std::pair("min_component_volume:", "min-volume:")}) {
     if (line.starts_with(field)) line.replace(0, std::string_view(field).size(), flag);
   }
   line.insert(0, "--");

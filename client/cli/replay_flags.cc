@@ -235,6 +235,14 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       ->allow_extra_args(false)
       ->group(kGroup);
   app.add_option(
+         "--wall-plane", flags.wall_planes,
+         "Wall at which a surface is cut, by the coordinate that is constant on it, in world "
+         "units. z=0 is a floor, with the fluid above it; z=5,below is a ceiling, with the "
+         "fluid below it. Repeat for more walls, one for each side of each axis")
+      ->type_name("AXIS=POSITION[,below]")
+      ->allow_extra_args(false)
+      ->group(kGroup);
+  app.add_option(
          "--slice", flags.slices,
          "Plane to cut 3D particles with: x=C, y=C, z=C, or a point and a normal. Repeat for "
          "more planes")

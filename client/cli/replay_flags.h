@@ -43,6 +43,7 @@ struct ReplayFlags {
   std::string box;               ///< "X0,X1,Y0,Y1[,Z0,Z1]"; empty: the box of the input.
   bool wrap = false;             ///< Results are wrapped into the periodic box.
   std::optional<double> noise_filter;
+  std::vector<std::string> wall_planes;  ///< "x=0", "x=9,below": the walls of a surface.
   std::vector<std::string> walls;  ///< "X0,Y0,X1,Y1,...": the points of each wall; or "NAME=1,2".
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   std::string sizes = "equal";

@@ -133,6 +133,27 @@ absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& param
   return absl::OkStatus();
 }
 
+// Parses each --wall-plane. The core's Validate checks how they fit.
+absl::Status AddWallPlanes(const ReplayFlags& flags, ReconstructionParameters& parameters) {
+  constexpr std::string_view kAxes = "xyz", kBelow = ",below", kAbove = ",above";
+  for (const std::string& text : flags.wall_planes) {
+    std::string_view rest = text;
+    const bool is_below = rest.ends_with(kBelow);
+    if (is_below || rest.ends_with(kAbove)) rest.remove_suffix(kBelow.size());
+    const std::size_t axis = rest.empty() ? kAxes.npos : kAxes.find(rest.front());
+    if (axis != kAxes.npos && rest.substr(1).starts_with('=')) {
+      const std::vector<double> position = Numbers(std::string(rest.substr(2)));
+      if (position.size() == 1) {
+        parameters.wall_planes.push_back({static_cast<int>(axis), position[0], !is_below});
+        continue;
+      }
+    }
+    return WrongFlag("--wall-plane", text,
+                     "x, y or z and a coordinate: z=0 with the fluid above, or z=5,below");
+  }
+  return absl::OkStatus();
+}
+
 // Parses each --wall. The core's Validate checks what the points form.
 absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   for (const std::string& text : flags.walls) {
@@ -243,6 +264,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   if (auto status = AddSections(flags, parameters); !status.ok()) return status;
   if (auto status = AddPhases(flags, parameters); !status.ok()) return status;
   if (auto status = AddWalls(flags, parameters); !status.ok()) return status;
+  if (auto status = AddWallPlanes(flags, parameters); !status.ok()) return status;
   if (auto status = SetBox(flags, box, parameters); !status.ok()) return status;
   if (flags.clean == "on" || flags.clean == "off") {
     parameters.clean = flags.clean == "on";

@@ -90,6 +90,10 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
   for (const Wall& wall : parameters.walls) AppendAll(flags, " --wall ", NumberList(wall.points));
+  for (const WallPlane& wall : parameters.wall_planes) {
+    AppendAll(flags, " --wall-plane ", std::string(1, "xyz"[wall.axis]), "=",
+              ShortestNumber(wall.position), wall.is_fluid_above ? "" : ",below");
+  }
   if (!parameters.wall_phases.empty()) {
     AppendAll(flags, " --wall ", PhasesOf(parameters.phase_attribute, parameters.wall_phases));
   }

@@ -47,6 +47,10 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
   if (parameters->walls != requested.walls || parameters->wall_phases != requested.wall_phases) {
     return absl::UnimplementedError("the server does not support walls: use a newer one");
   }
+  if (parameters->wall_planes != requested.wall_planes) {
+    return absl::UnimplementedError(
+        "the server does not support walls of surfaces: use a newer one");
+  }
   return StreamInfo{
       .stream_id = opened.stream_id(),
       .parameters = *parameters,

@@ -177,6 +177,29 @@ void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
   }
 }
 
+// Reads the walls of a surface: {"axis": "z", "position": 0, "side": "above"}.
+void TakeWallPlanes(py::dict& arguments, std::vector<WallPlane>& planes) {
+  const auto given = Take<std::vector<py::object>>(arguments, "wall_planes");
+  if (!given) return;
+  constexpr std::string_view kAxes = "xyz";
+  for (std::size_t k = 0; k < given->size(); ++k) {
+    const std::string field = "wall_planes[" + std::to_string(k) + "]";
+    const auto refuse = [&] {
+      Raise(Invalid("UNSUPPORTED", field, py::repr((*given)[k]).cast<std::string>(),
+                    "must be a dict of axis ('x', 'y' or 'z'), position, and side of the fluid "
+                    "('above' or 'below')"));
+    };
+    if (!py::isinstance<py::dict>((*given)[k])) refuse();
+    py::dict dict = (*given)[k].cast<py::dict>().attr("copy")();
+    const auto axis = Take<std::string>(dict, "axis");
+    const auto position = Take<double>(dict, "position");
+    const std::string side = Take<std::string>(dict, "side").value_or("above");
+    const bool is_axis = axis && axis->size() == 1 && kAxes.find(*axis) != kAxes.npos;
+    if (!is_axis || !position || (side != "above" && side != "below") || !dict.empty()) refuse();
+    planes.push_back({static_cast<int>(kAxes.find(*axis)), *position, side == "above"});
+  }
+}
+
 py::object ToPython(const std::optional<SlicePlane>& slice) {
   if (!slice) return py::none();
   const auto triple = [](const std::array<double, 3>& v) {
@@ -213,6 +236,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeBox(arguments, parameters.box);
   TakeInto(arguments, "noise_filter", parameters.noise_filter);
   TakeWalls(arguments, parameters.walls);
+  TakeWallPlanes(arguments, parameters.wall_planes);
   TakeInto(arguments, "wall_phases", parameters.wall_phases);
   TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
@@ -311,6 +335,14 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
   }
   py::list walls;
   for (const Wall& wall : parameters.walls) walls.append(wall.points);
+  py::list wall_planes;
+  for (const WallPlane& wall : parameters.wall_planes) {
+    py::dict dict;
+    dict["axis"] = std::string(1, "xyz"[wall.axis]);
+    dict["position"] = wall.position;
+    dict["side"] = wall.is_fluid_above ? "above" : "below";
+    wall_planes.append(dict);
+  }
   const auto named = [](auto value) { return std::string(Name(value)); };
   using namespace py::literals;
   py::dict dict("output"_a = named(parameters.output), "placement"_a = named(parameters.placement),
@@ -327,7 +359,7 @@ py::dict ToDict(const ReconstructionParameters& parameters) {
                 "sections"_a = sections, "box"_a = ToPython(parameters.box),
                 "wrap"_a = parameters.box && parameters.box->wraps,
                 "noise_filter"_a = parameters.noise_filter, "walls"_a = walls,
-                "wall_phases"_a = parameters.wall_phases,
+                "wall_phases"_a = parameters.wall_phases, "wall_planes"_a = wall_planes,
                 "phase_attribute"_a = parameters.phase_attribute,
                 "sizes"_a = named(parameters.sizes), "boundary"_a = named(parameters.boundary));
   if (parameters.output == Output::kSurface) {

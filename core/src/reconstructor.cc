@@ -142,6 +142,7 @@ SurfaceParameters SurfaceParametersOf(const ReconstructionParameters& parameters
   surface.min_component_volume = parameters.surface.min_component_volume;
   surface.min_component_particles = parameters.min_component_particles;
   surface.box = parameters.box;
+  surface.wall_planes = parameters.wall_planes;
   return surface;
 }
 

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -22,6 +24,7 @@
 #include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame/scale.h"
+#include "frame/wall_rules.h"
 #include "frame_lengths.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
@@ -35,6 +38,7 @@
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/surface_bytes.h"
+#include "space_cut/surface_cut.h"
 #include "space_identities/shell_identities.h"
 #include "space_vertices/drops.h"
 #include "space_vertices/point_attributes.h"
@@ -42,8 +46,21 @@
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
 #include "space_vertices/virtual_plane.h"
+#include "walls/wall_images.h"
 
 namespace partiemc {
+
+namespace {
+
+/// Warm buffers of CutAtWalls.
+struct WallCutScratch {
+  std::vector<space::AxisPlane> planes;
+  std::vector<std::uint8_t> is_cut;  // By shell.
+  space::SurfaceCutScratch cut;
+  space::SurfacePieces pieces;
+};
+
+}  // namespace
 
 struct SurfaceWorkspace::Buffers {
   DistinctIdsScratch distinct_ids;
@@ -52,7 +69,9 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceCrossings crossings;
   space::Bodies bodies;
   space::CleaningScratch cleaning;
-  LiftScratch lift;  // Empty without a periodic box.
+  LiftScratch lift;         // Empty without a periodic box.
+  WallImageScratch images;  // Empty without walls.
+  WallCutScratch wall_cut;
   std::vector<Vec3> anchors, positions, normals;
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
@@ -142,14 +161,16 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
                     " MiB: reach fewer bricks, or try again later")});
 }
 
-/// Sets the counts that identities and attributes require.
-void AddBodies(const Frame& frame, const space::Bodies& bodies, space::SurfaceSize& size) {
+/// Sets the counts that identities and attributes require. `particles`: without images behind
+/// walls.
+void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& bodies,
+               space::SurfaceSize& size) {
   std::uint64_t in_bodies = 0;
   for (const space::Body& body : bodies.bodies) {
     in_bodies += body.particles;
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
-  const std::uint64_t alone = frame.ParticleCount() - in_bodies;
+  const std::uint64_t alone = particles - in_bodies;
   size.bodies = bodies.bodies.size() + alone;
   size.samples = frame.ids.empty() ? 0 : size.samples + alone;
   for (const Attribute& attribute : frame.attributes) size.attribute_values += attribute.components;
@@ -249,6 +270,75 @@ void MakeEmpty(Surface& surface) {
   surface.attributes.clear();
 }
 
+/// Checks the walls, and that nothing excludes them.
+absl::Status CheckWallsOf(const SurfaceParameters& parameters) {
+  const std::vector<WallPlane>& planes = parameters.wall_planes;
+  if (planes.empty()) return absl::OkStatus();
+  const char* rule = nullptr;
+  if (parameters.box) rule = "must be absent with a periodic box";
+  if (parameters.sizes == Sizes::kOwn) rule = "must be absent unless sizes are equal";
+  if (rule != nullptr) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(kReasonOutOfRange), "parameters.wall_planes",
+                           absl::StrCat(planes.size()), rule});
+  }
+  return CheckWallPlanes(planes, parameters.kernel_radius, parameters.spacing);
+}
+
+// Images of particles reach two kernel radii behind walls: F is exact for one of them, which
+// windows require. Particles up to half a spacing behind a wall are before it.
+constexpr double kImageRadii = 2, kWallTolerance = .5;
+
+/// The space before the walls, in world units; absent without walls.
+std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters) {
+  if (parameters.wall_planes.empty()) return std::nullopt;
+  const FluidBox box = FluidBoxOf(parameters.wall_planes);
+  return space::ClipBox{{box.low[0], box.low[1], box.low[2]},
+                        {box.high[0], box.high[1], box.high[2]}};
+}
+
+/// Cuts the shells that reach a wall. Returns false if CutSurface does.
+bool CutAtWalls(const SurfaceParameters& parameters, WallCutScratch& scratch, Surface& surface) {
+  // Above the largest move of a plane (CutSurface), so that no other shell reaches a moved plane.
+  constexpr double kReach = 1e-4;
+  scratch.planes.clear();
+  scratch.is_cut.assign(surface.ShellCount(), 0);
+  bool any = false;
+  for (const WallPlane& plane : parameters.wall_planes) {
+    scratch.planes.push_back({plane.axis, plane.position, plane.is_fluid_above});
+    const double sign = plane.is_fluid_above ? 1 : -1;
+    const double reach = kReach * parameters.spacing +
+                         kReach * std::numeric_limits<float>::epsilon() * std::abs(plane.position);
+    for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+      if (scratch.is_cut[shell] != 0) continue;
+      for (std::size_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1];
+           ++p) {
+        const double at = surface.points[3 * p + static_cast<std::size_t>(plane.axis)];
+        if (sign * (at - plane.position) > reach) continue;
+        scratch.is_cut[shell] = 1;
+        any = true;
+        break;
+      }
+    }
+  }
+  if (!any) return true;
+  // A body and its cavities are cut together.
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+      const std::uint32_t outer = surface.outer_of[shell];
+      if (outer == kNoShell) continue;
+      if (pass == 0 ? scratch.is_cut[shell] != 0 : scratch.is_cut[outer] != 0) {
+        scratch.is_cut[shell] = scratch.is_cut[outer] = 1;
+      }
+    }
+  }
+  return space::CutSurface({.planes = scratch.planes,
+                            .is_cut = scratch.is_cut,
+                            .spacing = parameters.spacing,
+                            .are_walls = true},
+                           scratch.cut, scratch.pieces, surface);
+}
+
 /// The periods of the lattice; without a box, none.
 LatticePeriods PeriodsOf(const SurfaceParameters& parameters, double cell_size) {
   LatticePeriods periods;
@@ -293,6 +383,7 @@ absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     absl::Status status = Validate(*parameters.box, parameters.kernel_radius, parameters.spacing);
     if (!status.ok()) return status;
   }
+  if (absl::Status status = CheckWallsOf(parameters); !status.ok()) return status;
   if (absl::Status status = Validate(limits); !status.ok()) return status;
   return SurfaceReconstructor(parameters, limits);
 }
@@ -346,11 +437,13 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   const SurfacePlacement placement = parameters_.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
   LiftedFrame lifted{.frame = given};
+  std::size_t own_particles = given.ParticleCount();
   const Frame& frame = lifted.frame;
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
-                          .is_simplified = parameters_.simplify > 0};
+                          .is_simplified = parameters_.simplify > 0,
+                          .has_walls = !parameters_.wall_planes.empty()};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
@@ -374,6 +467,21 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                      b.lift, lifted);
       if (!checked.ok()) return checked;
     }
+    if (!parameters_.wall_planes.empty()) {
+      checked = AddWallImages({.frame = given,
+                               .planes = parameters_.wall_planes,
+                               .depth = kImageRadii * parameters_.kernel_radius * h,
+                               .tolerance = kWallTolerance * h,
+                               .reserve =
+                                   [&](std::uint64_t bytes) {
+                                     size.lift_bytes = bytes;
+                                     return Reserve(size, control.memory);
+                                   }},
+                              b.images, lifted.frame, own_particles);
+      size.particles = frame.ParticleCount();
+      if (!checked.ok() || own_particles == 0) return checked;
+    }
+    b.virtual_plane.volumes.before_walls = SpaceBeforeWalls(parameters_);
     SizeRange sizes;
     if (parameters_.sizes == Sizes::kOwn) {
       const auto range = RangeOfSizes(frame, in_space_, {.spacing = h, .cell_size = cell_size});
@@ -386,6 +494,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);
     if (checked.ok()) space::SortParticles(frame, scale, b.bins);
+    b.bins.first_image = parameters_.wall_planes.empty() ? kNoIndex : own_particles;
     return checked;
   });
   if (!status.ok()) return status;
@@ -399,7 +508,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;
     if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
-    AddBodies(frame, b.bodies, size);
+    AddBodies(frame, own_particles, b.bodies, size);
     absl::Status reserved = Reserve(size, control.memory);
     if (reserved.ok()) space::ListSteps(bricks, b.crossings);
     return reserved;
@@ -445,6 +554,11 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     in_stage(Stage::kMesh, [&] {
       simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
     });
+  }
+  if (!parameters_.wall_planes.empty()) {
+    const bool is_cut =
+        in_stage(Stage::kMesh, [&] { return CutAtWalls(parameters_, b.wall_cut, surface); });
+    if (!is_cut) return absl::InternalError("a surface cannot be cut at its walls");
   }
   if (!frame.attributes.empty()) {
     in_stage(Stage::kAttributes, [&] {

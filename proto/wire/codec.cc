@@ -397,6 +397,8 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   if (!plane) return UnknownEnum("parameters.plane", message.plane());
   auto walls = DecodeWalls(message);
   if (!walls.ok()) return walls.status();
+  auto wall_planes = DecodeWallPlanes(message);
+  if (!wall_planes.ok()) return wall_planes.status();
 
   ReconstructionParameters parameters;
   parameters.output = *output;
@@ -407,6 +409,7 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
   parameters.boundary = *boundary;
   parameters.plane = *plane;
   parameters.walls = *std::move(walls);
+  parameters.wall_planes = *std::move(wall_planes);
   parameters.wall_phases = {message.wall_phases().begin(), message.wall_phases().end()};
   if (message.has_spacing()) parameters.spacing = message.spacing();
   if (message.has_kernel_radius()) parameters.kernel_radius = message.kernel_radius();
@@ -476,6 +479,7 @@ void EncodeParameters(const ReconstructionParameters& parameters,
   if (parameters.sizes == Sizes::kOwn) message.set_sizes(v1::SIZES_OWN);
   if (parameters.boundary == Boundary::kGrains) message.set_boundary(v1::BOUNDARY_GRAINS);
   EncodeWalls(parameters.walls, message);
+  EncodeWallPlanes(parameters.wall_planes, message);
   for (const std::int32_t phase : parameters.wall_phases) {
     message.add_wall_phases(phase);
     message.set_phase_attribute(parameters.phase_attribute);

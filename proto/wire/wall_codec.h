@@ -18,4 +18,13 @@ absl::StatusOr<std::vector<Wall>> DecodeWalls(const v1::ReconstructionParameters
 /// Adds walls to `message`, which has none.
 void EncodeWalls(const std::vector<Wall>& walls, v1::ReconstructionParameters& message);
 
+/// Copies the walls of a surface. The core's Validate checks them.
+/// Errors: INVALID_ARGUMENT with a Violation for more than kMaxWallPlanes walls, or another axis
+/// than 0, 1, 2.
+absl::StatusOr<std::vector<WallPlane>> DecodeWallPlanes(
+    const v1::ReconstructionParameters& message);
+
+/// Adds walls of a surface to `message`, which has none.
+void EncodeWallPlanes(const std::vector<WallPlane>& planes, v1::ReconstructionParameters& message);
+
 }  // namespace partiemc::wire

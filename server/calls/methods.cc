@@ -243,6 +243,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("surface-levels");
   response.add_capabilities("walls");
   response.add_capabilities("wall-phases");
+  response.add_capabilities("wall-planes");
   response.add_capabilities("surface-sizes");
   if (context_.relay != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");

@@ -38,7 +38,8 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   const auto& [output, placement, fill, spacing, spacing_rule, sizes, boundary, kernel_radius,
                cell_size, reference_radius, surface_offset, attribute_tolerance, normal_memory,
                clean, min_component_area, min_component_particles, plane, slice, isovalue, sections,
-               phase_attribute, surface, box, noise_filter, walls, wall_phases] = parameters;
+               phase_attribute, surface, box, noise_filter, walls, wall_phases, wall_planes] =
+      parameters;
   const auto& [thinning_distance, max_drop_particles, simplify, min_component_volume] = surface;
   std::string bytes;
   const auto put_small = [&](auto value) { PutNumber(static_cast<std::uint32_t>(value), bytes); };
@@ -125,6 +126,12 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     put_small('x');
     put_small(phase);
     bytes += phase_attribute;
+  }
+  for (const WallPlane& wall : wall_planes) {
+    put_small('q');
+    put_small(wall.axis);
+    PutNumber(wall.position, bytes);
+    put_small(wall.is_fluid_above);
   }
   return ChecksumOf(bytes);
 }

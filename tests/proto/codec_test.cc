@@ -83,6 +83,7 @@ TEST(Parameters, EveryNumberComesBackAsItWas) {
   parameters.noise_filter = 0.375;
   parameters.walls = {{.points = {0, 0, 1, 0}}, {.points = {0.1, -2, 3, 4, 5, 6.5}}};
   parameters.wall_phases = {7, -16'777'216};
+  parameters.wall_planes = {{0, -1.5, true}, {2, 9, false}};
   parameters.sizes = Sizes::kOwn;
   parameters.boundary = Boundary::kGrains;
   v1::ReconstructionParameters message;
@@ -135,6 +136,22 @@ TEST(Parameters, WallsAreCopiedAsTheyAre) {
   EncodeParameters({.walls = {{.points = {1, 2, 3, 4}}}}, message);
   ASSERT_EQ(message.walls_size(), 1);
   EXPECT_EQ(message.walls(0).points_size(), 4);
+}
+
+TEST(Parameters, WrongWallPlanesAreRefused) {
+  v1::ReconstructionParameters message;
+  message.add_wall_planes()->set_axis(0x80000001);
+  auto refused = FindViolation(DecodeParameters(message).status());
+  ASSERT_TRUE(refused.has_value());
+  EXPECT_EQ(refused->field, "parameters.wall_planes[0].axis");
+  message.mutable_wall_planes(0)->set_axis(2);
+  EXPECT_TRUE(DecodeParameters(message).ok());
+  while (message.wall_planes_size() <= static_cast<int>(ReconstructionParameters::kMaxWallPlanes)) {
+    message.add_wall_planes();
+  }
+  refused = FindViolation(DecodeParameters(message).status());
+  ASSERT_TRUE(refused.has_value());
+  EXPECT_EQ(refused->field, "parameters.wall_planes");
 }
 
 TEST(Parameters, TooManyPointsOfWallsAreRefused) {

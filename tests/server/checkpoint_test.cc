@@ -188,6 +188,22 @@ TEST(Checkpoint, IsBoundToEveryParameter) {
   EXPECT_TRUE(ParseCheckpoint(checkpoint, session->parameters(), Terms(), nullptr).ok());
 }
 
+TEST(Checkpoint, IsBoundToTheWallsOfASurface) {
+  std::vector<ReconstructionParameters> all(5, BlobParameters());
+  for (ReconstructionParameters& parameters : all) parameters.output = Output::kSurface;
+  all[1].wall_planes = {{0, 1, true}};
+  all[2].wall_planes = {{1, 1, true}};
+  all[3].wall_planes = {{0, 1, false}};
+  all[4].wall_planes = {{0, 2, true}};
+  for (std::size_t of = 0; of < all.size(); ++of) {
+    const std::string checkpoint = Serialize(1, State{}, all[of], Terms(), nullptr);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const auto parsed = ParseCheckpoint(checkpoint, all[k], Terms(), nullptr);
+      EXPECT_EQ(ReasonOf(parsed.status()) == kReasonCheckpointMismatch, k != of) << of << " " << k;
+    }
+  }
+}
+
 TEST(Checkpoint, DistinguishesParametersWithTheSameValue) {
   ReconstructionParameters tolerant = BlobParameters(), isoline = BlobParameters();
   tolerant.attribute_tolerance = 0.3;

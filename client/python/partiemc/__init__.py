@@ -87,6 +87,9 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         wall, `rings.contacts` the points where the outline meets a wall, `rings.contact_angles` the
         angles of the fluid there, in radians.
     wall_phases: the phases of the particles of walls (`phase_attribute`). Their outline is a wall.
+    wall_planes: walls at which a surface is cut, at most one for each side of each axis: for each a
+        dict of axis ("x", "y" or "z"), position, and side of the fluid ("above", the default, or
+        "below"). [{"axis": "z", "position": 0}] is the floor z = 0.
     sizes: "equal" (the default), or "own": each particle has the size sqrt(volume), for a surface
         cbrt(volume).
     boundary: "bulk" (the default), or "grains", with own sizes: particles are discs of the diameter

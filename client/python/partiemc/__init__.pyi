@@ -177,6 +177,7 @@ class Reconstructor:
         noise_filter: Optional[float] = ...,
         walls: Optional[Sequence[ArrayLike]] = ...,
         wall_phases: Optional[Sequence[int]] = ...,
+        wall_planes: Optional[Sequence[dict]] = ...,
         sizes: Optional[str] = ...,
         boundary: Optional[str] = ...) -> None: ...
     def reconstruct(
@@ -257,6 +258,7 @@ def reconstruct(
     noise_filter: Optional[float] = ...,
     walls: Optional[Sequence[ArrayLike]] = ...,
     wall_phases: Optional[Sequence[int]] = ...,
+    wall_planes: Optional[Sequence[dict]] = ...,
     sizes: Optional[str] = ...,
     boundary: Optional[str] = ...) -> Result: ...
 def estimate_spacing(positions: Positions) -> Optional[float]: ...

@@ -125,6 +125,15 @@ struct Wall {
   friend bool operator==(const Wall&, const Wall&) = default;
 };
 
+/// A fixed wall of a surface: a plane parallel to two axes.
+struct WallPlane {
+  int axis = 0;         ///< The coordinate that is constant on the wall: 0, 1, 2 for x, y, z.
+  double position = 0;  ///< That coordinate, in world units.
+  bool is_fluid_above = true;  ///< The fluid has larger coordinates than the wall.
+
+  friend bool operator==(const WallPlane&, const WallPlane&) = default;
+};
+
 /// Used only by Output::kSurface.
 struct SurfaceOptions {
   /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
@@ -285,6 +294,14 @@ struct ReconstructionParameters {
   /// particles is a further wall in each frame, half a spacing outside of their outermost layers.
   /// Walls need two layers or more. Excludes what `walls` exclude, and `noise_filter`.
   std::vector<std::int32_t> wall_phases = {};
+
+  static constexpr std::size_t kMaxWallPlanes = 6;
+
+  /// Walls at which a surface is cut (core/WALLS.md, "Surfaces"): at most one for each side of each
+  /// axis. The fluid is where all walls have it. The triangles on walls are in Surface::cuts. Two
+  /// walls of one axis are at least a kernel radius apart. Requires Output::kSurface; excludes
+  /// sections, own sizes and `box`.
+  std::vector<WallPlane> wall_planes = {};
 
   friend bool operator==(const ReconstructionParameters&,
                          const ReconstructionParameters&) = default;

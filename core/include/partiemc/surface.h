@@ -58,8 +58,9 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, that lie on faces of the periodic box, where a body was cut
-  /// (SurfaceParameters::box). They close the surface; areas do not count them.
+  /// Triangles, ascending, that lie on faces of the periodic box (SurfaceParameters::box) or on
+  /// walls (SurfaceParameters::wall_planes), where a body was cut. They close the surface; areas do
+  /// not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.

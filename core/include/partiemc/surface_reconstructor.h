@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -60,6 +61,9 @@ struct SurfaceParameters {
 
   /// As ReconstructionParameters::box: shells are unwrapped.
   std::optional<PeriodicBox> box = std::nullopt;
+
+  /// As ReconstructionParameters::wall_planes.
+  std::vector<WallPlane> wall_planes = {};
 
   friend bool operator==(const SurfaceParameters&, const SurfaceParameters&) = default;
 };

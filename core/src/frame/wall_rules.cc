@@ -111,9 +111,68 @@ absl::Status CheckWallPhases(const ReconstructionParameters& p) {
   return CheckPhaseAttribute(p.phase_attribute, "particles of some phases are walls");
 }
 
+// Checks that nothing excludes the walls of a surface.
+absl::Status CheckOthersOfPlanes(const ReconstructionParameters& p) {
+  const auto refused = [&](std::string_view rule) {
+    return Refused("wall_planes", absl::StrCat(p.wall_planes.size()), rule);
+  };
+  if (p.output != Output::kSurface) return refused("must be absent unless the output is a surface");
+  if (!p.sections.empty()) return refused("must be absent with sections");
+  if (p.box) return refused("must be absent with a periodic box");
+  if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
+  return absl::OkStatus();
+}
+
+// Whether a coordinate can be one of a wall.
+bool IsCoordinate(double value) {
+  const double magnitude = std::abs(value);
+  return magnitude == 0 || (magnitude >= kLeast && magnitude <= kMost);
+}
+
 }  // namespace
 
+absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_radius,
+                             double spacing) {
+  constexpr std::size_t kMost = ReconstructionParameters::kMaxWallPlanes;
+  if (planes.size() > kMost) {
+    return Refused("wall_planes", absl::StrCat(planes.size()),
+                   absl::StrCat("must be at most ", kMost, ": two for each axis"));
+  }
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    const WallPlane& plane = planes[k];
+    const std::string field = absl::StrCat("wall_planes[", k, "]");
+    if (plane.axis < 0 || plane.axis > 2) {
+      return Refused(field + ".axis", absl::StrCat(plane.axis), "must be x, y or z");
+    }
+    if (!IsCoordinate(plane.position)) {
+      return Refused(field + ".position", ShortestNumber(plane.position),
+                     "must be 0 or in [1e-60, 1e60] in magnitude");
+    }
+    for (std::size_t other = 0; other < k; ++other) {
+      if (planes[other].axis != plane.axis) continue;
+      const std::string name = absl::StrCat("wall_planes[", other, "]");
+      if (planes[other].is_fluid_above == plane.is_fluid_above) {
+        return Refused(field, ShortestNumber(plane.position),
+                       "must have another axis or the fluid on the other side than " + name);
+      }
+      const double low = plane.is_fluid_above ? plane.position : planes[other].position;
+      const double high = plane.is_fluid_above ? planes[other].position : plane.position;
+      if (high - low > 0 && high - low >= kernel_radius * spacing) continue;
+      return Refused(field + ".position", ShortestNumber(plane.position),
+                     absl::StrCat("must leave a kernel radius of fluid between this wall and ",
+                                  name, ", ", ShortestNumber(kernel_radius * spacing)));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckWalls(const ReconstructionParameters& p) {
+  if (!p.wall_planes.empty()) {
+    absl::Status status = CheckOthersOfPlanes(p);
+    if (status.ok())
+      status = CheckWallPlanes(p.wall_planes, p.kernel_radius, p.spacing.value_or(0));
+    if (!status.ok()) return status;
+  }
   if (absl::Status status = CheckWallPhases(p); !status.ok()) return status;
   if (p.walls.empty()) return absl::OkStatus();
   std::size_t points = 0;

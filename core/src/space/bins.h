@@ -44,6 +44,11 @@ struct SpaceBins {
   std::vector<float> weight;          ///< Empty if uniform; else padded, too.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
+  /// Particles of the frame from this index on are mirror images behind walls. They count for F,
+  /// but are not particles of a body.
+  std::uint32_t first_image = kNoIndex;
+
+  bool IsImage(std::uint32_t particle) const { return source[particle] >= first_image; }
 
   struct Keyed {
     std::uint64_t key;  // Cell and fractions: the whole position.

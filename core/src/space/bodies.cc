@@ -183,6 +183,10 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
       bodies.body_of_particle[p] = index;
       if (index == kNoIndex) continue;
       Body& body = bodies.bodies[index];
+      if (bins.IsImage(p)) {
+        ++body.images;
+        continue;
+      }
       ++body.particles;
       body.volume += frame.volumes.empty() ? usual : frame.volumes[bins.source[p]];
     }

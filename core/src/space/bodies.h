@@ -18,6 +18,7 @@ namespace partiemc::space {
 struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
   std::uint64_t particles = 0;  ///< Particles whose nearest inside node is in the body.
+  std::uint64_t images = 0;     ///< The same for mirror images behind walls.
   double volume = 0;            ///< Volume of these particles, world units cubed.
 };
 

@@ -95,13 +95,15 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
   std::uint32_t kept = 0;
   for (std::size_t index = 0; index < bodies.bodies.size(); ++index) {
     const Body& body = bodies.bodies[index];
+    const bool is_image = body.particles == 0 && body.images > 0;
     const bool is_empty = limits.drops_empty && body.particles == 0;
     const bool is_spray =
         body.volume < limits.least_volume || body.particles < limits.least_particles;
-    dropped.empty += is_empty;
-    dropped.spray += is_spray && !is_empty;
-    scratch.new_index[index] = is_empty || is_spray ? kNoIndex : kept;
-    if (!is_empty && !is_spray) bodies.bodies[kept++] = body;
+    dropped.empty += is_empty && !is_image;
+    dropped.spray += is_spray && !is_empty && !is_image;
+    const bool is_dropped = is_image || is_empty || is_spray;
+    scratch.new_index[index] = is_dropped ? kNoIndex : kept;
+    if (!is_dropped) bodies.bodies[kept++] = body;
   }
   if (kept == bodies.bodies.size()) return dropped;
   bodies.bodies.resize(kept);

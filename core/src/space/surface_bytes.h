@@ -17,8 +17,10 @@ struct SurfaceSize {
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
   bool has_state = false;              ///< Of a stream.
   bool is_simplified = false;
-  std::uint64_t lift_bytes = 0;  ///< Of a periodic box (periodic/lift.h).
-  std::uint64_t samples = 0;     ///< Particles that a state may store; 0 without ids.
+  bool has_walls = false;
+  std::uint64_t lift_bytes =
+      0;  ///< Of a periodic box (periodic/lift.h), or of walls (walls/wall_images.h).
+  std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
 };
 
 /// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
@@ -49,6 +51,9 @@ inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
 inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 
+/// Bytes of the cut at walls, per point.
+inline constexpr std::uint64_t kBytesPerCutPoint = 500;
+
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
@@ -72,6 +77,7 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   const std::uint64_t points = size.edges + size.loops + drop_points;
   bytes += kBytesPerValue * size.attribute_values * points;
   if (size.is_simplified) bytes += kBytesPerSimplifiedPoint * points;
+  if (size.has_walls) bytes += kBytesPerCutPoint * points;
   if (size.has_state) {
     bytes += kBytesPerTrackedEdge * size.edges + kBytesPerTrackedBody * size.bodies +
              kBytesPerTrackedParticle * size.particles + kBytesPerSample * size.samples;

@@ -87,11 +87,24 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() *
                                              farthest[static_cast<std::size_t>(plane.axis)];
-    plane.at += shift * kShiftAlong[static_cast<std::size_t>(plane.axis)] * step;
+    const double move = shift * step * kShiftAlong[static_cast<std::size_t>(plane.axis)];
+    plane.at += input.are_walls && !plane.keeps_above ? -move : move;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
   return CapPlanes(s.plane, s.mesh);
+}
+
+/// Moves the points of caps to the given planes.
+void ReturnToPlanes(const SurfaceCutInput& input, CutMesh& mesh) {
+  for (std::size_t cap = 0; cap < input.planes.size(); ++cap) {
+    const AxisPlane& plane = input.planes[cap];
+    for (std::size_t k = 3 * std::size_t{mesh.cap_offsets[cap]};
+         k < 3 * std::size_t{mesh.cap_offsets[cap + 1]}; ++k) {
+      mesh.points[3 * std::size_t{mesh.triangles[k]} + static_cast<std::size_t>(plane.axis)] =
+          plane.at;
+    }
+  }
 }
 
 std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t point) {
@@ -370,10 +383,16 @@ void Assembly::WriteParents() {
 
 bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePieces& pieces,
                 Surface& surface) {
-  for (const double shift : kShifts) {
+  // With walls, the second half of the tries leaves the points where the cuts are.
+  const std::size_t tries = input.are_walls ? 2 * kShifts.size() : kShifts.size();
+  for (std::size_t attempt = 0; attempt < tries; ++attempt) {
+    const double shift = kShifts[attempt % kShifts.size()];
     FillMesh(input, surface, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
+    const bool returns = input.are_walls && shift != 0 && attempt < kShifts.size();
+    if (returns) ReturnToPlanes(input, s.mesh);
     Assembly(input, surface, s, pieces).Run();
+    if (returns && !Validate(s.surface).ok()) continue;
     s.surface.statistics = surface.statistics;
     std::swap(s.surface.attributes, surface.attributes);
     std::swap(s.surface, surface);

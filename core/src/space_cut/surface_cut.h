@@ -20,6 +20,10 @@ struct SurfaceCutInput {
   /// each outer shell is a body.
   std::span<const std::uint32_t> body_of;
   double spacing = 1;  ///< World units.
+  /// Planes move to the side that is kept, and the points on a plane that has moved return to the
+  /// given plane: all points are exactly on walls or before them. Validate checks the surface then.
+  /// If it always fails, the points stay on the plane that has moved.
+  bool are_walls = false;
 };
 
 /// Warm buffers of CutSurface.
@@ -54,8 +58,8 @@ struct SurfacePieces {
 ///
 /// Where a vertex lies on a plane, or rounding leaves a decision open, all planes with the same
 /// axis move by the same amount: by up to .00002 spacings (kShifts in
-/// surface_cut.cc). Returns false, with `surface` unchanged, if this does not help, which is a bug.
-/// Requires: S1 to S5; `surface.attributes` without values.
+/// surface_cut.cc); walls, each to its side. Returns false, with `surface` unchanged, if this does
+/// not help, which is a bug. Requires: S1 to S5; `surface.attributes` without values.
 /// Deterministic. Cost: linear in the surface, plus CutAtPlane and CapPlanes; ShellsAround if a
 /// cavity remains in a shell that falls into several parts.
 [[nodiscard]] bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& scratch,

@@ -106,7 +106,7 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
   shells.of_particle.assign(body_of.size(), kNoShell);
   shells.particles.assign(shells.shells.size(), 0);
   for (std::size_t p = 0; p < body_of.size(); ++p) {
-    if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
+    if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody || input.bins.IsImage(p)) continue;
     const std::uint32_t number = shells.number[shells.shell_of_body[body_of[p]]];
     shells.of_particle[p] = number;
     ++shells.particles[number];

@@ -26,6 +26,11 @@ Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
   return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};
 }
 
+/// The box in other units, relative to an origin in these units.
+ClipBox Relative(const ClipBox& box, double units, const Vec3& origin) {
+  return {units * box.low - origin, units * box.high - origin};
+}
+
 /// Calls visit(cell, loop of the cell, loop) for all loops, in parallel over cells.
 template <typename Visit>
 void ForEachLoopOfCells(const SpaceCrossings& crossings, const Visit& visit) {
@@ -59,7 +64,7 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
   });
 }
 
-void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {
   const auto origin_of = [&](std::uint32_t body) {
     return LowestNodeOf(bricks, bodies.bodies[body]);
@@ -74,26 +79,26 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
     BodyVolumes::Part part;
     ForEachCurve(crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
       const Vec3 b = positions[from] - origin, c = positions[to] - origin;
-      const double volume = Dot(a, Cross(b, c)) / 6;
       area += Length(Cross(b - a, c - a)) / 2;
-      part.volume += volume;
-      part.moment = part.moment + (volume / 4) * (a + b + c);
+      if (volumes.before_walls) {
+        const ClippedMeasure clipped =
+            MeasureClipped(a, b, c, Relative(*volumes.before_walls, 1 / cell_size, origin));
+        part.area += clipped.area;
+        part.volume += clipped.volume;
+      } else {
+        part.volume += Dot(a, Cross(b, c)) / 6;
+      }
     });
     volumes.areas[index] = area;
+    if (!volumes.before_walls) part.area = area;
     volumes.parts[index] = part;
   });
   volumes.measures.assign(bodies.bodies.size(), {});
   for (std::uint32_t loop = 0; loop < crossings.loop_count; ++loop) {
     const std::uint32_t vertex = crossings.edge_count + loop;
     BodyMeasure& measure = volumes.measures[volumes.body_of[vertex]];
-    measure.area += volumes.areas[loop] * volumes.SizeOf(vertex);
+    measure.area += volumes.parts[loop].area * volumes.SizeOf(vertex);
     measure.volume += volumes.parts[loop].volume;
-    measure.centroid = measure.centroid + volumes.parts[loop].moment;
-  }
-  for (std::uint32_t body = 0; body < volumes.measures.size(); ++body) {
-    BodyMeasure& measure = volumes.measures[body];
-    const double inverse = measure.volume > 0 ? 1 / measure.volume : 0;
-    measure.centroid = origin_of(body) + inverse * measure.centroid;
   }
 }
 
@@ -106,6 +111,13 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
     const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
                c = positions[triangle[2]] - origin;
+    if (volumes.before_walls) {
+      const ClippedMeasure part =
+          MeasureClipped(a, b, c, Relative(*volumes.before_walls, 1, origin));
+      volumes.measures[body].area += part.area;
+      volumes.measures[body].volume += part.volume;
+      continue;
+    }
     double area = Length(Cross(b - a, c - a)) / 2;
     if (!volumes.sizes.empty()) {
       area *= (volumes.SizeOf(triangle[0]) + volumes.SizeOf(triangle[1]) +

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space_vertices/clipped_measures.h"
 
 namespace partiemc::space {
 
@@ -19,7 +21,6 @@ namespace partiemc::space {
 struct BodyMeasure {
   double area = 0;  ///< With own sizes, each part times the local size.
   double volume = 0;
-  Vec3 centroid;
 };
 
 struct BodyVolumes {
@@ -32,9 +33,12 @@ struct BodyVolumes {
 
   double SizeOf(std::size_t vertex) const { return sizes.empty() ? 1 : double{sizes[vertex]}; }
 
+  /// With walls, the space before them in world units: areas and volumes are those of the parts in
+  /// it.
+  std::optional<ClipBox> before_walls;
+
   struct Part {
-    double volume = 0;
-    Vec3 moment;
+    double area = 0, volume = 0;
   };
   std::vector<Part> parts;      ///< Scratch: by loop.
   std::vector<double> offsets;  ///< Scratch: by body.
@@ -54,9 +58,9 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
                         const SpaceCrossings& crossings, const Bodies& bodies,
                         BodyVolumes& volumes);
 
-/// Measures the bodies, with all quads cut along their faces.
+/// Measures the bodies, with all quads cut along their faces. Positions are in cells.
 /// Requires: FindBodyOfVertices. Parallel over cells, then linear in loops.
-void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings,
+void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
 /// Measures the bodies that the triangles bound. Positions, area and volume are in world units.

@@ -111,9 +111,8 @@ bool Touch(const Drops::Box& a, const Drops::Box& b) {
 
 /// Adds a particle at a place in cells.
 void AddParticle(const Vec3& at, double volume, Drops::Drop& drop) {
-  if (drop.particles == 0) drop.origin = at;
+  if (!(drop.volume > 0)) drop.origin = at;
   const Vec3 from = at - drop.origin;
-  ++drop.particles;
   drop.volume += volume;
   drop.first = drop.first + volume * from;
   const double radius = RadiusOf(volume), own = radius * radius / 5;
@@ -144,12 +143,16 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
     for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
       const std::uint32_t body = bodies.body_of_particle[p];
       if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
+      const bool is_image = bins.IsImage(p);
+      if (body == kNoIndex && is_image) continue;
       const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
       const Vec3 at = origin + within;
       const double volume =
           input.frame.volumes.empty() ? usual : unit * input.frame.volumes[input.bins.source[p]];
       if (body != kNoIndex) {
-        AddParticle(at, volume, drops.drops[drops.drop_of[body]]);
+        Drops::Drop& drop = drops.drops[drops.drop_of[body]];
+        AddParticle(at, volume, drop);
+        drop.particles += !is_image;
         continue;
       }
       const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
@@ -159,6 +162,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       Drops::Drop& drop = drops.drops.emplace_back();
       drop.particle = p;
       AddParticle(at, volume, drop);
+      drop.particles = 1;
       // An outside node that no surface has passed.
       const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
       drop.box = {corner, corner};

@@ -52,7 +52,7 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   std::vector<float>& sizes = scratch.volumes.sizes;
   sizes.assign(input.scale.has_own_sizes ? anchors.size() : 0, 1);
   FindBodyOfVertices(bricks, input.field, crossings, input.bodies, scratch.volumes);
-  MeasureBodies(bricks, crossings, input.bodies, anchors, scratch.volumes);
+  MeasureBodies(bricks, crossings, cell_size, input.bodies, anchors, scratch.volumes);
 
   positions = anchors;
   FindRoots(input.bins, input.scale, crossings, constants.root, positions, normals, sizes);
@@ -66,7 +66,7 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   // The first round misses the volume of small bodies: where a surface bends strongly, moving it
   // changes its area.
   for (int round = 0; round < 2; ++round) {
-    MeasureBodies(bricks, crossings, input.bodies, positions, scratch.volumes);
+    MeasureBodies(bricks, crossings, cell_size, input.bodies, positions, scratch.volumes);
     MatchVolumes(input.bodies, {.unit = cell_size, .limit = constants.volume_limit * h}, normals,
                  scratch.volumes, positions);
   }

@@ -120,6 +120,34 @@ TEST(WallsReplay, ReportListsTheWalls) {
   EXPECT_THAT(report, HasSubstr("wall 2</th><td>28,4,28,8,32,8,32,4</td>"));
 }
 
+TEST(WallsReplay, BlockFillsItsTankInSpace) {
+  const support::TemporaryFolder folder;
+  std::ofstream file(folder.Path("block.csv"));
+  file << "x,y,z\n";
+  for (int k = 0; k < 720; ++k) {
+    file << k % 10 + .5 << "," << k / 10 % 9 + .5 << "," << k / 90 + .5 << "\n";
+  }
+  file.close();
+  const Ran ran =
+      Replayed(folder.Path("block.csv"),
+               {"--local", "--surface", "--wall-plane", "z=0", "--wall-plane", "x=10,below",
+                "--wall-plane", "x=0,above", "--wall-plane", "y=0", "--wall-plane", "y=9,below",
+                "--format", "obj", "--output-dir", folder.Path("out")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  for (const std::string text : {"w=0", "z", "z=", "z=1,2", "z=x", "z=0,beside", ""}) {
+    const Ran wrong = Replayed(folder.Path("block.csv"), {"--local", "--wall-plane", text});
+    EXPECT_EQ(wrong.exit_code, 2);
+    EXPECT_THAT(wrong.error, HasSubstr("--wall-plane"));
+  }
+  const Ran twice = Replayed(folder.Path("block.csv"), {"--local", "--surface", "--wall-plane",
+                                                        "z=0", "--wall-plane", "z=1"});
+  EXPECT_EQ(twice.exit_code, 2);
+  EXPECT_THAT(twice.error, HasSubstr("--wall-plane number 2: "));
+  const Ran outline = Replayed(folder.Path("block.csv"), {"--local", "--wall-plane", "z=0"});
+  EXPECT_EQ(outline.exit_code, 2);
+  EXPECT_THAT(outline.error, HasSubstr("--wall-plane: "));
+}
+
 TEST(WallsReplay, WrongWallsAreRefused) {
   const support::TemporaryFolder folder;
   WriteColumn(folder.Path("column.csv"));

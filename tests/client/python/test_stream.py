@@ -103,6 +103,25 @@ class Streams(unittest.TestCase):
                     numpy.testing.assert_array_equal(getattr(result.rings, name),
                                                      getattr(expected.rings, name))
 
+    def test_walls_of_surfaces_are_those_of_this_process(self):
+        grid = numpy.arange(9) + 0.5
+        block = numpy.stack(numpy.meshgrid(grid, grid, grid), -1).reshape(-1, 3)
+        walls = [{"axis": "z", "position": 0.0, "side": "above"},
+                 {"axis": "x", "position": 9.0, "side": "below"}]
+        parameters = {"spacing": 1, "output": "surface", "wall_planes": walls}
+        expected = partiemc.reconstruct(block, **parameters)
+        points = numpy.asarray(expected.surface.points).reshape(-1, 3)
+        self.assertEqual(points[:, 2].min(), 0)
+        self.assertEqual(points[:, 0].max(), 9)
+        with partiemc.connect(self.address, **parameters) as stream:
+            self.assertEqual(stream.parameters["wall_planes"], walls)
+            stream.send(block)
+            self.assertEqual(digests(stream.receive()), digests(expected))
+        for wrong in ([{"axis": "w", "position": 0}], [{"axis": "x"}], ["x=0"],
+                      [{"axis": "x", "position": 0, "side": "left"}]):
+            with self.assertRaises(partiemc.Error):
+                partiemc.reconstruct(block, spacing=1, output="surface", wall_planes=wrong)
+
     def test_wall_particles_are_those_of_this_process(self):
         x, y = numpy.meshgrid(numpy.arange(-2, 24) + 0.5, numpy.arange(-2, 15) + 0.5)
         positions = numpy.column_stack([x.ravel(), y.ravel()])

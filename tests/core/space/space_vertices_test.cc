@@ -100,7 +100,7 @@ struct OnSphere : Anchored {
     }
     BodyVolumes volumes;
     FindBodyOfVertices(bins.bricks, field, crossings, bodies, volumes);
-    MeasureBodies(bins.bricks, crossings, bodies, positions, volumes);
+    MeasureBodies(bins.bricks, crossings, 1, bodies, positions, volumes);
     areas = volumes.areas;
   }
 

@@ -66,6 +66,13 @@ typedef struct partiemc_section {
   double isovalue;     /* As in partiemc_options; 0: the outline of the body. */
 } partiemc_section;
 
+/* A fixed wall of a surface, parallel to two axes. */
+typedef struct partiemc_wall_plane {
+  int axis;        /* The coordinate that is constant on the wall: 0, 1, 2 for x, y, z. */
+  double position; /* That coordinate, in world units. */
+  int fluid_below; /* Not 0: the fluid has smaller coordinates than the wall; 0: larger ones. */
+} partiemc_wall_plane;
+
 typedef struct partiemc_options {
   size_t size;
   double spacing;        /* Particle spacing, world units; 0: estimated. */
@@ -160,6 +167,10 @@ typedef struct partiemc_options {
    * most 16. Excludes what `walls` exclude. */
   const int32_t* wall_phases;
   size_t wall_phase_count;
+  /* Walls at which a surface is cut, at most one for each side of each axis. Excludes outlines,
+   * sections, own sizes and `box`. */
+  const partiemc_wall_plane* wall_planes;
+  size_t wall_plane_count;
 } partiemc_options;
 /* Sets every option to its default. `size` is sizeof(partiemc_options). */
 void partiemc_options_init(partiemc_options* options, size_t size);

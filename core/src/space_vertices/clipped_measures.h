@@ -1,0 +1,23 @@
+// Volume and area of the part of a closed triangle surface in a box parallel to the axes.
+#pragma once
+
+#include "base/vec3.h"
+
+namespace partiemc::space {
+
+/// A box without sides where its coordinates are infinite.
+struct ClipBox {
+  Vec3 low, high;
+};
+
+struct ClippedMeasure {
+  double area = 0;    ///< Of the triangle in the box.
+  double volume = 0;  ///< Summed over a closed surface: the volume that it encloses in the box.
+};
+
+/// Measures a triangle. The volume is the flux of the field (clamp(x), 0, 0) where y and z are in
+/// the box, whose divergence is 1 in the box and 0 elsewhere. The box and the points are relative
+/// to an origin that all triangles of a surface share; near it, sums lose no digits.
+ClippedMeasure MeasureClipped(const Vec3& a, const Vec3& b, const Vec3& c, const ClipBox& box);
+
+}  // namespace partiemc::space

@@ -1,0 +1,152 @@
+#include "walls/wall_images.h"
+
+#include <algorithm>
+#include <string>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "base/cancellation.h"
+#include "frame/frame_view.h"
+#include "partiemc/status.h"
+
+namespace partiemc {
+namespace {
+
+constexpr std::size_t kAxes = 3;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Bytes of a particle in a WallImageScratch. Vectors that grow may hold twice as much.
+std::uint64_t BytesOfParticle(const Frame& frame) {
+  std::uint64_t bytes = 2 * (kAxes * sizeof(double) + sizeof(std::uint32_t));
+  if (!frame.volumes.empty()) bytes += sizeof(float);
+  if (!frame.ids.empty()) bytes += sizeof(std::uint64_t);
+  if (!frame.velocities.empty()) bytes += kAxes * sizeof(float);
+  for (const Attribute& attribute : frame.attributes) {
+    bytes += sizeof(float) * static_cast<std::uint64_t>(attribute.components);
+  }
+  return bytes;
+}
+
+// Copies the values of each particle from its original.
+template <typename Value>
+std::span<const Value> Gather(std::span<const Value> from, std::size_t components,
+                              std::span<const std::uint32_t> originals, std::vector<Value>& to) {
+  to.clear();
+  if (from.empty()) return {};
+  to.reserve(components * originals.size());
+  for (const std::uint32_t original : originals) {
+    const auto first = from.begin() + static_cast<std::ptrdiff_t>(components * original);
+    to.insert(to.end(), first, first + static_cast<std::ptrdiff_t>(components));
+  }
+  return to;
+}
+
+// Calls visit(position, number) for the particles that have an effect.
+template <typename Real, typename Visit>
+void ForEachNear(std::span<const Real> positions, const FluidBox& box, double tolerance,
+                 const Visit& visit) {
+  for (std::size_t particle = 0; particle < positions.size() / kAxes; ++particle) {
+    std::array<double, kAxes> at;
+    bool is_near = true;
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      at[k] = static_cast<double>(positions[kAxes * particle + k]);
+      is_near = is_near && at[k] >= box.low[k] - tolerance && at[k] <= box.high[k] + tolerance;
+    }
+    if (is_near) visit(at, static_cast<std::uint32_t>(particle));
+  }
+}
+
+// The number of images of a particle, with itself.
+std::uint64_t CountImages(const std::array<double, kAxes>& at, const FluidBox& box, double depth) {
+  std::uint64_t count = 1;
+  for (std::size_t k = 0; k < kAxes; ++k) {
+    const double above = at[k] - box.low[k], below = box.high[k] - at[k];
+    count *= std::uint64_t{1} + (above > 0 && above <= depth) + (below > 0 && below <= depth);
+  }
+  return count;
+}
+
+// Appends the images along one axis of all particles so far.
+void MirrorAlong(std::size_t axis, const FluidBox& box, double depth, WallImageScratch& s) {
+  const std::size_t count = s.originals.size();
+  const auto add = [&](std::size_t particle, double wall) {
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      const double at = s.positions[kAxes * particle + k];
+      s.positions.push_back(k == axis ? wall + (wall - at) : at);
+    }
+    s.originals.push_back(s.originals[particle]);
+    if (s.velocities.empty()) return;
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      const float velocity = s.velocities[kAxes * particle + k];
+      s.velocities.push_back(k == axis ? -velocity : velocity);
+    }
+  };
+  for (std::size_t particle = 0; particle < count; ++particle) {
+    const double at = s.positions[kAxes * particle + axis];
+    const double above = at - box.low[axis], below = box.high[axis] - at;
+    if (above > 0 && above <= depth) add(particle, box.low[axis]);
+    if (below > 0 && below <= depth) add(particle, box.high[axis]);
+  }
+}
+
+}  // namespace
+
+FluidBox FluidBoxOf(std::span<const WallPlane> planes) {
+  FluidBox box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+  for (const WallPlane& plane : planes) {
+    const auto axis = static_cast<std::size_t>(plane.axis);
+    (plane.is_fluid_above ? box.low : box.high)[axis] = plane.position;
+  }
+  return box;
+}
+
+absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& s, Frame& with_images,
+                           std::size_t& particles) {
+  const Frame& given = input.frame;
+  const FluidBox box = FluidBoxOf(input.planes);
+  const auto for_each_near = [&](const auto& visit) {
+    std::visit([&](auto positions) { ForEachNear(positions, box, input.tolerance, visit); },
+               given.positions);
+  };
+  std::uint64_t all = 0;
+  for_each_near([&](const std::array<double, kAxes>& at, std::uint32_t) {
+    all += CountImages(at, box, input.depth);
+  });
+  if (all > FrameLimits::kMostParticles) {
+    return InvalidFrame(kReasonTooManyParticles, "positions", absl::StrCat(all),
+                        absl::StrCat("must be at most ", FrameLimits::kMostParticles,
+                                     " with the mirror images behind walls"));
+  }
+  if (absl::Status status = input.reserve(all * BytesOfParticle(given)); !status.ok()) {
+    return status;
+  }
+  s.positions.clear();
+  s.originals.clear();
+  s.positions.reserve(kAxes * all);
+  s.originals.reserve(all);
+  for_each_near([&](const std::array<double, kAxes>& at, std::uint32_t particle) {
+    s.positions.insert(s.positions.end(), at.begin(), at.end());
+    s.originals.push_back(particle);
+  });
+  ThrowIfCancelled();
+  particles = s.originals.size();
+  s.velocities.reserve(given.velocities.empty() ? 0 : kAxes * all);
+  Gather(given.velocities, kAxes, s.originals, s.velocities);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) MirrorAlong(axis, box, input.depth, s);
+  with_images = given;
+  with_images.positions = std::span<const double>(s.positions);
+  with_images.velocities = s.velocities;
+  with_images.volumes = Gather(given.volumes, 1, s.originals, s.volumes);
+  with_images.ids = Gather(given.ids, 1, s.originals, s.ids);
+  s.attributes.assign(given.attributes.begin(), given.attributes.end());
+  s.values.resize(std::max(s.values.size(), s.attributes.size()));
+  for (std::size_t k = 0; k < s.attributes.size(); ++k) {
+    Attribute& attribute = s.attributes[k];
+    attribute.values = Gather(attribute.values, static_cast<std::size_t>(attribute.components),
+                              s.originals, s.values[k]);
+  }
+  with_images.attributes = s.attributes;
+  return absl::OkStatus();
+}
+
+}  // namespace partiemc
