@@ -25,7 +25,8 @@ export function applySpaceKey(scene: Turnable, key: string, shift: boolean): boo
  * Turns by a drag; pans by a drag with Shift or another button or two fingers; zooms and takes keys (`attachGestures`).
  * Returns a function: true during a drag.
  */
-export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void): () => boolean {
+export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void,
+  scrolls = false): () => boolean {
   let isPanning = false;
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   const { isDragging } = attachGestures(canvas, {
@@ -38,6 +39,6 @@ export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable
     },
     zoom: (x, y, factor) => { scene.view = zoomAt(scene.camera, x, y, factor); },
     key: (key, shift) => applySpaceKey(scene, key, shift),
-  }, onChange);
+  }, onChange, scrolls);
   return isDragging;
 }
