@@ -334,6 +334,7 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
                  "Most particles of a frame in the report, selected evenly; 0: none")
       ->type_name("N")
       ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
       ->needs(report)
       ->group(kGroup);
   app.add_flag("--check", flags.check, "Check every result against the guarantees")->group(kGroup);

@@ -94,6 +94,24 @@ test('cut faces have the colours of their bodies and hide what is behind them', 
   await shot('translucent');
 });
 
+test('the clip plane cuts the outlines of sections', async () => {
+  await openCut();
+  // On the section z = 0 of the ball without a cavity, in front of the plane, beside it and behind it.
+  const around = (angle) => [8 + 6.4 * Math.cos(angle), 6.4 * Math.sin(angle), 0];
+  const circle = Array.from({ length: 720 }, (_, k) => around(k * Math.PI / 360));
+  const [front, back] = [circle.filter(([, y]) => y < -4), circle.filter(([, y]) => y > 1)];
+  const before = await coloursAt(...front, ...back);
+  await changes('sections', () => toggle('Sections'));
+  const cut = await coloursAt(...front, ...back);
+  const changed = (from, to) => before.slice(from, to).filter((colour, k) => apart(colour, cut[from + k]) > 12).length;
+  await shot('sections');
+  assert.equal(changed(0, front.length), 0, 'nothing is drawn on the side that is cut away');
+  assert.ok(changed(front.length, before.length) > 20, 'the other side has its outline');
+  await changes('no clip plane', () => choose('Clip plane', 'none'));
+  const whole = await coloursAt(...front);
+  assert.ok(whole.some((colour, k) => apart(colour, cut[k]) > 12));
+});
+
 test('the pointer is on the cut face, and selects its body', async () => {
   await openCut();
   const readout = viewer.pane().locator('.space .readout');
