@@ -20,12 +20,12 @@ absl::Status CheckCombinations(const CLI::App& app) {
     return absl::InvalidArgumentError("--format: requires --output-dir");
   }
   if (app.count("--surface") > 0) {
-    for (const char* flat : {"--report", "--gauge", "--color-by"}) {
+    for (const char* flat : {"--gauge", "--color-by"}) {
       if (app.count(flat) > 0) {
         return absl::InvalidArgumentError(
             Concat(flat,
-                   ": shows outlines, so it cannot be combined with --surface; --output-dir writes "
-                   "surfaces"));
+                   ": shows outlines, so it cannot be combined with --surface; --report and "
+                   "--output-dir show surfaces with all attributes"));
       }
     }
   }
@@ -334,8 +334,16 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
           ->type_name("FILE")
           ->group(kGroup);
   AddGaugeFlag(app, flags.gauges)->needs(stats)->group(kGroup);
-  app.add_option("--report", flags.report, "HTML page that shows every frame")
-      ->type_name("FILE.html")
+  CLI::Option* const report =
+      app.add_option("--report", flags.report, "HTML page that shows every frame")
+          ->type_name("FILE.html")
+          ->group(kGroup);
+  app.add_option("--report-particles", flags.report_particles,
+                 "Most particles of a frame in the report, selected evenly; 0: none")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
+      ->needs(report)
       ->group(kGroup);
   app.add_flag("--check", flags.check, "Check every result against the guarantees")->group(kGroup);
   app.add_flag("--keep-going", flags.keep_going, "Exit with 0 even if frames were refused")
@@ -368,6 +376,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
       "--gauge level=height:0.5\n"
       "  partiemc replay splash.vtu --local --surface --spacing 0.05 --output-dir out "
       "--format ply,vtp\n"
+      "  partiemc replay splash.vtu --local --surface --spacing 0.05 --report splash.html\n"
       "  partiemc replay colliding_drops.pemc --surface --name drops --coordinates compact\n"
       "  partiemc replay dam_break.pemc --local --isolines .2,.5,.8 --report dam_break.html\n"
       "  partiemc replay dam_break.pemc --name dam --rate 25 --loop   and elsewhere: partiemc "

@@ -72,6 +72,7 @@ struct ReplayFlags {
   std::string stats;
   std::vector<std::string> gauges;  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
   std::string report;
+  std::uint64_t report_particles = 20'000;
 };
 
 /// Adds the verb to `app`; its flags go to `flags`, which must outlive the parsing.

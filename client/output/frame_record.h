@@ -27,10 +27,11 @@ struct FrameRecord {
   /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and of
   /// `result` only the particle count, the doubts and the sections are used.
   const Surface* surface = nullptr;
-  std::span<const double> particles = {};          ///< x0, y0, x1, y1, ... or empty.
-  std::span<const float> particle_areas = {};      ///< Of each of them; empty: not known.
-  std::array<double, kStageCount> stages_ms = {};  ///< Wall time by stage.
-  double total_ms = 0;                             ///< Wall time of the whole frame.
+  std::span<const double> particles = {};           ///< x0, y0, x1, y1, ... or empty.
+  std::span<const double> particles_in_space = {};  ///< Of a surface: x0, y0, z0, ... or empty.
+  std::span<const float> particle_areas = {};       ///< Of each of them; empty: not known.
+  std::array<double, kStageCount> stages_ms = {};   ///< Wall time by stage.
+  double total_ms = 0;                              ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::uint64_t surface_digest = 0;

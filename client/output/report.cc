@@ -3,20 +3,23 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <span>
 #include <string_view>
 
 #include "absl/strings/escaping.h"
 #include "client/output/color_map.h"
 #include "client/output/html.h"
 #include "client/output/report_geometry.h"
+#include "client/output/report_surface.h"
 #include "client/output/text.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
 
-// report_page.html, embedded by embed.cmake.
+// report_page.html and report_space.txt, embedded by embed.cmake.
 namespace page {
 extern const std::string_view kReportPageHtml;
+extern const std::string_view kReportSpaceTxt;
 }  // namespace page
 
 namespace {
@@ -126,6 +129,33 @@ void AppendSections(std::string& out, const FrameRecord& frame) {
   out += ']';
 }
 
+void AppendDoubts(std::string& out, const Doubts& doubts) {
+  out += R"(,"doubts":[)";
+  bool first = true;
+  for (const Doubt doubt : kAllDoubts) {
+    if (!doubts.Has(doubt)) continue;
+    AppendAll(out, first ? "\"" : ",\"", Explanation(doubt), "\"");
+    first = false;
+  }
+  out += ']';
+}
+
+void AppendNamed(std::string& out, std::span<const std::pair<std::string_view, double>> numbers) {
+  for (const auto& [name, value] : numbers) {
+    AppendAll(out, ",\"", name, "\":");
+    AppendShown(out, value);
+  }
+}
+
+void AppendStages(std::string& out, const FrameRecord& frame) {
+  out += R"(,"stages":{)";
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    AppendAll(out, k > 0 ? ",\"" : "\"", kStageNames[k], "\":");
+    AppendShown(out, frame.stages_ms[k]);
+  }
+  out += '}';
+}
+
 std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options) {
   const Result& result = frame.result;
   const FrameStatistics& statistics = result.statistics;
@@ -135,14 +165,8 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
   AppendAll(out, R"(,"self_intersections":)", statistics.self_intersections,
             R"(,"folded_triangles":)", statistics.folded_triangles, R"(,"dropped_holes":)",
             statistics.dropped_holes, R"(,"dropped_components":)", statistics.dropped_components,
-            R"(,"dropped_spray":)", statistics.dropped_spray, R"(,"doubts":[)");
-  bool first = true;
-  for (const Doubt doubt : kAllDoubts) {
-    if (!statistics.doubts.Has(doubt)) continue;
-    AppendAll(out, first ? "\"" : ",\"", Explanation(doubt), "\"");
-    first = false;
-  }
-  out += ']';
+            R"(,"dropped_spray":)", statistics.dropped_spray);
+  AppendDoubts(out, statistics.doubts);
   const std::pair<std::string_view, double> numbers[] = {
       {"time", frame.time},
       {"area", statistics.area},
@@ -150,17 +174,10 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
       {"spacing", statistics.spacing},
       {"milliseconds", frame.total_ms},
   };
-  for (const auto& [name, value] : numbers) {
-    AppendAll(out, ",\"", name, "\":");
-    AppendShown(out, value);
-  }
-  out += R"(,"stages":{)";
-  for (std::size_t k = 0; k < kStageCount; ++k) {
-    AppendAll(out, k > 0 ? ",\"" : "\"", kStageNames[k], "\":");
-    AppendShown(out, frame.stages_ms[k]);
-  }
+  AppendNamed(out, numbers);
+  AppendStages(out, frame);
   const std::size_t particles = frame.particles.size() / 2;
-  AppendAll(out, R"(},"particles_shown":)", std::min(particles, options.max_particles),
+  AppendAll(out, R"(,"particles_shown":)", std::min(particles, options.max_particles),
             R"(,"particles_given":)", particles, R"(,"mesh_shown":)",
             result.mesh.TriangleCount() <= options.max_triangles ? "true" : "false",
             R"(,"rings_digest":")", DigestText(frame.rings_digest), R"(","mesh_digest":")",
@@ -183,6 +200,41 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
   AppendSections(out, frame);
   out += '}';
   return out;
+}
+
+/// `shown`: null if the frame has no picture, because the report has reached its limit.
+std::string SurfaceNumbers(const FrameRecord& frame, const ReportSurface* shown) {
+  const Surface& surface = *frame.surface;
+  const SurfaceTotals totals = TotalsOf(surface);
+  std::string out =
+      Concat(R"({"frame":)", frame.index, R"(,"particles":)", frame.result.statistics.particles,
+             R"(,"triangles":)", surface.TriangleCount(), R"(,"bodies":)", totals.bodies,
+             R"(,"cavities":)", totals.cavities, R"(,"genus":)", totals.genus);
+  AppendAll(out, R"(,"dropped_holes":)", surface.statistics.dropped_cavities,
+            R"(,"dropped_components":)", surface.statistics.dropped_components,
+            R"(,"dropped_spray":)", surface.statistics.dropped_spray);
+  AppendDoubts(out, frame.result.statistics.doubts);
+  const std::pair<std::string_view, double> numbers[] = {
+      {"time", frame.time},
+      {"area", totals.area},
+      {"volume", totals.volume},
+      {"spacing", frame.result.statistics.spacing},
+      {"milliseconds", frame.total_ms},
+  };
+  AppendNamed(out, numbers);
+  AppendStages(out, frame);
+  AppendAll(out, R"(,"has_picture":)", shown != nullptr ? "true" : "false",
+            R"(,"triangles_shown":)", shown != nullptr ? shown->triangles : 0,
+            R"(,"particles_shown":)", shown != nullptr ? shown->particles : 0,
+            R"(,"particles_given":)", frame.particles_in_space.size() / 3, R"(,"surface_digest":")",
+            DigestText(frame.surface_digest), R"("})");
+  return out;
+}
+
+std::string Scripts(std::string_view numbers, std::string_view geometry) {
+  return Concat("<script type=\"application/json\" class=\"frame-numbers\">", numbers,
+                "</script><script type=\"text/plain\" class=\"frame-geometry\">", geometry,
+                "</script>\n");
 }
 
 std::string ParameterRows(const std::vector<std::pair<std::string, std::string>>& parameters) {
@@ -223,11 +275,13 @@ std::string Text(const SlicePlane& slice) {
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters) {
   const auto spacings = [](double value) { return Concat(ShortestNumber(value), " spacings"); };
+  const bool is_surface = parameters.output == Output::kSurface;
   const bool has_grains = parameters.boundary == Boundary::kGrains;
   const auto yes_no = [](bool value) { return std::string(value ? "on" : "off"); };
   std::vector<std::pair<std::string, std::string>> lines = {
       {"placement", std::string(Name(parameters.placement))},
-      {"fill", std::string(Name(parameters.fill))},
+      is_surface ? std::pair<std::string, std::string>("output", Name(parameters.output))
+                 : std::pair<std::string, std::string>("fill", Name(parameters.fill)),
       {"spacing", parameters.spacing ? ShortestNumber(*parameters.spacing)
                                      : Concat("estimated, ", Name(parameters.spacing_rule))},
       {"kernel radius", spacings(parameters.kernel_radius)},
@@ -261,7 +315,19 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
   if (parameters.attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
     lines.emplace_back("attribute tolerance", ShortestNumber(parameters.attribute_tolerance));
   }
-  lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
+  if (is_surface) {
+    lines.emplace_back("thinning distance", spacings(parameters.surface.thinning_distance));
+    if (parameters.surface.simplify > 0) {
+      lines.emplace_back("simplify", spacings(parameters.surface.simplify));
+    }
+    if (parameters.surface.min_component_volume > 0) {
+      lines.emplace_back(
+          "smallest volume",
+          Concat(ShortestNumber(parameters.surface.min_component_volume), " cubed spacings"));
+    }
+  } else {
+    lines.emplace_back("normal memory", yes_no(parameters.normal_memory));
+  }
   if (parameters.clean) lines.emplace_back("clean", yes_no(*parameters.clean));
   if (parameters.min_component_area > 0) {
     lines.emplace_back("smallest area",
@@ -290,23 +356,41 @@ absl::StatusOr<ReportWriter> ReportWriter::Create(const std::filesystem::path& p
   return writer;
 }
 
-absl::Status ReportWriter::Add(const FrameRecord& frame) {
-  if (frame.surface) {
-    return absl::InvalidArgumentError("report: cannot show surfaces in space; must be of outlines");
-  }
+std::string ReportWriter::OutlineScripts(const FrameRecord& frame) const {
   const std::string geometry = EncodeReportGeometry(frame, {.max_particles = options_.max_particles,
                                                             .max_triangles = options_.max_triangles,
                                                             .color_by = options_.color_by});
-  return file_.Append(Concat("<script type=\"application/json\" class=\"frame-numbers\">",
-                             FrameNumbers(frame, options_),
-                             "</script><script type=\"text/plain\" class=\"frame-geometry\">",
-                             absl::Base64Escape(geometry), "</script>\n"));
+  return Scripts(FrameNumbers(frame, options_), absl::Base64Escape(geometry));
+}
+
+std::string ReportWriter::SurfaceScripts(const FrameRecord& frame) {
+  has_surfaces_ = true;
+  if (surface_bytes_ < options_.max_surface_bytes) {
+    const ReportSurface shown = EncodeReportSurface(
+        frame,
+        {.max_particles = options_.max_particles, .max_triangles = options_.max_surface_triangles});
+    const std::string geometry = absl::Base64Escape(shown.bytes);
+    surface_bytes_ += geometry.size();
+    if (surface_bytes_ <= options_.max_surface_bytes) {
+      return Scripts(SurfaceNumbers(frame, &shown), geometry);
+    }
+  }
+  return Scripts(SurfaceNumbers(frame, nullptr), "");
+}
+
+absl::Status ReportWriter::Add(const FrameRecord& frame) {
+  return file_.Append(frame.surface ? SurfaceScripts(frame) : OutlineScripts(frame));
 }
 
 absl::Status ReportWriter::Finish(const Summary& summary, double wall_seconds) {
   const std::string_view tail =
       page::kReportPageHtml.substr(page::kReportPageHtml.find(kFramesMark) + kFramesMark.size());
   absl::Status status = file_.Append(Expand(tail, [&](std::string_view name) {
+    if (name == "space" && !has_surfaces_) return std::string();
+    if (name == "space") {
+      return Concat("<script type=\"text/plain\" id=\"space-part\">", page::kReportSpaceTxt,
+                    "</script>\n");
+    }
     if (name == "headline") return EscapeHtml(summary.Headline(wall_seconds));
     if (name == "summary") return SummaryRows(summary);
     return ParameterRows(options_.parameters);

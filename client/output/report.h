@@ -22,8 +22,13 @@ struct ReportOptions {
   std::vector<std::pair<std::string, std::string>> parameters = {};
   /// A frame with more particles shows an even selection, with a note.
   std::size_t max_particles = 20'000;
-  /// A frame with more triangles shows no mesh, with a note.
+  /// An outline with more triangles shows no mesh, with a note.
   std::size_t max_triangles = 300'000;
+  /// A surface with more triangles is simplified, with a note.
+  std::size_t max_surface_triangles = 100'000;
+  /// Once the pictures of surfaces have this many bytes in the file, further frames have numbers
+  /// but no picture, with a note.
+  std::size_t max_surface_bytes = 200'000'000;
   std::string color_by = {};  ///< As in FrameWriterOptions.
 };
 
@@ -32,16 +37,18 @@ std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters);
 
 /// Writes one HTML file that requires no network and no other file. Each frame is written at once,
-/// so memory does not grow. The file appears with Finish. Its size is 140 kB, plus about four bytes
+/// so memory does not grow. The file appears with Finish. Its size is 190 kB, plus about four bytes
 /// per particle and vertex, eight per triangle and 200 per ring. Geometry is rounded to 1/128 of
 /// the spacing.
+/// With surfaces it has 235 kB more, which draw in space, plus about seven bytes per triangle and
+/// per particle, and four per value of an attribute (report_surface.h).
 class ReportWriter {
  public:
   /// Errors: as for AtomicFile.
   static absl::StatusOr<ReportWriter> Create(const std::filesystem::path& path,
                                              ReportOptions options);
 
-  /// Errors: INVALID_ARGUMENT for a surface in space; as for AtomicFile.
+  /// Errors: as for AtomicFile.
   absl::Status Add(const FrameRecord& frame);
 
   /// Adds the table of `summary` and completes the file.
@@ -51,8 +58,13 @@ class ReportWriter {
   ReportWriter(AtomicFile file, ReportOptions options)
       : file_(std::move(file)), options_(std::move(options)) {}
 
+  std::string OutlineScripts(const FrameRecord& frame) const;
+  std::string SurfaceScripts(const FrameRecord& frame);
+
   AtomicFile file_;
   ReportOptions options_;
+  bool has_surfaces_ = false;
+  std::size_t surface_bytes_ = 0;  ///< Of all pictures of surfaces.
 };
 
 }  // namespace partiemc::client

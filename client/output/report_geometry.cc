@@ -1,7 +1,6 @@
 #include "client/output/report_geometry.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "client/output/color_map.h"
 #include "client/output/formats/file_mesh.h"
+#include "client/output/report_bytes.h"
 
 namespace partiemc::client {
 namespace {
@@ -28,7 +28,7 @@ constexpr double kMaxSteps = 1 << 28;
 // Height of the rows in which particles are sorted, in steps: two spacings.
 constexpr std::int64_t kParticleRow = 2 * static_cast<std::int64_t>(kStepsPerSpacing);
 
-class Encoder {
+class Encoder : public ReportBytes {
  public:
   explicit Encoder(const FrameRecord& frame) {
     Box box;
@@ -52,20 +52,6 @@ class Encoder {
     Float64(step_);
   }
 
-  void Count(std::uint64_t value) {
-    while (value >= 0x80) {
-      out_ += static_cast<char>(value | 0x80);
-      value >>= 7;
-    }
-    out_ += static_cast<char>(value);
-  }
-
-  void Byte(std::uint8_t value) { out_ += static_cast<char>(value); }
-
-  void Signed(std::int64_t value) {
-    Count((static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63));
-  }
-
   std::pair<std::int64_t, std::int64_t> Quantise(double x, double y) const {
     return {std::llround((x - origin_x_) / step_), std::llround((y - origin_y_) / step_)};
   }
@@ -80,15 +66,7 @@ class Encoder {
     for (std::size_t k = 0; k < points.size(); k += 2) Point(Quantise(points[k], points[k + 1]));
   }
 
-  std::string Take() { return std::move(out_); }
-
  private:
-  void Float64(double value) {
-    const auto bits = std::bit_cast<std::uint64_t>(value);
-    for (int shift = 0; shift < 64; shift += 8) out_ += static_cast<char>(bits >> shift);
-  }
-
-  std::string out_;
   double origin_x_ = 0, origin_y_ = 0, step_ = 1;
   std::pair<std::int64_t, std::int64_t> last_ = {0, 0};
 };

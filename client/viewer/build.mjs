@@ -2,21 +2,25 @@
 // Fails if the page exceeds its size limit.
 //
 //   node build.mjs [--out DIR] [--debug]    the page, in DIR (default: build/page)
-//   node build.mjs --report                 the report, in client/output/report_page.html
+//   node build.mjs --report                 the report, in client/output/report_page.html and report_space.txt
 //
 // The page has index.html, page.js, page.css, icon.svg, each with a compressed copy (.gz). It loads
 // space.js (drawing) and space_worker.js (decoder) when it shows a surface. The report is one file,
-// which C++ completes. It is committed, so that `partiemc` builds without npm.
+// which C++ completes, for surfaces with the part that draws them. Both are committed, so that `partiemc`
+// builds without npm.
 import { execFileSync } from 'node:child_process';
 import { cpSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { gzipSync } from 'node:zlib';
+import { gunzipSync, gzipSync } from 'node:zlib';
 import { build } from 'esbuild';
 
 /** Limits in bytes, compressed: of the page, and of the part that it loads to show surfaces. */
 const LIMIT = 150_000;
 const SPACE_LIMIT = 250_000;
+/** Limits in characters, of the committed report and its part for surfaces. */
+const REPORT_LIMIT = 200_000;
+const REPORT_SPACE_LIMIT = 300_000;
 const SPACE_FILES = ['space.js', 'space_worker.js'];
 
 const here = path.dirname(fileURLToPath(import.meta.url));
@@ -91,6 +95,19 @@ export async function buildReport() {
   return expand('report/report.html').replace(/\{\{(style|script)\}\}/g, (_, name) => parts[name]);
 }
 
+/** The script that draws the surfaces of a report. */
+export async function buildReportSpace() {
+  const { outputFiles: [{ text }] } = await build({
+    ...OPTIONS, entryPoints: [path.join(here, 'src/report/space_part.ts')], outdir: out, format: 'iife', charset: 'utf8',
+    write: false,
+  });
+  return text;
+}
+
+/** A script as text for a document, and the inverse. */
+const packedText = (script) => gzipSync(script, { level: 9 }).toString('base64');
+export const unpackedText = (text) => gunzipSync(Buffer.from(text, 'base64')).toString('utf8');
+
 function pack() {
   const parts = { page: { total: 0, limit: LIMIT }, 'part for surfaces': { total: 0, limit: SPACE_LIMIT } };
   for (const name of readdirSync(out).sort()) {
@@ -112,7 +129,10 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
   if (process.argv.includes('--report')) {
     const report = await buildReport();
     writeFileSync(path.join(root, 'client/output/report_page.html'), report);
-    console.log(`the report: ${report.length} characters`);
+    const space = packedText(await buildReportSpace());
+    writeFileSync(path.join(root, 'client/output/report_space.txt'), space);
+    console.log(`the report: ${report.length} characters, with surfaces ${space.length} more`);
+    if (report.length > REPORT_LIMIT || space.length > REPORT_SPACE_LIMIT) throw new Error('the report is too large');
   } else {
     await buildPage();
     pack();

@@ -2,7 +2,7 @@
 # Builds the page into DIR (default: build/page beside this script), and fetches its packages by npm
 # if they are missing. Requires node, npm and protoc: docker/install.sh viewer service.
 #   client/viewer/build.sh [--out DIR]
-#   client/viewer/build.sh --report       writes client/output/report_page.html
+#   client/viewer/build.sh --report       writes client/output/report_page.html, report_space.txt
 #   client/viewer/build.sh --packages     only fetches packages
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

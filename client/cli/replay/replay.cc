@@ -132,6 +132,7 @@ class Receiver {
                                  .result = event_.frame.result,
                                  .surface = flags_.surface ? &event_.frame.result.surface : nullptr,
                                  .particles = PlaneParticles(*frame),
+                                 .particles_in_space = SpaceParticles(*frame),
                                  .particle_areas = areas,
                                  .stages_ms = event_.frame.times.stages_ms,
                                  .total_ms = event_.frame.times.total_ms,
@@ -148,10 +149,15 @@ class Receiver {
     return status;
   }
 
-  /// Returns no particles for 3D frames. They do not lie in the plane of the outline, so no output
-  /// draws them.
+  /// Returns no particles for 3D frames, because they do not lie in the plane of the outline.
   static std::span<const double> PlaneParticles(const RecordedFrame& frame) {
     if (frame.components != 2) return {};
+    return frame.positions;
+  }
+
+  /// The particles of a surface, which the report draws.
+  std::span<const double> SpaceParticles(const RecordedFrame& frame) const {
+    if (!flags_.surface || frame.components != 3) return {};
     return frame.positions;
   }
 
@@ -243,9 +249,7 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   }
   const bool has_files = !flags.output_dir.empty() || !flags.stats.empty() || !flags.report.empty();
   if (flags.local && !has_files && !flags.check && !flags.quiet) {
-    Complain(kGood, flags.surface ? "no file was written; --output-dir and --stats write files"
-                                  : "no file was written; --output-dir, --stats and --report write "
-                                    "files");
+    Complain(kGood, "no file was written; --output-dir, --stats and --report write files");
   }
   return code;
 }

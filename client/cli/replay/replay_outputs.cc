@@ -25,14 +25,19 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
          .subtitle = flags.local ? "reconstructed in process"
                                  : "reconstructed by the server at " + flags.server.address,
          .parameters = DescribeParameters(Resolve(parameters)),
+         .max_particles = flags.report_particles,
          .color_by = flags.color_by});
     if (!report.ok()) return report.status();
     outputs.report_.emplace(*std::move(report));
+    outputs.is_surface_ = flags.surface;
   }
   return outputs;
 }
 
-bool ReplayOutputs::WantsNormals() const { return frames_.ShowNormals() || report_.has_value(); }
+bool ReplayOutputs::WantsNormals() const {
+  // The report computes the normals of surfaces from the triangles.
+  return frames_.ShowNormals() || (report_.has_value() && !is_surface_);
+}
 
 absl::Status ReplayOutputs::Write(const FrameRecord& frame) {
   absl::Status status = frames_.Write(frame);

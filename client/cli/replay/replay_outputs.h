@@ -42,6 +42,7 @@ class ReplayOutputs {
 
   FrameOutputs frames_;
   std::optional<ReportWriter> report_;
+  bool is_surface_ = false;  ///< The report is of surfaces.
 };
 
 }  // namespace partiemc::client

@@ -6,7 +6,7 @@ import { existsSync, readdirSync, readFileSync, rmSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
-import { buildReport } from '../build.mjs';
+import { buildReport, buildReportSpace, unpackedText } from '../build.mjs';
 
 const here = path.dirname(fileURLToPath(import.meta.url));
 const viewer = path.dirname(here);
@@ -16,8 +16,10 @@ const names = process.argv.slice(2);
 if (!existsSync(path.join(viewer, 'build/generated'))) {
   throw new Error('build the page first: client/viewer/build.sh generates the messages');
 }
-if (await buildReport() !== readFileSync(path.join(viewer, '../output/report_page.html'), 'utf8')) {
-  throw new Error('client/output/report_page.html is out of date: run client/viewer/build.sh --report');
+const committed = (name) => readFileSync(path.join(viewer, '../output', name), 'utf8');
+if (await buildReport() !== committed('report_page.html') ||
+    await buildReportSpace() !== unpackedText(committed('report_space.txt'))) {
+  throw new Error('client/output/report_page.html or report_space.txt is out of date: run client/viewer/build.sh --report');
 }
 rmSync(out, { recursive: true, force: true });
 const tests = readdirSync(here).filter((name) => name.endsWith('.test.ts'))

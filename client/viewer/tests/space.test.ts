@@ -60,6 +60,21 @@ test('a zoom keeps the point under the pointer, a pan moves by pixels', () => {
   }
 });
 
+test('the content bounds the zoom, and a view beyond the bounds only comes back', () => {
+  const content = { low: [0, 0, 0], high: [3, 4, 0] } as { low: Vector; high: Vector };
+  for (const camera of cameras) {
+    const zoomed = (height: number, factor: number) =>
+      zoomAt({ ...camera, view: { ...view, height } }, 150, 500, factor, content).height;
+    assert.equal(zoomed(10, 1e9), 5e-4);
+    assert.equal(zoomed(10, 1e-9), 500);
+    assert.equal(zoomed(10, 2), 5);
+    assert.equal(zoomed(1e-6, 2), 1e-6);
+    assert.equal(zoomed(1e-6, 0.5), 2e-6);
+    assert.equal(zoomed(1e6, 0.5), 1e6);
+    assert.equal(zoomed(1e6, 2), 5e5);
+  }
+});
+
 test('a drag turns, and stops above the target', () => {
   const turned = turnBy(view, size, 60, 0);
   isNear([turned.turn, turned.tilt], [view.turn - Math.PI / 10, view.tilt]);
@@ -85,7 +100,7 @@ test('a fitted box is in the picture, and fills it', () => {
 
 test('keys turn, pan, zoom and fit', () => {
   let fits = 0;
-  const scene = { view: { ...view }, get camera(): Camera { return { view: this.view, isPerspective: true, size }; }, fit() { ++fits; } };
+  const scene = { view: { ...view }, extent: null, get camera(): Camera { return { view: this.view, isPerspective: true, size }; }, fit() { ++fits; } };
   assert.ok(applySpaceKey(scene, 'ArrowLeft', false));
   assert.notEqual(scene.view.turn, view.turn);
   assert.ok(applySpaceKey(scene, 'ArrowLeft', true));

@@ -85,6 +85,20 @@ TEST(SurfaceReplay, WithoutOutputsNamesThem) {
   EXPECT_THAT(with.error, Not(HasSubstr("no file was written")));
 }
 
+TEST(SurfaceReplay, WritesAReport) {
+  const support::TemporaryFolder input, output;
+  WriteBalls(input);
+  const Ran ran = RunPartiemc(Flags(input, {"--attributes", "p", "--report", output.Path("r.html"),
+                                            "--report-particles", "100"}));
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(FilesIn(output.path()), ElementsAre("r.html"));
+  const std::string report = Content(output.Path("r.html"));
+  EXPECT_THAT(report, HasSubstr("\"bodies\":2,\"cavities\":0,\"genus\":0"));
+  EXPECT_THAT(report, HasSubstr("\"particles_shown\":100,\"particles_given\":778"));
+  EXPECT_THAT(report, HasSubstr("id=\"space-part\""));
+  EXPECT_LT(report.size(), 520'000u);
+}
+
 TEST(SurfaceReplay, DropsSmallBodiesOnRequest) {
   const support::TemporaryFolder input, output;
   WriteBalls(input);

@@ -10,7 +10,6 @@
 #include "client/output/fixtures.h"
 #include "client/output/frame_writer.h"
 #include "client/output/read_files.h"
-#include "client/output/report.h"
 #include "client/output/surface_scene.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -318,14 +317,6 @@ TEST(SurfaceFiles, FormatsOfOutlinesRefuseSurfaces) {
     EXPECT_TRUE(HoldsSurfaces(format)) << Name(format);
     EXPECT_TRUE(CheckHoldsSurfaces(format).ok());
   }
-}
-
-TEST(SurfaceFiles, AReportRefusesSurfaces) {
-  support::TemporaryFolder directory;
-  auto report = ReportWriter::Create(directory / "report.html", {});
-  ASSERT_TRUE(report.ok());
-  EXPECT_EQ(report->Add({.result = kNoOutline, .surface = &Scene()}).code(),
-            absl::StatusCode::kInvalidArgument);
 }
 
 TEST(SurfaceFiles, NumbersBeyondTheFormatAreRefused) {

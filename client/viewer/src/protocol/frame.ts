@@ -86,6 +86,8 @@ export interface Frame {
   /** Surfaces in space, not decoded yet. The outlines of such a frame are its sections. */
   surface?: SurfaceMessage;
   surfaceDigest?: bigint;
+  /** Numbers of a surface that the frame does not have whole. */
+  shells?: { bodies: number; cavities: number; genus: number };
   /** Why the frame has neither rings nor mesh: the contradiction in its message. Absent for an intact one. */
   problem?: string;
 }

@@ -87,6 +87,13 @@ function lost(field: string, rule: string): Error {
   return lostField(`surface.${field}`, rule);
 }
 
+/** Handles of all shells: a shell has the Euler characteristic points - triangles / 2 = 2 - 2 genus. */
+export function genusOf(message: SurfaceMessage | undefined): number {
+  const lastOf = (bytes: Uint8Array) => (bytes.length < 4 ? 0 : arrayOf(Uint32Array, bytes.subarray(bytes.length - 4))[0]);
+  if (!message) return 0;
+  return message.outerOf.length / 4 - (lastOf(message.pointOffsets) - lastOf(message.triangleOffsets) / 2) / 2;
+}
+
 /** The bytes of a frame: views into its message. */
 export function surfaceMessageOf(message: ReconstructedFrame): SurfaceMessage {
   const { surface } = message;

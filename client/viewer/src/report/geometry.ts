@@ -1,6 +1,7 @@
 import { bytesOf } from '../protocol/arrays';
 import { channelsOf, type Channels } from '../protocol/channels';
 import { bareRings, type Mesh, NO_RING, type Rings } from '../protocol/frame';
+import { bytesOfBase64, Reader } from './reader';
 
 /** Geometry of a frame in a report. The format is described in client/output/report_geometry.h. */
 export interface Geometry {
@@ -13,68 +14,12 @@ export interface Geometry {
   particleAttributes: Channels;
 }
 
-/** Reads varints and quantised points from the bytes of a frame. */
-class Reader {
-  private readonly bytes: Uint8Array;
-  private readonly view: DataView;
-  private next = 0;
-  private step = 1;
-  private x = 0;
-  private y = 0;
-
-  constructor(base64: string) {
-    this.bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-    this.view = new DataView(this.bytes.buffer);
-  }
-
-  origin(): [number, number] {
-    const origin: [number, number] = [this.float64(), this.float64()];
-    this.step = this.float64();
-    return origin;
-  }
-
-  count(): number {
-    let value = 0;
-    for (let shift = 0; ; shift += 7) {
-      const byte = this.bytes[this.next++];
-      value |= (byte & 0x7f) << shift;
-      if (byte < 0x80) return value >>> 0;
-    }
-  }
-
-  signed(): number {
-    const value = this.count();
-    return (value >>> 1) ^ -(value & 1);
-  }
-
-  /** x, y of `count` points, relative to the origin. */
-  points(count: number): Float32Array {
-    const points = new Float32Array(2 * count);
-    for (let k = 0; k < 2 * count; k += 2) {
-      points[k] = this.step * (this.x += this.signed());
-      points[k + 1] = this.step * (this.y += this.signed());
-    }
-    return points;
-  }
-
-  byteArray(): Uint8Array {
-    const count = this.count();
-    this.next += count;
-    return this.bytes.subarray(this.next - count, this.next);
-  }
-
-  private float64(): number {
-    this.next += 8;
-    return this.view.getFloat64(this.next - 8, true);
-  }
-}
-
 /** Name of the attribute, and the range of each of its channels. */
 export interface Colors { name: string; ranges: readonly (readonly [number, number])[] }
 
 /** Decodes the geometry of a frame. */
 export function decodeGeometry(base64: string, colors: Colors | null): Geometry {
-  const reader = new Reader(base64);
+  const reader = new Reader(bytesOfBase64(base64));
   const origin = reader.origin();
   const rings = decodeRings(reader);
   const mesh = decodeMesh(reader, rings.points);

@@ -1,7 +1,6 @@
 // The script of `partiemc replay --report`: the frames in the document, drawn by the page's parts.
 import 'uplot/dist/uPlot.min.css';
 import './report.css';
-import { applyKey } from '../draw/navigation';
 import { Gauges } from '../gauges/gauges';
 import { AS_STREAMED } from '../stream/settings';
 import { addressText, parseAddress } from '../ui/address';
@@ -11,11 +10,15 @@ import { releaseFocusAfterClicks, usesKey } from '../ui/keys';
 import { LookPanel, type Switch } from '../ui/look_panel';
 import { downloadCurves } from '../ui/export_panel';
 import { Pane } from '../ui/pane';
+import { SpacePanel } from '../ui/space_panel';
 import { StatusLine } from '../ui/status_line';
 import { TextPace } from '../ui/text_pace';
+import { axesOf } from '../space/camera';
 import { Theme } from '../ui/theme';
 import { TimePanel } from '../ui/time_panel';
 import { reportOutlines } from './outlines';
+import { bytesOfBase64 } from './reader';
+import type { SpacePart } from './space_part';
 import { ReportTrack } from './track';
 
 /** Keys that switch a part of the picture. */
@@ -27,7 +30,7 @@ const LAYER_KEYS: Record<string, Switch> = {
 const FORMER_LAYERS: Record<string, string> = { mesh: 'edges', colors: '', isolines: 'sections' };
 
 /** Reads the frames that client/output/report.cc has written into the document. */
-function trackOfDocument(): ReportTrack {
+function trackOfDocument(spacePart: SpacePart | null): ReportTrack {
   const scripts = (name: string) => [...document.querySelectorAll(`script.${name}`)];
   const geometries = scripts('frame-geometry');
   const rows = [...document.querySelectorAll<HTMLTableRowElement>('table.parameters tr')];
@@ -39,12 +42,24 @@ function trackOfDocument(): ReportTrack {
     document.body.dataset.color ?? '',
     reportOutlines(rows.map(({ cells: [name, value] }) => [name.textContent ?? '', value.textContent ?? ''])),
     scripts('frame-numbers').map((script) => JSON.parse(script.textContent ?? '')),
-    (index) => geometries[index].textContent ?? '');
+    (index) => geometries[index].textContent ?? '', spacePart);
+}
+
+/** The part of the report that draws surfaces; null if there is none, or if the browser cannot unpack it. */
+async function loadSpacePart(): Promise<SpacePart | null> {
+  const packed = document.getElementById('space-part')?.textContent;
+  if (!packed || !('DecompressionStream' in globalThis)) return null;
+  const unpacked = new Blob([bytesOfBase64(packed.trim())]).stream().pipeThrough(new DecompressionStream('gzip'));
+  const script = document.createElement('script');
+  script.textContent = await new Response(unpacked).text();
+  document.head.append(script);
+  return (globalThis as { partiemcSpacePart?: SpacePart }).partiemcSpacePart ?? null;
 }
 
 class Report {
-  private readonly track = trackOfDocument();
+  private readonly track: ReportTrack;
   private readonly look = new LookPanel(() => this.lookChanged());
+  private readonly space: SpacePanel;
   private readonly pane: Pane;
   private readonly time: TimePanel;
   private readonly curves: CurvesPanel;
@@ -54,10 +69,15 @@ class Report {
   /** False until the address has been read, which must not be overwritten before. */
   private isReady = false;
 
-  constructor() {
+  constructor(spacePart: SpacePart | null) {
+    this.track = trackOfDocument(spacePart);
     this.pane = new Pane(this.track, { ...AS_STREAMED }, {
       chosen: () => {}, closed: () => {}, moved: () => this.writeAddress(),
-    }, null);
+    }, null, spacePart && ((events) => spacePart.pictureOf(events)));
+    this.space = new SpacePanel(() => {
+      this.pane.setSpaceLook(this.space.look);
+      this.writeAddress();
+    }, () => this.pane.spaceView && axesOf(this.pane.spaceView.view).back);
     this.pane.setIndex(0, 1, true);
     byId('stage', HTMLElement).append(this.pane.element);
     this.time = new TimePanel(() => this.track, () => {
@@ -73,9 +93,16 @@ class Report {
       this.curves.setDark(dark);
     });
     const { color, colorRanges } = this.track;
-    this.look.setAttributes([...colorRanges.keys()], null);
-    this.look.setColour(colorRanges.has(color) ? color : 'plain');
-    this.look.toggle('edges');
+    if (!this.track.hasSurfaces) {
+      this.look.setAttributes([...colorRanges.keys()], null);
+      this.look.setColour(colorRanges.has(color) ? color : 'plain');
+      this.look.toggle('edges');
+    }
+    this.curves.setKind(this.track.hasSurfaces ? 'space' : 'plane');
+    for (const element of document.querySelectorAll<HTMLElement>('[data-of]')) {
+      element.hidden = (element.dataset.of === 'space') !== this.track.hasSurfaces;
+    }
+    setText(byId('space-help', HTMLElement), 'Drag turns, with Shift it pans. The wheel with Ctrl zooms. A click selects a body.');
     this.listen();
     this.readAddress();
     this.isReady = true;
@@ -87,15 +114,14 @@ class Report {
 
   private listen(): void {
     const zoom = (key: string) => {
-      applyKey(this.pane.scene, key, false);
-      this.pane.setView(this.pane.scene.view);
+      this.pane.zoom(key);
       this.writeAddress();
     };
     button('zoom-in').addEventListener('click', () => zoom('+'));
     button('zoom-out').addEventListener('click', () => zoom('-'));
-    button('export-csv').addEventListener('click', () => downloadCurves(this.track, this.track.title, new Gauges()));
+    button('export-csv').addEventListener('click', () => downloadCurves(this.track, this.track.title, new Gauges(), this.track.hasSurfaces));
     button('fit').addEventListener('click', () => this.pane.fit());
-    addEventListener('beforeprint', () => this.pane.scene.draw());
+    addEventListener('beforeprint', () => this.pane.drawn.draw());
     const actions: Record<string, () => void> = {
       ' ': () => this.time.toggle(),
       ',': () => this.time.step(-1), ArrowLeft: () => this.time.step(-1),
@@ -137,6 +163,8 @@ class Report {
     const layers = values.get('layers')?.split(',').map((name) => FORMER_LAYERS[name] ?? name);
     this.look.text = layers ? [...layers, 'fill', `colour:${this.look.look.colour}`].join(',') : address.look;
     if (address.view) this.pane.setView(address.view);
+    if (address.camera) this.pane.setSpaceView(address.camera);
+    if (address.space) this.space.text = address.space;
     const { player } = this.track;
     player.seek(address.frame === null ? player.sequence ?? 1 : this.track.sequenceOf(address.frame));
     if (values.get('play') === '1') player.play();
@@ -145,10 +173,11 @@ class Report {
   private writeAddress(): void {
     const { player } = this.track;
     if (!this.isReady || player.mode !== 'paused' || player.sequence === null) return;
+    const camera = this.pane.spaceView;
     this.ownAddress = addressText({
       panes: [], file: '', open: '', frame: Number(this.track.labelOf(player.sequence)),
       view: this.pane.isFree ? null : this.pane.scene.view, look: this.look.text,
-      camera: null, space: '',
+      camera: camera?.isMoved ? camera.view : null, space: this.space.text,
     });
     try {
       history.replaceState(null, '', this.ownAddress);
@@ -164,9 +193,11 @@ class Report {
     this.pane.refresh(this.pace);
     this.time.refresh(this.pace);
     this.curves.refresh(this.track, null, this.pane.summary, this.pane.isStreamed, this.pace);
-    this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl);
+    if (this.track.hasSurfaces) this.look.setAttributes(this.pane.channels, this.track);
+    this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl, this.pane.isSpace);
+    this.space.offer(this.pane.isSpace, this.pane.outlines.length > 1);
     this.look.setOutlines(this.track.outlines);
-    this.look.setLegend(this.pane.scene.legend());
+    this.look.setLegend(this.pane.legend);
     this.status.refresh([this.pane.state], 0, this.track, now);
     setText(byId('omissions', HTMLElement), this.track.omissions(player.sequence ?? 0));
     document.body.dataset.frame = this.track.labelOf(player.sequence ?? 0);
@@ -174,4 +205,4 @@ class Report {
   }
 }
 
-new Report();
+void loadSpacePart().catch(() => null).then((spacePart) => new Report(spacePart));

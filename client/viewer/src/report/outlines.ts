@@ -6,6 +6,7 @@ export function reportOutlines(rows: readonly (readonly [string, string])[]): Ou
   const own: Outline = {
     plane: planeOf(value('slice')), isovalue: value('isovalue') ? Number(value('isovalue')) : null,
   };
+  if (value('output') === 'surface') own.isSurface = true;
   const sections = rows.filter(([name]) => /^section \d+$/.test(name)).map(([, text]): Outline => {
     const isovalue = /isovalue (\S+)$/.exec(text);
     return { plane: planeOf(text) ?? own.plane, isovalue: isovalue ? Number(isovalue[1]) : null };

@@ -10,6 +10,8 @@ import { ringCounts, STAGES } from '../stream/summary';
 import type { Method, Track } from '../stream/track';
 import { count } from '../ui/format';
 import { decodeGeometry } from './geometry';
+import type { SpacePart } from './space_part';
+import { surfaceFrame, type SurfaceNumbers, surfaceOmissions, surfaceSummary } from './surfaces';
 
 /** Numbers of a frame, written by client/output/report.cc. Null: not finite. */
 export interface FrameNumbers {
@@ -57,6 +59,8 @@ const RATE = 12;
 /** Frames larger than the median by this factor do not extend the initial view. */
 const LARGEST_FRAME = 3;
 
+const isSurface = (numbers: FrameNumbers | SurfaceNumbers): numbers is SurfaceNumbers => 'bodies' in numbers;
+
 const orNaN = (value: number | null) => value ?? NaN;
 
 /** The frames of a report. Frame k has the sequence k + 1. Geometry is decoded on demand. */
@@ -75,16 +79,19 @@ export class ReportTrack implements Track {
   private latest: { sequence: number; frame: Frame } | null = null;
 
   constructor(readonly title: string, readonly method: Method, readonly color: string,
-              readonly outlines: readonly Outline[], private readonly numbers: FrameNumbers[],
-              private readonly geometryOf: (index: number) => string) {
-    this.bounds = boundsOfAll(numbers);
-    this.colorRanges = rangesOfAll(color, numbers);
+              readonly outlines: readonly Outline[], private readonly numbers: (FrameNumbers | SurfaceNumbers)[],
+              private readonly geometryOf: (index: number) => string, private readonly spacePart: SpacePart | null) {
+    const flat = numbers.flatMap((one) => (isSurface(one) ? [] : [one]));
+    this.bounds = boundsOfAll(flat);
+    this.colorRanges = rangesOfAll(color, flat);
     this.doubts = [...new Set(numbers.flatMap(({ doubts }) => doubts))];
     numbers.forEach((one, k) => this.history.insert(this.entry(one, k + 1), Infinity));
     this.player = new Player(this, false);
     this.player.loop = true;
     this.player.seek(1);
   }
+
+  get hasSurfaces(): boolean { return this.numbers.some(isSurface); }
 
   range(): Range | null { return this.numbers.length > 0 ? { first: 1, last: this.numbers.length } : null; }
   rate(): number { return RATE; }
@@ -105,6 +112,7 @@ export class ReportTrack implements Track {
   omissions(sequence: number): string {
     const numbers = this.numbers[sequence - 1];
     if (!numbers) return '';
+    if (isSurface(numbers)) return surfaceOmissions(numbers);
     const { particles_shown: shown, particles_given: given } = numbers;
     return [
       numbers.mesh_shown ? '' : 'The mesh is too large for the report.',
@@ -112,8 +120,8 @@ export class ReportTrack implements Track {
     ].filter(Boolean).join(' ');
   }
 
-  private entry(numbers: FrameNumbers, sequence: number): Entry {
-    const summary: Summary = {
+  private entry(numbers: FrameNumbers | SurfaceNumbers, sequence: number): Entry {
+    const summary: Summary = isSurface(numbers) ? surfaceSummary(numbers) : {
       area: orNaN(numbers.area), triangles: numbers.triangles,
       ...ringCounts(numbers.measures.map(([area]) => area ?? 0)),
       trianglesGrid: numbers.triangles_grid, milliseconds: orNaN(numbers.milliseconds),
@@ -135,6 +143,9 @@ export class ReportTrack implements Track {
 
   private decode(sequence: number): Frame {
     const numbers = this.numbers[sequence - 1];
+    if (isSurface(numbers)) {
+      return surfaceFrame(this.geometryOf(sequence - 1), numbers, sequence, this.doubtsOf(numbers), this.spacePart);
+    }
     const colors = numbers.colors ? { name: this.color, ranges: numbers.colors } : null;
     const { sections, ...geometry } = decodeGeometry(this.geometryOf(sequence - 1), colors);
     const frame: Frame = {
@@ -166,8 +177,12 @@ export class ReportTrack implements Track {
       milliseconds: orNaN(numbers.milliseconds), droppedHoles: numbers.dropped_holes,
       droppedComponents: numbers.dropped_components, droppedSpray: numbers.dropped_spray,
       selfIntersections: numbers.self_intersections, foldedTriangles: numbers.folded_triangles,
-      doubts: numbers.doubts.map((text) => this.doubts.indexOf(text)),
+      doubts: this.doubtsOf(numbers),
     };
+  }
+
+  private doubtsOf({ doubts }: { doubts: string[] }): number[] {
+    return doubts.map((text) => this.doubts.indexOf(text));
   }
 }
 

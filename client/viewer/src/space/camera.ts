@@ -28,6 +28,9 @@ const MARGIN = 0.1;
 /** A drag over the height of the picture turns by this angle. */
 const TURN_RADIANS = Math.PI;
 const STEEPEST = Math.PI / 2;
+/** Limits of the picture's height, as shares of the fitted one: float32 resolves no less. */
+const NEAREST_ZOOM = 1e-4;
+const FARTHEST_ZOOM = 100;
 const SMALLEST_HEIGHT = 1e-30;
 const LARGEST_HEIGHT = 1e30;
 
@@ -74,10 +77,16 @@ export function pointAt(camera: Camera, x: number, y: number): Vector {
   return plus(plus(camera.view.target, right, (x - width / 2) * unit), up, (height / 2 - y) * unit);
 }
 
-/** The view zoomed by `factor`. The point under the CSS position stays there. */
-export function zoomAt(camera: Camera, x: number, y: number, factor: number): SpaceView {
+/**
+ * The view zoomed by `factor`. The point under the CSS position stays there. `content`: the box of the content, which
+ * bounds the zoom; a view beyond the bounds only comes back. Null: unknown.
+ */
+export function zoomAt(camera: Camera, x: number, y: number, factor: number, content: Box | null = null): SpaceView {
   const { view } = camera;
-  const height = limited(view.height / factor);
+  const size = content ? Math.hypot(...minus(content.high, content.low)) : 0;
+  const [least, most] = size > 0 ? [NEAREST_ZOOM * size, FARTHEST_ZOOM * size] : [SMALLEST_HEIGHT, LARGEST_HEIGHT];
+  const height = factor > 1 ? Math.max(limited(view.height / factor), Math.min(view.height, least))
+    : Math.min(limited(view.height / factor), Math.max(view.height, most));
   const fixed = pointAt(camera, x, y);
   return { ...view, height, target: plus(fixed, minus(view.target, fixed), height / view.height) };
 }

@@ -1,8 +1,8 @@
 import { ARROWS, attachGestures, FAST, KEY_ZOOM } from '../draw/gestures';
-import { type Camera, panBy, type SpaceView, turnBy, zoomAt } from './camera';
+import { type Box, type Camera, panBy, type SpaceView, turnBy, zoomAt } from './camera';
 
 /** The part of a scene that navigation uses. */
-export interface Turnable { view: SpaceView; readonly camera: Camera; fit(): void }
+export interface Turnable { view: SpaceView; readonly camera: Camera; readonly extent: Box | null; fit(): void }
 
 /** Turn and pan per key press, in CSS pixels of a drag. */
 const KEY_PIXELS = 24;
@@ -14,8 +14,8 @@ export function applySpaceKey(scene: Turnable, key: string, shift: boolean): boo
   const arrow = ARROWS[key];
   if (arrow && shift) scene.view = panBy(camera, arrow[0] * FAST * KEY_PIXELS, arrow[1] * FAST * KEY_PIXELS);
   else if (arrow) scene.view = turnBy(scene.view, camera.size, arrow[0] * KEY_PIXELS, arrow[1] * KEY_PIXELS);
-  else if (key === '+' || key === '=') scene.view = zoomAt(camera, width / 2, height / 2, KEY_ZOOM);
-  else if (key === '-' || key === '_') scene.view = zoomAt(camera, width / 2, height / 2, 1 / KEY_ZOOM);
+  else if (key === '+' || key === '=') scene.view = zoomAt(camera, width / 2, height / 2, KEY_ZOOM, scene.extent);
+  else if (key === '-' || key === '_') scene.view = zoomAt(camera, width / 2, height / 2, 1 / KEY_ZOOM, scene.extent);
   else if (key === '0') scene.fit();
   else return false;
   return true;
@@ -25,7 +25,8 @@ export function applySpaceKey(scene: Turnable, key: string, shift: boolean): boo
  * Turns by a drag; pans by a drag with Shift or another button or two fingers; zooms and takes keys (`attachGestures`).
  * Returns a function: true during a drag.
  */
-export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void): () => boolean {
+export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable, onChange: () => void,
+  scrolls = false): () => boolean {
   let isPanning = false;
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   const { isDragging } = attachGestures(canvas, {
@@ -36,8 +37,8 @@ export function attachSpaceNavigation(canvas: HTMLCanvasElement, scene: Turnable
     drag: (right, down, hasTwo) => {
       scene.view = isPanning || hasTwo ? panBy(scene.camera, right, down) : turnBy(scene.view, scene.camera.size, right, down);
     },
-    zoom: (x, y, factor) => { scene.view = zoomAt(scene.camera, x, y, factor); },
+    zoom: (x, y, factor) => { scene.view = zoomAt(scene.camera, x, y, factor, scene.extent); },
     key: (key, shift) => applySpaceKey(scene, key, shift),
-  }, onChange);
+  }, onChange, scrolls);
   return isDragging;
 }

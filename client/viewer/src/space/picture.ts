@@ -3,16 +3,16 @@ import type { Mark } from '../export/marks';
 import { marksOf } from '../export/marks';
 import { hex, theme } from '../draw/colours';
 import type { Frame } from '../protocol/frame';
+import type { Surface, SurfaceMessage } from '../protocol/surface';
 import type { Outline } from '../protocol/sections';
 import { make, setText } from '../ui/dom';
 import { count, number } from '../ui/format';
 import { ScaleBar } from '../ui/scale_bar';
 import { axesDrawing, type AxesDrawing } from './axes';
 import { type SpaceView, unitsPerPixel, type Vector, viewText } from './camera';
-import { decoder } from './decoder';
-import { loadSpace } from './drawing';
+import type { SpaceModule } from './drawing';
 import type { SpaceLook } from './look';
-import { attachSpaceNavigation } from './navigation';
+import { applySpaceKey, attachSpaceNavigation } from './navigation';
 import { type PickedShell, spaceFrameOf, SpaceScene } from './scene';
 import { shellAt } from './shells';
 
@@ -23,6 +23,12 @@ export interface SpaceEvents {
   selected(point: Vector | null): void;
   /** A frame is shown now. */
   shown(frame: Frame): void;
+}
+
+/** Where a picture gets its decoder and its drawing. Both throw an Error with a sentence. */
+export interface SpaceSource {
+  load(): Promise<SpaceModule>;
+  decode(message: SurfaceMessage): Promise<Surface>;
 }
 
 /** A selected point lies in its surface, so rounding may put it beside the box: by this share of the box. */
@@ -54,7 +60,8 @@ export class SpacePicture {
   private era = 0;
   private waiting: { frame: Frame; outlines: readonly Outline[] } | null = null;
 
-  constructor(private readonly events: SpaceEvents) {
+  /** `scrolls`: as of attachGestures. */
+  constructor(private readonly events: SpaceEvents, private readonly source: SpaceSource, scrolls = false) {
     this.axes.setAttribute('class', 'overlay');
     this.axes.setAttribute('aria-hidden', 'true');
     this.element = make('div', { class: 'space' }, this.canvas, this.axes, this.scaleBar.element, this.readout);
@@ -62,7 +69,7 @@ export class SpacePicture {
       this.isFree = false;
       this.dirty = true;
       events.moved(true);
-    });
+    }, scrolls);
     this.listen();
     this.observer.observe(this.canvas);
     void this.load();
@@ -95,6 +102,14 @@ export class SpacePicture {
     this.scene.view = { ...view };
     this.isFree = false;
     this.dirty = true;
+  }
+
+  /** Zooms about the middle by a key, as in the focused picture. */
+  zoom(key: string): void {
+    applySpaceKey(this.scene, key, false);
+    this.isFree = false;
+    this.dirty = true;
+    this.events.moved(true);
   }
 
   fit(): void {
@@ -156,7 +171,7 @@ export class SpacePicture {
 
   private async load(): Promise<void> {
     try {
-      const { createDrawing } = await loadSpace();
+      const { createDrawing } = await this.source.load();
       if (!this.isClosed) this.scene.attach(createDrawing(this.canvas));
     } catch (error) {
       this.drawingProblem = textOf(error);
@@ -172,7 +187,7 @@ export class SpacePicture {
       this.waiting = null;
       if (!frame.surface) break;
       try {
-        const surface = await decoder.decode(frame.surface);
+        const surface = await this.source.decode(frame.surface);
         if (this.isClosed) break;
         if (era !== this.era) continue;
         this.frameProblem = '';

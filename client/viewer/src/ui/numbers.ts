@@ -1,5 +1,6 @@
 import { digestText } from '../protocol/digest';
 import { NO_RING, type Frame, type Statistics } from '../protocol/frame';
+import { genusOf } from '../protocol/surface';
 import { reductionOf, ringCounts } from '../stream/summary';
 import type { Method } from '../stream/track';
 import { make, setText } from './dom';
@@ -16,9 +17,9 @@ function outerAndHoles({ rings: { outerOf } }: Frame): string {
   return `${count(outer)}, ${count(outerOf.length - outer)}`;
 }
 
-function shellCounts({ surface }: Frame): string {
+function shellCounts({ surface, shells }: Frame): string {
   const { rings: bodies, holes: cavities } = ringCounts([...surface?.measures.volume ?? []]);
-  return `${count(bodies)}, ${count(cavities)}`;
+  return `${count(shells?.bodies ?? bodies)}, ${count(shells?.cavities ?? cavities)}`;
 }
 
 function reduction(statistics: Statistics): string {
@@ -48,6 +49,7 @@ const ROWS: Row[] = [
   { key: 'reduction', of: 'plane', title: 'Reduction', text: ({ statistics }) => reduction(statistics) },
   { key: 'area', title: 'Area', text: ({ statistics }) => number(statistics.area, 7) },
   { key: 'volume', of: 'space', title: 'Volume', text: ({ statistics }) => number(statistics.volume ?? 0, 7) },
+  { key: 'genus', of: 'space', title: 'Genus', text: ({ frame }) => count(frame.shells?.genus ?? genusOf(frame.surface)) },
   { key: 'perimeter', of: 'plane', title: 'Perimeter', text: ({ statistics }) => number(statistics.perimeter, 7) },
   { key: 'contact-angles', of: 'plane', title: 'Contact angles', text: ({ frame }) => contactAngles(frame), isWide: true },
   { key: 'spacing', title: 'Spacing', text: ({ statistics }) => number(statistics.spacing) },

@@ -1,5 +1,6 @@
 import { Output } from '@proto/v1/reconstruction_pb';
 import { attachNavigation, Scene, type Legend, type Look } from '../draw';
+import { applyKey } from '../draw/navigation';
 import { contactMarks } from '../draw/contacts';
 import { boundsOf } from '../draw/view';
 import type { Drawn } from '../export/canvas_copy';
@@ -197,6 +198,16 @@ export class Pane {
 
   /** Whether the view follows the content. */
   get isFree(): boolean { return this.followed.isFree; }
+
+  /** Zooms about the middle of the picture by the key + or -. */
+  zoom(key: string): void {
+    if (this.space && this.isSpace) {
+      this.space.zoom(key);
+      return;
+    }
+    applyKey(this.scene, key, false);
+    this.setView(this.scene.view);
+  }
 
   /** Lets the view follow the content again. */
   fit(): void {

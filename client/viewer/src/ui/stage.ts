@@ -8,11 +8,16 @@ import { byId } from './dom';
 import type { Point } from './measure';
 import type { Vector } from '../space/camera';
 import { DEFAULT_SPACE_LOOK, type SpaceLook } from '../space/look';
-import { SpacePicture } from '../space/picture';
+import { decoder } from '../space/decoder';
+import { loadSpace } from '../space/drawing';
+import { SpacePicture, type SpaceSource } from '../space/picture';
 import { Pane } from './pane';
 
 /** More pictures would be too small to compare. */
 const MOST_PANES = 4;
+
+/** Surfaces are drawn by space.js and decoded by a worker. */
+const SPACE_SOURCE: SpaceSource = { load: loadSpace, decode: (message) => decoder.decode(message) };
 
 /** One to four panes side by side. One of them is chosen. */
 export class Stage {
@@ -43,7 +48,7 @@ export class Stage {
     }, {
       frame: (changed) => new Variant(this.gateway, changed),
       stream: (of, other) => new VariantStream(this.gateway, of, other),
-    }, (events) => new SpacePicture(events));
+    }, (events) => new SpacePicture(events, SPACE_SOURCE));
     pane.setLook(this.look);
     pane.setSpaceLook(this.spaceLook);
     this.panes.push(pane);

@@ -94,6 +94,36 @@ test('cut faces have the colours of their bodies and hide what is behind them', 
   await shot('translucent');
 });
 
+test('the clip plane cuts the outlines of sections', async () => {
+  await openCut();
+  // Around the section z = 0 of the ball without a cavity, whose radius is between 5.9 and 6.7.
+  const circle = Array.from({ length: 90 * 9 }, (_, k) => {
+    const [angle, radius] = [(k % 90) * Math.PI / 45, 5.9 + 0.1 * Math.floor(k / 90)];
+    return [8 + radius * Math.cos(angle), radius * Math.sin(angle), 0];
+  });
+  const places = await Promise.all(circle.map((point) => viewer.placeOf(point)));
+  const others = await Promise.all(circle.map(([x, ...rest]) => viewer.placeOf([x - 16, ...rest])));
+  const kept = [...places, ...others].filter((_, k) => circle[k % circle.length][1] > -1);
+  // A place in front of the plane can also show what is behind it, of both balls.
+  const isApart = (at) => kept.every(({ x, y }) => Math.hypot(x - at.x, y - at.y) > 6);
+  const front = circle.filter(([, y], k) => y < -1 && isApart(places[k]));
+  const back = circle.filter(([, y]) => y > 1);
+  // The section y = 2 lies behind the plane, and is seen through the surface.
+  await viewer.page.locator('#outline-list input:enabled').nth(1).uncheck();
+  const before = await coloursAt(...front, ...back);
+  await changes('sections', () => toggle('Sections'));
+  const cut = await coloursAt(...front, ...back);
+  // The line is orange; the colours of the surface's silhouette change as well, but keep their hue.
+  const isLine = (former, now) => now[0] - now[2] > former[0] - former[2] + 40;
+  const lines = (from, to) => before.slice(from, to).filter((colour, k) => isLine(colour, cut[from + k])).length;
+  await shot('sections');
+  assert.equal(lines(0, front.length), 0, 'nothing is drawn on the side that is cut away');
+  assert.ok(lines(front.length, before.length) > 20, 'the other side has its outline');
+  await changes('no clip plane', () => choose('Clip plane', 'none'));
+  const whole = await coloursAt(...front);
+  assert.ok(whole.filter((colour, k) => isLine(before[k], colour)).length > 20, 'without the plane the line is whole');
+});
+
 test('the pointer is on the cut face, and selects its body', async () => {
   await openCut();
   const readout = viewer.pane().locator('.space .readout');

@@ -27,7 +27,7 @@ function balls(frame) {
   return `${lines.join('\n')}\n`;
 }
 
-/** The folder of the frames, which the first call writes. */
+/** The folder of the frames in `world.folder`, which the first call writes. */
 export function ballsOf(world) {
   const folder = path.join(world.folder, 'balls');
   if (existsSync(folder)) return folder;
