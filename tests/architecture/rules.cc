@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <iterator>
 #include <map>
 #include <regex>
+#include <set>
 #include <sstream>
+#include <string>
 #include <utility>
 
 #include "partiemc/stage.h"
@@ -382,6 +385,29 @@ Violations NoMachinePaths(const SourceTree& tree) {
     for (const std::string& found : Matches(text, kMachinePath)) {
       violations.push_back(path + ": names " + found);
     }
+  }
+  return violations;
+}
+
+Violations TestsAreBuilt(const SourceTree& tree) {
+  std::set<std::string> words;
+  for (const auto& [path, text] : tree) {
+    if (!path.ends_with("CMakeLists.txt")) continue;
+    std::string word;
+    for (const char c : text + ' ') {
+      if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.') {
+        word += c;
+      } else {
+        words.insert(std::exchange(word, {}));
+      }
+    }
+  }
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (Room(path) != "tests" || !path.ends_with("_test.cc")) continue;
+    const std::string file = path.substr(path.rfind('/') + 1);
+    if (words.contains(file) || words.contains(file.substr(0, file.size() - 3))) continue;
+    violations.push_back(path + ": no CMakeLists.txt names it, so it is not built");
   }
   return violations;
 }

@@ -48,6 +48,9 @@ Violations ServerAndClientAreStrangers(const SourceTree& tree);
 /// No file contains a path of a developer's machine.
 Violations NoMachinePaths(const SourceTree& tree);
 
+/// Each *_test.cc is a source of a test: a CMake file names it, with or without ".cc".
+Violations TestsAreBuilt(const SourceTree& tree);
+
 /// The packages that the CMake files require are in docker/packages: the core's in `core`, VTK in
 /// `vtk`, the tests' in `tests`, all others in `service`.
 Violations PackageSetsAreComplete(const SourceTree& tree);

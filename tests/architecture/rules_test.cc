@@ -238,6 +238,14 @@ TEST(Architecture, APathOfAMachineIsSeen) {
   EXPECT_THAT(NoMachinePaths(tree), Contains(HasSubstr("README.md: names")));
 }
 
+TEST(Architecture, TestsAreBuilt) { EXPECT_THAT(TestsAreBuilt(Project()), IsEmpty()); }
+
+TEST(Architecture, ATestThatIsNotBuiltIsSeen) {
+  EXPECT_THAT(
+      TestsAreBuilt(Without("tests/core/CMakeLists.txt", "phases_accuracy_test.cc")),
+      Contains(HasSubstr("tests/core/phases_accuracy_test.cc: no CMakeLists.txt names it")));
+}
+
 TEST(Architecture, PackageSetsAreComplete) {
   EXPECT_THAT(PackageSetsAreComplete(Project()), IsEmpty());
 }

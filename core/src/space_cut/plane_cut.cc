@@ -77,8 +77,8 @@ bool LiesOnOtherPlane(const CutMesh& mesh, const Edge& edge, std::uint32_t point
   });
 }
 
-/// Appends the normal at the part t of an edge. Opposite normals have no mean: then that of the
-/// lower end.
+/// Appends the normal at the part t of an edge. Opposite normals have no mean; the lower end's
+/// normal takes its place.
 void AddNormal(const Edge& edge, double t, CutMesh& mesh) {
   const auto normal_of = [&](std::uint32_t point) {
     const float* const normal = &mesh.normals[3 * std::size_t{point}];

@@ -73,7 +73,8 @@ struct PlaneCutScratch {
 
 /// Replaces the mesh by its part on the kept side of the plane, and adds a cap without triangles to
 /// `mesh.caps`. New points have exactly the coordinate `plane.at`; their other coordinates are
-/// rounded, between those of the ends of their edges. Their normals are those of the edges there.
+/// rounded, and lie between the coordinates of the ends of their edges. They have the normals of
+/// the edges there.
 ///
 /// A triangle becomes one or two triangles, or is dropped. Where the plane crosses an earlier cap,
 /// inside and outside alternate along the common line of both planes. Each stretch inside becomes

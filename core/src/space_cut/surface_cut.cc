@@ -23,8 +23,8 @@ constexpr std::array kShifts = {0.,  1.,   2.,   3.,   5.,    8.,    13.,   21.,
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 64;
 // Moved alike along two axes, planes would follow diagonal edges of bodies on a lattice.
 constexpr std::array kShiftAlong = {1., 1.37, 1.71};
-// Points closer to a plane than this part of a step are too close. The vertices of a flat face are
-// up to 1e-7 spacings away from a plane, so many may be near a plane in the face.
+// Points closer to a plane than this part of a step are too close. Many vertices may be near a
+// plane: those of a flat face in it are up to 1e-7 spacings away.
 constexpr double kClearance = 1. / 256;
 // A piece is dust if its volume is below this part of the volume of a cube around it, or its size
 // below this part of its distance from the origin: rounding hides its volume or its centroid.
