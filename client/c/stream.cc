@@ -318,7 +318,9 @@ partiemc_surface ViewOf(const Surface& surface) {
           .outer_of = surface.outer_of.data(),
           .shells = reinterpret_cast<const partiemc_shell*>(surface.measures.data()),
           .parents = is_tracked ? surface.parents.data() : nullptr,
-          .parent_offsets = is_tracked ? surface.parent_offsets.data() : nullptr};
+          .parent_offsets = is_tracked ? surface.parent_offsets.data() : nullptr,
+          .cut_count = surface.cuts.size(),
+          .cuts = surface.cuts.data()};
 }
 
 // Requires: AddResult has filled `event`.

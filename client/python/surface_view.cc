@@ -95,6 +95,9 @@ void DefineSurface(py::module_& module) {
           "parent_offsets",
           [](S s) { return View<std::uint32_t>(s.part.parent_offsets, 1, s.owner); },
           "(S + 1,) uint32; (1,) if shells are not tracked.")
+      .def_property_readonly(
+          "cuts", [](S s) { return View<std::uint32_t>(s.part.cuts, 1, s.owner); },
+          "(K,) uint32, ascending: triangles on walls (wall_planes). `area` does not count them.")
       .def(
           "check", [](S s) { RaiseUnlessOk(Validate(s.part)); },
           "Checks with exact arithmetic that every shell is closed, manifold, oriented and free of "

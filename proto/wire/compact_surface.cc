@@ -1,6 +1,7 @@
 #include "wire/compact_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -107,6 +108,31 @@ Order OrderOf(const Surface& surface) {
     }
   }
   return order;
+}
+
+// The triangles of the message that are cuts of the surface.
+std::vector<std::uint32_t> CutsOf(const Surface& surface, const Order& order) {
+  std::vector<std::uint32_t> cuts;
+  if (surface.cuts.empty()) return cuts;
+  // Triangles are recognised by their points.
+  const auto key = [](std::array<std::uint32_t, 3> points) {
+    std::sort(points.begin(), points.end());
+    return points;
+  };
+  std::vector<std::array<std::uint32_t, 3>> known;
+  for (const std::uint32_t cut : surface.cuts) {
+    const std::uint32_t* const points = &surface.triangles[3 * std::size_t{cut}];
+    known.push_back(key({points[0], points[1], points[2]}));
+  }
+  std::sort(known.begin(), known.end());
+  for (std::size_t t = 0; t < surface.TriangleCount(); ++t) {
+    const std::uint32_t* const points = &order.triangles[3 * t];
+    const auto of_surface =
+        key({order.points[points[0]], order.points[points[1]], order.points[points[2]]});
+    if (!std::binary_search(known.begin(), known.end(), of_surface)) continue;
+    cuts.push_back(static_cast<std::uint32_t>(t));
+  }
+  return cuts;
 }
 
 absl::Status EncodeRounded(std::span<const double> points, std::span<const std::uint32_t> order,
@@ -216,6 +242,9 @@ absl::Status EncodeCompact(const Surface& surface, const Origin& origin, double 
   triangles.resize(meshopt_encodeIndexBufferBound(order.triangles.size(), surface.PointCount()));
   triangles.resize(meshopt_encodeIndexBuffer(Data(triangles), triangles.size(),
                                              order.triangles.data(), order.triangles.size()));
+  const std::vector<std::uint32_t> cuts = CutsOf(surface, order);
+  message.mutable_cuts()->assign(reinterpret_cast<const char*>(cuts.data()),
+                                 cuts.size() * sizeof(std::uint32_t));
   if (has_normals) {
     EncodeNormals(surface.normals, order.points, *message.mutable_normals());
   } else {

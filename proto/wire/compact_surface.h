@@ -9,7 +9,7 @@
 
 namespace partiemc::wire {
 
-/// Writes points, triangles, attributes and, if `has_normals`, normals. Points and triangles are
+/// Writes points, triangles, cuts, attributes and, if `has_normals`, normals. Points and triangles are
 /// reordered within their shells, so that they compress better. Sets `step`. meshoptimizer
 /// allocates memory. Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if a coordinate is more
 /// than 2^30 steps from the origin.

@@ -150,8 +150,23 @@ absl::Status DecodePlain(const v1::Surface& message, const PointFormat& format, 
   return absl::OkStatus();
 }
 
-// Writes offsets, points, triangles, normals and attributes, in the coordinate format and relative
-// to the origin of `message`.
+absl::Status DecodeCuts(const v1::Surface& message, Surface& surface) {
+  constexpr absl::string_view kField = "surface.cuts";
+  if (message.cuts().size() % sizeof(std::uint32_t) != 0) {
+    return Lost(kField, "is no array of uint32");
+  }
+  CopyBytes(message.cuts(), surface.cuts);
+  for (std::size_t k = 0; k < surface.cuts.size(); ++k) {
+    const bool ascends = k == 0 || surface.cuts[k - 1] < surface.cuts[k];
+    if (surface.cuts[k] < surface.TriangleCount() && ascends) continue;
+    return Lost(kField, absl::StrCat("must be ascending numbers of the ", surface.TriangleCount(),
+                                     " triangles"));
+  }
+  return absl::OkStatus();
+}
+
+// Writes offsets, points, triangles, cuts, normals and attributes, in the coordinate format and
+// relative to the origin of `message`.
 absl::Status EncodeGeometry(const Surface& surface, double spacing, bool has_normals,
                             v1::ReconstructedFrame& message) {
   v1::Surface& to = *message.mutable_surface();
@@ -163,6 +178,7 @@ absl::Status EncodeGeometry(const Surface& surface, double spacing, bool has_nor
     return EncodeCompact(surface, origin, spacing, has_normals && !surface.normals.empty(), to);
   }
   to.clear_step();
+  AssignBytes(std::span<const std::uint32_t>(surface.cuts), *to.mutable_cuts());
   AssignBytes(std::span<const std::uint32_t>(surface.triangles), *to.mutable_triangles());
   if (has_normals) {
     AssignBytes(std::span<const float>(surface.normals), *to.mutable_normals());
@@ -216,6 +232,7 @@ absl::Status DecodeSurface(const v1::ReconstructedFrame& message, Surface& surfa
                         {.format = message.coordinate_format(), .origin = origin, .components = 3},
                         surface);
   if (status.ok()) status = CheckTriangles(surface);
+  if (status.ok()) status = DecodeCuts(from, surface);
   if (!status.ok()) return status;
   DecodeMeasures(from, surface);
   return absl::OkStatus();

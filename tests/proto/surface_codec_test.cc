@@ -146,6 +146,56 @@ TEST(SurfaceMessage, AReusedMessageAndResultHoldNothingOfTheFrameBefore) {
   }
 }
 
+// The mean of the corners of each cut, sorted.
+std::vector<std::array<double, 3>> MiddlesOfCuts(const Surface& surface) {
+  std::vector<std::array<double, 3>> middles;
+  for (const std::uint32_t cut : surface.cuts) {
+    std::array<double, 3> middle{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t point = surface.triangles[3 * std::size_t{cut} + k];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        middle[axis] += surface.points[3 * point + axis] / 3;
+      }
+    }
+    middles.push_back(middle);
+  }
+  std::sort(middles.begin(), middles.end());
+  return middles;
+}
+
+TEST(SurfaceMessage, HasTheCutsInEveryFormat) {
+  std::vector<double> positions;
+  for (int x = 0; x < 12; ++x) {
+    for (int y = 0; y < 9; ++y) {
+      for (int z = 0; z < 7; ++z) positions.insert(positions.end(), {x + .5, y + .5, z + .5});
+    }
+  }
+  const auto reconstructor = Reconstructor::Create(
+      {.output = Output::kSurface, .spacing = 1.0, .wall_planes = {{.axis = 2}, {.axis = 0}}});
+  ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+  State state;
+  Workspace workspace;
+  Result result;
+  const Frame frame{.positions = std::span<const double>(positions), .components = 3};
+  ASSERT_TRUE(reconstructor->Reconstruct(frame, state, workspace, result).ok());
+  ASSERT_GT(result.surface.cuts.size(), 50u);
+  ASSERT_TRUE(Validate(result.surface).ok());
+  const Surface exact = Decoded(Encoded(result, kExact)).surface;
+  EXPECT_EQ(exact, result.surface);
+  const auto middles = MiddlesOfCuts(result.surface);
+  for (const Coordinates format : {Coordinates::kRelativeFloat32, Coordinates::kCompact}) {
+    const Surface seen = Decoded(Encoded(result, {.normals = true, .coordinates = format})).surface;
+    ASSERT_EQ(seen.cuts.size(), result.surface.cuts.size());
+    const auto near = MiddlesOfCuts(seen);
+    // Rounding may change the order of middles with equal coordinates, so sums are compared.
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double sum = 0;
+      for (std::size_t k = 0; k < near.size(); ++k) sum += near[k][axis] - middles[k][axis];
+      EXPECT_NEAR(sum / static_cast<double>(near.size()), 0, .001);
+    }
+  }
+}
+
 TEST(SurfaceMessage, WithoutBodiesKeepsTheNamesOfItsAttributes) {
   Result empty;
   empty.Clear();
@@ -332,6 +382,9 @@ std::vector<Hostile> Changes() {
       {"surface.identities", [](S& s) { s.mutable_identities()->resize(8); }},
       {"surface.measures", [](S& s) { s.mutable_measures()->RemoveLast(); }},
       {"surface.measures", [](S& s) { s.add_measures(); }},
+      {"surface.cuts", [](S& s) { s.set_cuts("12345"); }},
+      {"surface.cuts", [](S& s) { s.set_cuts(std::string(8, '\0')); }},
+      {"surface.cuts", [](S& s) { s.set_cuts("\xff\xff\xff\x7f"); }},
       {"surface.attributes[0]", [](S& s) { s.mutable_attributes(0)->set_components(4); }},
       {"surface.attributes[0]", [](S& s) { s.mutable_attributes(0)->set_components(0); }},
       {"surface.attributes[1]", [](S& s) { s.mutable_attributes(1)->mutable_values()->resize(7); }},

@@ -29,7 +29,6 @@ struct SurfaceStatistics {
   std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
   std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
-  std::uint64_t cut_bodies = 0;          ///< Bodies that were cut at faces of the periodic box.
 
   friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
 };
@@ -58,9 +57,8 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, that lie on faces of the periodic box (SurfaceParameters::box) or on
-  /// walls (SurfaceParameters::wall_planes), where a body was cut. They close the surface; areas do
-  /// not count them.
+  /// Triangles, ascending, that lie on walls (SurfaceParameters::wall_planes), where a body was cut.
+  /// They close the surface; areas do not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.

@@ -322,6 +322,7 @@ SimplifyReport Simplify(const SimplifyLimits& limits, Surface& surface) {
   surface.point_offsets.assign(simplified.point_offsets.begin(), simplified.point_offsets.end());
   surface.triangle_offsets.assign(simplified.triangle_offsets.begin(),
                                   simplified.triangle_offsets.end());
+  surface.cuts.clear();
   for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) {
     space::MeasureShell(shell, surface);
   }

@@ -23,6 +23,7 @@ struct SimplifyReport {
 
 /// Removes points, and connects the others by fewer triangles. The other points keep their bits,
 /// their order, normals and attributes; shells keep their order. Sets area, volume and centroid.
+/// No triangle is a cut afterwards.
 /// Requires: S1 to S5, except that normals and attributes may have no values yet.
 /// Deterministic for any number of threads. Allocates memory in each call.
 /// Cost: n log n in the triangles for each round; usually one to three rounds.

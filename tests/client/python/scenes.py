@@ -50,7 +50,7 @@ def assert_equal(case, one, other, but=()):
     of_all = "points normals area centroids particle_counts identities parents parent_offsets outer_of"
     for part, names in (("rings", f"{of_all} offsets perimeter cuts wetted contacts contact_angles"),
                         ("mesh", "points triangles classes"),
-                        ("surface", f"{of_all} point_offsets triangle_offsets triangles volume")):
+                        ("surface", f"{of_all} point_offsets triangle_offsets triangles volume cuts")):
         for name in names.split():
             mine, its = (getattr(getattr(each, part), name) for each in (one, other))
             case.assertEqual((mine.dtype, mine.shape, mine.tobytes()), (its.dtype, its.shape, its.tobytes()),
