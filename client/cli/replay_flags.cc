@@ -20,13 +20,15 @@ absl::Status CheckCombinations(const CLI::App& app) {
     return absl::InvalidArgumentError("--format: requires --output-dir");
   }
   if (app.count("--surface") > 0) {
-    for (const char* flat : {"--gauge", "--color-by"}) {
-      if (app.count(flat) > 0) {
-        return absl::InvalidArgumentError(
-            Concat(flat,
-                   ": shows outlines, so it cannot be combined with --surface; --report and "
-                   "--output-dir show surfaces with all attributes"));
-      }
+    if (app.count("--gauge") > 0) {
+      return absl::InvalidArgumentError(
+          "--gauge: measures outlines, so it cannot be combined with --surface; --stats has the "
+          "areas and volumes of surfaces");
+    }
+    if (app.count("--color-by") > 0) {
+      return absl::InvalidArgumentError(
+          "--color-by: colours outlines, so it cannot be combined with --surface; --report and "
+          "--output-dir have surfaces with all attributes");
     }
   }
   if (app.count("--check") > 0 && app.count("--coordinates") > 0) {
@@ -339,7 +341,7 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
           ->type_name("FILE.html")
           ->group(kGroup);
   app.add_option("--report-particles", flags.report_particles,
-                 "Most particles of a frame in the report, selected evenly; 0: none")
+                 "Maximum number of particles per frame in the report, selected evenly; 0: none")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber)

@@ -1,11 +1,14 @@
 #include "client/cli/stream_recorder.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_replace.h"
 #include "client/output/text.h"
 #include "partiemc/status.h"
 
@@ -23,10 +26,19 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
   }
 }
 
+// A word for a shell, which may come from a stranger.
+std::string Quoted(std::string_view text) {
+  const bool is_plain = std::ranges::all_of(text, [](char c) {
+    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '.';
+  });
+  if (is_plain && !text.empty()) return std::string(text);
+  return Concat("'", absl::StrReplaceAll(text, {{"'", "'\\''"}}), "'");
+}
+
 // The value of --phases and of --wall for particles.
 std::string PhasesOf(const std::string& attribute, const std::vector<std::int32_t>& phases) {
   const std::vector<double> numbers(phases.begin(), phases.end());
-  return Concat(attribute, "=", NumberList(numbers));
+  return Concat(Quoted(attribute), "=", NumberList(numbers));
 }
 
 // The value of --slice.

@@ -1,13 +1,16 @@
 #include "client/library/watch_call.h"
 
 #include <algorithm>
+#include <set>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "client/library/channel.h"
 #include "client/library/retry_policy.h"
+#include "wire/bytes.h"
 #include "wire/surface_level.h"
 
 namespace partiemc::client {
@@ -55,14 +58,24 @@ void TakeParticles(const Frame& echoed, const ReconstructionParameters& paramete
   Project(echoed.velocities, components, axes, frame.particle_velocities);
   frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
   frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
-  frame.particle_attributes.resize(echoed.attributes.size());
-  for (std::size_t k = 0; k < echoed.attributes.size(); ++k) {
-    const Attribute& from = echoed.attributes[k];
-    AttributeValues& to = frame.particle_attributes[k];
-    to.name = from.name;
-    to.components = from.components;
-    to.values.assign(from.values.begin(), from.values.end());
+}
+
+// Takes the scalars that have values, of several with one name the first. Returns false if one has
+// not as many values as there are particles.
+bool TakeScalars(const v1::ReconstructedFrame& result, std::size_t particles, WatchedFrame& frame) {
+  std::set<std::string_view> names;
+  for (const v1::NamedScalar& from : result.particle_scalars()) {
+    if (from.values().empty() || !names.insert(from.name()).second) continue;
+    const std::uint32_t components = std::max(from.components(), 1u);
+    if (components > 3 || from.values().size() != components * sizeof(float) * particles) {
+      return false;
+    }
+    AttributeValues& to = frame.particle_attributes.emplace_back();
+    to.name = from.name();
+    to.components = static_cast<int>(components);
+    wire::CopyBytes(from.values(), to.values);
   }
+  return true;
 }
 
 }  // namespace
@@ -218,12 +231,10 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   particles_.mutable_ids()->swap(*result.mutable_particle_ids());
   particles_.mutable_volumes()->swap(*result.mutable_particle_volumes());
   particles_.mutable_velocities()->swap(*result.mutable_particle_velocities());
-  particles_.mutable_scalars()->Swap(result.mutable_particle_scalars());
-  std::vector<std::string> names;
-  for (const v1::NamedScalar& scalar : particles_.scalars()) names.push_back(scalar.name());
-  wire::AttributeViews views;
-  const auto particles = wire::DecodeFrame(particles_, names, views);
-  if (!particles.ok()) return Broken("sent particles that cannot be read");
+  const auto particles = wire::DecodeFrame(particles_);
+  if (!particles.ok() || !TakeScalars(result, particles->ParticleCount(), frame)) {
+    return Broken("sent particles that cannot be read");
+  }
   TakeParticles(*particles, stream_.parameters, frame);
   return absl::OkStatus();
 }

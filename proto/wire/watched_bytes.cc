@@ -74,13 +74,20 @@ std::vector<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
   return found;
 }
 
+// Shares the memory of `bytes`.
+std::vector<grpc::Slice> SlicesOf(const grpc::ByteBuffer& bytes) {
+  std::vector<grpc::Slice> slices;
+  if (!bytes.Dump(&slices).ok()) slices.clear();
+  return slices;
+}
+
 }  // namespace
 
 WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
   constexpr int kPath[] = {v1::ReconstructResponse::kFrameFieldNumber};
   // Of several frames the last one counts, as for a parser.
   const std::vector<Span> frames = Find(response, kPath);
-  if (!frames.empty()) Append(response, frames.back().offset, frames.back().length);
+  if (!frames.empty()) Append(SlicesOf(response), frames.back().offset, frames.back().length);
 }
 
 void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame) {
@@ -94,6 +101,7 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
       {From::kVelocitiesFieldNumber, To::kParticleVelocitiesFieldNumber},
       {From::kScalarsFieldNumber, To::kParticleScalarsFieldNumber},
   };
+  const std::vector<grpc::Slice> slices = SlicesOf(request);
   AppendOwn(Written([&](CodedOutputStream& out) {
     out.WriteTag(VarintTag(To::kParticleFormatFieldNumber));
     out.WriteVarint32(static_cast<std::uint32_t>(frame.position_format()));
@@ -106,7 +114,7 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
         out.WriteTag(LengthTag(field));
         out.WriteVarint64(array.length);
       }));
-      Append(request, array.offset, array.length);
+      Append(slices, array.offset, array.length);
     }
   }
 }
@@ -150,12 +158,12 @@ void WatchedBytes::AppendOwn(const std::string& bytes) {
   memory_ += bytes.size();
 }
 
-void WatchedBytes::Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length) {
-  std::vector<grpc::Slice> slices;
-  if (!whole.Dump(&slices).ok()) return;
+void WatchedBytes::Append(std::span<const grpc::Slice> whole, std::size_t offset,
+                          std::size_t length) {
   size_ += length;
-  for (const grpc::Slice& slice : slices) {
-    if (offset < slice.size() && length > 0) {
+  for (const grpc::Slice& slice : whole) {
+    if (length == 0) return;
+    if (offset < slice.size()) {
       const std::size_t end = std::min(slice.size(), offset + length);
       slices_.push_back(slice.sub(offset, end));
       if (std::exchange(counted_, slice.begin()) != slice.begin()) memory_ += slice.size();

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,7 @@ class WatchedBytes {
 
  private:
   void AppendOwn(const std::string& bytes);
-  void Append(const grpc::ByteBuffer& whole, std::size_t offset, std::size_t length);
+  void Append(std::span<const grpc::Slice> whole, std::size_t offset, std::size_t length);
 
   std::vector<grpc::Slice> slices_;
   std::size_t size_ = 0, memory_ = 0;

@@ -162,8 +162,8 @@ void OtherPart::OnFrame(std::size_t slot, grpc::ByteBuffer& request) {
   auto status =
       assembler()->Offer(joined_.seat, *sequence, request.Length(),
                          std::make_shared<PartMessage>(request), FrameAssembler::Clock::now());
-  // CANCELLED means that the assembler has removed this call. The call then ends with a status, so
-  // the frame needs no refusal.
+  // CANCELLED means that another call has taken over the part. This call then ends with a status,
+  // so the frame needs no refusal.
   if (!absl::IsCancelled(status)) slots_[slot].refusal = std::move(status);
 }
 

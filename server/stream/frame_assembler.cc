@@ -237,8 +237,12 @@ absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std
   std::shared_ptr<AssemblyMember> leader;
   {
     const MutexLock lock(mutex_);
-    if (ended_ || members_[seat.part - 1].holder != seat.holder) {
+    if (members_[seat.part - 1].holder != seat.holder) {
       return absl::CancelledError("the call sends no part any more");
+    }
+    if (ended_) {
+      return RefusedPart(kReasonPartLate, "sequence", absl::StrCat(sequence),
+                         "must be sent before part 0 ends the stream");
     }
     if (auto status = CheckOffer(seat.part, sequence, bytes); !status.ok()) return status;
     Gathered& frame = frames_.try_emplace(sequence, Gathered{.since = now}).first->second;

@@ -108,7 +108,8 @@ class FrameAssembler {
   void Leave(const Seat& seat);
   /// Stores a part of frame `sequence` that arrived at `now`.
   /// Errors, which change nothing: PART_LATE, PART_DUPLICATE, PART_AHEAD, FRAME_BYTES, each with a
-  /// Violation; CANCELLED, without a Violation, if the assembler has removed the call.
+  /// Violation; CANCELLED, without a Violation, if the call has left or another one has taken over
+  /// the part.
   absl::Status Offer(const Seat& seat, std::uint64_t sequence, std::uint64_t bytes,
                      std::shared_ptr<const PartBytes> part, Clock::time_point now);
   /// Drops a stored part, unless Take has returned it.

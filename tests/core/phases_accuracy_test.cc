@@ -189,6 +189,42 @@ void Measure(const KnownScene& known, double noise, Random& random, Figures& fig
   MeasureAngles(known, result, figures);
 }
 
+// A lens between two phases: the arcs meet at 120 degrees. Straight lines that are fitted to arcs
+// move junctions outward (core/PHASES.md).
+TEST(PhasesAccuracy, AnglesOfALens) {
+  constexpr int kSeeds = 8;
+  for (const double width : {10., 20.}) {
+    double turned = 0, apart = 0;
+    int angles = 0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      Random random(seed);
+      const double turn = random.Uniform(0, 3);
+      const double radius = width / std::sqrt(3), away = radius / 2;
+      const double x = away * std::cos(turn), y = away * std::sin(turn);
+      const Distance lens = Both(Drop(x, y, radius), Drop(-x, -y, radius));
+      const Distance half = Line(0, 0, turn + std::numbers::pi / 2);
+      const PhaseScene scene{
+          support::DiscBody(kRadius),
+          {{1, Both(Reversed(lens), half)}, {2, Both(Reversed(lens), Reversed(half))}, {3, lens}}};
+      Particles particles = Filled(scene, random);
+      ReconstructionParameters parameters{.spacing = 1.0};
+      for (const int phase : {1, 2, 3}) parameters.sections.push_back({.phase = phase});
+      const Result result = support::ReconstructOnce(parameters, particles);
+      const Rings& rings = result.sections[2].rings;
+      for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+        const std::size_t point = rings.contacts[k];
+        turned += std::abs(rings.contact_angles[k] * 180 / std::numbers::pi - 120);
+        apart += std::hypot(rings.points[2 * point], rings.points[2 * point + 1]) - width / 2;
+        ++angles;
+      }
+    }
+    std::printf("lens of width %.0f: angles %.1f degrees, junctions %.2f outward\n", width,
+                turned / angles, apart / angles);
+    EXPECT_EQ(angles, 2 * kSeeds);
+    EXPECT_LE(turned / angles, 15);
+  }
+}
+
 TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
   constexpr int kSeeds = 8;
   std::printf("%-14s %8s %8s %8s %8s %10s %12s\n", "", "rest", "area", "noise", "area", "junctions",

@@ -141,7 +141,9 @@ void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
   attributes_.clear();
   for (const std::string& name : attribute_names_) {
     for (const ParticleAttribute& one : recorded.attributes) {
-      if (one.name == name) attributes_.push_back({one.name, one.components, one.values});
+      if (one.name != name) continue;
+      attributes_.push_back({one.name, one.components, one.values});
+      break;  // A recording may hold a name twice.
     }
     if (name == kVelocityAttribute && !recorded.time && !recorded.velocities.empty()) {
       attributes_.push_back({kVelocityAttribute, recorded.components, recorded.velocities});

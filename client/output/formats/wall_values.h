@@ -1,4 +1,4 @@
-// Values at the points of rings that touch walls (ReconstructionParameters::walls).
+// Values at the points of rings that touch walls or have contacts (Rings::contacts).
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 
 namespace partiemc::client {
 
-/// One value for each point of the rings. Empty if the rings touch no wall.
+/// One value for each point of the rings. Empty if the rings touch no wall and have no contact.
 struct WallValues {
   /// 1: the segment to the next point of the ring lies on a wall.
   std::vector<std::uint8_t> wetted;
-  std::vector<float> contact_angles;  ///< In degrees; NaN where no outline meets a wall.
+  std::vector<float> contact_angles;  ///< In degrees; NaN at points that are no contacts.
 };
 
 inline WallValues WallValuesOf(const Rings& rings) {

@@ -52,9 +52,9 @@ struct Rings {
   /// (ReconstructionParameters::walls), except where the repair has moved an end of it off the
   /// wall.
   std::vector<std::uint32_t> wetted;
-  /// Points, ascending, where an outline meets a wall, or the outline of a phase a third region:
-  /// another phase or the outside of the body. The angle of the fluid or phase there, between wall
-  /// and outline or between both sides of the ring, in radians.
+  /// Points, ascending. Of a body: where its outline meets a wall. Of a phase: where it meets two
+  /// other phases, or one and the outside (core/PHASES.md). And the angle of the fluid or of the
+  /// phase there, in radians, at most 2 pi.
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

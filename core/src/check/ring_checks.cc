@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <numeric>
 #include <string>
 #include <vector>
 
 #include "base/predicates.h"
+#include "partiemc/status.h"
 #include "vertices/intersections.h"
 #include "vertices/ring_depths.h"
 
@@ -146,8 +148,32 @@ absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> po
   return absl::OkStatus();
 }
 
+namespace {
+
+absl::Status CheckContacts(const Rings& rings) {
+  if (rings.contact_angles.size() != rings.contacts.size()) {
+    return Broken("contacts: ", rings.contact_angles.size(), " angles for ", rings.contacts.size(),
+                  " contacts");
+  }
+  for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+    const std::uint32_t point = rings.contacts[k];
+    if (point >= rings.PointCount() || (k > 0 && point <= rings.contacts[k - 1])) {
+      return Broken("contacts: point ", point, " is not in order, or beyond the ",
+                    rings.PointCount(), " points");
+    }
+    constexpr auto kTurn = static_cast<float>(2 * std::numbers::pi);
+    if (const float angle = rings.contact_angles[k]; !(angle >= 0 && angle <= kTurn)) {
+      return Broken("contacts: the angle ", ShortestNumber(angle), " at point ", point,
+                    " is not in [0, 2 pi]");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::Status CheckRings(const Rings& rings) {
-  for (const auto check : {CheckR1, CheckR2, CheckR3, CheckR4}) {
+  for (const auto check : {CheckR1, CheckR2, CheckR3, CheckR4, CheckContacts}) {
     if (absl::Status status = check(rings); !status.ok()) return status;
   }
   return absl::OkStatus();

@@ -255,7 +255,8 @@ absl::Status CheckCuts(const Surface& surface) {
       const auto at = [&](int corner) { return surface.points[3 * triangle[corner] + axis]; };
       is_on_plane = is_on_plane || (at(0) == at(1) && at(1) == at(2));
     }
-    if (!is_on_plane) return Broken("S5: triangle ", t, " of the cuts is not on a face of a box");
+    if (!is_on_plane)
+      return Broken("S5: triangle ", t, " of the cuts is in no plane parallel to two axes");
   }
   return absl::OkStatus();
 }

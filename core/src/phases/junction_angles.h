@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 namespace partiemc {
@@ -15,10 +16,10 @@ struct PhaseRing {
   std::span<const std::uint8_t> is_junction;
 };
 
-/// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in
-/// [0, 2 pi). Each side of the ring has a parabola that begins at the junction, fitted by least
-/// squares to the points from 1.5 to 6 spacings away (along the ring, before the next junction).
-/// Shorter sides have a chord. Cost: linear in these points.
-float JunctionAngle(const PhaseRing& ring, std::size_t k, double spacing);
+/// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in [0, 2
+/// pi]. Each side of the ring has a parabola, fitted by least squares to the points from 1.5 to 6
+/// spacings away along the ring, before the next junction. Absent if a side has fewer than four
+/// such points. Cost: linear in these points.
+std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, double spacing);
 
 }  // namespace partiemc

@@ -51,7 +51,9 @@ void NormalsFromTriangles(NormalWeights weights, const std::vector<Vec3>& positi
       Vec3 weighted = product;
       if (weights == NormalWeights::kSphere) {
         const Vec3 &next = sides[k], &last = sides[(k + 2) % 3];
-        weighted = (1 / Dot(next, next)) * ((1 / Dot(last, last)) * product);
+        const double next_square = Dot(next, next), last_square = Dot(last, last);
+        if (!(next_square > 0 && last_square > 0)) continue;
+        weighted = (1 / next_square) * ((1 / last_square) * product);
       }
       normals[triangle[k]] = normals[triangle[k]] + weighted;
     }

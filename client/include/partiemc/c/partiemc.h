@@ -376,8 +376,8 @@ typedef struct partiemc_event {
 
   /* With `walls`: wetted_count points, ascending, whose segment to the next point of the ring lies
    * on a wall; contact_count points, ascending, where an outline meets a wall, and the angle of the
-   * fluid at each, between the wall and the outline, in radians. The outline of a phase has such
-   * points where it meets two other phases, or one and the outside. */
+   * fluid at each, between the wall and the outline, in radians. Contacts of a phase are
+   * the points where it meets two other phases, or one and the outside, with its angles. */
   size_t wetted_count;
   const uint32_t* wetted;
   size_t contact_count;

@@ -92,7 +92,7 @@ struct WatchedFrame {
   std::vector<std::uint64_t> particle_ids;
   std::vector<float> particle_volumes, particle_velocities;
   /// The attributes that the producer sends with its particles (ParticleFrame.scalars), such as
-  /// phases: `components` values per particle.
+  /// phases: `components` values per particle, distinct names.
   std::vector<AttributeValues> particle_attributes;
   std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
   /// Set for the first frame after a loss: one line with the lost address, the cause, the address
