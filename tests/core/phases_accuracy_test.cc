@@ -221,7 +221,7 @@ TEST(PhasesAccuracy, AnglesOfALens) {
     std::printf("lens of width %.0f: angles %.1f degrees, junctions %.2f outward\n", width,
                 turned / angles, apart / angles);
     EXPECT_EQ(angles, 2 * kSeeds);
-    EXPECT_LE(turned / angles, 15);
+    EXPECT_LE(turned / angles, 6);
   }
 }
 
