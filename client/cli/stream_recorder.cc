@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/str_replace.h"
 #include "client/output/text.h"
 #include "partiemc/status.h"
 
@@ -32,7 +31,15 @@ std::string Quoted(std::string_view text) {
     return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '.';
   });
   if (is_plain && !text.empty()) return std::string(text);
-  return Concat("'", absl::StrReplaceAll(text, {{"'", "'\\''"}}), "'");
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (c == '\'') {
+      quoted += "'\\''";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "'";
 }
 
 // The value of --phases and of --wall for particles.
