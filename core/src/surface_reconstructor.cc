@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -270,6 +269,14 @@ void MakeEmpty(Surface& surface) {
   surface.attributes.clear();
 }
 
+std::uint64_t CountWallAxes(const SurfaceParameters& parameters) {
+  std::array<bool, 3> has_wall{};
+  for (const WallPlane& plane : parameters.wall_planes) {
+    has_wall[static_cast<std::size_t>(plane.axis)] = true;
+  }
+  return static_cast<std::uint64_t>(std::ranges::count(has_wall, true));
+}
+
 /// Checks the walls, and that nothing excludes them.
 absl::Status CheckWallsOf(const SurfaceParameters& parameters) {
   const std::vector<WallPlane>& planes = parameters.wall_planes;
@@ -287,7 +294,9 @@ absl::Status CheckWallsOf(const SurfaceParameters& parameters) {
 
 // Images of particles reach two kernel radii behind walls: F is exact for one of them, which
 // windows require. Particles up to half a spacing behind a wall are before it.
-constexpr double kImageRadii = 2, kWallTolerance = .5;
+// A particle on a wall would have no image, and half of a lone one would be cut off: such particles
+// move to kLeastHeight before the wall.
+constexpr double kImageRadii = 2, kWallTolerance = .5, kLeastHeight = .05;
 
 /// The space before the walls, in world units; absent without walls.
 std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters) {
@@ -307,8 +316,7 @@ bool CutAtWalls(const SurfaceParameters& parameters, WallCutScratch& scratch, Su
   for (const WallPlane& plane : parameters.wall_planes) {
     scratch.planes.push_back({plane.axis, plane.position, plane.is_fluid_above});
     const double sign = plane.is_fluid_above ? 1 : -1;
-    const double reach = kReach * parameters.spacing +
-                         kReach * std::numeric_limits<float>::epsilon() * std::abs(plane.position);
+    const double reach = kReach * parameters.spacing + 1e-5 * kReach * std::abs(plane.position);
     for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
       if (scratch.is_cut[shell] != 0) continue;
       for (std::size_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1];
@@ -443,7 +451,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
                           .is_simplified = parameters_.simplify > 0,
-                          .has_walls = !parameters_.wall_planes.empty()};
+                          .wall_axes = CountWallAxes(parameters_)};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
@@ -472,6 +480,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                                .planes = parameters_.wall_planes,
                                .depth = kImageRadii * parameters_.kernel_radius * h,
                                .tolerance = kWallTolerance * h,
+                               .nearest = kLeastHeight * h,
                                .reserve =
                                    [&](std::uint64_t bytes) {
                                      size.lift_bytes = bytes;

@@ -210,6 +210,42 @@ TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
   }
 }
 
+// Lone particles at walls are cut the most. The cut frees memory, so the peak counts.
+TEST(MemoryGuard, IsToldNoLessThanACutAtWallsTakes) {
+  support::Random random(5);
+  std::vector<double> on_floor, on_edge;
+  for (int p = 0; p < 900; ++p) {
+    const double z = random.Uniform(0, .7);
+    on_floor.insert(on_floor.end(), {4. * (p % 30), 4. * (p / 30), z});
+    const double x = 4 * p + random.Uniform(-.5, .5), y = random.Uniform(0, .4);
+    on_edge.insert(on_edge.end(), {x, y, random.Uniform(0, .4)});
+  }
+  const std::vector<WallPlane> floor = {{.axis = 2}}, edge = {{.axis = 1}, {.axis = 2}};
+  for (const SurfacePlacement placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                                           SurfacePlacement::kVirtualPlane}) {
+    for (const auto& [xyz, walls] : {std::pair(&on_floor, floor), std::pair(&on_edge, edge)}) {
+      SCOPED_TRACE(
+          absl::StrCat("placement ", static_cast<int>(placement), ", walls ", walls.size()));
+      const auto reconstructor =
+          SurfaceReconstructor::Create({.placement = placement, .wall_planes = walls});
+      ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+      const Frame frame{.positions = std::span<const double>(*xyz), .components = 3};
+      const std::size_t before = live_bytes;
+      peak_bytes = before;
+      RecordingGuard guard(3);
+      SurfaceWorkspace workspace;
+      Surface surface;
+      const absl::Status status =
+          reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
+      ASSERT_TRUE(status.ok()) << status;
+      const std::size_t held = peak_bytes - before;
+      EXPECT_GT(surface.cuts.size(), 1000u);
+      EXPECT_LE(held, guard.last());
+      EXPECT_GE(6 * static_cast<double>(held), static_cast<double>(guard.last()));
+    }
+  }
+}
+
 // The simplification frees its memory, so the peak counts.
 TEST(MemoryGuard, IsToldNoLessThanASimplificationTakes) {
   for (SurfaceCase& tested : SurfaceCases()) {

@@ -84,9 +84,11 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
   }
   for (AxisPlane plane : input.planes) {
     ThrowIfCancelled();
+    // Opposite faces of a box move alike; a wall moves alone, because the next one may be far away.
+    const double far =
+        input.are_walls ? std::abs(plane.at) : farthest[static_cast<std::size_t>(plane.axis)];
     const double step =
-        kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() *
-                                             farthest[static_cast<std::size_t>(plane.axis)];
+        kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() * far;
     const double move = shift * step * kShiftAlong[static_cast<std::size_t>(plane.axis)];
     plane.at += input.are_walls && !plane.keeps_above ? -move : move;
     if (!InSpaceDomain(plane.at)) plane.at = 0;

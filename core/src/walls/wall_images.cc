@@ -41,16 +41,18 @@ std::span<const Value> Gather(std::span<const Value> from, std::size_t component
   return to;
 }
 
-// Calls visit(position, number) for the particles that have an effect.
+// Calls visit(position, number) for the particles that have an effect. Those nearer to a wall than
+// `nearest`, or behind it, move to this distance before it, so that each has an image.
 template <typename Real, typename Visit>
 void ForEachNear(std::span<const Real> positions, const FluidBox& box, double tolerance,
-                 const Visit& visit) {
+                 double nearest, const Visit& visit) {
   for (std::size_t particle = 0; particle < positions.size() / kAxes; ++particle) {
     std::array<double, kAxes> at;
     bool is_near = true;
     for (std::size_t k = 0; k < kAxes; ++k) {
       at[k] = static_cast<double>(positions[kAxes * particle + k]);
       is_near = is_near && at[k] >= box.low[k] - tolerance && at[k] <= box.high[k] + tolerance;
+      at[k] = std::min(std::max(at[k], box.low[k] + nearest), box.high[k] - nearest);
     }
     if (is_near) visit(at, static_cast<std::uint32_t>(particle));
   }
@@ -105,8 +107,9 @@ absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& s, Fra
   const Frame& given = input.frame;
   const FluidBox box = FluidBoxOf(input.planes);
   const auto for_each_near = [&](const auto& visit) {
-    std::visit([&](auto positions) { ForEachNear(positions, box, input.tolerance, visit); },
-               given.positions);
+    std::visit(
+        [&](auto positions) { ForEachNear(positions, box, input.tolerance, input.nearest, visit); },
+        given.positions);
   };
   std::uint64_t all = 0;
   for_each_near([&](const std::array<double, kAxes>& at, std::uint32_t) {

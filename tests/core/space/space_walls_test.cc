@@ -307,6 +307,43 @@ TEST(SurfaceWalls, AWallFarFromTheFluidChangesNothing) {
   }
 }
 
+// A wall at 1e30 stands for none. Planes of one axis once moved alike, and this one moved the floor
+// into the fluid.
+TEST(SurfaceWalls, AWallAtAnyDistanceLeavesTheOppositeWall) {
+  Random random(3);
+  const SpaceParticles particles = OnFloor(
+      0, 5, .1, random, [](const Vec3& at) { return std::abs(at.x) < 5 && std::abs(at.y) < 5; });
+  const WallPlane floor{.axis = 2};
+  const Surface alone = AtWalls(particles, {floor});
+  ASSERT_GT(alone.ShellCount(), 0u);
+  for (const double far : {1e6, 1e12, 1e16, 1e30, 1e60}) {
+    const WallPlane ceiling{.axis = 2, .position = far, .is_fluid_above = false};
+    const Surface surface = AtWalls(particles, {floor, ceiling});
+    EXPECT_NEAR(VolumeOf(surface), VolumeOf(alone), 1e-6 * VolumeOf(alone)) << far;
+  }
+}
+
+TEST(SurfaceWalls, ParticlesOnAWallAndBehindItKeepTheirVolume) {
+  const std::vector<WallPlane> corner = {{.axis = 0}, {.axis = 1}, {.axis = 2}};
+  const std::vector<std::pair<Vec3, std::vector<WallPlane>>> places = {{{0, 0, 0}, {corner[2]}},
+                                                                       {{0, 0, -.3}, {corner[2]}},
+                                                                       {{0, 0, 0}, corner},
+                                                                       {{-.3, -.3, -.3}, corner}};
+  for (const auto& [place, walls] : places) {
+    SpaceParticles one;
+    one.Add(place);
+    EXPECT_NEAR(VolumeOf(AtWalls(one, walls)), 1, .05) << place.x << ' ' << place.z;
+  }
+  for (const int side : {2, 3}) {
+    SpaceParticles cube;
+    for (int k = 0; k < side * side * side; ++k) {
+      cube.Add({1. * (k % side), 1. * (k / side % side), 1. * (k / side / side)});
+    }
+    const double volume = side * side * side;
+    EXPECT_NEAR(VolumeOf(AtWalls(cube, {corner[2]})), volume, .05 * volume) << side;
+  }
+}
+
 TEST(SurfaceWalls, DropsAndBodiesKeepTheirIdentities) {
   Random random(8);
   const auto reconstructor = SurfaceReconstructor::Create(
