@@ -52,9 +52,9 @@ struct Rings {
   /// (ReconstructionParameters::walls), except where the repair has moved an end of it off the
   /// wall.
   std::vector<std::uint32_t> wetted;
-  /// Points, ascending. Of a body: where its outline meets a wall. Of a phase: where it meets two
-  /// other phases, or one and the outside (core/PHASES.md). And the angle of the fluid or of the
-  /// phase there, in radians, at most 2 pi.
+  /// Points, ascending, where the outline of a body meets a wall, or where a phase meets two other
+  /// phases, or one and the outside (core/PHASES.md). `contact_angles` are the angles of the fluid,
+  /// or of the phase, at these points, in radians, at most 2 pi.
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

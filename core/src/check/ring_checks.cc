@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -161,7 +160,7 @@ absl::Status CheckContacts(const Rings& rings) {
       return Broken("contacts: point ", point, " is not in order, or beyond the ",
                     rings.PointCount(), " points");
     }
-    constexpr auto kTurn = static_cast<float>(2 * std::numbers::pi);
+    constexpr float kTurn = 6.2831855f;  // 2 pi.
     if (const float angle = rings.contact_angles[k]; !(angle >= 0 && angle <= kTurn)) {
       return Broken("contacts: the angle ", ShortestNumber(angle), " at point ", point,
                     " is not in [0, 2 pi]");

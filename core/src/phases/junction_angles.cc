@@ -1,7 +1,6 @@
 #include "phases/junction_angles.h"
 
 #include <algorithm>
-#include <numbers>
 
 #include "base/point.h"
 #include "walls/point_math.h"
@@ -65,7 +64,7 @@ std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, double 
   const auto before = DirectionFrom(ring, k, -1, spacing);
   if (!after || !before) return std::nullopt;
   const double angle = AngleBetween(*after, *before);
-  constexpr double kTurn = 2 * std::numbers::pi;
+  constexpr double kTurn = 6.283185307179586;  // 2 pi.
   // The inside is on the left of the ring.
   const double inside = Cross(*after, *before) < 0 ? kTurn - angle : angle;
   return std::min(static_cast<float>(inside), static_cast<float>(kTurn));
