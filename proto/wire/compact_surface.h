@@ -9,8 +9,8 @@
 
 namespace partiemc::wire {
 
-/// Writes points, triangles, cuts, attributes and, if `has_normals`, normals. Points and triangles are
-/// reordered within their shells, so that they compress better. Sets `step`. meshoptimizer
+/// Writes points, triangles, cuts, attributes and, if `has_normals`, normals. Points and triangles
+/// are reordered within their shells, so that they compress better. Sets `step`. meshoptimizer
 /// allocates memory. Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if a coordinate is more
 /// than 2^30 steps from the origin.
 absl::Status EncodeCompact(const Surface& surface, const Origin& origin, double spacing,
