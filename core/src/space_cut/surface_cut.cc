@@ -133,7 +133,7 @@ class Assembly {
   }
 
  private:
-  // Whole shells are pieces as well, so that all shells are in the order of their points.
+  // All shells are in the order of their points, so whole shells are pieces as well.
   void AddWholeTriangles();
   void FindPieces();
   bool DropDust();
