@@ -15,7 +15,6 @@
 #include <tuple>
 
 #include "absl/synchronization/mutex.h"
-#include "server/compute/heap.h"
 #include "server/options.h"
 #include "server/rpc/health_check.h"
 #include "server/server.h"
@@ -91,7 +90,6 @@ void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
 }
 
 int Serve(const CommandLine& line) {
-  KeepFreedMemory();
   TakeAllDescriptors();
   // Disables abseil's deadlock detection. Linux distributions build abseil with it, and it slows
   // down every lock of gRPC.

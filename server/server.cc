@@ -395,7 +395,7 @@ absl::Status Server::Listen() {
   acceptor_ = *std::move(acceptor);
   if (address_.unix_path.empty()) address_.port = acceptor_->port();
   streams_ = std::make_unique<ChannelzStreams>();
-  watch_.Start(streams_.get(), GiveBackFreedMemory);
+  watch_.Start(streams_.get());
   acceptor_->Start([this](int descriptor) {
     grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
     connection.fd = descriptor;

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/compute/heap.h"
-
 namespace partiemc::server {
 
 // The pool's threads ("runners") are plain threads, not tasks of the oneTBB arena. A thread that
@@ -81,7 +79,7 @@ void ComputePool::Run() {
       task->afterwards();
       task.reset();  // Destructors of captured objects run without the lock.
     }
-    GiveBack(TakeOutlived(), WarmSize::Clock::now() - gave_back_ >= warm_time_);
+    Destroy(TakeOutlived());
   }
 }
 
@@ -98,7 +96,7 @@ std::optional<ComputePool::Task> ComputePool::WaitForTask() {
     } else {
       task_came_.Wait(mutex_);
     }
-    GiveBack(TakeOutlived(), false);
+    Destroy(TakeOutlived());
   }
 }
 
@@ -172,14 +170,11 @@ ComputePool::Workers ComputePool::TakeOutlived() {
   return outlived;
 }
 
-// Destroys `workers`. Then returns freed memory to the operating system if there were workers or if
-// `due`. Unlocks the mutex during this work.
-void ComputePool::GiveBack(Workers workers, bool due) {
-  if (workers.empty() && !due) return;
-  gave_back_ = WarmSize::Clock::now();
+// Destroys `workers` without the mutex.
+void ComputePool::Destroy(Workers workers) {
+  if (workers.empty()) return;
   const MutexUnlock unlock(mutex_);
   workers.clear();
-  GiveBackFreedMemory();
 }
 
 }  // namespace partiemc::server

@@ -47,8 +47,7 @@ inline constexpr std::chrono::seconds kBetweenShortages(1);
 /// Memory: a job gets the worker that was used last, so a single stream always uses the same
 /// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: at
 /// least as many streams as there are workers sent frames of that size recently; then all workers
-/// may be needed at any time, so none is dropped. Freed memory returns to the system when a worker
-/// is dropped, and every `warm_time` while jobs run. If the budget lacks memory, idle workers whose
+/// may be needed at any time, so none is dropped. If the budget lacks memory, idle workers whose
 /// bytes count in the budget are dropped at once.
 class ComputePool {
  public:
@@ -105,7 +104,7 @@ class ComputePool {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void MemoryIsShort() ABSL_LOCKS_EXCLUDED(mutex_);
   Workers TakeOutlived() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void GiveBack(Workers workers, bool due) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Destroy(Workers workers) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const unsigned threads_;
   const WarmSize::Clock::duration warm_time_;
@@ -126,7 +125,6 @@ class ComputePool {
   // Time at which the budget last lacked memory. Idle workers that were created before it are
   // dropped.
   WarmSize::Clock::time_point memory_was_short_ ABSL_GUARDED_BY(mutex_){};
-  WarmSize::Clock::time_point gave_back_ ABSL_GUARDED_BY(mutex_) = WarmSize::Clock::now();
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 
   std::vector<std::thread> runners_;

@@ -1,17 +1,13 @@
-// Configures when the C library's heap returns freed memory to the operating system. glibc only.
+// The heap of the process: when it returns freed memory to the operating system.
 #pragma once
 
 #include <cstdint>
 
 namespace partiemc::server {
 
-/// Keeps freed memory in the process. A stream allocates and frees the bytes of its frames all the
-/// time. Returning the pages to the system each time costs more than copying the bytes. Requires:
-/// no thread was started yet.
-void KeepFreedMemory();
-
-/// Returns all freed memory to the operating system. Cost: half a millisecond for 13 MiB, during
-/// which no other thread can allocate.
+/// Returns all freed memory to the operating system now; otherwise jemalloc does so within
+/// seconds. Other threads allocate meanwhile. Does nothing in programs without jemalloc: tests, and
+/// servers with sanitizers. Cost: a millisecond for some ten MiB.
 void GiveBackFreedMemory();
 
 /// Resident memory of the process in bytes; 0 if unknown. Cost: some microseconds.

@@ -47,11 +47,6 @@ constexpr std::uint64_t kHealthOnlyStreams = 16;
 constexpr milliseconds kHealthOnlyDelay(20);
 constexpr std::uint64_t kFirstBytes = 4 << 10;
 
-// Delay after the end of a flood until freed memory is returned to the system. gRPC frees the
-// flood's memory soon after its connection has ended. The return takes some milliseconds, during
-// which no thread can allocate.
-constexpr milliseconds kBetweenGivingBack(500);
-
 constexpr seconds kBetweenForgetting(1);
 constexpr std::uint32_t kLinesPerSecond = 10;
 
@@ -89,9 +84,8 @@ ConnectionWatch::~ConnectionWatch() {
   }
 }
 
-void ConnectionWatch::Start(StreamCounter* streams, std::function<void()> give_back_memory) {
+void ConnectionWatch::Start(StreamCounter* streams) {
   streams_ = streams;
-  give_back_memory_ = std::move(give_back_memory);
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -143,10 +137,6 @@ void ConnectionWatch::Run() {
   while (!stop_) {
     HandleEvents(TimeToWait(Clock::now()));
     const auto now = Clock::now();
-    if (now >= give_back_at_) {
-      give_back_at_ = Clock::time_point::max();
-      give_back_memory_();
-    }
     const MutexLock lock(mutex_);
     if (now >= end_all_at_) {
       while (!connections_.empty()) {
@@ -319,7 +309,6 @@ void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::
   Abort(cut.socket.get());
   ++counters_.floods[static_cast<std::size_t>(flood)];
   counts_.OnFlood(cut.peer.address, cut.tracked->admission, now);
-  if (give_back_memory_) give_back_at_ = std::min(give_back_at_, now + kBetweenGivingBack);
   if (log_limit_.Allow(now)) {
     LogEvent(spdlog::level::warn, "connection cut",
              {{"peer", cut.peer.name.empty() ? cut.peer.address : cut.peer.name},

@@ -56,8 +56,7 @@ class ConnectionWatch {
   ConnectionWatch& operator=(const ConnectionWatch&) = delete;
 
   /// Starts the thread. `streams` outlives the watch; if it is null, streams are not counted.
-  /// `give_back_memory` is called half a second after a connection was cut.
-  void Start(StreamCounter* streams, std::function<void()> give_back_memory = nullptr);
+  void Start(StreamCounter* streams);
 
   /// Watches an accepted connection, or refuses it. Unless it is refused, `hand_over` is called
   /// with its descriptor: at once, or later by the watching thread.
@@ -114,8 +113,6 @@ class ConnectionWatch {
   const ConnectionRules rules_;
   ConnectionTable& table_;
   StreamCounter* streams_ = nullptr;
-  std::function<void()> give_back_memory_;
-  Clock::time_point give_back_at_ = Clock::time_point::max();  // Used by thread_ only.
   const Descriptor events_, wake_;
   Counters counters_;
   std::atomic<std::size_t> count_ = 0;

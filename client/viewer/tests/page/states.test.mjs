@@ -120,7 +120,7 @@ test('refused settings show no picture of the former ones', async () => {
   const stream = world.loop('plain');
   await open('#stream=plain');
   await viewer.shows(5);
-  await viewer.button('Pause').click();
+  await viewer.pause();
   const digest = await viewer.value('rings-digest');
   // The reference radius must be smaller than the kernel radius. No input field can check this, so the
   // server refuses the settings.

@@ -215,6 +215,13 @@ export class Viewer {
 
   async frame(k = 0) { return Number(await this.value('frame', k)) || 0; }
 
+  /** Pauses, and returns the frame. The page writes its number in the next refresh of the screen. */
+  async pause(k = 0) {
+    await this.button('Pause').click();
+    await this.refreshes();
+    return this.frame(k);
+  }
+
   async numbers(k = 0) {
     const cells = await this.pane(k).locator('[data-key]').evaluateAll(
       (all) => all.map((cell) => [cell.dataset.key, cell.textContent.trim()]));
