@@ -189,39 +189,51 @@ void Measure(const KnownScene& known, double noise, Random& random, Figures& fig
   MeasureAngles(known, result, figures);
 }
 
-// A lens between two phases: the arcs meet at 120 degrees. Straight lines that are fitted to arcs
-// move junctions outward (core/PHASES.md).
-TEST(PhasesAccuracy, AnglesOfALens) {
+// A lens between two phases: the arcs meet at 120 degrees. Straight lines that are fitted to its
+// arcs meet .4 to .6 too far outward.
+TEST(PhasesAccuracy, JunctionsOfALens) {
   constexpr int kSeeds = 8;
   for (const double width : {10., 20.}) {
-    double turned = 0, apart = 0;
-    int angles = 0;
-    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      Random random(seed);
-      const double turn = random.Uniform(0, 3);
-      const double radius = width / std::sqrt(3), away = radius / 2;
-      const double x = away * std::cos(turn), y = away * std::sin(turn);
-      const Distance lens = Both(Drop(x, y, radius), Drop(-x, -y, radius));
-      const Distance half = Line(0, 0, turn + std::numbers::pi / 2);
-      const PhaseScene scene{
-          support::DiscBody(kRadius),
-          {{1, Both(Reversed(lens), half)}, {2, Both(Reversed(lens), Reversed(half))}, {3, lens}}};
-      Particles particles = Filled(scene, random);
-      ReconstructionParameters parameters{.spacing = 1.0};
-      for (const int phase : {1, 2, 3}) parameters.sections.push_back({.phase = phase});
-      const Result result = support::ReconstructOnce(parameters, particles);
-      const Rings& rings = result.sections[2].rings;
-      for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
-        const std::size_t point = rings.contacts[k];
-        turned += std::abs(rings.contact_angles[k] * 180 / std::numbers::pi - 120);
-        apart += std::hypot(rings.points[2 * point], rings.points[2 * point + 1]) - width / 2;
-        ++angles;
+    for (const double noise : {0., .1}) {
+      double turned = 0, apart = 0, outward = 0;
+      int angles = 0;
+      for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        Random random(seed);
+        const double turn = random.Uniform(0, 3);
+        const double radius = width / std::sqrt(3), away = radius / 2;
+        const double x = away * std::cos(turn), y = away * std::sin(turn);
+        const Distance lens = Both(Drop(x, y, radius), Drop(-x, -y, radius));
+        const Distance half = Line(0, 0, turn + std::numbers::pi / 2);
+        const PhaseScene scene{support::DiscBody(kRadius),
+                               {{1, Both(Reversed(lens), half)},
+                                {2, Both(Reversed(lens), Reversed(half))},
+                                {3, lens}}};
+        Particles particles = Filled(scene, random);
+        particles.volumes.assign(particles.size(), 1);
+        particles = support::Shaken(particles, random, noise);
+        ReconstructionParameters parameters{.spacing = 1.0};
+        for (const int phase : {1, 2, 3}) parameters.sections.push_back({.phase = phase});
+        const Result result = support::ReconstructOnce(parameters, particles);
+        const Rings& rings = result.sections[2].rings;
+        // The junctions lie on this axis, half a width from the origin.
+        const double axis_x = -std::sin(turn), axis_y = std::cos(turn);
+        for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+          const double px = rings.points[2 * rings.contacts[k]];
+          const double py = rings.points[2 * rings.contacts[k] + 1];
+          const double along = std::abs(px * axis_x + py * axis_y) - width / 2;
+          apart += std::hypot(along, px * axis_y - py * axis_x);
+          outward += along;
+          turned += std::abs(rings.contact_angles[k] * 180 / std::numbers::pi - 120);
+          ++angles;
+        }
       }
+      std::printf(
+          "lens of width %2.0f, noise %.1f: junctions off by %.3f, outward %.3f; angles %.2f\n",
+          width, noise, apart / angles, outward / angles, turned / angles);
+      EXPECT_EQ(angles, 2 * kSeeds);
+      EXPECT_LE(apart / angles, noise > 0 ? .25 : .2);
+      EXPECT_LE(turned / angles, noise > 0 ? 6 : 3);
     }
-    std::printf("lens of width %.0f: angles %.1f degrees, junctions %.2f outward\n", width,
-                turned / angles, apart / angles);
-    EXPECT_EQ(angles, 2 * kSeeds);
-    EXPECT_LE(turned / angles, 6);
   }
 }
 

@@ -8,8 +8,8 @@
 namespace partiemc {
 namespace {
 
-// The part of a side that determines its direction, in spacings. Nearer points lie on a chord from
-// the junction (MoveJunctions), which may be some tenths of a spacing too far along the side.
+// The part of a side that determines its direction, in spacings. Nearer points lie on a parabola
+// from the junction (MoveJunctions).
 constexpr double kNearest = 1.5, kFarthest = 8;
 // A parabola with fewer points would follow their noise.
 constexpr int kFewestPoints = 4;
@@ -38,8 +38,10 @@ struct ParabolaFit {
 };
 
 /// The direction in which a side leaves the junction at point `k`, if it is long enough; `step` is
-/// 1 for the side after it, -1 for the side before it.
-std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int step, double h) {
+/// 1 for the side after it, -1 for the side before it. Inside of the body, the junction is one of
+/// the points. On the body's outline it is not, since there it stays on the rounded outline.
+std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int step, bool is_inside,
+                                   double h) {
   const std::size_t count = ring.points.size();
   const Point junction = PointAt(ring.world, ring.points[k]);
   ParabolaFit fit;
@@ -54,14 +56,16 @@ std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int ste
     if (s >= kNearest) fit.Add(x, s);
   }
   if (fit.s0 < kFewestPoints) return std::nullopt;
+  if (is_inside) fit.Add({}, 0);
   return fit.Direction();
 }
 
 }  // namespace
 
-std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, double spacing) {
-  const auto after = DirectionFrom(ring, k, 1, spacing);
-  const auto before = DirectionFrom(ring, k, -1, spacing);
+std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, bool is_inside,
+                                   double spacing) {
+  const auto after = DirectionFrom(ring, k, 1, is_inside, spacing);
+  const auto before = DirectionFrom(ring, k, -1, is_inside, spacing);
   if (!after || !before) return std::nullopt;
   const double angle = AngleBetween(*after, *before);
   constexpr double kTurn = 6.283185307179586;  // 2 pi.

@@ -5,11 +5,16 @@
 #include <optional>
 #include <span>
 
+#include "phases/arc_curve.h"
+#include "walls/point_math.h"
+
 namespace partiemc {
 namespace {
 
-// The part of an arc that determines its line, in spacings from the junction.
-constexpr double kNearest = 1.5, kFarthest = 4.5;
+// At most four arcs meet in a cell.
+constexpr std::size_t kMostArcs = 4;
+// Steps of the search for the point nearest to curves.
+constexpr int kSteps = 3;
 // Weight of a junction's place against lines that hardly determine it.
 constexpr double kOwnWeight = 1e-3;
 // A junction moves by at most this number of spacings.
@@ -20,14 +25,7 @@ constexpr double kShare = .9, kSharedShare = .45;
 // Lines that meet at a smaller angle, by its sine, do not determine a point.
 constexpr double kSmallestSine = .3;
 
-struct Line {
-  Point through;
-  Point along;  // Unit.
-};
-
-double Cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
-Point Between(const Point& from, const Point& to) { return {to.x - from.x, to.y - from.y}; }
-double Length(const Point& v) { return std::sqrt(v.x * v.x + v.y * v.y); }
+Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
 // The inner points of an arc in the order of their distance from one of its ends.
 class ArcFrom {
@@ -44,51 +42,25 @@ class ArcFrom {
   bool is_start_;
 };
 
-// Calls visit(point, distance) for the points of an arc up to `farthest`, with their distances
-// along the arc from `from`.
-template <typename Visit>
-void ForEachWithin(const ArcFrom& arc, const Point& from, double farthest,
-                   const SharedPoints& points, Visit visit) {
-  Point last = from;
+// The curve of an arc near one of its ends, relative to it.
+std::optional<ArcCurve> CurveOf(const ArcFrom& arc, const Point& junction, double h,
+                                const SharedPoints& points) {
+  ArcCurveFit fit;
+  Point last = junction;
   double distance = 0;
-  for (std::size_t k = 0; k < arc.size() && distance <= farthest; ++k) {
+  for (std::size_t k = 0; k < arc.size() && distance <= kCurvatureFarthest * h; ++k) {
     const Point& at = points.position[arc[k]];
     distance += Length(Between(last, at));
     last = at;
-    if (distance <= farthest) visit(arc[k], distance);
+    fit.Add(Between(junction, at), distance / h);
   }
+  return fit.Fit();
 }
 
-// The line through the points of an arc that are neither near the junction nor far from it.
-std::optional<Line> LineOf(const ArcFrom& arc, const Point& junction, double h,
-                           const SharedPoints& points) {
-  double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  ForEachWithin(arc, junction, kFarthest * h, points, [&](std::uint32_t point, double distance) {
-    if (distance < kNearest * h) return;
-    const Point at = Between(junction, points.position[point]);
-    count += 1;
-    x += at.x;
-    y += at.y;
-    xx += at.x * at.x;
-    xy += at.x * at.y;
-    yy += at.y * at.y;
-  });
-  if (count < 2) return std::nullopt;
-  x /= count;
-  y /= count;
-  const double cxx = xx / count - x * x, cxy = xy / count - x * y, cyy = yy / count - y * y;
-  // The eigenvector of the larger eigenvalue.
-  const double half = (cxx - cyy) / 2;
-  const double root = std::sqrt(half * half + cxy * cxy);
-  Point along = half >= 0 ? Point{half + root, cxy} : Point{cxy, root - half};
-  const double length = Length(along);
-  if (!(length > 0)) return std::nullopt;
-  return Line{{junction.x + x, junction.y + y}, {along.x / length, along.y / length}};
-}
-
-// Puts the points of an arc before kNearest onto the chord to the first point behind it.
-void Straighten(const ArcFrom& arc, const Point& before, const Point& junction, double h,
-                SharedPoints& points) {
+// Puts the points of an arc before kCurveNearest onto a parabola from the junction to the first
+// point behind it, with the bend of its curve.
+void Reshape(const ArcFrom& arc, const Point& before, const Point& junction, double h,
+             const std::optional<ArcCurve>& curve, SharedPoints& points) {
   double reach = 0;
   std::optional<Point> target;
   Point last = before;
@@ -96,9 +68,12 @@ void Straighten(const ArcFrom& arc, const Point& before, const Point& junction, 
     const Point& at = points.position[arc[k]];
     reach += Length(Between(last, at));
     last = at;
-    if (reach >= kNearest * h) target = at;
+    if (reach >= kCurveNearest * h) target = at;
   }
   if (!target) return;
+  const Point chord = Between(junction, *target);
+  const double bow = curve ? curve->bend * Dot(chord, chord) : 0;
+  const Point side = curve ? Point{curve->along.y * bow, -curve->along.x * bow} : Point{};
   double distance = 0;
   last = before;
   for (std::size_t k = 0; k < arc.size(); ++k) {
@@ -107,18 +82,16 @@ void Straighten(const ArcFrom& arc, const Point& before, const Point& junction, 
     if (distance >= reach) return;
     last = at;
     const double share = distance / reach;
-    at = {junction.x + share * (target->x - junction.x),
-          junction.y + share * (target->y - junction.y)};
+    at = Plus(Plus(junction, Times(chord, share)), Times(side, share * (1 - share)));
   }
 }
 
 // The point nearest to lines, near `from`.
-Point MeetingPoint(std::span<const Line> lines, const Point& from, double h) {
+Point MeetingPoint(std::span<const Line> lines, const Point& from) {
   double xx = kOwnWeight, xy = 0, yy = kOwnWeight, bx = 0, by = 0;
   for (const Line& line : lines) {
     const Point normal{-line.along.y, line.along.x};
-    const Point to = Between(from, line.through);
-    const double height = normal.x * to.x + normal.y * to.y;
+    const double height = Dot(normal, Between(from, line.through));
     xx += normal.x * normal.x;
     xy += normal.x * normal.y;
     yy += normal.y * normal.y;
@@ -126,10 +99,12 @@ Point MeetingPoint(std::span<const Line> lines, const Point& from, double h) {
     by += height * normal.y;
   }
   const double determinant = xx * yy - xy * xy;
-  Point move{(yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant};
+  return {from.x + (yy * bx - xy * by) / determinant, from.y + (xx * by - xy * bx) / determinant};
+}
+
+Point Limited(const Point& move, double most) {
   const double length = Length(move);
-  const double share = length > kLongestMove * h ? kLongestMove * h / length : 1;
-  return {from.x + share * move.x, from.y + share * move.y};
+  return length > most ? Times(move, most / length) : move;
 }
 
 // Where lines meet the ring of a vertex of the body, between the neighbours of the vertex.
@@ -158,6 +133,33 @@ Point PlaceOnRing(std::span<const Line> lines, std::uint32_t vertex, const Rings
   return {at.x + share * side.x, at.y + share * side.y};
 }
 
+// Where the curves of a junction meet; they are relative to it.
+Point PlaceOf(std::span<const std::optional<ArcCurve>> curves, std::uint32_t junction,
+              const Rings& body, double h, const JunctionScratch& scratch,
+              const SharedPoints& points) {
+  const Point before = points.position[junction];
+  const bool is_body = junction < body.PointCount();
+  Point now = before;
+  std::array<Line, kMostArcs> lines;
+  for (int step = 0; step < kSteps; ++step) {
+    std::size_t count = 0;
+    for (const auto& curve : curves) {
+      if (!curve) continue;
+      Line& line = lines[count++] = curve->TangentNear(Between(before, now));
+      line.through = Plus(before, line.through);
+    }
+    if (count < (is_body ? 1u : 2u)) return before;
+    const std::span<const Line> known(lines.data(), count);
+    if (is_body) {
+      now = PlaceOnRing(known, junction, body, scratch, points);
+    } else {
+      const Point move = Between(before, MeetingPoint(known, now));
+      now = Plus(before, Limited(move, kLongestMove * h));
+    }
+  }
+  return now;
+}
+
 void CollectEnds(const Interfaces& interfaces, std::size_t body_points, JunctionScratch& scratch) {
   scratch.ends.clear();
   scratch.is_contact.assign(body_points, 0);
@@ -184,25 +186,19 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
   for (std::size_t first = 0, last = 0; first < scratch.ends.size(); first = last) {
     const std::uint32_t junction = scratch.ends[first].junction;
     while (last < scratch.ends.size() && scratch.ends[last].junction == junction) ++last;
-    // At most four arcs meet in a cell.
-    std::array<Line, 4> lines;
-    std::size_t count = 0;
     const Point before = points.position[junction];
-    for (std::size_t k = first; k < last; ++k) {
-      const auto& [_, arc, is_start] = scratch.ends[k];
-      const auto line = LineOf({interfaces, interfaces.arcs[arc], is_start}, before, h, points);
-      if (line && count < lines.size()) lines[count++] = *line;
+    const std::size_t count = std::min(last - first, kMostArcs);
+    std::array<std::optional<ArcCurve>, kMostArcs> curves;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& [_, arc, is_start] = scratch.ends[first + k];
+      curves[k] = CurveOf({interfaces, interfaces.arcs[arc], is_start}, before, h, points);
     }
-    if (count == 0) continue;
-    const std::span<const Line> known(lines.data(), count);
-    const bool is_body = junction < body.PointCount();
-    const Point now = is_body      ? PlaceOnRing(known, junction, body, scratch, points)
-                      : count >= 2 ? MeetingPoint(known, before, h)
-                                   : before;
+    if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) continue;
+    const Point now = PlaceOf(std::span(curves).first(count), junction, body, h, scratch, points);
     points.position[junction] = now;
-    for (std::size_t k = first; k < last; ++k) {
-      const auto& [_, arc, is_start] = scratch.ends[k];
-      Straighten({interfaces, interfaces.arcs[arc], is_start}, before, now, h, points);
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& [_, arc, is_start] = scratch.ends[first + k];
+      Reshape({interfaces, interfaces.arcs[arc], is_start}, before, now, h, curves[k], points);
     }
   }
 }

@@ -161,7 +161,8 @@ void WritePhaseRings(const Phases& p, const Scale& scale, PhaseLabel label, Plac
       rings.normals.insert(rings.normals.end(), {normal.x, normal.y});
       if (p.is_junction[point] == 0) continue;
       const auto angle =
-          JunctionAngle({points, p.world, p.is_junction}, k, scale.spacing * scale.cell_size);
+          JunctionAngle({points, p.world, p.is_junction}, k, !p.numbers.IsBody(points[k]),
+                        scale.spacing * scale.cell_size);
       if (!angle) continue;
       rings.contacts.push_back(phase.offsets[ring] + static_cast<std::uint32_t>(k));
       rings.contact_angles.push_back(*angle);

@@ -1,0 +1,61 @@
+// The curve of an interface near a junction: a line or a circle, fitted to its points.
+#pragma once
+
+#include <optional>
+
+#include "base/point.h"
+
+namespace partiemc {
+
+/// The points of an interface that determine its curve, by their distances along it from the
+/// junction, in spacings. Nearer points lie on rounded corners.
+inline constexpr double kCurveNearest = 1.5;
+/// The farthest points that determine the place and the direction, and those that determine the
+/// curvature.
+inline constexpr double kCurveFarthest = 5, kCurvatureFarthest = 9;
+
+struct Line {
+  Point through;
+  Point along;  ///< Unit.
+};
+
+/// The points near which n = offset + slope t + bend (t^2 + n^2), a circle, or a line if bend is 0.
+/// t and n are the coordinates along `along` and to the left of it.
+struct ArcCurve {
+  Point along;  ///< Unit. From the origin towards the points.
+  double offset = 0, slope = 0, bend = 0;
+
+  /// The tangent at the point of the curve nearest to `at`, up to the second order in the distance.
+  Line TangentNear(const Point& at) const;
+};
+
+/// Fits an ArcCurve by least squares. Points are relative to one origin near the junction.
+class ArcCurveFit {
+ public:
+  /// `distance`: from the junction along the interface, in spacings. Points that do not determine
+  /// the curve are ignored.
+  void Add(const Point& at, double distance);
+  /// Absent with fewer than two points up to kCurveFarthest. The bend is that of the points up to
+  /// kCurvatureFarthest. It is reduced by the share that noise may explain (core/PHASES.md,
+  /// step 4).
+  std::optional<ArcCurve> Fit() const;
+
+ private:
+  // Sums over points, with q = x^2 + y^2. A turned frame has the same q.
+  struct Sums {
+    double count = 0, x = 0, y = 0, q = 0, xx = 0, xy = 0, yy = 0, xq = 0, yq = 0, qq = 0;
+
+    void Add(const Point& at);
+  };
+  // Covariances, times the number of points, in the frame of a curve.
+  struct Moments {
+    double t, n, q;  // Means.
+    double tt, tn, nn, tq, nq, qq;
+  };
+  static Moments MomentsOf(const Sums& sums, const Point& along);
+  static double BendOf(const Sums& sums, const Point& along);
+
+  Sums near_, wide_;
+};
+
+}  // namespace partiemc
