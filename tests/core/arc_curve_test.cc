@@ -28,7 +28,7 @@ ArcCurveFit FitTo(double radius, double noise, support::Random& random) {
 TEST(ArcCurve, IsTheCircleOrTheLineOfItsPoints) {
   support::Random random(1);
   for (const double radius : {4., 10., 1e3, HUGE_VAL, -10., -4.}) {
-    const auto curve = FitTo(radius, 0, random).Fit();
+    const auto curve = FitTo(radius, 0, random).Fit(kPlaceNoise);
     ASSERT_TRUE(curve) << radius;
     const Line line = curve->TangentNear({});
     EXPECT_NEAR(line.through.x, 0, 1e-9) << radius;
@@ -42,7 +42,7 @@ TEST(ArcCurve, IsTheCircleOrTheLineOfItsPoints) {
 TEST(ArcCurve, TangentsTouchTheCurve) {
   support::Random random(1);
   const double radius = 8;
-  const auto curve = FitTo(radius, 0, random).Fit();
+  const auto curve = FitTo(radius, 0, random).Fit(kPlaceNoise);
   ASSERT_TRUE(curve);
   for (const double off : {-.2, .2}) {
     const Line line = curve->TangentNear({.5, off});
@@ -60,7 +60,7 @@ TEST(ArcCurve, NoiseDoesNotBendLines) {
   int bent = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     support::Random random(seed);
-    const auto curve = FitTo(HUGE_VAL, .1, random).Fit();
+    const auto curve = FitTo(HUGE_VAL, .1, random).Fit(kPlaceNoise);
     ASSERT_TRUE(curve);
     bent += curve->bend != 0;
   }
@@ -72,11 +72,11 @@ TEST(ArcCurve, NeedsTwoPoints) {
   fit.Add({1, 0}, 1);
   fit.Add({2, 0}, 2);
   fit.Add({6, 0}, 6);
-  EXPECT_FALSE(fit.Fit());
+  EXPECT_FALSE(fit.Fit(kPlaceNoise));
   fit.Add({2, 0}, 3);
-  EXPECT_FALSE(fit.Fit());  // At one place.
+  EXPECT_FALSE(fit.Fit(kPlaceNoise));  // At one place.
   fit.Add({3, 0}, 4);
-  const auto curve = fit.Fit();
+  const auto curve = fit.Fit(kPlaceNoise);
   ASSERT_TRUE(curve);
   EXPECT_EQ(curve->bend, 0);
 }

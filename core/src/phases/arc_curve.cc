@@ -10,10 +10,6 @@ namespace {
 
 // A bend needs this number of points.
 constexpr int kFewestBent = 5;
-// A bend counts as noise up to the square root of this number times its standard error. That error
-// is too small, since smoothing makes the deviations of neighbours alike.
-constexpr double kNoiseFactor = 100;
-
 // The direction of the larger eigenvalue of a covariance.
 Point MainDirection(double xx, double xy, double yy) {
   const double half = (xx - yy) / 2;
@@ -61,6 +57,11 @@ void ArcCurveFit::Add(const Point& at, double distance) {
   if (distance <= kCurvatureFarthest) wide_.Add(at);
 }
 
+void ArcCurveFit::AddEnd(const Point& at) {
+  near_.Add(at);
+  wide_.Add(at);
+}
+
 ArcCurveFit::Moments ArcCurveFit::MomentsOf(const Sums& s, const Point& along) {
   const double a = along.x, b = along.y;
   const double x = s.x / s.count, y = s.y / s.count, q = s.q / s.count;
@@ -77,7 +78,7 @@ ArcCurveFit::Moments ArcCurveFit::MomentsOf(const Sums& s, const Point& along) {
           .qq = s.qq - s.q * q};
 }
 
-double ArcCurveFit::BendOf(const Sums& sums, const Point& along) {
+double ArcCurveFit::BendOf(const Sums& sums, const Point& along, double noise) {
   if (sums.count < kFewestBent) return 0;
   const Moments m = MomentsOf(sums, along);
   if (!(m.tt > 0)) return 0;
@@ -87,11 +88,11 @@ double ArcCurveFit::BendOf(const Sums& sums, const Point& along) {
   if (!(qq > 0)) return 0;
   const double bend = nq / qq;
   const double variance = std::max(nn - bend * nq, 0.0) / ((sums.count - 3) * qq);
-  const double noise = kNoiseFactor * variance, square = bend * bend;
-  return square > noise ? bend * (1 - noise / square) : 0;
+  const double square = bend * bend;
+  return square > noise * variance ? bend * (1 - noise * variance / square) : 0;
 }
 
-std::optional<ArcCurve> ArcCurveFit::Fit() const {
+std::optional<ArcCurve> ArcCurveFit::Fit(double noise) const {
   if (near_.count < 2) return std::nullopt;
   const Moments world = MomentsOf(near_, {1, 0});
   ArcCurve curve{.along = MainDirection(world.tt, world.tn, world.nn)};
@@ -99,12 +100,27 @@ std::optional<ArcCurve> ArcCurveFit::Fit() const {
   if (!(length > 0)) return std::nullopt;
   const bool is_backward = curve.along.x * near_.x + curve.along.y * near_.y < 0;
   curve.along = Times(curve.along, is_backward ? -1 / length : 1 / length);
-  curve.bend = BendOf(wide_, curve.along);
+  curve.bend = BendOf(wide_, curve.along, noise);
   const Moments m = MomentsOf(near_, curve.along);
   if (!(m.tt > 0)) return std::nullopt;
   curve.slope = (m.tn - curve.bend * m.tq) / m.tt;
   curve.offset = m.n - curve.slope * m.t - curve.bend * m.q;
   return curve;
+}
+
+std::optional<ArcCurve> CurveOfEnd(std::span<const std::uint32_t> inner, bool is_start,
+                                   const Point& junction, double spacing,
+                                   std::span<const Point> positions) {
+  ArcCurveFit fit;
+  Point last = junction;
+  double distance = 0;
+  for (std::size_t k = 0; k < inner.size() && distance <= kCurvatureFarthest; ++k) {
+    const Point& at = positions[inner[is_start ? k : inner.size() - 1 - k]];
+    distance += Length(Minus(at, last)) / spacing;
+    last = at;
+    fit.Add(Minus(at, junction), distance);
+  }
+  return fit.Fit(kPlaceNoise);
 }
 
 }  // namespace partiemc

@@ -1,7 +1,9 @@
 // The curve of an interface near a junction: a line or a circle, fitted to its points.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "base/point.h"
 
@@ -13,6 +15,11 @@ inline constexpr double kCurveNearest = 1.5;
 /// The farthest points that determine the place and the direction, and those that determine the
 /// curvature.
 inline constexpr double kCurveFarthest = 5, kCurvatureFarthest = 9;
+
+/// A bend counts as noise up to the square root of this number times its standard error, where the
+/// curve determines a place. The standard error is too small by far: smoothing makes the deviations
+/// of neighbours alike, and a place is extrapolated.
+inline constexpr double kPlaceNoise = 100;
 
 struct Line {
   Point through;
@@ -35,10 +42,11 @@ class ArcCurveFit {
   /// `distance`: from the junction along the interface, in spacings. Points that do not determine
   /// the curve are ignored.
   void Add(const Point& at, double distance);
+  /// Adds the end itself, if its place is known.
+  void AddEnd(const Point& at);
   /// Absent with fewer than two points up to kCurveFarthest. The bend is that of the points up to
-  /// kCurvatureFarthest. It is reduced by the share that noise may explain (core/PHASES.md,
-  /// step 4).
-  std::optional<ArcCurve> Fit() const;
+  /// kCurvatureFarthest, times 1 - noise variance / bend^2, or 0 if this is negative.
+  std::optional<ArcCurve> Fit(double noise) const;
 
  private:
   // Sums over points, with q = x^2 + y^2. A turned frame has the same q.
@@ -53,9 +61,16 @@ class ArcCurveFit {
     double tt, tn, nn, tq, nq, qq;
   };
   static Moments MomentsOf(const Sums& sums, const Point& along);
-  static double BendOf(const Sums& sums, const Point& along);
+  static double BendOf(const Sums& sums, const Point& along, double noise);
 
   Sums near_, wide_;
 };
+
+/// The curve of an arc near one of its ends, relative to `junction`, which is that end. `inner`:
+/// the numbers of the other points of the arc, from its start to its end. Lengths are in cells.
+/// `noise`: kPlaceNoise.
+std::optional<ArcCurve> CurveOfEnd(std::span<const std::uint32_t> inner, bool is_start,
+                                   const Point& junction, double spacing,
+                                   std::span<const Point> positions);
 
 }  // namespace partiemc

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/parallel.h"
+#include "phases/arc_curve.h"
 #include "vertices/placement.h"
 #include "vertices/ring_filters.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {
@@ -212,33 +215,122 @@ void FillNormals(std::span<const std::uint32_t> inner, SharedPoints& points) {
   }
 }
 
-void Smooth(const Scale& scale, const VirtualPlaneConstants& c, const PhaseArc& arc,
-            std::span<const std::uint32_t> inner, PeriodicRing ring, SharedPoints& points) {
-  const double h = scale.spacing;
-  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
-    const std::uint32_t point = inner[IndexInArc(arc, static_cast<std::size_t>(k))];
-    ring.x[k] = RingUnits(points.position[point].x);
-    ring.y[k] = RingUnits(points.position[point].y);
-    ring.normal_x[k] = points.normal[point].x;
-    ring.normal_y[k] = points.normal[point].y;
+// How an open arc continues beyond an end: as its mirror image across a normal of its curve.
+struct Mirror {
+  Point through;
+  Point along;  // Unit, the tangent.
+
+  Point OfPosition(const Point& x) const {
+    return Minus(x, Times(along, 2 * Dot(along, Minus(x, through))));
   }
-  for (std::int32_t* values : {ring.x, ring.y}) ring.Repeat(values, 0, ring.count);
-  for (float* values : {ring.normal_x, ring.normal_y}) ring.Repeat(values, 0, ring.count);
-  MeasureArc(ring, {});
+  VertexNormal OfNormal(const VertexNormal& n) const {
+    const auto x = static_cast<float>(along.x), y = static_cast<float>(along.y);
+    const float twice = 2 * (x * n.x + y * n.y);
+    return {n.x - twice * x, n.y - twice * y};
+  }
+};
+
+// Absent for a closed arc, and for an end that is straight or has no curve.
+std::optional<Mirror> MirrorOf(const PhaseArc& arc, bool is_start, double h,
+                               const Interfaces& interfaces, const SharedPoints& points) {
+  if (arc.IsClosed()) return std::nullopt;
+  const std::span<const std::uint32_t> inner = interfaces.InnerPoints(arc);
+  const Point& end = points.position[is_start ? arc.start : arc.end];
+  const auto curve = CurveOfEnd(inner, is_start, end, h, points.position);
+  if (!curve || curve->bend == 0) return std::nullopt;
+  const Point& last = points.position[is_start ? inner.front() : inner.back()];
+  const Line tangent = curve->TangentNear(Minus(last, end));
+  return Mirror{Plus(end, tangent.through), tangent.along};
+}
+
+// An arc as a ring: a closed one, or an open one along it and back. Beyond the ends of an open arc
+// the ring may hold mirror images.
+class ArcRing {
+ public:
+  ArcRing(const PhaseArc& arc, std::span<const std::uint32_t> inner, PeriodicRing& ring,
+          const std::optional<Mirror>& before, const std::optional<Mirror>& after)
+      : arc_(arc), inner_(inner), ring_(ring), before_(before), after_(after) {}
+
+  // The vertices that are no images.
+  std::ptrdiff_t count() const { return static_cast<std::ptrdiff_t>(inner_.size()); }
+
+  void SetPositions(const SharedPoints& points) {
+    const auto set = [&](std::ptrdiff_t k, const Point& at) {
+      ring_.x[k] = RingUnits(at.x);
+      ring_.y[k] = RingUnits(at.y);
+    };
+    const auto at = [&](std::ptrdiff_t k) { return points.position[inner_[k]]; };
+    for (std::ptrdiff_t k = 0; k < ring_.count; ++k) set(k, at(Index(k)));
+    for (std::int32_t* values : {ring_.x, ring_.y}) ring_.Repeat(values, 0, ring_.count);
+    MeasureArc(ring_, {});
+    ForEachImage([&](const Mirror& mirror, std::ptrdiff_t k, std::ptrdiff_t of) {
+      set(k, mirror.OfPosition(at(of)));
+    });
+  }
+  // Continues the normals of count() vertices.
+  void ContinueNormals() {
+    for (float* values : {ring_.normal_x, ring_.normal_y}) Continue(values);
+    ForEachImage([&](const Mirror& mirror, std::ptrdiff_t k, std::ptrdiff_t of) {
+      const VertexNormal image = mirror.OfNormal({ring_.normal_x[of], ring_.normal_y[of]});
+      ring_.normal_x[k] = image.x;
+      ring_.normal_y[k] = image.y;
+    });
+  }
+  void Continue(float* values) {
+    for (std::ptrdiff_t k = count(); k < ring_.count; ++k) values[k] = values[Index(k)];
+    ring_.Repeat(values, 0, ring_.count);
+  }
+
+ private:
+  std::ptrdiff_t Index(std::ptrdiff_t k) const {
+    return static_cast<std::ptrdiff_t>(IndexInArc(arc_, static_cast<std::size_t>(k)));
+  }
+  // Calls visit(mirror, image, vertex).
+  template <typename Visit>
+  void ForEachImage(Visit visit) {
+    const std::ptrdiff_t last = count() - 1;
+    if (before_) {
+      for (std::ptrdiff_t k = 1; k <= std::min(last, ring_.margin); ++k) visit(*before_, -k, k);
+    }
+    if (after_) {
+      const std::ptrdiff_t most = std::min(last, ring_.count + ring_.margin - 1 - last);
+      for (std::ptrdiff_t k = 1; k <= most; ++k) visit(*after_, last + k, last - k);
+    }
+  }
+
+  const PhaseArc& arc_;
+  const std::span<const std::uint32_t> inner_;
+  PeriodicRing& ring_;
+  const std::optional<Mirror>&before_, &after_;
+};
+
+void Smooth(const Scale& scale, const VirtualPlaneConstants& c, const PhaseArc& arc,
+            const Interfaces& interfaces, PeriodicRing ring, SharedPoints& points) {
+  const double h = scale.spacing;
+  const std::span<const std::uint32_t> inner = interfaces.InnerPoints(arc);
+  const auto before = MirrorOf(arc, true, h, interfaces, points);
+  const auto after = MirrorOf(arc, false, h, interfaces, points);
+  ArcRing extended(arc, inner, ring, before, after);
+  const std::ptrdiff_t count = extended.count();
+  extended.SetPositions(points);
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
+    ring.normal_x[k] = points.normal[inner[k]].x;
+    ring.normal_y[k] = points.normal[inner[k]].y;
+  }
+  extended.ContinueNormals();
   for (const bool by_angle : {false, true}) {
-    MeanNormals(ring, 0, ring.count, (by_angle ? c.bilateral_reach : c.normal_reach) * h, by_angle);
-    ring.Repeat(ring.next_x, 0, ring.count);
-    ring.Repeat(ring.next_y, 0, ring.count);
+    MeanNormals(ring, 0, count, (by_angle ? c.bilateral_reach : c.normal_reach) * h, by_angle);
     std::swap(ring.normal_x, ring.next_x);
     std::swap(ring.normal_y, ring.next_y);
+    extended.ContinueNormals();
   }
-  MeanCurvature(ring, 0, ring.count, c.curvature_reach * h);
+  MeanCurvature(ring, 0, count, c.curvature_reach * h);
   const double rounding = c.rounding * scale.kernel_radius * scale.kernel_radius / 9;
-  for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
     ring.base[k] = static_cast<float>(rounding * std::clamp<double>(ring.shift[k], -1 / h, 1 / h));
   }
-  ring.Repeat(ring.base, 0, ring.count);
-  MeanShift(ring, 0, ring.count, c.smoothing_reach * h);
+  extended.Continue(ring.base);
+  MeanShift(ring, 0, count, c.smoothing_reach * h);
   for (std::size_t k = 0; k < inner.size(); ++k) {
     Point& at = points.position[inner[k]];
     at.x += double{ring.shift[k]} * ring.normal_x[k];
@@ -294,7 +386,7 @@ void SmoothInterfaces(const Scale& scale, const VirtualPlaneConstants& constants
   ParallelFor(interfaces.arcs.size(), [&](std::size_t k) {
     if (rings.sizes()[k].count == 0) return;
     const PhaseArc& arc = interfaces.arcs[k];
-    Smooth(scale, constants, arc, interfaces.InnerPoints(arc), rings[k], points);
+    Smooth(scale, constants, arc, interfaces, rings[k], points);
   });
 }
 

@@ -59,8 +59,10 @@ void CollectArcs(const TileDirectory& directory, const PhaseMap& map, const Poin
                  std::span<const PhaseRings> phases, Interfaces& interfaces);
 
 /// Smooths the arcs as steps 2 and 3 of the default placement smooth rings (core/METHOD.md),
-/// without supports. An open arc is smoothed as the ring that runs along it and back. Arcs whose
-/// ring is shorter than VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
+/// without supports. An open arc is smoothed as the ring that runs along it and back. A bent end
+/// continues as its mirror image across a normal of its curve (arc_curve.h) instead, as a circle
+/// does; otherwise the smoothing would move bent ends towards the middle of their circles. Arcs
+/// whose ring is shorter than VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
 void SmoothInterfaces(const Scale& scale, const VirtualPlaneConstants& constants,
                       Interfaces& interfaces, SharedPoints& points);
 

@@ -17,10 +17,9 @@ struct PhaseRing {
 };
 
 /// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in [0, 2
-/// pi]. Each side of the ring has a parabola, fitted by least squares to the points from 1.5 to 8
-/// spacings away along the ring, before the next junction, and to the junction itself if it lies
-/// inside of the body (`is_inside`). Absent if a side has fewer than four
-/// such points. Cost: linear in these points.
+/// pi]. Each side of the ring has a curve (arc_curve.h), fitted to its points before the next
+/// junction, and to the junction itself if it lies inside of the body (`is_inside`). Absent if a
+/// side has fewer than four points from 1.5 to 9 spacings away. Cost: linear in these points.
 std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, bool is_inside,
                                    double spacing);
 

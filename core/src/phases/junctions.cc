@@ -42,21 +42,6 @@ class ArcFrom {
   bool is_start_;
 };
 
-// The curve of an arc near one of its ends, relative to it.
-std::optional<ArcCurve> CurveOf(const ArcFrom& arc, const Point& junction, double h,
-                                const SharedPoints& points) {
-  ArcCurveFit fit;
-  Point last = junction;
-  double distance = 0;
-  for (std::size_t k = 0; k < arc.size() && distance <= kCurvatureFarthest * h; ++k) {
-    const Point& at = points.position[arc[k]];
-    distance += Length(Between(last, at));
-    last = at;
-    fit.Add(Between(junction, at), distance / h);
-  }
-  return fit.Fit();
-}
-
 // Puts the points of an arc before kCurveNearest onto a parabola from the junction to the first
 // point behind it, with the bend of its curve.
 void Reshape(const ArcFrom& arc, const Point& before, const Point& junction, double h,
@@ -191,7 +176,8 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
     std::array<std::optional<ArcCurve>, kMostArcs> curves;
     for (std::size_t k = 0; k < count; ++k) {
       const auto& [_, arc, is_start] = scratch.ends[first + k];
-      curves[k] = CurveOf({interfaces, interfaces.arcs[arc], is_start}, before, h, points);
+      curves[k] = CurveOfEnd(interfaces.InnerPoints(interfaces.arcs[arc]), is_start, before, h,
+                             points.position);
     }
     if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) continue;
     const Point now = PlaceOf(std::span(curves).first(count), junction, body, h, scratch, points);

@@ -1,4 +1,4 @@
-// Moves the points where interfaces meet to where their lines meet.
+// Moves the points where interfaces meet to where their curves meet.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ struct JunctionScratch {
 };
 
 /// Near a junction, the field of each phase sees a corner and rounds it. Each arc therefore has a
-/// line, fitted to its points from kNearest to kFarthest spacings away. The junction moves to the
-/// point nearest to these lines. The points before kNearest go onto a chord. A vertex of the body's
-/// rings moves along its ring, at most to the next vertices.
+/// curve, fitted to its points from 1.5 to 9 spacings away (arc_curve.h). The junction moves to the
+/// point nearest to these curves. The points before 1.5 spacings go onto an arc to it. A vertex of
+/// the body's rings moves along its ring, at most to the next vertices.
 /// Cost: linear in the points near junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
                    JunctionScratch& scratch, SharedPoints& points);
