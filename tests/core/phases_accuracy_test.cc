@@ -237,6 +237,51 @@ TEST(PhasesAccuracy, JunctionsOfALens) {
   }
 }
 
+// A lens that floats on a straight surface. The body's outline has corners at its contacts.
+TEST(PhasesAccuracy, ContactsOfAFloatingLens) {
+  constexpr int kSeeds = 8;
+  constexpr double kWidth = 16, kAbove = .6, kBelow = .8;  // Angles at the surface, in radians.
+  for (const double noise : {0., .1}) {
+    double apart = 0, turned = 0, area = 0;
+    int angles = 0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      Random random(seed);
+      const double turn = random.Uniform(0, 6.28), up_x = -std::sin(turn), up_y = std::cos(turn);
+      const double above = kWidth / 2 / std::sin(kAbove), below = kWidth / 2 / std::sin(kBelow);
+      const double down = -above * std::cos(kAbove), up = below * std::cos(kBelow);
+      const Distance lens =
+          Both(Drop(down * up_x, down * up_y, above), Drop(up * up_x, up * up_y, below));
+      const Distance bath =
+          Both(Drop(0, 0, kRadius), [=](double x, double y) { return x * up_x + y * up_y; });
+      const Distance body = [=](double x, double y) { return std::min(lens(x, y), bath(x, y)); };
+      const PhaseScene scene{{body, kRadius + 1}, {{1, Both(bath, Reversed(lens))}, {2, lens}}};
+      Particles particles = Filled(scene, random);
+      particles.volumes.assign(particles.size(), 1);
+      particles = support::Shaken(particles, random, noise);
+      ReconstructionParameters parameters{.spacing = 1.0};
+      for (const int phase : {1, 2}) parameters.sections.push_back({.phase = phase});
+      const Result result = support::ReconstructOnce(parameters, particles);
+      const Rings& rings = result.sections[1].rings;
+      for (std::size_t k = 0; k < rings.contacts.size(); ++k) {
+        const double px = rings.points[2 * rings.contacts[k]];
+        const double py = rings.points[2 * rings.contacts[k] + 1];
+        apart += std::hypot(std::abs(px * up_y - py * up_x) - kWidth / 2, px * up_x + py * up_y);
+        const double angle = rings.contact_angles[k];
+        turned += std::abs(angle - kAbove - kBelow) * 180 / std::numbers::pi;
+        ++angles;
+      }
+      const double all = result.statistics.area / static_cast<double>(particles.size());
+      area = std::max(area, std::abs(all - 1));
+    }
+    std::printf("floating lens, noise %.1f: contacts off by %.3f, angles %.2f, area of all %.5f\n",
+                noise, apart / angles, turned / angles, area);
+    EXPECT_EQ(angles, 2 * kSeeds);
+    EXPECT_LE(apart / angles, noise > 0 ? .25 : .2);
+    EXPECT_LE(turned / angles, noise > 0 ? 6 : 4);
+    EXPECT_LE(area, .005);
+  }
+}
+
 TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
   constexpr int kSeeds = 8;
   std::printf("%-14s %8s %8s %8s %8s %10s %12s\n", "", "rest", "area", "noise", "area", "junctions",

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "walls/point_math.h"
-
 namespace partiemc {
 namespace {
 
@@ -35,6 +33,11 @@ Line ArcCurve::TangentNear(const Point& at) const {
   by_n /= length;
   return {{to_t * along.x - to_n * along.y, to_t * along.y + to_n * along.x},
           {by_n * along.x + by_t * along.y, by_n * along.y - by_t * along.x}};
+}
+
+Point ArcCurve::DirectionAt(const Point& at) const {
+  const Point direction = TangentNear(at).along;
+  return Dot(direction, along) < 0 ? Times(direction, -1) : direction;
 }
 
 void ArcCurveFit::Sums::Add(const Point& at) {
@@ -106,21 +109,6 @@ std::optional<ArcCurve> ArcCurveFit::Fit(double noise) const {
   curve.slope = (m.tn - curve.bend * m.tq) / m.tt;
   curve.offset = m.n - curve.slope * m.t - curve.bend * m.q;
   return curve;
-}
-
-std::optional<ArcCurve> CurveOfEnd(std::span<const std::uint32_t> inner, bool is_start,
-                                   const Point& junction, double spacing,
-                                   std::span<const Point> positions) {
-  ArcCurveFit fit;
-  Point last = junction;
-  double distance = 0;
-  for (std::size_t k = 0; k < inner.size() && distance <= kCurvatureFarthest; ++k) {
-    const Point& at = positions[inner[is_start ? k : inner.size() - 1 - k]];
-    distance += Length(Minus(at, last)) / spacing;
-    last = at;
-    fit.Add(Minus(at, junction), distance);
-  }
-  return fit.Fit(kPlaceNoise);
 }
 
 }  // namespace partiemc

@@ -1,11 +1,13 @@
 // The curve of an interface near a junction: a line or a circle, fitted to its points.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 
 #include "base/point.h"
+#include "walls/point_math.h"
 
 namespace partiemc {
 
@@ -34,6 +36,8 @@ struct ArcCurve {
 
   /// The tangent at the point of the curve nearest to `at`, up to the second order in the distance.
   Line TangentNear(const Point& at) const;
+  /// The direction of this tangent, away from the origin.
+  Point DirectionAt(const Point& at) const;
 };
 
 /// Fits an ArcCurve by least squares. Points are relative to one origin near the junction.
@@ -66,11 +70,36 @@ class ArcCurveFit {
   Sums near_, wide_;
 };
 
-/// The curve of an arc near one of its ends, relative to `junction`, which is that end. `inner`:
-/// the numbers of the other points of the arc, from its start to its end. Lengths are in cells.
-/// `noise`: kPlaceNoise.
-std::optional<ArcCurve> CurveOfEnd(std::span<const std::uint32_t> inner, bool is_start,
-                                   const Point& junction, double spacing,
-                                   std::span<const Point> positions);
+/// The curve of points along a path, relative to `junction`, where the path begins. `path[k]` is
+/// the number of a point in `positions`. Lengths are in cells.
+template <typename Path>
+std::optional<ArcCurve> CurveAlong(const Path& path, const Point& junction, double spacing,
+                                   std::span<const Point> positions) {
+  ArcCurveFit fit;
+  Point last = junction;
+  double distance = 0;
+  for (std::size_t k = 0; k < path.size() && distance <= kCurvatureFarthest; ++k) {
+    const Point& at = positions[path[k]];
+    distance += Length(Minus(at, last)) / spacing;
+    last = at;
+    fit.Add(Minus(at, junction), distance);
+  }
+  return fit.Fit(kPlaceNoise);
+}
+
+/// The inner points of an arc in the order of their distance from one of its ends.
+class ArcPath {
+ public:
+  ArcPath(std::span<const std::uint32_t> inner, bool is_start)
+      : inner_(inner), is_start_(is_start) {}
+  std::size_t size() const { return inner_.size(); }
+  std::uint32_t operator[](std::size_t k) const {
+    return inner_[is_start_ ? k : inner_.size() - 1 - k];
+  }
+
+ private:
+  std::span<const std::uint32_t> inner_;
+  bool is_start_;
+};
 
 }  // namespace partiemc

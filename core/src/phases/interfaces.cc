@@ -236,7 +236,7 @@ std::optional<Mirror> MirrorOf(const PhaseArc& arc, bool is_start, double h,
   if (arc.IsClosed()) return std::nullopt;
   const std::span<const std::uint32_t> inner = interfaces.InnerPoints(arc);
   const Point& end = points.position[is_start ? arc.start : arc.end];
-  const auto curve = CurveOfEnd(inner, is_start, end, h, points.position);
+  const auto curve = CurveAlong(ArcPath(inner, is_start), end, h, points.position);
   if (!curve || curve->bend == 0) return std::nullopt;
   const Point& last = points.position[is_start ? inner.front() : inner.back()];
   const Line tangent = curve->TangentNear(Minus(last, end));

@@ -16,7 +16,7 @@ constexpr double kDirectionNoise = 20;
 
 /// The direction in which a side leaves the junction at point `k`, if it is long enough; `step` is
 /// 1 for the side after it, -1 for the side before it. Inside of the body, the junction is one of
-/// the points. On the body's outline it is not, since there it stays on the rounded outline.
+/// the points. On the body's outline it is not, since its place is less certain there.
 std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int step, bool is_inside,
                                    double h) {
   const std::size_t count = ring.points.size();
@@ -37,9 +37,7 @@ std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int ste
   if (points < kFewestPoints) return std::nullopt;
   if (is_inside) fit.AddEnd({});
   const auto curve = fit.Fit(kDirectionNoise);
-  if (!curve) return std::nullopt;
-  const Point direction = curve->TangentNear({}).along;
-  return Dot(direction, curve->along) < 0 ? Times(direction, -1) : direction;
+  return curve ? std::optional(curve->DirectionAt({})) : std::nullopt;
 }
 
 }  // namespace

@@ -6,13 +6,14 @@
 #include <span>
 
 #include "phases/arc_curve.h"
+#include "phases/body_corner.h"
 #include "walls/point_math.h"
 
 namespace partiemc {
 namespace {
 
-// At most four arcs meet in a cell.
-constexpr std::size_t kMostArcs = 4;
+// At most four arcs meet in a cell. A corner of the body has two more curves.
+constexpr std::size_t kMostArcs = 4, kMostCurves = 6;
 // Steps of the search for the point nearest to curves.
 constexpr int kSteps = 3;
 // Weight of a junction's place against lines that hardly determine it.
@@ -27,30 +28,16 @@ constexpr double kSmallestSine = .3;
 
 Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
-// The inner points of an arc in the order of their distance from one of its ends.
-class ArcFrom {
- public:
-  ArcFrom(const Interfaces& interfaces, const PhaseArc& arc, bool is_start)
-      : inner_(interfaces.InnerPoints(arc)), is_start_(is_start) {}
-  std::size_t size() const { return inner_.size(); }
-  std::uint32_t operator[](std::size_t k) const {
-    return inner_[is_start_ ? k : inner_.size() - 1 - k];
-  }
-
- private:
-  std::span<const std::uint32_t> inner_;
-  bool is_start_;
-};
-
-// Puts the points of an arc before kCurveNearest onto a parabola from the junction to the first
-// point behind it, with the bend of its curve.
-void Reshape(const ArcFrom& arc, const Point& before, const Point& junction, double h,
-             const std::optional<ArcCurve>& curve, SharedPoints& points) {
+// Puts the points of a path before kCurveNearest onto a parabola from the junction to the first
+// point behind it, with the bend of its curve. Calls on_move with their numbers.
+template <typename Path, typename OnMove>
+void Reshape(const Path& path, const Point& before, const Point& junction, double h,
+             const std::optional<ArcCurve>& curve, SharedPoints& points, OnMove on_move) {
   double reach = 0;
   std::optional<Point> target;
   Point last = before;
-  for (std::size_t k = 0; k < arc.size() && !target; ++k) {
-    const Point& at = points.position[arc[k]];
+  for (std::size_t k = 0; k < path.size() && !target; ++k) {
+    const Point& at = points.position[path[k]];
     reach += Length(Between(last, at));
     last = at;
     if (reach >= kCurveNearest * h) target = at;
@@ -61,13 +48,14 @@ void Reshape(const ArcFrom& arc, const Point& before, const Point& junction, dou
   const Point side = curve ? Point{curve->along.y * bow, -curve->along.x * bow} : Point{};
   double distance = 0;
   last = before;
-  for (std::size_t k = 0; k < arc.size(); ++k) {
-    Point& at = points.position[arc[k]];
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    Point& at = points.position[path[k]];
     distance += Length(Between(last, at));
     if (distance >= reach) return;
     last = at;
     const double share = distance / reach;
     at = Plus(Plus(junction, Times(chord, share)), Times(side, share * (1 - share)));
+    on_move(path[k], Plus(chord, Times(side, 1 - 2 * share)));
   }
 }
 
@@ -118,14 +106,15 @@ Point PlaceOnRing(std::span<const Line> lines, std::uint32_t vertex, const Rings
   return {at.x + share * side.x, at.y + share * side.y};
 }
 
-// Where the curves of a junction meet; they are relative to it.
-Point PlaceOf(std::span<const std::optional<ArcCurve>> curves, std::uint32_t junction,
-              const Rings& body, double h, const JunctionScratch& scratch,
-              const SharedPoints& points) {
+using Curves = std::array<std::optional<ArcCurve>, kMostCurves>;
+
+// Where the curves of a junction meet; they are relative to it. `is_on_ring`: a vertex of the body
+// that stays on its ring.
+Point PlaceOf(const Curves& curves, std::uint32_t junction, bool is_on_ring, const Rings& body,
+              double h, const JunctionScratch& scratch, const SharedPoints& points) {
   const Point before = points.position[junction];
-  const bool is_body = junction < body.PointCount();
   Point now = before;
-  std::array<Line, kMostArcs> lines;
+  std::array<Line, kMostCurves> lines;
   for (int step = 0; step < kSteps; ++step) {
     std::size_t count = 0;
     for (const auto& curve : curves) {
@@ -133,9 +122,9 @@ Point PlaceOf(std::span<const std::optional<ArcCurve>> curves, std::uint32_t jun
       Line& line = lines[count++] = curve->TangentNear(Between(before, now));
       line.through = Plus(before, line.through);
     }
-    if (count < (is_body ? 1u : 2u)) return before;
+    if (count < (is_on_ring ? 1u : 2u)) return before;
     const std::span<const Line> known(lines.data(), count);
-    if (is_body) {
+    if (is_on_ring) {
       now = PlaceOnRing(known, junction, body, scratch, points);
     } else {
       const Point move = Between(before, MeetingPoint(known, now));
@@ -143,6 +132,58 @@ Point PlaceOf(std::span<const std::optional<ArcCurve>> curves, std::uint32_t jun
     }
   }
   return now;
+}
+
+// The normal of a point whose outline has this direction now.
+void TurnNormal(const Point& along, VertexNormal& normal) {
+  const double length = Length(along);
+  if (!(length > 0)) return;
+  const Point unit{along.y / length, -along.x / length};
+  const double sign = unit.x * double{normal.x} + unit.y * double{normal.y} < 0 ? -1 : 1;
+  normal = {static_cast<float>(sign * unit.x), static_cast<float>(sign * unit.y)};
+}
+
+// Moves a junction and the points near it.
+void MoveJunction(std::span<const JunctionScratch::ArcEnd> ends, const Rings& body, double h,
+                  const Interfaces& interfaces, JunctionScratch& scratch, SharedPoints& points) {
+  const std::uint32_t junction = ends[0].junction;
+  const Point before = points.position[junction];
+  const auto path_of = [&](const JunctionScratch::ArcEnd& end) {
+    return ArcPath(interfaces.InnerPoints(interfaces.arcs[end.arc]), end.is_start);
+  };
+  Curves curves;
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    curves[k] = CurveAlong(path_of(ends[k]), before, h, points.position);
+  }
+  if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return;
+  const bool is_body = junction < body.PointCount();
+  Point now;
+  if (!is_body) {
+    now = PlaceOf(curves, junction, false, body, h, scratch, points);
+  } else {
+    scratch.has_moved[junction] = 1;
+    const RingPath ahead(body, junction, true, h, scratch.is_contact, points.position);
+    const RingPath back(body, junction, false, h, scratch.is_contact, points.position);
+    const auto corner = CornerOf(ahead, back, before, h, points.position);
+    if (corner) {
+      curves[kMostArcs] = corner->ahead;
+      curves[kMostArcs + 1] = corner->back;
+    }
+    now = PlaceOf(curves, junction, !corner, body, h, scratch, points);
+    const auto on_move = [&](std::uint32_t vertex, const Point& along) {
+      scratch.has_moved[vertex] = 1;
+      TurnNormal(along, points.normal[vertex]);
+    };
+    if (corner) {
+      Reshape(ahead, before, now, h, corner->ahead, points, on_move);
+      Reshape(back, before, now, h, corner->back, points, on_move);
+    }
+  }
+  points.position[junction] = now;
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    Reshape(path_of(ends[k]), before, now, h, curves[k], points,
+            [](std::uint32_t, const Point&) {});
+  }
 }
 
 void CollectEnds(const Interfaces& interfaces, std::size_t body_points, JunctionScratch& scratch) {
@@ -171,21 +212,9 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
   for (std::size_t first = 0, last = 0; first < scratch.ends.size(); first = last) {
     const std::uint32_t junction = scratch.ends[first].junction;
     while (last < scratch.ends.size() && scratch.ends[last].junction == junction) ++last;
-    const Point before = points.position[junction];
     const std::size_t count = std::min(last - first, kMostArcs);
-    std::array<std::optional<ArcCurve>, kMostArcs> curves;
-    for (std::size_t k = 0; k < count; ++k) {
-      const auto& [_, arc, is_start] = scratch.ends[first + k];
-      curves[k] = CurveOfEnd(interfaces.InnerPoints(interfaces.arcs[arc]), is_start, before, h,
-                             points.position);
-    }
-    if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) continue;
-    const Point now = PlaceOf(std::span(curves).first(count), junction, body, h, scratch, points);
-    points.position[junction] = now;
-    for (std::size_t k = 0; k < count; ++k) {
-      const auto& [_, arc, is_start] = scratch.ends[first + k];
-      Reshape({interfaces, interfaces.arcs[arc], is_start}, before, now, h, curves[k], points);
-    }
+    MoveJunction(std::span(scratch.ends).subspan(first, count), body, h, interfaces, scratch,
+                 points);
   }
 }
 

@@ -31,15 +31,15 @@ void TakeBody(const PlacedVertices& placed, const Rings& body, double cell_size,
   }
 }
 
-// Points in world units. Vertices of the body that are no contact keep their bits.
+// Points in world units. Vertices of the body that have not moved keep their bits.
 void ToWorld(const PlacedVertices& placed, const Rings& body, double cell_size, Phases& p) {
   const auto convert = [&](const std::vector<Point>& from, std::span<const double> of_body,
                            std::vector<double>& to) {
     to.assign(of_body.begin(), of_body.end());
     to.resize(2 * from.size());
     for (std::size_t k = 0; k < from.size(); ++k) {
-      const bool moves = k >= of_body.size() / 2 ||
-                         (&from == &p.points.position && p.junctions.is_contact[k] != 0);
+      const bool moves =
+          k >= of_body.size() / 2 || (&from == &p.points.position && p.junctions.has_moved[k] != 0);
       if (!moves) continue;
       to[2 * k] = from[k].x * cell_size;
       to[2 * k + 1] = from[k].y * cell_size;
@@ -112,6 +112,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
                static_cast<PhaseLabel>(k + 1), p.trace, p.rings[k]);
   }
   TakeBody(placed, body, input.scale.cell_size, p.points);
+  p.junctions.has_moved.assign(body.PointCount(), 0);
   FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
@@ -127,6 +128,11 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   ToWorld(placed, body, input.scale.cell_size, p);
   if (!RepairPhases(body, p.rings, p.world_roots, p.repair, p.world)) return false;
   std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
+  for (std::size_t k = 0; k < body.PointCount(); ++k) {
+    if (p.junctions.has_moved[k] == 0) continue;
+    body.normals[2 * k] = p.points.normal[k].x;
+    body.normals[2 * k + 1] = p.points.normal[k].y;
+  }
   p.particle_counts.clear();
   for (const RingMeasures& of : body.measures) p.particle_counts.push_back(of.particle_count);
   MeasureRings(body);

@@ -1,0 +1,45 @@
+#include "phases/body_corner.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace partiemc {
+namespace {
+
+// The sine of the smallest turn of a corner. With noise, smaller turns may be chance.
+constexpr double kSmallestTurn = .4;
+
+}  // namespace
+
+RingPath::RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, double spacing,
+                   std::span<const std::uint8_t> is_contact, std::span<const Point> positions)
+    : vertex_(vertex), is_ahead_(is_ahead) {
+  const auto after = std::ranges::upper_bound(body.offsets, vertex);
+  begin_ = *(after - 1);
+  count_ = *after - begin_;
+  Point last = positions[vertex];
+  double distance = 0;
+  for (; size_ + 1 < count_ && distance <= kCurvatureFarthest; ++size_) {
+    const std::uint32_t next = (*this)[size_];
+    if (is_contact[next] != 0) return;
+    distance += Length(Minus(positions[next], last)) / spacing;
+    last = positions[next];
+  }
+}
+
+std::uint32_t RingPath::operator[](std::size_t k) const {
+  const auto step = static_cast<std::uint32_t>(k + 1);
+  return begin_ + (vertex_ - begin_ + (is_ahead_ ? step : count_ - step)) % count_;
+}
+
+std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
+                                   double spacing, std::span<const Point> positions) {
+  const auto after = CurveAlong(ahead, vertex, spacing, positions);
+  const auto before = CurveAlong(back, vertex, spacing, positions);
+  if (!after || !before) return std::nullopt;
+  const Point to = after->DirectionAt({}), from = before->DirectionAt({});
+  const bool is_corner = Dot(to, from) > 0 || std::abs(Cross(to, from)) > kSmallestTurn;
+  return is_corner ? std::optional(BodyCorner{*after, *before}) : std::nullopt;
+}
+
+}  // namespace partiemc

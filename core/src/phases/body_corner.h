@@ -1,0 +1,40 @@
+// Corners of the body's outline where interfaces end.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "base/point.h"
+#include "partiemc/result.h"
+#include "phases/arc_curve.h"
+
+namespace partiemc {
+
+/// The vertices of a ring of the body after or before one of them, up to kCurvatureFarthest or the
+/// next contact.
+class RingPath {
+ public:
+  /// Lengths are in cells. `is_contact`: by vertex, whether interfaces end there.
+  RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, double spacing,
+           std::span<const std::uint8_t> is_contact, std::span<const Point> positions);
+  std::size_t size() const { return size_; }
+  std::uint32_t operator[](std::size_t k) const;
+
+ private:
+  std::uint32_t begin_, count_, vertex_;
+  bool is_ahead_;
+  std::size_t size_ = 0;
+};
+
+/// The curves of both sides of a vertex, relative to it.
+struct BodyCorner {
+  ArcCurve ahead, back;
+};
+
+/// Absent if a side is too short for a curve, or if the outline turns by less than 24 degrees.
+std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
+                                   double spacing, std::span<const Point> positions);
+
+}  // namespace partiemc
