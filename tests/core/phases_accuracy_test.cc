@@ -278,7 +278,7 @@ TEST(PhasesAccuracy, ContactsOfAFloatingLens) {
     EXPECT_EQ(angles, 2 * kSeeds);
     EXPECT_LE(apart / angles, noise > 0 ? .25 : .2);
     EXPECT_LE(turned / angles, noise > 0 ? 6 : 4);
-    EXPECT_LE(area, .005);
+    EXPECT_LE(area, .001);
   }
 }
 

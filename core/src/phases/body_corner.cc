@@ -9,6 +9,15 @@ namespace {
 // The sine of the smallest turn of a corner. With noise, smaller turns may be chance.
 constexpr double kSmallestTurn = .4;
 
+double AreaOf(std::uint32_t begin, std::uint32_t end, std::span<const Point> positions) {
+  const Point origin = positions[begin];
+  double twice = 0;
+  for (std::uint32_t k = begin + 1; k + 1 < end; ++k) {
+    twice += Cross(Minus(positions[k], origin), Minus(positions[k + 1], origin));
+  }
+  return twice / 2;
+}
+
 }  // namespace
 
 RingPath::RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, double spacing,
@@ -40,6 +49,35 @@ std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, 
   const Point to = after->DirectionAt({}), from = before->DirectionAt({});
   const bool is_corner = Dot(to, from) > 0 || std::abs(Cross(to, from)) > kSmallestTurn;
   return is_corner ? std::optional(BodyCorner{*after, *before}) : std::nullopt;
+}
+
+void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas) {
+  areas.clear();
+  for (std::size_t ring = 0; ring < body.RingCount(); ++ring) {
+    areas.push_back(AreaOf(body.offsets[ring], body.offsets[ring + 1], positions));
+  }
+}
+
+void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
+                      std::span<std::uint8_t> has_moved, SharedPoints& points) {
+  for (std::size_t ring = 0; ring < body.RingCount(); ++ring) {
+    const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
+    const std::span<std::uint8_t> moved = has_moved.subspan(begin, end - begin);
+    if (std::ranges::find(moved, kMovedCorner) == moved.end()) continue;
+    double length = 0;
+    for (std::uint32_t k = begin; k < end; ++k) {
+      length += Length(Minus(points.position[k + 1 == end ? begin : k + 1], points.position[k]));
+    }
+    if (!(length > 0)) continue;
+    const double lost = areas[ring] - AreaOf(begin, end, points.position);
+    const double offset = std::clamp(lost / length, -limit, limit);
+    for (std::uint32_t k = begin; k < end; ++k) {
+      const VertexNormal& normal = points.normal[k];
+      points.position[k] =
+          Plus(points.position[k], Times({double{normal.x}, double{normal.y}}, offset));
+      if (has_moved[k] == 0) has_moved[k] = kMoved;
+    }
+  }
 }
 
 }  // namespace partiemc

@@ -5,12 +5,17 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "base/point.h"
 #include "partiemc/result.h"
 #include "phases/arc_curve.h"
+#include "phases/interfaces.h"
 
 namespace partiemc {
+
+/// Elements of has_moved.
+inline constexpr std::uint8_t kMoved = 1, kMovedCorner = 2;
 
 /// The vertices of a ring of the body after or before one of them, up to kCurvatureFarthest or the
 /// next contact.
@@ -36,5 +41,14 @@ struct BodyCorner {
 /// Absent if a side is too short for a curve, or if the outline turns by less than 24 degrees.
 std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
                                    double spacing, std::span<const Point> positions);
+
+/// The signed area of each ring of the body, holes negative.
+void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas);
+
+/// Moves all vertices of rings with corners along their normals, by at most `limit`, until the
+/// rings have these areas again, up to the second order. `has_moved`: by vertex, kMovedCorner at
+/// corners; set for each vertex that moves.
+void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
+                      std::span<std::uint8_t> has_moved, SharedPoints& points);
 
 }  // namespace partiemc

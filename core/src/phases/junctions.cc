@@ -161,17 +161,17 @@ void MoveJunction(std::span<const JunctionScratch::ArcEnd> ends, const Rings& bo
   if (!is_body) {
     now = PlaceOf(curves, junction, false, body, h, scratch, points);
   } else {
-    scratch.has_moved[junction] = 1;
     const RingPath ahead(body, junction, true, h, scratch.is_contact, points.position);
     const RingPath back(body, junction, false, h, scratch.is_contact, points.position);
     const auto corner = CornerOf(ahead, back, before, h, points.position);
+    scratch.has_moved[junction] = corner ? kMovedCorner : kMoved;
     if (corner) {
       curves[kMostArcs] = corner->ahead;
       curves[kMostArcs + 1] = corner->back;
     }
     now = PlaceOf(curves, junction, !corner, body, h, scratch, points);
     const auto on_move = [&](std::uint32_t vertex, const Point& along) {
-      scratch.has_moved[vertex] = 1;
+      scratch.has_moved[vertex] = kMoved;
       TurnNormal(along, points.normal[vertex]);
     };
     if (corner) {

@@ -20,7 +20,7 @@ struct JunctionScratch {
   };
   std::vector<ArcEnd> ends;              // By junction, then arc.
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
-  std::vector<std::uint8_t> has_moved;   // By point of the body.
+  std::vector<std::uint8_t> has_moved;   // By point of the body: 0, kMoved or kMovedCorner.
 };
 
 /// Near a junction, the field of each phase sees a corner and rounds it. Each arc therefore has a

@@ -6,6 +6,7 @@
 
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
+#include "phases/body_corner.h"
 #include "phases/junction_angles.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
@@ -15,6 +16,8 @@ namespace {
 
 // Interfaces move by at most this number of spacings to match areas.
 constexpr double kAreaLimit = .5;
+// The outline of a body moves by at most this number of spacings to keep its area at corners.
+constexpr double kCornerLimit = .1;
 
 // Copies the vertices of the body to the shared points.
 void TakeBody(const PlacedVertices& placed, const Rings& body, double cell_size,
@@ -116,7 +119,10 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
+  SumRingAreas(body, p.points.position, p.ring_areas);
   MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+  RestoreRingAreas(body, p.ring_areas, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
+                   p.points);
   SumRegions(input.bins, input.scale, p.field, p.labels, p.map, p.rings, p.areas);
   CountParticles(p);
   if (input.parameters.spacing.has_value() || !input.frame.volumes.empty()) {

@@ -32,6 +32,7 @@ struct Phases {
   SharedPoints points;
   std::vector<double> world, world_roots;      ///< By shared point, interleaved, in world units.
   std::vector<std::uint64_t> particle_counts;  ///< By ring of the body.
+  std::vector<double> ring_areas;              ///< By ring of the body, in squared cells.
   Interfaces interfaces;
   PhaseTraceScratch trace;
   JunctionScratch junctions;
@@ -72,11 +73,11 @@ inline std::uint64_t InterfacePointsOf(const Phases& phases) {
   return phases.map.edges.size() + phases.map.cells.size();
 }
 
-/// Divides the body among the phases. Vertices of `body` where interfaces end move along its rings
-/// (MoveJunctions), and those that the repair needs return to their roots; the rings are then
-/// measured again. Returns false if the repair failed, which is a bug.
-/// Requires: MapPhases; the default placement. Deterministic. Cost: for each phase, linear in
-/// tiles; the rest linear in the points and particles near interfaces.
+/// Divides the body among the phases. Vertices of `body` where interfaces end move (MoveJunctions);
+/// rings with corners there move to keep their areas. Those vertices that the repair needs return
+/// to their roots. The rings are then measured again. Returns false if the repair failed, which is
+/// a bug. Requires: MapPhases; the default placement. Deterministic. Cost: for each phase, linear
+/// in tiles; the rest linear in the points and particles near interfaces.
 [[nodiscard]] bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed,
                                Phases& phases, Rings& body);
 
