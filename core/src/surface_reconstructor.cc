@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -39,6 +40,7 @@
 #include "space/surface_bytes.h"
 #include "space_cut/surface_cut.h"
 #include "space_identities/shell_identities.h"
+#include "space_images/body_images.h"
 #include "space_vertices/drops.h"
 #include "space_vertices/point_attributes.h"
 #include "space_vertices/qef.h"
@@ -51,8 +53,8 @@ namespace partiemc {
 
 namespace {
 
-/// Warm buffers of CutAtWalls.
-struct WallCutScratch {
+/// Warm buffers of CutAtWalls and CutAtBox.
+struct PlaneCuts {
   std::vector<space::AxisPlane> planes;
   std::vector<std::uint8_t> is_cut;  // By shell.
   space::SurfaceCutScratch cut;
@@ -68,9 +70,11 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceCrossings crossings;
   space::Bodies bodies;
   space::CleaningScratch cleaning;
-  LiftScratch lift;         // Empty without a periodic box.
-  WallImageScratch images;  // Empty without walls.
-  WallCutScratch wall_cut;
+  LiftScratch lift;                     // Empty without a periodic box.
+  space::BodyImageScratch body_images;  // Empty unless bodies percolate.
+  space::CutShells cut_shells;          // Empty unless bodies percolate.
+  WallImageScratch images;              // Empty without walls.
+  PlaneCuts plane_cuts;                 // Empty unless walls or a box cut.
   std::vector<Vec3> anchors, positions, normals;
   std::vector<std::uint8_t> is_fixed;
   space::VirtualPlaneScratch virtual_plane;
@@ -122,9 +126,46 @@ double LightestVolume(const Frame& frame, const SurfaceParameters& parameters) {
 // not voids of the fluid (core/METHOD.md, "Cleaning").
 constexpr double kMinCavityParticles = 2;
 
+// Copies of particles reach this many kernel radii beyond the faces of a periodic box, at most one
+// length. kCopyEnd radii inside this margin, the level set and its windows do not depend on where
+// the copies end.
+constexpr double kCopyMargin = 6, kCopyEnd = 2;
+
+/// The periodic box along the axes along which bodies percolate; infinite along the others. World
+/// units.
+struct CopiedBox {
+  space::ClipBox faces;     ///< The faces of the box.
+  space::ClipBox complete;  ///< Bodies within these planes are complete.
+  bool any = false;         ///< There are copies.
+  std::array<bool, 3> has_copies{};
+};
+
+CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  CopiedBox box;
+  box.has_copies = lifted.percolates;
+  std::array<double, 3> low, high, least, most;
+  low.fill(-kInfinity), least.fill(-kInfinity);
+  high.fill(kInfinity), most.fill(kInfinity);
+  const double radius = parameters.kernel_radius * parameters.spacing;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!lifted.percolates[k]) continue;
+    box.any = true;
+    const PeriodicAxis& axis = *parameters.box->axes[k];
+    const double reach = std::min(kCopyMargin * radius, axis.length) - kCopyEnd * radius;
+    low[k] = axis.origin, high[k] = axis.origin + axis.length;
+    least[k] = low[k] - reach, most[k] = high[k] + reach;
+  }
+  box.faces = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+  box.complete = {{least[0], least[1], least[2]}, {most[0], most[1], most[2]}};
+  return box;
+}
+
 /// Finds the bodies, and drops cavities and bodies as `parameters` require.
-SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& parameters,
+SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& copied,
+                                  const SurfaceParameters& parameters,
                                   SurfaceWorkspace::Buffers& b) {
+  const Frame& frame = lifted.frame;
   SurfaceStatistics statistics;
   const bool is_cleaned =
       parameters.clean.value_or(parameters.placement == SurfacePlacement::kVirtualPlane);
@@ -138,8 +179,18 @@ SurfaceStatistics FindCleanBodies(const Frame& frame, const SurfaceParameters& p
   const double h = parameters.spacing;
   ThrowIfCancelled();
   space::FindBodies(frame, b.bins, b.field, h, b.bodies);
+  if (copied.any) {
+    space::ChooseImages({.lifted = lifted,
+                         .bins = b.bins,
+                         .low = copied.complete.low,
+                         .high = copied.complete.high,
+                         .spacing = h,
+                         .cell_size = parameters.cell_size * h},
+                        b.body_images, b.bodies);
+  }
+  // Bodies without particles have no particle that says where they end.
   const space::DroppedBodies dropped =
-      space::DropBodies({.drops_empty = is_cleaned,
+      space::DropBodies({.drops_empty = is_cleaned || copied.any,
                          .least_volume = parameters.min_component_volume * h * h * h,
                          .least_particles = parameters.min_component_particles},
                         b.cleaning, b.bodies, b.field);
@@ -165,7 +216,9 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
 void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& bodies,
                space::SurfaceSize& size) {
   std::uint64_t in_bodies = 0;
-  for (const space::Body& body : bodies.bodies) {
+  for (std::uint32_t index = 0; index < bodies.bodies.size(); ++index) {
+    const space::Body& body = bodies.bodies[index];
+    if (body.first_image != index) continue;
     in_bodies += body.particles;
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
@@ -307,7 +360,7 @@ std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& paramete
 }
 
 /// Cuts the shells that reach a wall. Returns false if CutSurface does.
-bool CutAtWalls(const SurfaceParameters& parameters, WallCutScratch& scratch, Surface& surface) {
+bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface) {
   // Above the largest move of a plane (CutSurface), so that no other shell reaches a moved plane.
   constexpr double kReach = 1e-4;
   scratch.planes.clear();
@@ -344,6 +397,25 @@ bool CutAtWalls(const SurfaceParameters& parameters, WallCutScratch& scratch, Su
                             .is_cut = scratch.is_cut,
                             .spacing = parameters.spacing,
                             .are_walls = true},
+                           scratch.cut, scratch.pieces, surface);
+}
+
+/// Cuts the bodies that percolate at the faces of the box. Returns false if CutSurface does.
+bool CutAtBox(const SurfaceParameters& parameters, const CopiedBox& box,
+              const space::CutShells& shells, PlaneCuts& scratch, Surface& surface) {
+  if (!shells.any) return true;
+  scratch.planes.clear();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    if (!box.has_copies[k]) continue;
+    const PeriodicAxis& periodic = *parameters.box->axes[k];
+    scratch.planes.push_back({axis, periodic.origin, true});
+    scratch.planes.push_back({axis, periodic.origin + periodic.length, false});
+  }
+  return space::CutSurface({.planes = scratch.planes,
+                            .is_cut = shells.is_cut,
+                            .body_of = shells.outer_of,
+                            .spacing = parameters.spacing},
                            scratch.cut, scratch.pieces, surface);
 }
 
@@ -445,13 +517,14 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   const SurfacePlacement placement = parameters_.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
   LiftedFrame lifted{.frame = given};
+  CopiedBox copied;
   std::size_t own_particles = given.ParticleCount();
   const Frame& frame = lifted.frame;
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
                           .is_simplified = parameters_.simplify > 0,
-                          .wall_axes = CountWallAxes(parameters_)};
+                          .cut_axes = CountWallAxes(parameters_)};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
@@ -466,7 +539,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                       .box = *parameters_.box,
                       .axes = kAxes,
                       .range = 2 * parameters_.kernel_radius * h,
-                      .margin = 0,
+                      .margin = kCopyMargin * parameters_.kernel_radius * h,
                       .reserve =
                           [&](std::uint64_t bytes) {
                             size.lift_bytes = bytes;
@@ -474,6 +547,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                           }},
                      b.lift, lifted);
       if (!checked.ok()) return checked;
+      copied = CopiedBoxOf(parameters_, lifted);
+      size.particles = frame.ParticleCount();
+      size.cut_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
     }
     if (!parameters_.wall_planes.empty()) {
       checked = AddWallImages({.frame = given,
@@ -490,7 +566,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       size.particles = frame.ParticleCount();
       if (!checked.ok() || own_particles == 0) return checked;
     }
-    b.virtual_plane.volumes.before_walls = SpaceBeforeWalls(parameters_);
+    b.virtual_plane.volumes.clip =
+        copied.any ? std::optional(copied.faces) : SpaceBeforeWalls(parameters_);
+    b.virtual_plane.volumes.clips_images = copied.any;
     SizeRange sizes;
     if (parameters_.sizes == Sizes::kOwn) {
       const auto range = RangeOfSizes(frame, in_space_, {.spacing = h, .cell_size = cell_size});
@@ -503,7 +581,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);
     if (checked.ok()) space::SortParticles(frame, scale, b.bins);
-    b.bins.first_image = parameters_.wall_planes.empty() ? kNoIndex : own_particles;
+    b.bins.are_images_mirrored = !copied.any;
+    const bool has_images = copied.any || !parameters_.wall_planes.empty();
+    b.bins.first_image = has_images ? static_cast<std::uint32_t>(own_particles) : kNoIndex;
     return checked;
   });
   if (!status.ok()) return status;
@@ -512,7 +592,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     return absl::OkStatus();
   }
   in_stage(Stage::kField, [&] { space::SampleField(b.bins, scale, b.field); });
-  in_stage(Stage::kRings, [&] { surface.statistics = FindCleanBodies(frame, parameters_, b); });
+  in_stage(Stage::kRings,
+           [&] { surface.statistics = FindCleanBodies(lifted, copied, parameters_, b); });
   status = in_stage(Stage::kCrossings, [&] {
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;
@@ -547,6 +628,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     surface.statistics.bricks = bricks.size();
     space::AssembleSurface({bricks, b.field, b.crossings, b.bodies, b.positions, b.normals, b.thin},
                            b.mesh, surface);
+    b.cut_shells.any = false;
+    if (copied.any) {
+      space::FindCutShells(b.bodies, b.mesh.body_of_shell, surface, b.cut_shells);
+    }
     for (const space::Drops::Drop& drop : b.drops.drops) {
       if (!drop.is_taken) continue;
       surface.measures[b.mesh.shell_of[drop.first_vertex]].particles = drop.particles;
@@ -554,9 +639,11 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   });
   if (state != nullptr) {
     in_stage(Stage::kIdentities, [&] {
-      space::ContinueShells({frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin,
-                             b.mesh.shell_of, cell_size, PeriodsOf(parameters_, cell_size)},
-                            state->history, b.identities, b.next_history, surface);
+      space::ContinueShells(
+          {frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin, b.mesh.shell_of,
+           cell_size, PeriodsOf(parameters_, cell_size), &b.cut_shells,
+           (1 / cell_size) * copied.faces.low, (1 / cell_size) * copied.faces.high},
+          state->history, b.identities, b.next_history, surface);
     });
   }
   if (parameters_.simplify > 0) {
@@ -566,8 +653,14 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   }
   if (!parameters_.wall_planes.empty()) {
     const bool is_cut =
-        in_stage(Stage::kMesh, [&] { return CutAtWalls(parameters_, b.wall_cut, surface); });
+        in_stage(Stage::kMesh, [&] { return CutAtWalls(parameters_, b.plane_cuts, surface); });
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its walls");
+  }
+  if (copied.any) {
+    const bool is_cut = in_stage(Stage::kMesh, [&] {
+      return CutAtBox(parameters_, copied, b.cut_shells, b.plane_cuts, surface);
+    });
+    if (!is_cut) return absl::InternalError("a surface cannot be cut at its box");
   }
   if (!frame.attributes.empty()) {
     in_stage(Stage::kAttributes, [&] {

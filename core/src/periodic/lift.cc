@@ -218,6 +218,8 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
     s.cells[s.sets.Find(cell).root].percolates |= axes;
     all |= axes;
   }
+  // In space, clusters may percolate along different axes.
+  for (LiftCell& cell : s.cells) cell.percolates = cell.percolates == 0 ? 0 : all;
   return {(all & AxisBit(0)) != 0, (all & AxisBit(1)) != 0, (all & AxisBit(2)) != 0};
 }
 

@@ -84,7 +84,8 @@ struct LiftedFrame {
 ///
 /// A cluster percolates along an axis if it reaches its own image along this axis. Along such axes,
 /// its particles are wrapped into the box, and those within `margin` of a face get copies beyond
-/// the opposite face. A copy has the id, volume, velocity and attributes of its particle.
+/// the opposite face. If clusters percolate along different axes, which they can in space, this is
+/// so along all these axes. A copy has the id, volume, velocity and attributes of its particle.
 ///
 /// Two cells of the grid with very many particles may be joined although their particles are up to
 /// two ranges apart, so that the cost is bounded (kMostPairs in lift.cc).

@@ -44,9 +44,10 @@ struct SpaceBins {
   std::vector<float> weight;          ///< Empty if uniform; else padded, too.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
-  /// Particles of the frame from this index on are mirror images behind walls. They count for F,
-  /// but are not particles of a body.
+  /// Particles of the frame from this index on are mirror images behind walls, or copies beyond the
+  /// faces of a periodic box. They count for F, but are not particles of a body.
   std::uint32_t first_image = kNoIndex;
+  bool are_images_mirrored = true;  ///< False for copies: their attributes count.
 
   bool IsImage(std::uint32_t particle) const { return source[particle] >= first_image; }
 

@@ -93,7 +93,7 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
     std::uint32_t parent = part.body;
     if (parent == index) {
       part.body = static_cast<std::uint32_t>(bodies.bodies.size());
-      bodies.bodies.push_back({});
+      bodies.bodies.push_back({.first_image = part.body});
       lowest_z.push_back(std::numeric_limits<std::int64_t>::max());
     } else {
       part.body = bodies.parts[parent].body;

@@ -15,11 +15,22 @@
 
 namespace partiemc::space {
 
+/// What remains of a body in a frame with copies of particles (space_images/body_images.h).
+enum class BodyFate : std::uint8_t {
+  kWhole,  ///< It remains as it is.
+  kCut,    ///< Its part in the periodic box remains.
+  kGone,   ///< Another image of the body remains.
+};
+
 struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
   std::uint64_t particles = 0;  ///< Particles whose nearest inside node is in the body.
-  std::uint64_t images = 0;     ///< The same for mirror images behind walls.
+  std::uint64_t images = 0;     ///< The same for mirror images behind walls, or for copies.
   double volume = 0;            ///< Volume of these particles, world units cubed.
+  BodyFate fate = BodyFate::kWhole;
+  /// The first body that is an image of the same body. ChooseImages gives all of them the particles
+  /// and the volume of the whole body.
+  std::uint32_t first_image = kNoIndex;
 };
 
 /// The body of particles whose body was dropped.
@@ -40,6 +51,8 @@ struct Bodies {
 
   /// By particle of SpaceBins: its body, kDroppedBody, or kNoIndex if no inside node is near.
   std::vector<std::uint32_t> body_of_particle;
+
+  bool IsCut(std::uint32_t body) const { return bodies[body].fate == BodyFate::kCut; }
 
   /// The body of an inside node.
   std::uint32_t BodyOf(const BrickPlace& node) const {

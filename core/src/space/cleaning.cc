@@ -95,20 +95,23 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
   std::uint32_t kept = 0;
   for (std::size_t index = 0; index < bodies.bodies.size(); ++index) {
     const Body& body = bodies.bodies[index];
-    const bool is_image = body.particles == 0 && body.images > 0;
+    const bool is_gone = body.fate == BodyFate::kGone || (body.particles == 0 && body.images > 0);
     const bool is_empty = limits.drops_empty && body.particles == 0;
     const bool is_spray =
         body.volume < limits.least_volume || body.particles < limits.least_particles;
-    dropped.empty += is_empty && !is_image;
-    dropped.spray += is_spray && !is_empty && !is_image;
-    const bool is_dropped = is_image || is_empty || is_spray;
+    const bool counts = !is_gone && body.first_image == index;
+    dropped.empty += is_empty && counts;
+    dropped.spray += is_spray && !is_empty && counts;
+    const bool is_dropped = is_gone || is_empty || is_spray;
     scratch.new_index[index] = is_dropped ? kNoIndex : kept;
-    if (!is_dropped) bodies.bodies[kept++] = body;
+    if (is_dropped) continue;
+    bodies.bodies[kept] = body;
+    bodies.bodies[kept++].first_image = scratch.new_index[body.first_image];
   }
   if (kept == bodies.bodies.size()) return dropped;
   bodies.bodies.resize(kept);
   for (std::uint32_t& body : bodies.body_of_particle) {
-    if (body == kNoIndex) continue;
+    if (body == kNoIndex || body == kDroppedBody) continue;
     const std::uint32_t index = scratch.new_index[body];
     body = index == kNoIndex ? kDroppedBody : index;
   }

@@ -93,6 +93,7 @@ void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scrat
     return scratch.shell_of[is_dropped ? input.thin[v].corners[0] : v];
   };
   surface.outer_of.assign(shells, kNoIndex);
+  scratch.body_of_shell.assign(shells, kNoIndex);
   for (std::uint32_t brick = 0; brick < input.bricks.size(); ++brick) {
     ForEachCrossedEdge(crossings, brick, [&](std::uint32_t v, int i, int j, int k, int axis) {
       const std::uint32_t shell = shell_of(v);
@@ -101,7 +102,9 @@ void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scrat
       if (!input.field.IsInside(node)) {
         node = Normalise(input.bricks, brick, i + (axis == 0), j + (axis == 1), k + (axis == 2));
       }
-      const Body& body = input.bodies.bodies[input.bodies.BodyOf(node)];
+      const std::uint32_t index = input.bodies.BodyOf(node);
+      scratch.body_of_shell[shell] = index;
+      const Body& body = input.bodies.bodies[index];
       const BrickPlace below = Normalise(input.bricks, body.lowest.brick, body.lowest.i,
                                          body.lowest.j, body.lowest.k - 1);
       surface.outer_of[shell] = shell_of(crossings.EdgeVertex(below, 2));

@@ -39,6 +39,7 @@ using VertexTriangle = std::array<std::uint32_t, 3>;  ///< Vertex numbers of Spa
 struct MeshScratch {
   std::vector<VertexTriangle> triangles;
   std::vector<std::uint32_t> parent, shell_of, point_of, next;
+  std::vector<std::uint32_t> body_of_shell;  ///< kNoIndex for ellipsoids.
 };
 
 /// The triangles of marching cubes, cell by cell. Their corners are vertices on edges; in long

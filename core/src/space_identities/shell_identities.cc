@@ -29,6 +29,10 @@ void WriteIdentities(const ShellHistory& previous, const ShellIdentityScratch& s
   surface.parent_offsets.assign(1, 0);
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
     const std::uint32_t number = s.shells.number[shell];
+    if (number == kNoShell) {
+      surface.parent_offsets.push_back(static_cast<std::uint32_t>(surface.parents.size()));
+      continue;
+    }
     surface.measures[shell].identity = s.shells.shells[number].identity;
     auto relation = std::ranges::lower_bound(s.relations, number, {}, &Relation::now);
     for (; relation != s.relations.end() && relation->now == number; ++relation) {

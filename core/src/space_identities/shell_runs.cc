@@ -1,8 +1,10 @@
 #include "space_identities/shell_runs.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 namespace partiemc::space {
@@ -12,6 +14,11 @@ namespace {
 std::uint32_t ShellOfVertex(const ShellInput& input, std::uint32_t vertex) {
   const bool is_dropped = !input.thin.empty() && !input.thin[vertex].IsEmpty();
   return input.shell_of[is_dropped ? input.thin[vertex].corners[0] : vertex];
+}
+
+/// Whether a shell will be cut at the faces of a periodic box.
+bool IsCut(const ShellInput& input, std::uint32_t shell) {
+  return input.cut != nullptr && input.cut->any && input.cut->is_cut[shell] != 0;
 }
 
 /// Finds the outer shell of each body.
@@ -81,10 +88,64 @@ std::uint32_t NumberOf(std::uint32_t shell, NumberedShells& shells) {
   return shells.number[shell];
 }
 
-void CollectRuns(const Surface& surface, NumberedShells& shells, std::vector<ShellRun>& runs) {
+/// The nodes in the half-open box of the bodies that are cut.
+struct NodeBox {
+  std::array<std::int32_t, 3> first, last;
+
+  explicit NodeBox(const ShellInput& input) {
+    const std::array<double, 3> low{input.low.x, input.low.y, input.low.z},
+        high{input.high.x, input.high.y, input.high.z};
+    for (std::size_t k = 0; k < 3; ++k) {
+      constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+      first[k] = static_cast<std::int32_t>(std::clamp(std::ceil(low[k]), -kMost, kMost));
+      last[k] = static_cast<std::int32_t>(std::clamp(std::ceil(high[k]) - 1, -kMost, kMost));
+    }
+  }
+
+  /// Clips a run; false if nothing remains.
+  bool Clip(ShellRun& run) const {
+    run.first = std::max(run.first, first[0]);
+    run.last = std::min(run.last, last[0]);
+    return run.first <= run.last && run.row >= first[1] && run.row <= last[1] &&
+           run.layer >= first[2] && run.layer <= last[2];
+  }
+};
+
+/// Whether all points of a shell lie in the box.
+bool LiesInBox(const ShellInput& input, const Surface& surface, std::uint32_t shell) {
+  for (std::uint32_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1]; ++p) {
+    const Vec3 at = (1 / input.cell_size) * Vec3At(surface.points, p);
+    if (at.x < input.low.x || at.y < input.low.y || at.z < input.low.z || at.x > input.high.x ||
+        at.y > input.high.y || at.z > input.high.z) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Sets the shell that has the number of each shell: all images of a body that is cut have that of
+/// the first one. kNoShell for their cavities that do not remain.
+void FindStandIns(const ShellInput& input, const Surface& surface, NumberedShells& shells) {
+  std::vector<std::uint32_t>& stand_in = shells.stand_in;
+  stand_in.resize(surface.ShellCount());
+  for (std::uint32_t shell = 0; shell < stand_in.size(); ++shell) {
+    stand_in[shell] = shell;
+    if (!IsCut(input, shell)) continue;
+    if (surface.outer_of[shell] == kNoShell) {
+      stand_in[shell] = input.cut->outer_of[shell];
+    } else if (!LiesInBox(input, surface, shell)) {
+      stand_in[shell] = kNoShell;
+    }
+  }
+}
+
+void CollectRuns(const ShellInput& input, const Surface& surface, NumberedShells& shells,
+                 std::vector<ShellRun>& runs) {
+  const NodeBox box(input);
   runs.clear();
   shells.number.assign(surface.ShellCount(), kNoShell);
   shells.surface_shell.clear();
+  FindStandIns(input, surface, shells);
   for (std::size_t k = 1; k < shells.edges.size(); ++k) {
     const NumberedShells::Edge &from = shells.edges[k - 1], &to = shells.edges[k];
     if (from.layer != to.layer || from.row != to.row || from.node == to.node) continue;
@@ -95,10 +156,18 @@ void CollectRuns(const Surface& surface, NumberedShells& shells, std::vector<She
     } else if (surface.outer_of[shell] != kNoShell) {
       shell = surface.outer_of[shell];
     }
-    runs.push_back({to.layer, to.row, from.node + 1, to.node, NumberOf(shell, shells)});
+    const std::uint32_t stand_in = shells.stand_in[shell];
+    ShellRun run{to.layer, to.row, from.node + 1, to.node, kNoShell};
+    if (stand_in == kNoShell || (IsCut(input, shell) && !box.Clip(run))) continue;
+    run.shell = NumberOf(stand_in, shells);
+    runs.push_back(run);
   }
-  // Each shell has a run, so this numbers no other shells unless that is wrong.
-  for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) NumberOf(shell, shells);
+  // Each shell has a run, so this numbers no other shells unless that is wrong, or a body that is
+  // cut has no node in the box.
+  for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    const std::uint32_t stand_in = shells.stand_in[shell];
+    if (stand_in != kNoShell) shells.number[shell] = NumberOf(stand_in, shells);
+  }
 }
 
 void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
@@ -106,7 +175,10 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
   shells.of_particle.assign(body_of.size(), kNoShell);
   shells.particles.assign(shells.shells.size(), 0);
   for (std::size_t p = 0; p < body_of.size(); ++p) {
-    if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody || input.bins.IsImage(p)) continue;
+    if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
+    // Copies are particles of bodies that are whole.
+    const bool counts_images = !input.bins.are_images_mirrored && !input.bodies.IsCut(body_of[p]);
+    if (input.bins.IsImage(p) && !counts_images) continue;
     const std::uint32_t number = shells.number[shells.shell_of_body[body_of[p]]];
     shells.of_particle[p] = number;
     ++shells.particles[number];
@@ -125,7 +197,7 @@ void NumberShells(const ShellInput& input, const Surface& surface, NumberedShell
                   std::vector<ShellRun>& runs) {
   FindShellsOfBodies(input, shells);
   ListEdges(input, shells);
-  CollectRuns(surface, shells, runs);
+  CollectRuns(input, surface, shells, runs);
   shells.shells.clear();
   for (const std::uint32_t shell : shells.surface_shell) {
     const std::uint32_t outer = surface.outer_of[shell];

@@ -15,6 +15,7 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space_images/body_images.h"
 #include "space_vertices/drops.h"
 
 namespace partiemc {
@@ -39,13 +40,17 @@ struct ShellInput {
   std::span<const std::uint32_t> shell_of;  ///< By vertex, also of drops (MeshScratch).
   double cell_size;                         ///< World units.
   LatticePeriods periods = {};
+  /// With copies of particles: the shells that will be cut. Empty or null otherwise.
+  const CutShells* cut = nullptr;
+  Vec3 low = {}, high = {};  ///< Then: the box in cells; infinite along axes without copies.
 };
 
 /// The shells of a frame, numbered from 0 in the order of their first runs: by layer, row, node.
 struct NumberedShells {
-  std::vector<KnownShell> shells;            ///< By number; `outer` is a number.
-  std::vector<std::uint64_t> particles;      ///< By number.
-  std::vector<std::uint32_t> number;         ///< By shell of the surface.
+  std::vector<KnownShell> shells;        ///< By number; `outer` is a number.
+  std::vector<std::uint64_t> particles;  ///< By number.
+  /// By shell of the surface; kNoShell for cavities of cut bodies that do not lie in the box.
+  std::vector<std::uint32_t> number;
   std::vector<std::uint32_t> of_particle;    ///< By particle of the bins: number, or kNoShell.
   std::vector<std::uint32_t> surface_shell;  ///< By number.
 
@@ -56,6 +61,7 @@ struct NumberedShells {
   };
   std::vector<Edge> edges;                   ///< Scratch: the crossed edges along x.
   std::vector<std::uint32_t> shell_of_body;  ///< Scratch: the outer shell.
+  std::vector<std::uint32_t> stand_in;       ///< Scratch: by shell, the shell with its number.
 };
 
 /// Collects the runs of the shells and numbers the shells. `surface` has shells.
@@ -64,6 +70,8 @@ struct NumberedShells {
 /// run of outside nodes belongs to a cavity if an end of it is on the shell of the cavity. An
 /// ellipsoid has the nodes of its body; one that replaces a particle without a body has one node,
 /// the lowest of the particle's cell (space_vertices/drops.h).
+///
+/// Of a body that will be cut, only the nodes in the box count, and its images have one number.
 /// Cost: n log n in the crossed edges along x, linear in particles and shells.
 void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
                   std::vector<ShellRun>& runs);

@@ -31,6 +31,25 @@ ClipBox Relative(const ClipBox& box, double units, const Vec3& origin) {
   return {units * box.low - origin, units * box.high - origin};
 }
 
+/// Whether the measures of a body are those of its part in the box.
+bool IsClipped(const BodyVolumes& volumes, const Bodies& bodies, std::uint32_t body) {
+  return volumes.clip && (!volumes.clips_images || bodies.IsCut(body));
+}
+
+/// Gives all images of a body the sum of their measures.
+void ShareMeasures(const Bodies& bodies, BodyVolumes& volumes) {
+  if (!volumes.clips_images) return;
+  for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
+    const std::uint32_t first = bodies.bodies[body].first_image;
+    if (first == body) continue;
+    volumes.measures[first].area += volumes.measures[body].area;
+    volumes.measures[first].volume += volumes.measures[body].volume;
+  }
+  for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
+    volumes.measures[body] = volumes.measures[bodies.bodies[body].first_image];
+  }
+}
+
 /// Calls visit(cell, loop of the cell, loop) for all loops, in parallel over cells.
 template <typename Visit>
 void ForEachLoopOfCells(const SpaceCrossings& crossings, const Visit& visit) {
@@ -73,16 +92,18 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
   volumes.parts.resize(crossings.loop_count);
   ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
     const std::uint32_t vertex = crossings.edge_count + index;
-    const Vec3 origin = origin_of(volumes.body_of[vertex]);
+    const std::uint32_t body = volumes.body_of[vertex];
+    const bool is_clipped = IsClipped(volumes, bodies, body);
+    const Vec3 origin = origin_of(body);
     const Vec3 a = positions[vertex] - origin;
     double area = 0;
     BodyVolumes::Part part;
     ForEachCurve(crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
       const Vec3 b = positions[from] - origin, c = positions[to] - origin;
       area += Length(Cross(b - a, c - a)) / 2;
-      if (volumes.before_walls) {
+      if (is_clipped) {
         const ClippedMeasure clipped =
-            MeasureClipped(a, b, c, Relative(*volumes.before_walls, 1 / cell_size, origin));
+            MeasureClipped(a, b, c, Relative(*volumes.clip, 1 / cell_size, origin));
         part.area += clipped.area;
         part.volume += clipped.volume;
       } else {
@@ -90,7 +111,7 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
       }
     });
     volumes.areas[index] = area;
-    if (!volumes.before_walls) part.area = area;
+    if (!is_clipped) part.area = area;
     volumes.parts[index] = part;
   });
   volumes.measures.assign(bodies.bodies.size(), {});
@@ -100,6 +121,7 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
     measure.area += volumes.parts[loop].area * volumes.SizeOf(vertex);
     measure.volume += volumes.parts[loop].volume;
   }
+  ShareMeasures(bodies, volumes);
 }
 
 void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
@@ -111,9 +133,8 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
     const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
                c = positions[triangle[2]] - origin;
-    if (volumes.before_walls) {
-      const ClippedMeasure part =
-          MeasureClipped(a, b, c, Relative(*volumes.before_walls, 1, origin));
+    if (IsClipped(volumes, bodies, body)) {
+      const ClippedMeasure part = MeasureClipped(a, b, c, Relative(*volumes.clip, 1, origin));
       volumes.measures[body].area += part.area;
       volumes.measures[body].volume += part.volume;
       continue;
@@ -127,6 +148,7 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     volumes.measures[body].area += area;
     volumes.measures[body].volume += Dot(a, Cross(b, c)) / 6;
   }
+  ShareMeasures(bodies, volumes);
 }
 
 bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,

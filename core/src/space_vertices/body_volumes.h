@@ -33,9 +33,12 @@ struct BodyVolumes {
 
   double SizeOf(std::size_t vertex) const { return sizes.empty() ? 1 : double{sizes[vertex]}; }
 
-  /// With walls, the space before them in world units: areas and volumes are those of the parts in
-  /// it.
-  std::optional<ClipBox> before_walls;
+  /// With walls, the space before them; with copies of particles, the periodic box. In world units.
+  /// Areas and volumes are those of the parts in it.
+  std::optional<ClipBox> clip;
+  /// Only bodies that are cut are clipped, and all images of a body have the measures of their sum.
+  /// They then move alike.
+  bool clips_images = false;
 
   struct Part {
     double area = 0, volume = 0;

@@ -131,9 +131,12 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
   drops.drop_of.assign(bodies.bodies.size(), kNoIndex);
   for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
     const std::uint64_t particles = bodies.bodies[body].particles;
-    if (particles == 0 || particles > limits.most_particles) continue;
+    // A body that is cut is longer than the box.
+    if (particles == 0 || particles > limits.most_particles || bodies.IsCut(body)) continue;
     drops.drop_of[body] = static_cast<std::uint32_t>(drops.drops.size());
-    drops.drops.emplace_back().body = body;
+    Drops::Drop& drop = drops.drops.emplace_back();
+    drop.body = body;
+    drop.particles = particles;
   }
   const double h = input.scale.spacing, usual = h * h * h;
   const bool takes_lone = limits.least_particles <= 1;
@@ -152,7 +155,6 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       if (body != kNoIndex) {
         Drops::Drop& drop = drops.drops[drops.drop_of[body]];
         AddParticle(at, volume, drop);
-        drop.particles += !is_image;
         continue;
       }
       const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
