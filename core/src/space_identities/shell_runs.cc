@@ -174,7 +174,7 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
   const std::vector<std::uint32_t>& body_of = input.bodies.body_of_particle;
   shells.of_particle.assign(body_of.size(), kNoShell);
   shells.particles.assign(shells.shells.size(), 0);
-  for (std::size_t p = 0; p < body_of.size(); ++p) {
+  for (std::uint32_t p = 0; p < body_of.size(); ++p) {
     if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
     // Copies are particles of bodies that are whole.
     const bool counts_images = !input.bins.are_images_mirrored && !input.bodies.IsCut(body_of[p]);

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
+#include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -101,43 +103,50 @@ SpaceParticles Filled(int x, int y, int z, double shake, Random& random, Keep ke
   return particles;
 }
 
-/// Largest distance of a point of the outline on one face from the outline on the opposite face,
-/// along the axes of the face. Only points of cut triangles with a neighbour off the face count:
-/// the points at which the face cuts the free surface.
-struct FaceOutlines {
-  std::array<std::vector<std::array<double, 2>>, 2> points;
-};
+using FacePoint = std::array<double, 2>;
+using FaceSegment = std::array<FacePoint, 2>;
 
-FaceOutlines OutlinesOn(const Surface& surface, const PeriodicBox& box, std::size_t axis) {
-  std::vector<std::uint8_t> on_free(surface.PointCount());
-  std::size_t cut = 0;
-  for (std::size_t t = 0; t < surface.TriangleCount(); ++t) {
-    if (cut < surface.cuts.size() && surface.cuts[cut] == t) {
-      ++cut;
-      continue;
-    }
-    for (int k = 0; k < 3; ++k) on_free[surface.triangles[3 * t + k]] = 1;
-  }
-  FaceOutlines outlines;
-  for (std::size_t p = 0; p < surface.PointCount(); ++p) {
-    if (on_free[p] == 0) continue;
-    for (std::size_t side = 0; side < 2; ++side) {
-      const double face = box.axes[axis]->origin + side * box.axes[axis]->length;
-      if (std::abs(Coordinate(surface, p, axis) - face) > 1e-4) continue;
-      outlines.points[side].push_back({Coordinate(surface, p, (axis + 1) % 3),
-                                       Coordinate(surface, p, (axis + 2) % 3)});
+/// The outline at which a face cuts the free surface: edges on the face of triangles that are no
+/// cut.
+std::vector<FaceSegment> OutlineOnFace(const Surface& surface, std::size_t axis, double face) {
+  std::vector<FaceSegment> outline;
+  for (std::uint32_t t = 0; t < surface.TriangleCount(); ++t) {
+    if (std::ranges::binary_search(surface.cuts, t)) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      FaceSegment segment;
+      bool is_on_face = true;
+      for (std::size_t end = 0; end < 2; ++end) {
+        const std::uint32_t p = surface.triangles[3 * std::size_t{t} + (k + end) % 3];
+        is_on_face = is_on_face && std::abs(Coordinate(surface, p, axis) - face) <= 1e-4;
+        segment[end] = {Coordinate(surface, p, (axis + 1) % 3),
+                        Coordinate(surface, p, (axis + 2) % 3)};
+      }
+      if (is_on_face) outline.push_back(segment);
     }
   }
-  return outlines;
+  return outline;
 }
 
-double Mismatch(const FaceOutlines& outlines) {
+double DistanceFrom(const FacePoint& p, const FaceSegment& segment) {
+  const auto& [a, b] = segment;
+  const double x = b[0] - a[0], y = b[1] - a[1], square = x * x + y * y;
+  const double along = square > 0 ? ((p[0] - a[0]) * x + (p[1] - a[1]) * y) / square : 0;
+  const double t = std::clamp(along, 0., 1.);
+  return std::hypot(a[0] + t * x - p[0], a[1] + t * y - p[1]);
+}
+
+/// The largest distance of a point of the outline on one face from the outline on the opposite
+/// face.
+double Mismatch(const Surface& surface, const PeriodicBox& box, std::size_t axis) {
+  const double origin = box.axes[axis]->origin, length = box.axes[axis]->length;
+  const std::array<std::vector<FaceSegment>, 2> faces = {
+      OutlineOnFace(surface, axis, origin), OutlineOnFace(surface, axis, origin + length)};
   double worst = 0;
   for (std::size_t side = 0; side < 2; ++side) {
-    for (const auto& a : outlines.points[side]) {
-      double nearest = 1e300;
-      for (const auto& b : outlines.points[1 - side]) {
-        nearest = std::min(nearest, std::hypot(a[0] - b[0], a[1] - b[1]));
+    for (const FaceSegment& of : faces[side]) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const FaceSegment& segment : faces[1 - side]) {
+        nearest = std::min(nearest, DistanceFrom(of[0], segment));
       }
       worst = std::max(worst, nearest);
     }
@@ -145,45 +154,478 @@ double Mismatch(const FaceOutlines& outlines) {
   return worst;
 }
 
+double CutArea(const Surface& surface) {
+  double area = 0;
+  for (const std::uint32_t cut : surface.cuts) {
+    std::array<Vec3, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k] = Vec3At(surface.points, surface.triangles[3 * std::size_t{cut} + k]);
+    }
+    area += Length(Cross(corners[1] - corners[0], corners[2] - corners[0])) / 2;
+  }
+  return area;
+}
+
+void ExpectInBox(const Surface& surface, const PeriodicBox& box) {
+  for (std::size_t p = 0; p < surface.PointCount(); ++p) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!box.axes[axis]) continue;
+      const double above = Coordinate(surface, p, axis) - box.axes[axis]->origin;
+      ASSERT_GE(above, -1e-4);
+      ASSERT_LE(above, box.axes[axis]->length + 1e-4);
+    }
+  }
+}
+
 TEST(SurfacePercolation, FlatLayerIsCutAtFourFaces) {
   Random random(1);
   const PeriodicBox box = BoxOf(30, 24, 60);
   const SpaceParticles layer =
       Filled(30, 24, 30, 0, random, [](const Vec3& at) { return at.z > 20; });
-  const Surface surface = InBox(layer, box);
-  ASSERT_EQ(surface.ShellCount(), 1u);
-  const Sums sums = SumsOf(surface);
-  std::printf("volume %.6f, area %.6f, outlines %.2e %.2e, cuts %zu\n",
-              sums.volume / static_cast<double>(layer.size()), sums.area / (2 * 30 * 24),
-              Mismatch(OutlinesOn(surface, box, 0)), Mismatch(OutlinesOn(surface, box, 1)),
-              surface.cuts.size());
+  for (const auto placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+                               SurfacePlacement::kVirtualPlane}) {
+    const Surface surface = SurfaceOf(layer, {.placement = placement, .box = box});
+    ASSERT_EQ(surface.ShellCount(), 1u);
+    ExpectInBox(surface, box);
+    const Sums sums = SumsOf(surface);
+    const bool is_exact = placement == SurfacePlacement::kVirtualPlane;
+    EXPECT_NEAR(sums.volume, 7200, is_exact ? 1e-3 : 150);
+    EXPECT_NEAR(sums.area, 2 * 30 * 24, is_exact ? 1e-3 : 15);
+    EXPECT_NEAR(CutArea(surface), 2 * (30 + 24) * sums.volume / (30 * 24), is_exact ? 1e-2 : 5);
+    EXPECT_EQ(sums.particles, layer.size());
+    EXPECT_LT(Mismatch(surface, box, 0), 1e-7);
+    EXPECT_LT(Mismatch(surface, box, 1), 1e-7);
+  }
 }
 
-TEST(SurfacePercolation, WavyLayer) {
+SpaceParticles Wave(int x, int y, double phase, double shake, Random& random) {
+  return Filled(x, y, 24, shake, random, [&](const Vec3& at) {
+    return at.z < 12 + 4 * std::sin(2 * M_PI * (at.x + phase) / x);
+  });
+}
+
+// Where the faces lie does not matter.
+TEST(SurfacePercolation, WavyLayerKeepsItsVolumeAndArea) {
   Random random(1);
-  const PeriodicBox box = BoxOf(40, 24, 0);
-  const SpaceParticles layer =
-      Filled(40, 24, 30, .2, random, [](const Vec3& at) { return at.z < 14 + 4*std::sin(2*M_PI*(at.x+7)/40); });
-  const Surface surface = InBox(layer, box);
-  const Sums sums = SumsOf(surface);
-  std::printf("shells %zu volume %.6f, area %.6f, outlines %.2e %.2e, cuts %zu\n", surface.ShellCount(),
-              sums.volume / static_cast<double>(layer.size()), sums.area / (2 * 40 * 24),
-              Mismatch(OutlinesOn(surface, box, 0)), Mismatch(OutlinesOn(surface, box, 1)),
-              surface.cuts.size());
+  const SpaceParticles wave = Wave(40, 24, 7, .2, random);
+  std::optional<Sums> first;
+  for (const Vec3& origin : {Vec3{0, 0, 0}, Vec3{13, 0, 0}, Vec3{0, 5.3, 0}, Vec3{-7.7, 40.2, 0}}) {
+    const PeriodicBox box = BoxOf(40, 24, 0, origin);
+    const Surface surface = InBox(Wrapped(wave, box), box);
+    ASSERT_EQ(surface.ShellCount(), 1u);
+    ExpectInBox(surface, box);
+    const Sums sums = SumsOf(surface);
+    if (!first) first = sums;
+    EXPECT_NEAR(sums.volume / static_cast<double>(wave.size()), 1, .001);
+    EXPECT_NEAR(sums.volume / first->volume, 1, 1e-4);
+    EXPECT_NEAR(sums.area / first->area, 1, 1e-3);
+    EXPECT_EQ(sums.particles, wave.size());
+    const double along_x = Mismatch(surface, box, 0), along_y = Mismatch(surface, box, 1);
+    std::printf("wave: volume %.6f, area %.4f, faces differ by %.1e and %.1e h\n",
+                sums.volume / static_cast<double>(wave.size()), sums.area, along_x, along_y);
+    EXPECT_LT(along_x, 1e-3);
+    EXPECT_LT(along_y, 1e-3);
+  }
 }
 
-TEST(SurfacePercolation, FullBoxWithCavity) {
+// The lattice does not divide the lengths of the box.
+TEST(SurfacePercolation, AnyLengthWillDo) {
+  Random random(2);
+  SpaceParticles wave = Wave(40, 24, 7, .1, random);
+  const PeriodicBox box = BoxOf(40 * 1.0171, 24 * .9913, 0);
+  for (std::size_t k = 0; k < wave.xyz.size(); k += 3) {
+    wave.xyz[k] *= 1.0171;
+    wave.xyz[k + 1] *= .9913;
+  }
+  const Surface surface = InBox(wave, box);
+  ASSERT_EQ(surface.ShellCount(), 1u);
+  EXPECT_NEAR(SumsOf(surface).volume / static_cast<double>(wave.size()), 1, .001);
+  const double along_x = Mismatch(surface, box, 0), along_y = Mismatch(surface, box, 1);
+  std::printf("faces differ by %.4f and %.4f h\n", along_x, along_y);
+  EXPECT_LT(along_x, 1);
+  EXPECT_LT(along_y, 1);
+}
+
+// A cavity in the box is a cavity; across faces it is open.
+TEST(SurfacePercolation, FullBoxHasTheAreaOfItsCavity) {
   Random random(1);
   const PeriodicBox box = BoxOf(30, 30, 30);
-  for (const double x : {15., 0.}) {
-  const SpaceParticles layer =
-      Filled(30, 30, 30, .1, random, [&](const Vec3& at) { return std::hypot(std::remainder(at.x-x,30), at.y-15, at.z-15) > 7; });
+  for (const Vec3& centre : {Vec3{15, 15, 15}, Vec3{0, 15, 15}, Vec3{0, 30, 15}, Vec3{0, 0, 0}}) {
+    const SpaceParticles all = Filled(30, 30, 30, .1, random, [&](const Vec3& at) {
+      const Vec3 from = at - centre;
+      return Length({std::remainder(from.x, 30), std::remainder(from.y, 30),
+                     std::remainder(from.z, 30)}) > 7;
+    });
+    const Surface surface = InBox(all, box);
+    EXPECT_EQ(surface.ShellCount(), centre.x == 15 ? 2u : 1u);
+    ExpectInBox(surface, box);
+    const Sums sums = SumsOf(surface);
+    std::printf("cavity: volume %.6f, area %.4f of the sphere's\n",
+                sums.volume / static_cast<double>(all.size()), sums.area / (4 * M_PI * 49));
+    EXPECT_NEAR(sums.volume / static_cast<double>(all.size()), 1, .001);
+    EXPECT_NEAR(sums.area / (4 * M_PI * 49), 1, .03);
+    EXPECT_EQ(sums.particles, all.size());
+  }
+  const Surface full = InBox(Filled(30, 30, 30, 0, random, [](const Vec3&) { return true; }), box);
+  ASSERT_EQ(full.ShellCount(), 1u);
+  EXPECT_EQ(full.cuts.size(), full.TriangleCount());
+  EXPECT_EQ(full.measures[0].area, 0);
+  EXPECT_NEAR(full.measures[0].volume, 27000, 1e-2);
+}
+
+TEST(SurfacePercolation, ColumnsEndAtTheFacesOfTheirAxis) {
+  Random random(3);
+  const PeriodicBox box = BoxOf(40, 40, 40);
+  const auto disc = [](double a, double b) { return std::hypot(a - 20, b - 10) < 5; };
+  const SpaceParticles along_z =
+      Filled(40, 40, 40, .1, random, [&](const Vec3& at) { return disc(at.x, at.y); });
+  const Surface one = InBox(along_z, box);
+  ASSERT_EQ(one.ShellCount(), 1u);
+  EXPECT_NEAR(one.measures[0].volume / static_cast<double>(along_z.size()), 1, .001);
+  EXPECT_NEAR(one.measures[0].area / (2 * M_PI * 5 * 40), 1, .03);
+  EXPECT_LT(Mismatch(one, box, 2), 1e-3);
+  // Two columns along different axes are two clusters. Both are cut at all four faces.
+  SpaceParticles both =
+      Filled(40, 40, 40, 0, random, [&](const Vec3& at) { return disc(at.x + 20, at.z); });
+  const std::size_t along_y = both.size();
+  both.Add(
+      Filled(40, 40, 40, 0, random, [&](const Vec3& at) { return disc(at.y + 20, at.z - 20); }));
+  const Surface two = InBox(both, box);
+  EXPECT_EQ(two.ShellCount(), 4u);  // Halves: both columns lie on a face.
+  std::vector<std::uint64_t> particles;
+  for (const ShellMeasures& measures : two.measures) particles.push_back(measures.particles);
+  std::ranges::sort(particles, std::greater());
+  EXPECT_EQ(particles, (std::vector<std::uint64_t>{along_y, along_y, 0, 0}));
+  EXPECT_NEAR(SumsOf(two).volume / static_cast<double>(both.size()), 1, .005);
+}
+
+TEST(SurfacePercolation, DiagonalLayerPercolatesAlongAllAxes) {
+  Random random(4);
+  const PeriodicBox box = BoxOf(30, 30, 30);
+  const auto layer = Filled(30, 30, 30, .1, random, [](const Vec3& at) {
+    return std::abs(std::remainder(at.x + at.y - 22, 30)) < 6;
+  });
   const Surface surface = InBox(layer, box);
+  EXPECT_EQ(surface.ShellCount(), 2u);
+  ExpectInBox(surface, box);
   const Sums sums = SumsOf(surface);
-  std::printf("shells %zu volume %.6f, area %.6f, outlines %.2e %.2e, cuts %zu\n", surface.ShellCount(),
-              sums.volume / static_cast<double>(layer.size()), sums.area / (4 * M_PI * 49),
-              Mismatch(OutlinesOn(surface, box, 0)), Mismatch(OutlinesOn(surface, box, 1)),
-              surface.cuts.size());
+  EXPECT_NEAR(sums.volume / static_cast<double>(layer.size()), 1, .001);
+  EXPECT_NEAR(sums.area / (2 * 30 * 30 * std::sqrt(2.)), 1, .03);
+  EXPECT_EQ(sums.particles, layer.size());
+  for (std::size_t axis = 0; axis < 3; ++axis) EXPECT_LT(Mismatch(surface, box, axis), 1e-3);
+}
+
+// Drops near a layer, in one cluster with it, are whole wherever they are.
+TEST(SurfacePercolation, DropsNearALayerStayWhole) {
+  Random random(5);
+  const PeriodicBox box = BoxOf(30, 36, 0);
+  std::optional<double> volume;
+  for (const Vec3& centre : {Vec3{15, 18, 15.5}, {0, 18, 15.5}, {14, 1, 15.5}, {29, 35.5, 15.5}}) {
+    SpaceParticles all = Filled(30, 36, 8, 0, random, [](const Vec3&) { return true; });
+    const std::size_t layer = all.size();
+    Random of_drop(6);
+    SpaceParticles drop = testing::Ball({0, 0, 0}, 4, .1, of_drop);
+    for (std::size_t k = 0; k < drop.size(); ++k) all.Add(drop.At(k) + centre);
+    const Surface surface = InBox(Wrapped(all, box), box);
+    ASSERT_EQ(surface.ShellCount(), 2u);
+    const std::size_t of = surface.measures[0].particles == layer ? 1 : 0;
+    EXPECT_EQ(surface.measures[1 - of].particles, layer);
+    EXPECT_NEAR(surface.measures[1 - of].volume, 8 * 30 * 36, 1);
+    const ShellMeasures& whole = surface.measures[of];
+    EXPECT_EQ(whole.particles, drop.size());
+    if (!volume) volume = whole.volume;
+    EXPECT_NEAR(whole.volume, *volume, .002 * *volume);
+    EXPECT_NEAR(whole.volume, static_cast<double>(drop.size()), .005 * *volume);
+    // The image with the most particles in the box; on the face, any.
+    EXPECT_NEAR(std::remainder(whole.centroid_x - centre.x, 30), 0, .1);
+    EXPECT_NEAR(std::remainder(whole.centroid_y - centre.y, 36), 0, .1);
+    for (const std::uint32_t cut : surface.cuts) {
+      EXPECT_GE(cut, surface.triangle_offsets[1 - of]);
+      EXPECT_LT(cut, surface.triangle_offsets[2 - of]);
+    }
+  }
+}
+
+// A ball in a cavity across the corner, and lone particles on faces.
+TEST(SurfacePercolation, DropsAcrossTheCornerStayWhole) {
+  Random random(7);
+  const PeriodicBox box = BoxOf(36, 36, 36);
+  SpaceParticles all = Filled(36, 36, 36, 0, random, [&](const Vec3& at) {
+    return Length({std::remainder(at.x, 36), std::remainder(at.y, 36), std::remainder(at.z, 36)}) >
+           11;
+  });
+  const std::size_t fluid = all.size();
+  const SpaceParticles ball = testing::Ball({0, 0, 0}, 4, .1, random);
+  all.Add(ball);
+  all.Add(Vec3{0, 0, 7.5});
+  all.Add(Vec3{36, 7.5, 36});
+  const Surface surface = InBox(Wrapped(all, box), box);
+  ASSERT_EQ(surface.ShellCount(), 4u);
+  std::vector<std::uint64_t> particles;
+  for (const ShellMeasures& measures : surface.measures) particles.push_back(measures.particles);
+  std::ranges::sort(particles);
+  EXPECT_EQ(particles, (std::vector<std::uint64_t>{1, 1, ball.size(), fluid}));
+  EXPECT_NEAR(SumsOf(surface).volume / static_cast<double>(all.size()), 1, .001);
+}
+
+// A bar across both faces counts with all its particles, once.
+TEST(SurfacePercolation, MinimumSizeCountsAllImages) {
+  Random random(8);
+  const PeriodicBox box = BoxOf(24, 24, 0);
+  SpaceParticles all = Filled(24, 24, 6, 0, random, [](const Vec3&) { return true; });
+  const std::size_t layer = all.size();
+  const SpaceParticles drop = testing::Box({-2, -2, 12}, {1, 1, 14}, 0, random);
+  all.Add(drop);
+  SurfaceParameters parameters{.placement = SurfacePlacement::kVirtualPlane, .box = box};
+  for (const std::size_t least : {drop.size(), drop.size() + 1, layer, layer + 1}) {
+    parameters.min_component_particles = least;
+    const Surface surface = SurfaceOf(Wrapped(all, box), parameters);
+    const std::size_t shells = least <= drop.size() ? 2 : least <= layer ? 1 : 0;
+    EXPECT_EQ(surface.ShellCount(), shells);
+    EXPECT_EQ(surface.statistics.dropped_spray, 2 - shells);
+  }
+}
+
+SpaceParticles Uniform(std::size_t count, const Vec3& lengths, Random& random) {
+  SpaceParticles particles;
+  for (; count > 0; --count) {
+    const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
+    particles.Add({x, y, random.Uniform(0, lengths.z)});
+  }
+  return particles;
+}
+
+/// A frame and its box: a scene wrapped into a small box, noise of any density, layers with waves,
+/// holes and balls, or columns along several axes.
+std::pair<SpaceParticles, PeriodicBox> RandomPeriodicFrame(std::uint64_t seed, double radius) {
+  Random random(7919 * seed);
+  const double least = 4 * radius;
+  const auto length = [&] {
+    const double any = least * random.Uniform(1, 2);
+    return random.Chance(.5) ? std::ceil(any) : any;
+  };
+  const Vec3 lengths{length(), length(), length()};
+  SpaceParticles particles;
+  switch (random.Below(4)) {
+    case 0:
+      particles = testing::RandomSpaceScene(seed);
+      break;
+    case 1:
+      particles = Uniform(
+          static_cast<std::size_t>(random.Uniform(.02, 1.2) * lengths.x * lengths.y * least),
+          {lengths.x, lengths.y, least}, random);
+      break;
+    case 2: {
+      const double height = random.Uniform(1, 10), wave = random.Uniform(0, 5),
+                   gap = random.Chance(.3) ? .3 : 0;
+      particles = Filled(static_cast<int>(lengths.x), static_cast<int>(lengths.y), 16, .2, random,
+                         [&](const Vec3& at) {
+                           const double top = height + wave * std::sin(2 * M_PI * at.x / lengths.x);
+                           return at.z < top && !random.Chance(gap);
+                         });
+      for (std::size_t k = random.Below(5); k > 0; --k) {
+        const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
+        const Vec3 centre{x, y, random.Uniform(0, lengths.z)};
+        particles.Add(testing::Ball(centre, random.Uniform(.5, 4), .2, random));
+      }
+      particles.Add(Uniform(random.Below(30), lengths, random));
+      break;
+    }
+    default:
+      for (std::size_t k = random.Below(3) + 1; k > 0; --k) {
+        const Vec3 along{random.Chance(.5) ? lengths.x : 0, random.Chance(.5) ? lengths.y : 0,
+                         random.Chance(.5) ? lengths.z : 0};
+        const double steps = std::ceil(Length(along)), thickness = random.Uniform(.3, 2.5);
+        const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
+        const Vec3 from{x, y, random.Uniform(0, lengths.z)};
+        for (double step = 0; step < steps; ++step) {
+          particles.Add(testing::Ball(from + (step / steps) * along, thickness, .2, random));
+        }
+      }
+  }
+  Vec3 origin;
+  if (particles.size() > 0) origin = particles.At(random.Below(particles.size()));
+  if (random.Chance(.3))
+    origin = {std::floor(origin.x), std::floor(origin.y), std::floor(origin.z)};
+  PeriodicBox box = BoxOf(random.Chance(.8) ? lengths.x : 0, random.Chance(.8) ? lengths.y : 0,
+                          random.Chance(.8) ? lengths.z : 0, origin);
+  if (box == PeriodicBox()) box.axes[2] = PeriodicAxis{origin.z, lengths.z};
+  return {Wrapped(particles, box), box};
+}
+
+/// The shells that are cut lie in the box, and each has points on a face.
+void ExpectCutsOnFaces(const Surface& surface, const PeriodicBox& box) {
+  for (const std::uint32_t cut : surface.cuts) {
+    bool is_on_face = false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!box.axes[axis]) continue;
+      const double origin = box.axes[axis]->origin, length = box.axes[axis]->length;
+      const auto all_at = [&](double face) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double at = Coordinate(surface, surface.triangles[3 * cut + k], axis);
+          if (std::abs(at - face) > 1e-4 + 1e-9 * std::abs(face)) return false;
+        }
+        return true;
+      };
+      is_on_face = is_on_face || all_at(origin) || all_at(origin + length);
+    }
+    ASSERT_TRUE(is_on_face);
+  }
+}
+
+TEST(SurfacePercolation, RandomFramesKeepTheGuarantees) {
+  std::uint64_t with_cuts = 0, refused = 0;
+  const std::uint64_t frames = testing::Frames(300);
+  std::optional<SurfaceReconstructor> reconstructor;
+  SurfaceWorkspace workspace;
+  Surface surface;
+  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    const double radius = random.Chance(.3) ? 3 : random.Uniform(1.8, 2.5);
+    const auto [particles, box] = RandomPeriodicFrame(seed, radius);
+    if (particles.size() == 0) continue;
+    SurfaceParameters parameters{.box = box};
+    parameters.placement = seed % 4 == 0   ? SurfacePlacement::kMarchingCubes
+                           : seed % 4 == 1 ? SurfacePlacement::kQef
+                                           : SurfacePlacement::kVirtualPlane;
+    parameters.kernel_radius = radius;
+    parameters.cell_size = random.Chance(.5) ? 1 : random.Uniform(.6, 1.2);
+    parameters.simplify = random.Chance(.2) ? .1 : 0;
+    parameters.min_component_particles = random.Chance(.3) ? random.Below(12) : 0;
+    const auto created = SurfaceReconstructor::Create(parameters);
+    ASSERT_TRUE(created.ok()) << created.status();
+    SurfaceState state;
+    const absl::Status status =
+        created->Reconstruct(particles.AsFrame(), state, workspace, surface);
+    if (absl::IsInvalidArgument(status)) {
+      ++refused;  // Far from the origin.
+      continue;
+    }
+    ASSERT_TRUE(status.ok()) << status;
+    const absl::Status valid = Validate(surface);
+    ASSERT_TRUE(valid.ok()) << valid;
+    EXPECT_LE(SumsOf(surface).particles, particles.size());
+    with_cuts += surface.cuts.empty() ? 0 : 1;
+    ExpectCutsOnFaces(surface, box);
+    if (HasFailure()) break;
+  }
+  std::printf("%llu frames, %llu with cuts, %llu refused\n",
+              static_cast<unsigned long long>(frames), static_cast<unsigned long long>(with_cuts),
+              static_cast<unsigned long long>(refused));
+  EXPECT_GT(with_cuts, frames / 3);
+}
+
+/// A wavy layer with a cavity, and a drop above it, that drift along x and y.
+constexpr double kLong = 24, kWide = 16;
+TrackedParticles Drifting(Known known, int frame) {
+  Random random(9);
+  TrackedParticles all{.known = known, .time = 1. * frame};
+  const SpaceParticles layer = Filled(24, 16, 14, .1, random, [](const Vec3& at) {
+    return at.z < 11 + 2 * std::sin(2 * M_PI * at.x / kLong) && Length(at - Vec3{9, 8, 6}) > 3.2;
+  });
+  const Vec3 velocity{.9, -.35, 0}, shift = (1. * frame) * velocity;
+  all.Add(layer, 0, velocity, shift);
+  all.Add(testing::Ball({18, 5, 16}, 3, .1, random), 50000, velocity, shift);
+  return Wrapped(all, BoxOf(kLong, kWide, 0));
+}
+
+SurfaceParameters ForDrifting() {
+  return {.placement = SurfacePlacement::kVirtualPlane,
+          .kernel_radius = 2,
+          .box = BoxOf(kLong, kWide, 0)};
+}
+
+class DriftingLayer : public ::testing::TestWithParam<Known> {};
+INSTANTIATE_TEST_SUITE_P(With, DriftingLayer,
+                         ::testing::Values(support::kNothing, support::kIds, support::kVelocities,
+                                           support::kBoth),
+                         ::testing::PrintToStringParamName());
+
+TEST_P(DriftingLayer, KeepsItsIdentities) {
+  SurfaceStream stream(ForDrifting());
+  std::uint64_t layer = 0, drop = 0, cavity = 0;
+  int with_cavity = 0;
+  for (int frame = 0; frame < 100; ++frame) {
+    SCOPED_TRACE(frame);
+    const Surface& surface = stream.Next(Drifting(GetParam(), frame));
+    ASSERT_TRUE(Validate(surface).ok());
+    std::vector<std::size_t> by_volume(surface.ShellCount());
+    std::iota(by_volume.begin(), by_volume.end(), std::size_t{0});
+    std::ranges::sort(by_volume, std::greater(),
+                      [&](std::size_t k) { return surface.measures[k].volume; });
+    // The layer, the drop, and the cavity if it crosses no face.
+    ASSERT_GE(surface.ShellCount(), 2u);
+    ASSERT_LE(surface.ShellCount(), 3u);
+    const auto identity = [&](std::size_t k) { return surface.measures[by_volume[k]].identity; };
+    if (frame == 0) layer = identity(0), drop = identity(1), cavity = identity(2);
+    EXPECT_EQ(identity(0), layer);
+    EXPECT_EQ(identity(1), drop);
+    for (std::size_t k = 0; k < 2 && frame > 0; ++k) {
+      const auto parents = surface.ParentsOf(by_volume[k]);
+      ASSERT_EQ(parents.size(), 1u);
+      EXPECT_EQ(parents[0], identity(k));
+    }
+    if (surface.ShellCount() < 3) continue;
+    ++with_cavity;
+    EXPECT_NE(identity(2), 0u);
+    if (frame < 10) {
+      EXPECT_EQ(identity(2), cavity);
+    }
+  }
+  EXPECT_GT(with_cavity, 20);
+  EXPECT_LT(with_cavity, 100);
+}
+
+TEST(SurfacePercolation, ResumedStreamsHaveTheSameBits) {
+  SurfaceStream whole(ForDrifting()), resumed(ForDrifting());
+  for (int frame = 0; frame < 6; ++frame) {
+    const Surface& expected = whole.Next(Drifting(support::kBoth, frame));
+    const Surface& surface = resumed.Next(Drifting(support::kBoth, frame));
+    EXPECT_EQ(surface, expected);
+    const auto again = ParseSurfaceState(Serialize(resumed.state()));
+    ASSERT_TRUE(again.ok()) << again.status();
+    resumed.state() = *again;
+  }
+}
+
+TEST(SurfacePercolation, BitsDependNeitherOnThreadsNorOnOrder) {
+  Random random(10);
+  const PeriodicBox box = BoxOf(30.7, 24.3, 0);
+  SpaceParticles all = Wave(30, 24, 3, .3, random);
+  all.Add(testing::Ball({0, 0, 21}, 3, .2, random));
+  all.Add(Uniform(40, {30, 24, 40}, random));
+  all = Wrapped(all, box);
+  const SurfaceParameters parameters{.placement = SurfacePlacement::kVirtualPlane, .box = box};
+  const Surface first = SurfaceOf(all, parameters);
+  ASSERT_FALSE(first.cuts.empty());
+  EXPECT_EQ(SurfaceOf(testing::Shuffled(all, random), parameters), first);
+  for (const unsigned threads : {1u, 2u, 7u}) {
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
+    Arena arena(threads);
+    arena.Execute([&] { EXPECT_EQ(SurfaceOf(all, parameters), first); });
+  }
+}
+
+// At a face, half of the particles around a point are copies.
+TEST(SurfacePercolation, AttributesContinueAcrossTheFaces) {
+  Random random(11);
+  const PeriodicBox box = BoxOf(30, 24, 0);
+  const SpaceParticles wave = Wave(30, 24, 3, .1, random);
+  std::vector<float> values;
+  for (std::size_t k = 0; k < wave.size(); ++k) {
+    values.push_back(static_cast<float>(std::cos(2 * M_PI * (wave.At(k).x - 4) / 30)));
+  }
+  const std::vector<Attribute> attributes = {{"wave", 1, values}};
+  Frame frame = wave.AsFrame();
+  frame.attributes = attributes;
+  SurfaceStream stream({.placement = SurfacePlacement::kVirtualPlane, .box = box});
+  ASSERT_TRUE(stream.Try(frame).ok());
+  const Surface& surface = stream.surface();
+  ASSERT_EQ(surface.attributes[0].values.size(), surface.PointCount());
+  for (std::size_t p = 0; p < surface.PointCount(); ++p) {
+    const double x = Coordinate(surface, p, 0);
+    EXPECT_NEAR(surface.attributes[0].values[p], std::cos(2 * M_PI * (x - 4) / 30), .05);
   }
 }
 
