@@ -524,7 +524,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
                           .has_state = state != nullptr,
                           .is_simplified = parameters_.simplify > 0,
-                          .cut_axes = CountWallAxes(parameters_)};
+                          .wall_axes = CountWallAxes(parameters_)};
   const auto in_stage = [&](Stage stage, auto run) {
     return InStage(control.observer, stage, run);
   };
@@ -549,7 +549,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       if (!checked.ok()) return checked;
       copied = CopiedBoxOf(parameters_, lifted);
       size.particles = frame.ParticleCount();
-      size.cut_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
+      size.box_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
     }
     if (!parameters_.wall_planes.empty()) {
       checked = AddWallImages({.frame = given,

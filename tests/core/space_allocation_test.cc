@@ -132,6 +132,44 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
                                           testing::Values(1, 2), testing::Bool(),
                                           testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
+// A layer that percolates, with a drop and lone particles; then without the layer, so that nothing
+// is copied or cut.
+TEST(WarmPeriodicSurface, AllocatesNothing) {
+  const SurfaceParameters parameters{
+      .placement = SurfacePlacement::kVirtualPlane,
+      .kernel_radius = 2,
+      .box = PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{0, 12.5}}}};
+  const auto reconstructor = SurfaceReconstructor::Create(parameters);
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<std::vector<double>> frames;
+  support::Random random(1);
+  for (int k = 0; k < 4; ++k) {
+    std::vector<double>& xyz = frames.emplace_back();
+    for (int p = 0; p < 16 * 12 * (k < 3 ? 6 + k : 0); ++p) {
+      xyz.insert(xyz.end(), {p % 16 + .2 * k, p / 16 % 12 + random.Uniform(0, .2), p / 192 + .5});
+    }
+    for (int p = 0; p < 64; ++p) {
+      xyz.insert(xyz.end(), {p % 4 + 6. * k, p / 4 % 4 - 2., p / 16 + 17.});
+    }
+    for (int p = 0; p < 60; ++p) xyz.push_back(random.Uniform(0, 30));
+  }
+  const TrackedFrames tracked(frames);
+  SurfaceWorkspace workspace;
+  Surface surface;
+  SurfaceState state;
+  std::size_t before = 0;
+  for (int round = 0; round < 4; ++round) {
+    before = allocations;
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const absl::Status status =
+          reconstructor->Reconstruct(tracked.At(k), state, workspace, surface);
+      ASSERT_TRUE(status.ok()) << status;
+      ASSERT_EQ(surface.cuts.empty(), k == 3);
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u);
+}
+
 struct SurfaceCase {
   std::string name;
   std::vector<double> xyz;
@@ -242,6 +280,74 @@ TEST(MemoryGuard, IsToldNoLessThanACutAtWallsTakes) {
       EXPECT_GT(surface.cuts.size(), 1000u);
       EXPECT_LE(held, guard.last());
       EXPECT_GE(6 * static_cast<double>(held), static_cast<double>(guard.last()));
+    }
+  }
+}
+
+// Copies of particles and cuts count. A small box has the most copies.
+TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
+  struct Case {
+    std::string name;
+    std::vector<double> xyz;
+    PeriodicBox box;
+  };
+  support::Random random(6);
+  const auto box = [](double x, double y, double z) {
+    PeriodicBox periodic;
+    if (x > 0) periodic.axes[0] = PeriodicAxis{0, x};
+    if (y > 0) periodic.axes[1] = PeriodicAxis{0, y};
+    if (z > 0) periodic.axes[2] = PeriodicAxis{0, z};
+    return periodic;
+  };
+  const auto lattice = [](int x, int y, int z) {
+    std::vector<double> xyz;
+    for (int p = 0; p < x * y * z; ++p) {
+      xyz.insert(xyz.end(), {p % x + .5, p / x % y + .5, p / x / y + .5});
+    }
+    return xyz;
+  };
+  std::vector<double> noise;
+  for (int p = 0; p < 9'000; ++p) noise.push_back(random.Uniform(0, 20));
+  std::vector<double> columns;  // One particle thick, as short as possible.
+  for (int p = 0; p < 144 * 12; ++p) {
+    columns.insert(columns.end(), {p / 12 % 12 * 7., p / 144 * 7., p % 12 + .5});
+  }
+  std::vector<Case> cases = {{"layer", lattice(40, 40, 5), box(40, 40, 0)},
+                             {"thin layer", lattice(60, 60, 1), box(60, 60, 0)},
+                             {"full box", lattice(24, 24, 24), box(24, 24, 24)},
+                             {"smallest box", lattice(12, 12, 12), box(12, 12, 12)},
+                             {"column", lattice(6, 6, 60), box(0, 0, 60)},
+                             {"columns", columns, box(0, 0, 12)},
+                             {"noise", noise, box(20, 20, 20)}};
+  for (const Case& tested : cases) {
+    for (const SurfacePlacement placement :
+         {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
+          SurfacePlacement::kVirtualPlane}) {
+      SCOPED_TRACE(absl::StrCat(tested.name, ", placement ", static_cast<int>(placement)));
+      const auto reconstructor =
+          SurfaceReconstructor::Create({.placement = placement, .box = tested.box});
+      ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+      const std::vector<std::vector<double>> frames = {tested.xyz};
+      const TrackedFrames tracked(frames);
+      const std::size_t before = live_bytes;
+      peak_bytes = before;
+      std::uint64_t told = 0;
+      SurfaceWorkspace workspace;
+      Surface surface;
+      SurfaceState state;
+      for (int frame = 0; frame < 2; ++frame) {
+        RecordingGuard guard(100);
+        const absl::Status status = reconstructor->Reconstruct(tracked.At(0), state, workspace,
+                                                               surface, {.memory = &guard});
+        ASSERT_TRUE(status.ok()) << status;
+        told = guard.last();
+      }
+      const std::size_t held = peak_bytes - before;
+      EXPECT_GT(surface.cuts.size(), 0u);
+      RecordProperty("ratio",
+                     std::to_string(static_cast<double>(told) / static_cast<double>(held)));
+      EXPECT_LE(held, told);
+      EXPECT_GE(3 * static_cast<double>(held), static_cast<double>(told));
     }
   }
 }

@@ -18,8 +18,14 @@ namespace partiemc {
 /// A uniform grid over the boxes of triangles.
 class TriangleGrid {
  public:
-  /// `points` must outlive the grid. Requires: finite coordinates.
-  TriangleGrid(std::span<const double> points, std::span<const std::uint32_t> triangles);
+  TriangleGrid() = default;
+  /// Builds.
+  TriangleGrid(std::span<const double> points, std::span<const std::uint32_t> triangles) {
+    Build(points, triangles);
+  }
+
+  /// Replaces the triangles, and keeps the buffers. Requires: finite coordinates.
+  void Build(std::span<const double> points, std::span<const std::uint32_t> triangles);
 
   /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until `visit`
   /// returns false. The order of the pairs is fixed.
@@ -53,8 +59,8 @@ class TriangleGrid {
   double edge_ = 1;
 };
 
-inline TriangleGrid::TriangleGrid(std::span<const double> points,
-                                  std::span<const std::uint32_t> triangles) {
+inline void TriangleGrid::Build(std::span<const double> points,
+                                std::span<const std::uint32_t> triangles) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   boxes_.resize(triangles.size() / 3);
   low_.fill(kInfinity);
@@ -77,6 +83,7 @@ inline TriangleGrid::TriangleGrid(std::span<const double> points,
       extents += box.high[axis] - box.low[axis];
     }
   }
+  entries_.clear();
   if (boxes_.empty()) return;
   double extent = 0;
   for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] - low_[axis]);

@@ -105,7 +105,8 @@ bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points) {
 }
 
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
-                  std::span<const std::uint8_t> is_new, std::vector<Contact>& contacts) {
+                  std::span<const std::uint8_t> is_new, TriangleGrid& grid,
+                  std::vector<Contact>& contacts) {
   contacts.clear();
   for (std::uint32_t t = 0; t < triangles.size() / 3; ++t) {
     const Triangle corners = TriangleAt(triangles, t);
@@ -116,7 +117,8 @@ void FindContacts(std::span<const double> points, std::span<const std::uint32_t>
     contacts.push_back({t, t, BoxOf(points, corners)});
   }
   if (!contacts.empty()) return;
-  TriangleGrid(points, triangles).ForEachPair([&](std::uint32_t a, std::uint32_t b) {
+  grid.Build(points, triangles);
+  grid.ForEachPair([&](std::uint32_t a, std::uint32_t b) {
     if (is_new[a] == 0 && is_new[b] == 0) return true;
     const Triangle first = TriangleAt(triangles, a), second = TriangleAt(triangles, b);
     if (TrianglesCollide(points, first, second)) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/vec3.h"
+#include "check/triangle_grid.h"
 
 namespace partiemc::simplify {
 
@@ -36,8 +37,9 @@ struct Contact {
 /// Finds degenerate triangles or, if there are none, pairs of triangles that intersect. Exact.
 /// Only triangles with `is_new` set are checked, against all others.
 /// Requires: S1, coordinates in the domain of predicates_in_space.h.
-/// Cost: n log n in the triangles if they are of similar size.
+/// Cost: n log n in the triangles if they are of similar size. `grid`: a warm buffer.
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
-                  std::span<const std::uint8_t> is_new, std::vector<Contact>& contacts);
+                  std::span<const std::uint8_t> is_new, TriangleGrid& grid,
+                  std::vector<Contact>& contacts);
 
 }  // namespace partiemc::simplify

@@ -238,7 +238,8 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
     progress_[shell] = Progress::kCompared;
   }
   std::vector<Contact> contacts;
-  FindContacts(simplified.points, simplified.triangles, is_new, contacts);
+  TriangleGrid grid;
+  FindContacts(simplified.points, simplified.triangles, is_new, grid, contacts);
   for (const Contact& contact : contacts) {
     for (const std::uint32_t triangle : {contact.a, contact.b}) {
       const std::uint32_t shell = shell_of[triangle];

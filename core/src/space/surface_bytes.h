@@ -17,7 +17,8 @@ struct SurfaceSize {
   std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
   bool has_state = false;              ///< Of a stream.
   bool is_simplified = false;
-  std::uint64_t cut_axes = 0;  ///< Axes that have walls, or along which bodies percolate.
+  std::uint64_t wall_axes = 0;  ///< Axes that have walls.
+  std::uint64_t box_axes = 0;   ///< Axes along which bodies percolate.
   std::uint64_t lift_bytes =
       0;  ///< Of a periodic box (periodic/lift.h), or of walls (walls/wall_images.h).
   std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
@@ -51,9 +52,13 @@ inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
 inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 
-/// Bytes of the cut at walls or faces of a box, per point: with planes of one axis, and for each
+/// Bytes of the cut at walls, per point: with walls of one axis, and for each
 /// further axis. Lone particles at edges require the most.
 inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
+
+/// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and for
+/// each axis those of the cuts. Particles have copies far beyond the faces, so few points are cut.
+inline constexpr std::uint64_t kBytesPerBoxPoint = 300, kBytesPerBoxAxis = 50;
 
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
@@ -78,8 +83,11 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   const std::uint64_t points = size.edges + size.loops + drop_points;
   bytes += kBytesPerValue * size.attribute_values * points;
   if (size.is_simplified) bytes += kBytesPerSimplifiedPoint * points;
-  if (size.cut_axes > 0) {
-    bytes += (kBytesPerCutPoint + kBytesPerCutAxis * (size.cut_axes - 1)) * points;
+  if (size.wall_axes > 0) {
+    bytes += (kBytesPerCutPoint + kBytesPerCutAxis * (size.wall_axes - 1)) * points;
+  }
+  if (size.box_axes > 0) {
+    bytes += (kBytesPerBoxPoint + kBytesPerBoxAxis * size.box_axes) * points;
   }
   if (size.has_state) {
     bytes += kBytesPerTrackedEdge * size.edges + kBytesPerTrackedBody * size.bodies +

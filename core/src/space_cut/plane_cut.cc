@@ -8,7 +8,6 @@
 
 #include "base/bits.h"
 #include "base/predicates_in_space.h"
-#include "simplify/mesh_faults.h"
 
 namespace partiemc::space {
 namespace {
@@ -266,16 +265,13 @@ bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s)
 
 /// Whether clipped triangles are degenerate or touch triangles of the mesh. Only triangles within
 /// the boxes of the planes' clipped triangles can touch them.
-bool ClippedTouch(const CutMesh& mesh) {
+bool ClippedTouch(const CutMesh& mesh, PlaneCutScratch& s) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const std::size_t count = mesh.triangles.size() / 3;
-  // By axis and side: the range of the clipped triangles at this plane.
-  struct Layer {
-    AxisPlane plane;
-    double low = kInfinity, high = -kInfinity;
-  };
-  std::vector<Layer> layers;
-  for (const CutMesh::Cap& cap : mesh.caps) layers.push_back({cap.plane});
+  using Layer = PlaneCutScratch::Layer;
+  std::vector<Layer>& layers = s.layers;
+  layers.clear();
+  for (const CutMesh::Cap& cap : mesh.caps) layers.push_back({cap.plane, kInfinity, -kInfinity});
   const auto range_of = [&](std::size_t t, int axis) {
     const std::uint32_t* const corners = &mesh.triangles[3 * t];
     const double a = Coordinate(mesh, corners[0], axis), b = Coordinate(mesh, corners[1], axis),
@@ -300,8 +296,8 @@ bool ClippedTouch(const CutMesh& mesh) {
     nearest->low = std::min(nearest->low, range[0]);
     nearest->high = std::max(nearest->high, range[1]);
   }
-  std::vector<std::uint32_t> near;
-  std::vector<std::uint8_t> is_new;
+  s.near.clear();
+  s.is_new.clear();
   for (std::size_t t = 0; t < count; ++t) {
     const bool is_near =
         mesh.is_clipped[t] != 0 || std::any_of(layers.begin(), layers.end(), [&](const Layer& l) {
@@ -309,16 +305,22 @@ bool ClippedTouch(const CutMesh& mesh) {
           return of[0] <= l.high && of[1] >= l.low;
         });
     if (!is_near) continue;
-    near.insert(near.end(), &mesh.triangles[3 * t], &mesh.triangles[3 * t] + 3);
-    is_new.push_back(mesh.is_clipped[t]);
+    s.near.insert(s.near.end(), &mesh.triangles[3 * t], &mesh.triangles[3 * t] + 3);
+    s.is_new.push_back(mesh.is_clipped[t]);
   }
-  if (near.empty()) return false;
-  std::vector<simplify::Contact> contacts;
-  simplify::FindContacts(mesh.points, near, is_new, contacts);
-  return !contacts.empty();
+  if (s.near.empty()) return false;
+  simplify::FindContacts(mesh.points, s.near, s.is_new, s.grid, s.contacts);
+  return !s.contacts.empty();
 }
 
 }  // namespace
+
+void RemoveCaps(PlaneCutScratch& s, CutMesh& mesh) {
+  for (auto cap = mesh.caps.rbegin(); cap != mesh.caps.rend(); ++cap) {
+    s.spare_edges.emplace_back().swap(cap->edges);
+  }
+  mesh.caps.clear();
+}
 
 bool CutAtPlane(const AxisPlane& plane, double clearance, PlaneCutScratch& s, CutMesh& mesh) {
   if (!FindSides(plane, clearance, mesh, s)) return false;
@@ -329,12 +331,18 @@ bool CutAtPlane(const AxisPlane& plane, double clearance, PlaneCutScratch& s, Cu
   for (CutMesh::Cap& cap : mesh.caps) {
     if (!ClipCap(plane, crossings, mesh, cap, s)) return false;
   }
-  mesh.caps.push_back({plane, s.cap_edges});
+  CutMesh::Cap& cap = mesh.caps.emplace_back();
+  cap.plane = plane;
+  if (!s.spare_edges.empty()) {
+    cap.edges.swap(s.spare_edges.back());
+    s.spare_edges.pop_back();
+  }
+  cap.edges.assign(s.cap_edges.begin(), s.cap_edges.end());
   return true;
 }
 
 bool CapPlanes(PlaneCutScratch& s, CutMesh& mesh) {
-  if (ClippedTouch(mesh)) return false;
+  if (ClippedTouch(mesh, s)) return false;
   mesh.cap_offsets.assign(1, static_cast<std::uint32_t>(mesh.triangles.size() / 3));
   for (const CutMesh::Cap& cap : mesh.caps) {
     if (!FindLoops(mesh, cap, s)) return false;

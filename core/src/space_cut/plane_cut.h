@@ -14,6 +14,7 @@
 
 #include "base/vec3.h"
 #include "mesh/triangulate.h"
+#include "simplify/mesh_faults.h"
 
 namespace partiemc::space {
 
@@ -64,12 +65,25 @@ struct PlaneCutScratch {
   std::vector<std::uint32_t> triangles, shell_of;
   std::vector<std::uint8_t> is_clipped;
   std::vector<CutMesh::CapEdge> cap_edges, line_edges;
+  std::vector<std::vector<CutMesh::CapEdge>> spare_edges;  // Of earlier caps.
   // Of CapPlanes.
+  struct Layer {  // The range of the clipped triangles at a plane, along its axis.
+    AxisPlane plane;
+    double low, high;
+  };
+  std::vector<Layer> layers;
+  std::vector<std::uint32_t> near;
+  std::vector<std::uint8_t> is_new;
+  TriangleGrid grid;
+  std::vector<simplify::Contact> contacts;
   std::vector<std::uint32_t> point_of, next, loop_points, loop_offsets, flat_triangles;
   std::vector<std::array<double, 2>> places;
   std::vector<double> flat_points;
   Triangulator triangulator;
 };
+
+/// Removes the caps, and keeps their memory.
+void RemoveCaps(PlaneCutScratch& scratch, CutMesh& mesh);
 
 /// Replaces the mesh by its part on the kept side of the plane, and adds a cap without triangles to
 /// `mesh.caps`. New points have exactly the coordinate `plane.at`; their other coordinates are

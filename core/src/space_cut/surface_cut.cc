@@ -63,12 +63,13 @@ void AddShell(const Surface& surface, std::uint32_t shell, CutMesh& mesh) {
 }
 
 /// Copies the shells that are cut to the mesh.
-void FillMesh(const SurfaceCutInput& input, const Surface& surface, CutMesh& mesh) {
+void FillMesh(const SurfaceCutInput& input, const Surface& surface, PlaneCutScratch& plane,
+              CutMesh& mesh) {
   mesh.points = surface.points;
   mesh.normals = surface.normals;
   mesh.triangles.clear();
   mesh.shell_of.clear();
-  mesh.caps.clear();
+  RemoveCaps(plane, mesh);
   for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) {
     if (IsCut(input, shell)) AddShell(surface, shell, mesh);
   }
@@ -199,13 +200,11 @@ void Assembly::FindPieces() {
 /// Removes the triangles of pieces that are dust. Returns whether there are any.
 bool Assembly::DropDust() {
   CutMesh& mesh = s_.mesh;
-  struct Size {
-    Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-    Vec3 origin;
-    double volume = 0;
-    bool is_dust = false;
-  };
-  std::vector<Size> sizes(pieces_.sources.size());
+  using Size = SurfaceCutScratch::PieceSize;
+  std::vector<Size>& sizes = s_.sizes;
+  sizes.assign(
+      pieces_.sources.size(),
+      {{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}, {}, 0, false});
   for (std::size_t point = 0; point < s_.piece_of.size(); ++point) {
     if (s_.piece_of[point] == kNoIndex) continue;
     const Vec3 at = Vec3At(mesh.points, point);
@@ -339,7 +338,8 @@ void Assembly::Nest() {
   const auto pieces = static_cast<std::uint32_t>(pieces_.sources.size());
   // By shell of the given surface: its only outer piece, kNoShell, or kNoIndex - 1 for several.
   constexpr std::uint32_t kSeveral = kNoIndex - 1;
-  std::vector<std::uint32_t> only(from_.ShellCount(), kNoShell);
+  std::vector<std::uint32_t>& only = s_.only;
+  only.assign(from_.ShellCount(), kNoShell);
   const auto is_cavity = [&](std::uint32_t piece) {
     return pieces_.has_cuts[piece] == 0 && from_.outer_of[pieces_.sources[piece]] != kNoShell;
   };
@@ -389,7 +389,7 @@ bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePiece
   const std::size_t tries = input.are_walls ? 2 * kShifts.size() : kShifts.size();
   for (std::size_t attempt = 0; attempt < tries; ++attempt) {
     const double shift = kShifts[attempt % kShifts.size()];
-    FillMesh(input, surface, s.mesh);
+    FillMesh(input, surface, s.plane, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
     const bool returns = input.are_walls && shift != 0 && attempt < kShifts.size();
     if (returns) ReturnToPlanes(input, s.mesh);

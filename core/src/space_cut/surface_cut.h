@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "base/vec3.h"
 #include "partiemc/surface.h"
 #include "space_cut/plane_cut.h"
 
@@ -36,6 +37,13 @@ struct SurfaceCutScratch {
   std::vector<std::uint32_t> point_of;  // By point of the mesh: its point of the new surface.
   std::vector<std::uint32_t> largest;   // By shell: the largest piece of the body.
   std::vector<std::uint32_t> next;
+  std::vector<std::uint32_t> only;  // By shell: its only outer piece.
+  struct PieceSize {
+    Vec3 low, high, origin;
+    double volume;
+    bool is_dust;
+  };
+  std::vector<PieceSize> sizes;  // By piece.
   Surface surface;
 };
 

@@ -59,7 +59,8 @@ bool Intersects(const Surface& surface) { return pmp::does_self_intersect(MeshOf
 bool HasContacts(const Surface& surface) {
   const std::vector<std::uint8_t> all(surface.TriangleCount(), 1);
   std::vector<simplify::Contact> contacts;
-  simplify::FindContacts(surface.points, surface.triangles, all, contacts);
+  TriangleGrid grid;
+  simplify::FindContacts(surface.points, surface.triangles, all, grid, contacts);
   return !contacts.empty();
 }
 
