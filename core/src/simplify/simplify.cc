@@ -235,11 +235,15 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
     const std::size_t last = simplified.triangle_offsets[shell + 1];
     shell_of.resize(last, shell);
     is_new.resize(last, progress_[shell] == Progress::kSimplified ? 1 : 0);
-    progress_[shell] = Progress::kCompared;
   }
   std::vector<Contact> contacts;
   TriangleGrid grid;
   FindContacts(simplified.points, simplified.triangles, is_new, grid, contacts);
+  // While there are degenerate triangles, no pairs are compared.
+  const bool has_compared = contacts.empty() || contacts[0].a != contacts[0].b;
+  for (std::uint32_t shell = 0; shell < shells_ && has_compared; ++shell) {
+    progress_[shell] = Progress::kCompared;
+  }
   for (const Contact& contact : contacts) {
     for (const std::uint32_t triangle : {contact.a, contact.b}) {
       const std::uint32_t shell = shell_of[triangle];

@@ -514,6 +514,13 @@ TEST(SurfacePercolation, RandomFramesKeepTheGuarantees) {
   EXPECT_GT(with_cuts, frames / 3);
 }
 
+// The simplification makes degenerate triangles of one shell, and triangles of others that
+// intersect. It once compared only the first shell again.
+TEST(SurfacePercolation, SimplifiedShellsAreComparedAfterDegenerateOnes) {
+  SurfaceWorkspace workspace;
+  CheckRandomFrame(1769, workspace);
+}
+
 /// A wavy layer with a cavity, and a drop above it, that drift along x and y.
 constexpr double kLong = 24, kWide = 16;
 TrackedParticles Drifting(Known known, int frame) {
