@@ -36,10 +36,10 @@ struct DroppedBodies {
   std::uint64_t empty = 0, spray = 0;
 };
 
-/// Removes the bodies below the limits, those that are gone, and those that have mirror images
-/// only, and makes their nodes outside. The last two kinds do not count; several images of a body
-/// count as one. The other bodies keep their order and their particles. For a body, the particles
-/// of bodies in its cavities do not count.
+/// Removes the bodies below the limits, images with the fate kGone, and bodies that have mirror
+/// images only, and makes their nodes outside. Only the bodies below the limits count, several
+/// images of a body as one. The other bodies keep their order and their particles. For a body, the
+/// particles of bodies in its cavities do not count.
 DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bodies& bodies,
                          SpaceField& field);
 

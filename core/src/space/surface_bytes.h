@@ -56,8 +56,8 @@ inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 /// further axis. Lone particles at edges require the most.
 inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
 
-/// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and for
-/// each axis those of the cuts. Particles have copies far beyond the faces, so few points are cut.
+/// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and the
+/// cuts along each axis. Particles have copies far beyond the faces, so few points are cut.
 inline constexpr std::uint64_t kBytesPerBoxPoint = 300, kBytesPerBoxAxis = 50;
 
 /// For any frame.

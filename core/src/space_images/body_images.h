@@ -30,7 +30,7 @@ struct BodyImageScratch {
     std::uint32_t set = kNoIndex;  ///< A body of the same set, with a smaller or the same index.
     std::uint64_t given = 0;       ///< Its particles without copies.
     bool has_copies = false;       ///< Of its set.
-    // Of the first body of a set:
+    // Only the first body of a set has these:
     std::uint64_t particles = 0;
     double volume = 0;
     std::uint32_t best = kNoIndex;  ///< The image that remains whole.
@@ -42,11 +42,11 @@ struct BodyImageScratch {
 /// Sets the fate and the first image of each body of a frame with copies. Bodies that share a
 /// particle, given or copied, are images of one body.
 ///   - A body without copies remains whole.
-///   - Of the images within the planes, the one with the most given particles remains whole; of
-///     several, the first one. The other images are gone.
+///   - Among the images within the planes, the image with the most given particles remains whole,
+///     at a tie the first one. The other images are dropped.
 ///   - If there is no such image, or it lacks particles of the body, all images are cut.
-/// Sets the particles and the volume of each body to those of all its images together. A particle
-/// without a body that has a copy in a body belongs to this body, and is kDroppedBody then, so that
+/// Sets the particles and the volume of each body to the sum of all its images. If a particle has
+/// no body but its copy has one, it belongs to this body, and its own body is kDroppedBody, so that
 /// it does not become a drop. Bodies without particles remain whole.
 /// Requires: FindBodies. Deterministic. Cost: linear in particles and parts.
 void ChooseImages(const BodyImageInput& input, BodyImageScratch& scratch, Bodies& bodies);
