@@ -211,8 +211,8 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       app.add_option(
              "--periodic", flags.periodic,
              "Periodic axes of the results: a body that crosses the box is one body, and an "
-             "outline that reaches its own image is cut at the box. The box is that of the "
-             "LAMMPS dump, or --box")
+             "outline or a surface that reaches its own image is cut at the box. The box is "
+             "that of the LAMMPS dump, or --box")
           ->type_name("x,y,z")
           ->group(kGroup);
   app.add_option("--box", flags.box, "Bounds of the periodic box in world units")

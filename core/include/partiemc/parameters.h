@@ -267,8 +267,8 @@ struct ReconstructionParameters {
   /// If present, a body that crosses a face of the box is one body (core/PERIODIC.md).
   /// Particles may lie in the box or beside it. Results are unwrapped unless `wraps`: each body is
   /// whole, and the centre of its bounding box lies in the box. A body that reaches its own image
-  /// is cut at the faces (Rings::cuts). Surfaces and `farthest-particle` refuse such a frame with
-  /// the reason PERCOLATES. A length must be at least four kernel radii and at most kMostSpacings
+  /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
+  /// (PERCOLATES). A length must be at least four kernel radii and at most kMostSpacings
   /// spacings. For outlines, the box may have the axes of the plane of the particles. Excludes
   /// slices.
   std::optional<PeriodicBox> box = std::nullopt;

@@ -57,8 +57,8 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, that lie on walls (SurfaceParameters::wall_planes), where a body was
-  /// cut. They close the surface; areas do not count them.
+  /// Triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the periodic
+  /// box, where a body was cut. They close the surface; areas do not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.

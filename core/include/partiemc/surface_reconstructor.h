@@ -59,7 +59,7 @@ struct SurfaceParameters {
   double min_component_volume = 0;
   std::uint64_t min_component_particles = 0;
 
-  /// As ReconstructionParameters::box: shells are unwrapped.
+  /// As ReconstructionParameters::box. `max_tiles` counts copies of bodies that reach their image.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// As ReconstructionParameters::wall_planes.

@@ -312,7 +312,7 @@ typedef struct partiemc_surface {
    * parents[parent_offsets[k + 1]]. NULL if shells are not tracked. */
   const uint64_t* parents;
   const uint32_t* parent_offsets;
-  /* With `wall_planes`: cut_count triangles, ascending, that lie on walls. Areas do not count
+  /* cut_count triangles, ascending, on walls or on faces of a periodic box. Areas do not count
    * them. */
   size_t cut_count;
   const uint32_t* cuts;
