@@ -386,6 +386,47 @@ TEST(SurfacePercolation, MinimumSizeCountsAllImages) {
   }
 }
 
+// An ellipsoid would have no end at the faces.
+TEST(SurfacePercolation, ShortColumnsAreNoDrops) {
+  Random random(12);
+  const PeriodicBox box = BoxOf(0, 0, 12);
+  const SpaceParticles column = testing::Box({0, 0, 0}, {1, 0, 11}, 0, random);
+  const Surface surface = InBox(column, box);
+  ASSERT_EQ(surface.ShellCount(), 1u);
+  EXPECT_FALSE(surface.cuts.empty());
+  ExpectInBox(surface, box);
+  EXPECT_EQ(surface.measures[0].particles, column.size());
+  EXPECT_NEAR(surface.measures[0].volume, 24, .1);
+}
+
+// Drops of up to three particles near a layer, some across faces. A node of the lattice may be in a
+// drop but not in its image, because no cell fits into the box.
+TEST(SurfacePercolation, EveryParticleCountsOnce) {
+  constexpr double kApart = 5.4, kLength = 4 * kApart;
+  const PeriodicBox box = BoxOf(kLength, kLength, 0);
+  for (std::uint64_t seed = 1; seed <= testing::Frames(20); ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    SpaceParticles all = Filled(21, 21, 4, .05, random, [](const Vec3&) { return true; });
+    for (std::size_t k = 0; k < all.xyz.size(); ++k) {
+      if (k % 3 < 2) all.xyz[k] *= kLength / 21;
+    }
+    const double x = random.Uniform(0, kApart), y = random.Uniform(0, kApart);
+    for (int site = 0; site < 48; ++site) {
+      const Vec3 at{x + kApart * (site % 4), y + kApart * (site / 4 % 4), 8 + kApart * (site / 16)};
+      for (std::size_t count = random.Below(3) + 1; count > 0; --count) {
+        const double dx = random.Uniform(-.4, .4), dy = random.Uniform(-.4, .4);
+        all.Add(at + Vec3{dx, dy, random.Uniform(-.4, .4)});
+      }
+    }
+    const Surface surface = InBox(Wrapped(all, box), box);
+    EXPECT_EQ(surface.ShellCount(), 49u);
+    const Sums sums = SumsOf(surface);
+    EXPECT_EQ(sums.particles, all.size());
+    EXPECT_NEAR(sums.volume / static_cast<double>(all.size()), 1, .005);
+  }
+}
+
 SpaceParticles Uniform(std::size_t count, const Vec3& lengths, Random& random) {
   SpaceParticles particles;
   for (; count > 0; --count) {
@@ -573,6 +614,14 @@ TEST_P(DriftingLayer, KeepsItsIdentities) {
       ASSERT_EQ(parents.size(), 1u);
       EXPECT_EQ(parents[0], identity(k));
     }
+    const ShellHistory& history = stream.state().history;
+    EXPECT_EQ(history.shells.size(), surface.ShellCount());
+    std::uint64_t nodes = 0;  // Of the layer.
+    for (const ShellRun& run : history.runs) {
+      if (history.shells[run.shell].identity != layer) continue;
+      nodes += static_cast<std::uint64_t>(run.last - run.first) + 1;
+    }
+    EXPECT_NEAR(static_cast<double>(nodes) / surface.measures[by_volume[0]].volume, 1, .1);
     if (surface.ShellCount() < 3) continue;
     ++with_cavity;
     EXPECT_NE(identity(2), 0u);
@@ -582,6 +631,24 @@ TEST_P(DriftingLayer, KeepsItsIdentities) {
   }
   EXPECT_GT(with_cavity, 20);
   EXPECT_LT(with_cavity, 100);
+}
+
+// A drop across a face has all its particles, copies included.
+TEST(SurfacePercolation, SamplesOfADropAcrossAFaceAreAllItsParticles) {
+  Random random(13);
+  const PeriodicBox box = BoxOf(kLong, kWide, 0);
+  TrackedParticles all{.known = support::kIds};
+  all.Add(Filled(24, 16, 5, 0, random, [](const Vec3&) { return true; }), 100);
+  all.Add(testing::Box({-1, 7, 8}, {1, 8, 9}, 0, random), 0);  // Twelve particles.
+  all = Wrapped(all, box);
+  SurfaceStream stream(ForDrifting());
+  const Surface& surface = stream.Next(all);
+  ASSERT_EQ(surface.ShellCount(), 2u);
+  const ShellHistory& history = stream.state().history;
+  std::vector<int> samples(2);
+  for (const ShellSample& sample : history.samples) ++samples[sample.shell];
+  std::ranges::sort(samples);
+  EXPECT_EQ(samples, (std::vector<int>{12, 16}));
 }
 
 TEST(SurfacePercolation, ResumedStreamsHaveTheSameBits) {
