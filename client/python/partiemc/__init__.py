@@ -75,8 +75,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     min_component_volume: for output "surface": drops bodies with less particle volume, in cubed
         spacings. 0 by default.
     box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses the box is
-        one body, and results are unwrapped. An outline that reaches its own image is cut at the
-        faces (`rings.cuts`).
+        one body, and results are unwrapped. An outline or a surface that reaches its own image is
+        cut at the faces (`rings.cuts`, `surface.cuts`).
     wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
         weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.

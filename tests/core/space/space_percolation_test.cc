@@ -389,17 +389,18 @@ TEST(SurfacePercolation, MinimumSizeCountsAllImages) {
 // An ellipsoid would have no end at the faces.
 TEST(SurfacePercolation, ShortColumnsAreNoDrops) {
   Random random(12);
-  const PeriodicBox box = BoxOf(0, 0, 12);
-  const SpaceParticles column = testing::Box({0, 0, 0}, {1, 0, 11}, 0, random);
-  const Surface surface = InBox(column, box);
+  const PeriodicBox box = BoxOf(0, 0, 8);
+  const SpaceParticles column = testing::Box({0, 0, 0}, {1, 0, 7}, 0, random);
+  const Surface surface = SurfaceOf(
+      column, {.placement = SurfacePlacement::kVirtualPlane, .kernel_radius = 2, .box = box});
   ASSERT_EQ(surface.ShellCount(), 1u);
   EXPECT_FALSE(surface.cuts.empty());
   ExpectInBox(surface, box);
   EXPECT_EQ(surface.measures[0].particles, column.size());
-  EXPECT_NEAR(surface.measures[0].volume, 24, .1);
+  EXPECT_NEAR(surface.measures[0].volume, 16, .1);
 }
 
-// Drops of up to three particles near a layer, some across faces. A node of the lattice may be in a
+// Drops of up to six particles near a layer, some across faces. A node of the lattice may be in a
 // drop but not in its image, because no cell fits into the box.
 TEST(SurfacePercolation, EveryParticleCountsOnce) {
   constexpr double kApart = 5.4, kLength = 4 * kApart;
@@ -414,12 +415,15 @@ TEST(SurfacePercolation, EveryParticleCountsOnce) {
     const double x = random.Uniform(0, kApart), y = random.Uniform(0, kApart);
     for (int site = 0; site < 48; ++site) {
       const Vec3 at{x + kApart * (site % 4), y + kApart * (site / 4 % 4), 8 + kApart * (site / 16)};
-      for (std::size_t count = random.Below(3) + 1; count > 0; --count) {
-        const double dx = random.Uniform(-.4, .4), dy = random.Uniform(-.4, .4);
-        all.Add(at + Vec3{dx, dy, random.Uniform(-.4, .4)});
+      for (std::size_t count = random.Below(6) + 1; count > 0; --count) {
+        const double dx = random.Uniform(-.6, .6), dy = random.Uniform(-.6, .6);
+        all.Add(at + Vec3{dx, dy, random.Uniform(-.6, .6)});
       }
     }
-    const Surface surface = InBox(Wrapped(all, box), box);
+    const Surface surface =
+        SurfaceOf(Wrapped(all, box), {.placement = SurfacePlacement::kVirtualPlane,
+                                      .cell_size = seed % 2 == 0 ? 1 : .5,
+                                      .box = box});
     EXPECT_EQ(surface.ShellCount(), 49u);
     const Sums sums = SumsOf(surface);
     EXPECT_EQ(sums.particles, all.size());
