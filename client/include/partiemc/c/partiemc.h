@@ -144,7 +144,7 @@ typedef struct partiemc_options {
                               float64. NULL: float64. */
   const double* box; /* Six numbers: lower end and length of a periodic box along x, y and z; length
                         0: the axis is not periodic. A body that crosses a face is one body; an
-                        outline or surface that reaches its image is cut at the faces. NULL: no box. */
+                        outline or surface that reaches its image is cut there. NULL: no box. */
   int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
   const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume), for a surface
                         cbrt(volume). NULL: equal. */
