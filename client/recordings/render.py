@@ -13,6 +13,7 @@ import numpy as np
 LIGHT = np.array([-0.35, 0.55, 0.75]) / np.linalg.norm([-0.35, 0.55, 0.75])
 BODY, SKY = np.array([0.16, 0.47, 0.71]), np.array([0.83, 0.9, 0.97])
 OVERSAMPLING = 3
+CREASE = 0.8  # Cosine between a triangle and a normal at its corner, below which the corner is an edge.
 
 
 def read_obj(path):
@@ -51,6 +52,9 @@ def draw(points, normals, triangles, width, height, scale):
         if area >= 0 or left > right or top > bottom:  # Seen from behind, or outside.
             continue
         at_x, at_y = np.meshgrid(np.arange(left, right + 1), np.arange(top, bottom + 1))
+        across = np.cross(points[b] - points[a], points[c] - points[a])
+        across /= max(np.linalg.norm(across), 1e-300)
+        at_a, at_b, at_c = (normals[k] if normals[k] @ across > CREASE else across for k in (a, b, c))
         v = ((at_x - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (at_y - y[a])) / area
         w = ((x[b] - x[a]) * (at_y - y[a]) - (at_x - x[a]) * (y[b] - y[a])) / area
         u = 1 - v - w
@@ -58,7 +62,7 @@ def draw(points, normals, triangles, width, height, scale):
         window = (slice(top, bottom + 1), slice(left, right + 1))
         nearer = (u >= 0) & (v >= 0) & (w >= 0) & (here > depth[window])
         depth[window][nearer] = here[nearer]
-        mixed = u[..., None] * normals[a] + v[..., None] * normals[b] + w[..., None] * normals[c]
+        mixed = u[..., None] * at_a + v[..., None] * at_b + w[..., None] * at_c
         facing[window][nearer] = mixed[nearer]
     return shade(facing, depth > -np.inf)
 

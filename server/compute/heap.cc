@@ -20,10 +20,12 @@ extern "C" {
 //   frame stopped all threads for up to 15 ms.
 // - Small blocks may use any free extent, and large ones have no arena of their own. By default,
 //   frames of a million particles caused six times the page faults, 6 % of the processor time.
+// - Each thread keeps only free blocks of up to 4 KiB for itself, which bounds the memory of gRPC's
+//   threads in a flood of calls.
 [[gnu::visibility("default")]] extern const char* malloc_conf;
 const char* malloc_conf =
     "narenas:2,dirty_decay_ms:2000,muzzy_decay_ms:0,background_thread:true,"
-    "lg_extent_max_active_fit:20,oversize_threshold:0";
+    "lg_extent_max_active_fit:20,oversize_threshold:0,tcache_max:4096";
 
 }  // extern "C"
 
