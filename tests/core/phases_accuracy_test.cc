@@ -282,6 +282,33 @@ TEST(PhasesAccuracy, ContactsOfAFloatingLens) {
   }
 }
 
+// Small drops on a slab: corners of the slab and contacts are near each other.
+TEST(PhasesAccuracy, BodiesWithContactsKeepTheirArea) {
+  double worst = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Random random(seed);
+    const double width = random.Uniform(5, 16), angle = random.Uniform(.5, 2.4);
+    const double radius = width / 2 / std::sin(angle), down = -radius * std::cos(angle);
+    const double half = width / 2 + random.Uniform(0, 6);
+    const Distance slab = [=](double x, double y) {
+      return std::max(std::abs(x) - half, std::max(y, -6 - y));
+    };
+    const Distance drop = Both(Drop(0, down, radius), [](double, double y) { return -y; });
+    const Distance body = [=](double x, double y) { return std::min(slab(x, y), drop(x, y)); };
+    const PhaseScene scene{{body, 24}, {{1, slab}, {2, drop}}};
+    Particles particles = Filled(scene, random);
+    particles.volumes.assign(particles.size(), 1);
+    particles = support::Shaken(particles, random, random.Uniform(0, .2));
+    ReconstructionParameters parameters{.spacing = 1.0};
+    const double alone = support::ReconstructOnce(parameters, particles).statistics.area;
+    for (const int phase : {1, 2}) parameters.sections.push_back({.phase = phase});
+    const double area = support::ReconstructOnce(parameters, particles).statistics.area;
+    worst = std::max(worst, std::abs(area / alone - 1));
+  }
+  std::printf("drops on slabs: areas change by at most %.5f\n", worst);
+  EXPECT_LE(worst, .005);
+}
+
 TEST(PhasesAccuracy, DeviationFromKnownInterfaces) {
   constexpr int kSeeds = 8;
   std::printf("%-14s %8s %8s %8s %8s %10s %12s\n", "", "rest", "area", "noise", "area", "junctions",

@@ -40,6 +40,11 @@ Point ArcCurve::DirectionAt(const Point& at) const {
   return Dot(direction, along) < 0 ? Times(direction, -1) : direction;
 }
 
+double ArcCurve::MisfitOf(const Point& at) const {
+  const double t = Dot(along, at), n = Cross(along, at);
+  return n - offset - slope * t - bend * (t * t + n * n);
+}
+
 void ArcCurveFit::Sums::Add(const Point& at) {
   const double square = Dot(at, at);
   count += 1;

@@ -38,6 +38,8 @@ struct ArcCurve {
   Line TangentNear(const Point& at) const;
   /// The direction of this tangent, away from the origin.
   Point DirectionAt(const Point& at) const;
+  /// The height of a point above the curve, to the first order.
+  double MisfitOf(const Point& at) const;
 };
 
 /// Fits an ArcCurve by least squares. Points are relative to one origin near the junction.

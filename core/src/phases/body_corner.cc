@@ -8,6 +8,9 @@ namespace {
 
 // The sine of the smallest turn of a corner. With noise, smaller turns may be chance.
 constexpr double kSmallestTurn = .4;
+// A side is no curve if the root of the mean squared deviation of its points from it is larger, in
+// spacings. Another corner of the body may be near.
+constexpr double kLargestMisfit = .05;
 
 double AreaOf(std::uint32_t begin, std::uint32_t end, std::span<const Point> positions) {
   const Point origin = positions[begin];
@@ -16,6 +19,24 @@ double AreaOf(std::uint32_t begin, std::uint32_t end, std::span<const Point> pos
     twice += Cross(Minus(positions[k], origin), Minus(positions[k + 1], origin));
   }
   return twice / 2;
+}
+
+// Whether the points that determine a curve lie near it. `curve` is relative to `vertex`.
+bool Follows(const ArcCurve& curve, const RingPath& path, const Point& vertex, double spacing,
+             std::span<const Point> positions) {
+  double sum = 0, count = 0, distance = 0;
+  Point last = vertex;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const Point& at = positions[path[k]];
+    distance += Length(Minus(at, last)) / spacing;
+    last = at;
+    if (distance > kCurveFarthest) break;
+    if (distance < kCurveNearest) continue;
+    const double misfit = curve.MisfitOf(Minus(at, vertex)) / spacing;
+    sum += misfit * misfit;
+    count += 1;
+  }
+  return sum <= kLargestMisfit * kLargestMisfit * count;
 }
 
 }  // namespace
@@ -46,6 +67,10 @@ std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, 
   const auto after = CurveAlong(ahead, vertex, spacing, positions);
   const auto before = CurveAlong(back, vertex, spacing, positions);
   if (!after || !before) return std::nullopt;
+  if (!Follows(*after, ahead, vertex, spacing, positions) ||
+      !Follows(*before, back, vertex, spacing, positions)) {
+    return std::nullopt;
+  }
   const Point to = after->DirectionAt({}), from = before->DirectionAt({});
   const bool is_corner = Dot(to, from) > 0 || std::abs(Cross(to, from)) > kSmallestTurn;
   return is_corner ? std::optional(BodyCorner{*after, *before}) : std::nullopt;

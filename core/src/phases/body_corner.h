@@ -38,7 +38,8 @@ struct BodyCorner {
   ArcCurve ahead, back;
 };
 
-/// Absent if a side is too short for a curve, or if the outline turns by less than 24 degrees.
+/// Absent if a side is too short for a curve or deviates from it, or if the outline turns by less
+/// than 24 degrees.
 std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
                                    double spacing, std::span<const Point> positions);
 

@@ -29,14 +29,15 @@ constexpr double kSmallestSine = .3;
 Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
 // Puts the points of a path before kCurveNearest onto a parabola from the junction to the first
-// point behind it, with the bend of its curve. Calls on_move with their numbers.
+// point behind it, with the bend of its curve. Calls on_move with their numbers. A short path
+// stays, because its other end may move the same points.
 template <typename Path, typename OnMove>
 void Reshape(const Path& path, const Point& before, const Point& junction, double h,
              const std::optional<ArcCurve>& curve, SharedPoints& points, OnMove on_move) {
   double reach = 0;
   std::optional<Point> target;
   Point last = before;
-  for (std::size_t k = 0; k < path.size() && !target; ++k) {
+  for (std::size_t k = 0; 2 * k < path.size() && !target; ++k) {
     const Point& at = points.position[path[k]];
     reach += Length(Between(last, at));
     last = at;

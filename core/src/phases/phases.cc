@@ -120,14 +120,17 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
   SumRingAreas(body, p.points.position, p.ring_areas);
-  MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
-  RestoreRingAreas(body, p.ring_areas, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
-                   p.points);
+  const auto move_junctions = [&] {
+    MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+    RestoreRingAreas(body, p.ring_areas, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
+                     p.points);
+  };
+  move_junctions();
   SumRegions(input.bins, input.scale, p.field, p.labels, p.map, p.rings, p.areas);
   CountParticles(p);
   if (input.parameters.spacing.has_value() || !input.frame.volumes.empty()) {
     MatchPhaseAreas(p.rings, p.interfaces, kAreaLimit * input.scale.spacing, p.areas, p.points);
-    MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+    move_junctions();
   }
   p.is_junction.assign(p.points.position.size(), 0);
   for (const JunctionScratch::ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
