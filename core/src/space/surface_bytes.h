@@ -58,7 +58,7 @@ inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
 
 /// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and the
 /// cuts along each axis. Particles have copies far beyond the faces, so few points are cut.
-inline constexpr std::uint64_t kBytesPerBoxPoint = 300, kBytesPerBoxAxis = 50;
+inline constexpr std::uint64_t kBytesPerBoxPoint = 450, kBytesPerBoxAxis = 50;
 
 /// For any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;

@@ -18,8 +18,10 @@ namespace {
 
 // By how many steps planes move, one try after another. A step is in spacings and in last bits of
 // the coordinate.
-constexpr std::array kShifts = {0.,  1.,   2.,   3.,   5.,    8.,    13.,   21.,
-                                55., 144., 377., 987., 2584., 6765., 17711.};
+constexpr std::array kShifts = {0.,   1.,   2.,   3.,    5.,    8.,     13.,    21.,    55.,
+                                144., 377., 987., 2584., 6765., 17711., 46368., 121393.};
+// Walls move by these only: a larger move could bring them to other shells.
+constexpr std::size_t kShiftsOfWalls = 15;
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 64;
 // Moved alike along two axes, planes would follow diagonal edges of bodies on a lattice.
 constexpr std::array kShiftAlong = {1., 1.37, 1.71};
@@ -386,12 +388,13 @@ void Assembly::WriteParents() {
 bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePieces& pieces,
                 Surface& surface) {
   // With walls, the second half of the tries leaves the points where the cuts are.
-  const std::size_t tries = input.are_walls ? 2 * kShifts.size() : kShifts.size();
+  const std::size_t shifts = input.are_walls ? kShiftsOfWalls : kShifts.size();
+  const std::size_t tries = input.are_walls ? 2 * shifts : shifts;
   for (std::size_t attempt = 0; attempt < tries; ++attempt) {
-    const double shift = kShifts[attempt % kShifts.size()];
+    const double shift = kShifts[attempt % shifts];
     FillMesh(input, surface, s.plane, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
-    const bool returns = input.are_walls && shift != 0 && attempt < kShifts.size();
+    const bool returns = input.are_walls && shift != 0 && attempt < shifts;
     if (returns) ReturnToPlanes(input, s.mesh);
     Assembly(input, surface, s, pieces).Run();
     if (returns && !Validate(s.surface).ok()) continue;

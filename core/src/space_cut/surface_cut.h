@@ -65,11 +65,11 @@ struct SurfacePieces {
 /// parts have none.
 ///
 /// Where a vertex lies on a plane, or rounding leaves a decision open, all planes with the same
-/// axis move by the same amount: by up to .00002 spacings (kShifts in
-/// surface_cut.cc); walls, each to its side. Returns false, with `surface` unchanged, if this does
-/// not help, which is a bug. Requires: S1 to S5; `surface.attributes` without values.
-/// Deterministic. Cost: linear in the surface, plus CutAtPlane and CapPlanes; ShellsAround if a
-/// cavity remains in a shell that falls into several parts.
+/// axis move by the same amount: by up to .0002 spacings and 3e-9 of the coordinate (kShifts in
+/// surface_cut.cc); walls by a seventh of it, each to its side. Returns false, with `surface`
+/// unchanged, if this does not help, which is a bug. Requires: S1 to S5; `surface.attributes`
+/// without values. Deterministic. Cost: linear in the surface, plus CutAtPlane and CapPlanes;
+/// ShellsAround if a cavity remains in a shell that falls into several parts.
 [[nodiscard]] bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& scratch,
                               SurfacePieces& pieces, Surface& surface);
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <limits>
+#include <variant>
 
 #include "space/crossings.h"
 
@@ -50,7 +51,22 @@ void MeasureImages(const BrickDirectory& bricks, const Bodies& bodies, std::vect
   }
 }
 
-/// Joins the bodies that share a particle, and counts the particles of each set.
+Vec3 PositionOf(const Frame& frame, std::size_t particle) {
+  return std::visit(
+      [&](const auto& positions) -> Vec3 {
+        const auto* at = &positions[3 * particle];
+        return {double{at[0]}, double{at[1]}, double{at[2]}};
+      },
+      frame.positions);
+}
+
+bool IsWithin(const BodyImageInput& input, const Vec3& at) {
+  return at.x >= input.low.x && at.y >= input.low.y && at.z >= input.low.z &&
+         at.x <= input.high.x && at.y <= input.high.y && at.z <= input.high.z;
+}
+
+/// Joins the bodies that share a particle, and counts the particles of each set. Copies outside of
+/// the planes do not count.
 void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies) {
   const std::size_t given = input.lifted.particles;
   const Frame& frame = input.lifted.frame;
@@ -68,6 +84,8 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
     const std::uint32_t body = bodies.body_of_particle[p];
     if (body == kNoIndex || !input.bins.IsImage(p)) continue;
     s.images[body].has_copies = true;
+    // Near the end of the copies the level set is wrong, and may connect bodies.
+    if (!IsWithin(input, PositionOf(frame, input.bins.source[p]))) continue;
     const std::uint32_t original = input.lifted.originals[input.bins.source[p] - given];
     std::uint32_t& of_given = s.body_of[original];
     if (of_given == kNoIndex) {
@@ -96,8 +114,7 @@ bool IsComplete(const BodyImageInput& input, const Image& image) {
   const Vec3 cell{1, 1, 1};
   const Vec3 low = input.cell_size * (image.low - cell);
   const Vec3 high = input.cell_size * (image.high + cell);
-  return low.x >= input.low.x && low.y >= input.low.y && low.z >= input.low.z &&
-         high.x <= input.high.x && high.y <= input.high.y && high.z <= input.high.z;
+  return IsWithin(input, low) && IsWithin(input, high);
 }
 
 /// Finds the image of each set that remains whole.

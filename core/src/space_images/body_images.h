@@ -40,7 +40,7 @@ struct BodyImageScratch {
 };
 
 /// Sets the fate and the first image of each body of a frame with copies. Bodies that share a
-/// particle, given or copied, are images of one body.
+/// particle, given or copied within the planes, are images of one body.
 ///   - A body without copies remains whole.
 ///   - Among the images within the planes, the image with the most given particles remains whole,
 ///     at a tie the first one. The other images are dropped.
