@@ -93,6 +93,7 @@ const std::map<std::string, std::vector<std::string>>& PackagesByName() {
       {"partiemc", {}},
       {"PkgConfig", {"pkg-config"}},
       {"OpenSSL", {"libssl-dev"}},
+      {"jemalloc", {"libjemalloc-dev"}},
       {"nats", {"libnats-dev"}},
       {"prometheus-cpp", {"prometheus-cpp-dev"}},
       {"pybind11", {"pybind11-dev"}},
