@@ -349,13 +349,13 @@ TEST(SurfacePercolation, DropsNearALayerStayWhole) {
 // The sizes of the bodies that are not cut, for two places of the faces.
 std::pair<std::vector<std::uint64_t>, std::vector<std::uint64_t>> WholeBodies(std::uint64_t seed) {
   Random random(seed);
-  const int x = 8 + static_cast<int>(random.Uniform(0, 10)), y = x + 3, thick = 2 + seed % 3;
+  const int x = 8 + static_cast<int>(random.Uniform(0, 10)), y = x + 3,
+            thick = 2 + static_cast<int>(seed % 3);
   SpaceParticles all = Filled(x, y, thick, .1, random, [](const Vec3&) { return true; });
   for (int drop = 0; drop < 5; ++drop) {
     const Vec3 from{random.Uniform(0, x), random.Uniform(0, y), thick + random.Uniform(1, 8)};
-    for (int k = 0; k < 6; ++k) {
-      all.Add(from + Vec3{double{seed % 2 == 0} * k, double{seed % 2 == 1} * k, 0});
-    }
+    const Vec3 along = seed % 2 == 0 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    for (int k = 0; k < 6; ++k) all.Add(from + k * along);
   }
   std::array<std::vector<std::uint64_t>, 2> sizes;
   for (std::size_t place = 0; place < 2; ++place) {
