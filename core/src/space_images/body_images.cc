@@ -84,7 +84,7 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
     const std::uint32_t body = bodies.body_of_particle[p];
     if (body == kNoIndex || !input.bins.IsImage(p)) continue;
     s.images[body].has_copies = true;
-    // Near the end of the copies the level set is wrong, and may connect bodies.
+    // Near the end of the copies the level set is wrong, so it may connect bodies.
     if (!IsWithin(input, PositionOf(frame, input.bins.source[p]))) continue;
     const std::uint32_t original = input.lifted.originals[input.bins.source[p] - given];
     std::uint32_t& of_given = s.body_of[original];
