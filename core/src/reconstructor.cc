@@ -59,7 +59,7 @@ void Prepare(std::span<const Attribute> attributes, const ReconstructionParamete
   for (Result& section : result.sections) Name(attributes, section.attributes);
 }
 
-// The parameters of a section, not yet resolved.
+// The parameters of the outline of a Section, not yet resolved.
 ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const Section& section) {
   parameters.output = Output::kOutline;
   parameters.sections.clear();

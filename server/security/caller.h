@@ -24,8 +24,8 @@ inline constexpr std::string_view kReasonCallerWatchers = "CALLER_WATCHERS";
 inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 
 /// Counts the resources that a caller holds. All calls with the same token share an account.
-/// Without tokens, all calls of the same peer address share one (PeerAccounts). ComputePool and
-/// FairShare identify callers by the memory address of this object. Thread-safe.
+/// All calls without a token from the same host share one (HostOfPeer). ComputePool and FairShare
+/// identify callers by the memory address of this object. Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
   enum class Kind { kCall, kStream, kWatcher, kProbe };

@@ -6,8 +6,8 @@
 namespace partiemc::server {
 namespace {
 
-// Measured values. The process starts with 19 to 23 MiB of resident memory. Under a flood of
-// callers without a token, gRPC held up to 50 MiB of incomplete messages (tests/PROMISES.md).
+// More than was measured. The process starts with 19 to 23 MiB of resident memory. A flood from one
+// connection adds at most 57 MiB (server/OPERATIONS.md).
 constexpr std::uint64_t kProgramBytes = std::uint64_t{24} << 20;
 constexpr std::uint64_t kOnTheirWayBytes = std::uint64_t{64} << 20;
 

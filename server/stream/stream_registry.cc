@@ -83,6 +83,7 @@ absl::Status StreamRegistry::Enter(std::shared_ptr<StreamStateMachine> machine, 
   const StreamStateMachine* key = machine.get();
   Entry& entry = entries_[key];
   entry.machine = std::move(machine);
+  entry.arrival = arrived_++;
   entry.caller = std::move(caller);
   return absl::OkStatus();
 }
@@ -306,9 +307,11 @@ std::size_t StreamRegistry::OpenCount() const {
 }
 
 std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() const {
+  std::map<std::uint64_t, const Entry*> by_arrival;
+  for (const auto& [key, entry] : entries_) by_arrival[entry.arrival] = &entry;
   std::vector<std::shared_ptr<StreamStateMachine>> machines;
-  machines.reserve(entries_.size());
-  for (const auto& [key, entry] : entries_) machines.push_back(entry.machine);
+  machines.reserve(by_arrival.size());
+  for (const auto& [arrival, entry] : by_arrival) machines.push_back(entry->machine);
   return machines;
 }
 

@@ -132,8 +132,8 @@ class StreamRegistry {
   /// Returns these addresses. Each call rotates the list by one, so that clients spread evenly over
   /// the servers.
   std::vector<std::string> TakeElsewhere() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Drains the present state machines one after the other, evenly distributed over the time
-  /// `within`. New calls are still admitted.
+  /// Drains the present state machines one after the other in the order of their arrival, evenly
+  /// distributed over the time `within`. New calls are still admitted.
   void SendAway(std::chrono::milliseconds within) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Refuses new calls and drains every state machine.
   void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -158,6 +158,7 @@ class StreamRegistry {
  private:
   struct Entry {
     std::shared_ptr<StreamStateMachine> machine;
+    std::uint64_t arrival = 0;  // Number of calls that were admitted before this one.
     Caller caller;
     CallerAccount::Place place;           // Set while the stream is open.
     std::optional<StreamSummary> stream;  // Set while open; `counts` is stale, the machine has it.
@@ -180,6 +181,7 @@ class StreamRegistry {
   // Moves the slot of `former` to `entry` if both have the same caller account. Otherwise takes a
   // new slot for the caller of `entry`.
   static absl::Status TakePlace(Entry& entry, Entry* former);
+  // In the order of arrival.
   std::vector<std::shared_ptr<StreamStateMachine>> Machines() const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Entry* FindOpen(std::string_view token) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -195,6 +197,7 @@ class StreamRegistry {
   mutable Mutex mutex_;
   CondVar left_;
   std::map<const StreamStateMachine*, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t arrived_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t opened_ ABSL_GUARDED_BY(mutex_) = 0;
   std::atomic<std::uint64_t> changes_ = 0;
   std::vector<std::string> elsewhere_ ABSL_GUARDED_BY(mutex_);

@@ -10,7 +10,7 @@
 
 namespace partiemc::server {
 
-class ClosedTransport final : public StreamTransport, public StreamHandler {
+class ClosedTransport : public StreamTransport, public StreamHandler {
  public:
   void StartRead(std::size_t) override {}
   void StartWrite(Outgoing, std::size_t) override {}

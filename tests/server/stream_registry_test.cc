@@ -4,11 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "partiemc/status.h"
 #include "server/closed_transport.h"
@@ -236,6 +240,39 @@ TEST_F(Registry, SendsOneAfterTheOtherElsewhere) {
   registry_.SetElsewhere({"a:1", "b:1", "c:1"});
   EXPECT_THAT(registry_.TakeElsewhere(), ElementsAre("b:1", "c:1", "a:1"));
   EXPECT_THAT(registry_.TakeElsewhere(), ElementsAre("c:1", "a:1", "b:1"));
+}
+
+class RecordingTransport final : public ClosedTransport {
+ public:
+  explicit RecordingTransport(std::vector<const RecordingTransport*>& ended) : ended_(ended) {}
+  void Finish(const absl::Status&) override { ended_.push_back(this); }
+
+ private:
+  std::vector<const RecordingTransport*>& ended_;
+};
+
+TEST_F(Registry, SendsStreamsAwayInTheOrderOfTheirArrival) {
+  struct Stream {
+    std::shared_ptr<StreamStateMachine> machine;
+    std::unique_ptr<RecordingTransport> transport;
+  };
+  std::vector<const RecordingTransport*> ended, arrived;
+  std::vector<Stream> streams;
+  for (std::uint32_t i = 0; i < kMaxStreams; ++i) {
+    auto transport = std::make_unique<RecordingTransport>(ended);
+    auto machine = std::make_shared<StreamStateMachine>(*transport, *transport, pool_, budget_, 1);
+    streams.push_back({std::move(machine), std::move(transport)});
+  }
+  // The order must not be the order of the machines' addresses.
+  std::sort(streams.begin(), streams.end(), [](const Stream& a, const Stream& b) {
+    return std::greater<>()(a.machine.get(), b.machine.get());
+  });
+  for (const Stream& stream : streams) {
+    ASSERT_TRUE(registry_.Enter(stream.machine, {}).ok());
+    arrived.push_back(stream.transport.get());
+  }
+  registry_.SendAway(std::chrono::milliseconds(0));
+  EXPECT_EQ(ended, arrived);
 }
 
 TEST_F(Registry, DrainingLetsNobodyInAndSendsEverybodyHome) {

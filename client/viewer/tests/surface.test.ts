@@ -143,11 +143,20 @@ test('contradictions in a message are refused by name', () => {
     [{ normals: new Uint8Array(12) }, /normals must have three floats/],
     [{ attributes: [{ name: 'p', components: 4, values: new Uint8Array(0) }] }, /attributes\[0\] must have 1 to 3/],
     [{ attributes: [{ name: 'p', components: 1, values: new Uint8Array(4) }] }, /attributes\[0\] must have values/],
+    ...[words(8, 0), words(3, 3), words(16), new Uint8Array(3)].map((cuts): [Partial<SurfaceMessage>, RegExp] =>
+      [{ cuts }, /cuts must be ascending numbers of the 16 triangles/]),
     [{ origin: [NaN, 0, 0] }, /origin/],
   ];
   for (const [change, rule] of cases) {
     assert.throws(() => decodeSurface({ ...two(), ...change }, MeshoptDecoder), rule);
   }
+});
+
+test('the points of cuts are marked', () => {
+  const message = plainMessage([[0, 0, 0], [5, 0, 0]]);
+  assert.equal(decodeSurface(message, MeshoptDecoder).inCut, null);
+  message.cuts = bytesOf(Uint32Array.of(0, 8));  // With the points 0, 2 and 4 of each octahedron.
+  assert.deepEqual([...decodeSurface(message, MeshoptDecoder).inCut ?? []], [255, 0, 255, 0, 255, 0, 255, 0, 255, 0, 255, 0]);
 });
 
 test('a triangle with a point of another shell is refused', () => {

@@ -29,7 +29,7 @@ export function plainMessage(centres: readonly (readonly number[])[], format: ke
     triangleOffsets: bytesOf(Uint32Array.from([...shells, null], (_, k) => 8 * k)),
     outerOf: bytesOf(Uint32Array.from(shells, () => NO_SHELL)),
     identities: bytesOf(BigUint64Array.from(shells, (_, k) => BigInt(k + 1))),
-    normals: empty,
+    normals: empty, cuts: empty,
     attributes: [{ name: 'p', components: 1, values: bytesOf(Float32Array.from({ length: points.length / 3 }, (_, k) => k)) }],
     measures: {
       area: Float64Array.from(shells, () => 4 * Math.sqrt(3)), volume: Float64Array.from(shells, () => 4 / 3),

@@ -76,9 +76,10 @@ struct LocalMotion {
   }
 };
 
-/// Fits the motion of one cell to the cells within kMotionReach by least squares, with a ridge.
-/// Requires: `cells` are sorted and have moments. Deterministic: sums have the order of the
-/// cells. Cost: (2 kMotionReach + 1)^(axes - 1) binary searches.
+/// Fits the motion of one cell to the cells within kMotionReach by weighted least squares, with a
+/// ridge. Near cells with similar motions weigh most. Requires: `cells` are sorted and have
+/// moments. Deterministic: sums have a fixed order. Cost: (2 kMotionReach + 1)^(axes - 1) binary
+/// searches, three times as many if x is periodic.
 LocalMotion FitMotion(const MotionGrid& grid, std::span<const MotionCell> cells, std::size_t cell);
 
 }  // namespace partiemc

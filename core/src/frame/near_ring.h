@@ -1,4 +1,4 @@
-// The nearest neighbours of a position, and the spacing that they show.
+// The six nearest neighbours of a position, and the spacing that they show.
 #pragma once
 
 #include <algorithm>

@@ -57,7 +57,7 @@ void AddFoundSamples(std::span<const Found> found, std::vector<Relation>& relati
 /// has a node.
 void ApplySamples(Evidence& evidence, std::vector<Relation>& relations);
 
-/// Marks the relations that count, and the pieces that they link.
+/// Sets `counts` of the relations that count, and marks the pieces that these link.
 void MarkCounting(Evidence& evidence, std::vector<Relation>& relations);
 
 /// Removes the relations that do not count if one of their pieces has another that does.

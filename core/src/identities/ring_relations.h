@@ -34,12 +34,13 @@ struct RelationScratch {
   Evidence evidence;
 };
 
-/// Finds the related rings (core/IDENTITIES.md). Rings move by the displacement of their samples,
-/// else by their velocities, else not at all; then the nodes that they share are counted. If
-/// samples contradict the nodes, the samples decide. In a periodic box, nodes are compared after
-/// wrapping, because a ring may change its image. `relations` has each pair once, in no
-/// particular order.
-/// Cost: n log n in runs, rings and samples.
+/// Finds the related rings (core/IDENTITIES.md) by the nodes that they share after a movement.
+/// Rings of the last frame move by the displacements of their samples, or by their velocities if
+/// there are no samples; rings of this frame move back by their velocities. Rings without a
+/// relation that counts are compared where they are. If samples contradict the nodes, the samples
+/// decide. In a periodic box, nodes are wrapped first, because a ring may change its image.
+/// `relations` has each pair once, in no particular order. Cost: n log n in runs, rings and
+/// samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,
                  std::vector<Relation>& relations);
 

@@ -45,8 +45,8 @@ struct LiftScratch {
   std::vector<Attribute> attributes;
 };
 
-/// Bytes of a LiftScratch without copies, at most: `cell_of`, `wrapped` and `positions` in space;
-/// `cells`, `sets`, `low` and `high`.
+/// Bytes of a LiftScratch without copies of particles, at most. Per particle: `cell_of`, `wrapped`,
+/// `positions` in space, `groups`. Per cell: `cells`, `sets`, `low`, `high`, `groups`.
 inline constexpr std::uint64_t kBytesPerLiftedParticle = 60 + kBytesPerGroupedItem;
 inline constexpr std::uint64_t kBytesPerLiftCell = sizeof(LiftCell) + sizeof(std::uint32_t) +
                                                    sizeof(Image) + 2 * sizeof(Vec3) +

@@ -61,9 +61,9 @@ class ArcCurveFit {
 
     void Add(const Point& at);
   };
-  // Covariances, times the number of points, in the frame of a curve.
+  // Means, and sums of products of deviations, along (t) and across (n) a curve.
   struct Moments {
-    double t, n, q;  // Means.
+    double t, n, q;
     double tt, tn, nn, tq, nq, qq;
   };
   static Moments MomentsOf(const Sums& sums, const Point& along);

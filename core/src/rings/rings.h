@@ -51,8 +51,8 @@ struct RingScratch {
 /// Joins the segments of `crossings` to rings, in the order of their first segments, and assigns
 /// each hole to its outer ring. Cost: linear in segments, tiles and particles. Requires: resolved
 /// parameters.
-/// - `parameters.clean`: drops components without particles, and holes below 2 h^2 with everything
-///   in them (core/METHOD.md, "Cleaning").
+/// - `parameters.clean`: drops components without particles, and holes below 2 h^2 (.5 h^2 around
+///   grains) with everything in them (core/METHOD.md, "Cleaning").
 /// - `min_component_area`, `min_component_particles`: afterwards, and also without `clean`, drops
 ///   outer rings that enclose less area (in h^2) or fewer particles, with everything in them;
 ///   not if `keeps_spray`.

@@ -76,7 +76,7 @@ void LevelSetSampler::Build(const ParticleBins& bins, const Crossings& crossings
               [&](std::uint32_t tile) { LinkRuns(bins.tiles, tile); });
 }
 
-// Groups tiles into runs and allocates memory for their particles.
+// Groups the tiles with wanted particles into runs, and allocates memory for all their particles.
 void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   runs_.clear();
   run_of_.assign(tiles_.size(), kNoRun);

@@ -1,4 +1,4 @@
-// References to the ranges of memory that contain the particles around a few points.
+// Where the particles around the points of one query lie in memory.
 #pragma once
 
 #include <array>

@@ -209,7 +209,8 @@ class NearRows {
     std::int8_t first, last;
   };
 
-  /// Whether a length is an integer, or farther from one than ForEachNearRunOf rounds.
+  /// Whether a length in cells is an integer, or farther from one than the rounding errors of
+  /// ForEachNearRunOf.
   static bool IsExact(float length) {
     const float rest = std::abs(length - std::round(length));
     return rest == 0 || rest > 1e-4f;

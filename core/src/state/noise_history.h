@@ -15,7 +15,7 @@ namespace partiemc {
 
 inline constexpr std::uint32_t kWithNoiseMagic = 0x4e504d45;  // "EMPN"
 
-/// The size of SerializeWithNoise, if the other state has `state_bytes` bytes.
+/// The size of the result of SerializeWithNoise. `state_bytes`: the size of the other state.
 std::size_t SerializedNoiseBytes(const NoiseHistory& noise, std::size_t state_bytes);
 
 std::string SerializeWithNoise(const NoiseHistory& noise, std::string_view state_bytes);

@@ -292,7 +292,7 @@ class WallVertexFinder {
     return sharpest;
   }
 
-  // Whether a point is in a solid near the tile, by more than rounding.
+  // Whether a point is in a solid near the tile, deeper than rounding and less than one cell.
   bool IsBehindWall(std::uint32_t tile, const Point& point) const {
     bool is_behind = false;
     walls_.ForEachSolidNear(tile, point, [&](std::size_t, const NearestWall& nearest) {

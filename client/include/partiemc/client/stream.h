@@ -84,8 +84,8 @@ struct FrameParts {
   /// produce a stream of this name may send its parts.
   std::string token = {};
   /// Time limit for all parts of a frame, from the arrival of the first part. If a part is missing
-  /// then, the server refuses the frame (PARTS_MISSING). Must be below `deadline`, at most ten
-  /// minutes. The value of part 0 applies to all parts.
+  /// then, the server refuses the frame (PARTS_MISSING). 1 ms to ten minutes, at most `deadline`.
+  /// The value of part 0 applies to all parts.
   std::chrono::milliseconds timeout{10000};
 };
 

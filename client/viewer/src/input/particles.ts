@@ -64,7 +64,7 @@ function idsOf(rows: Rows, at: number): BigUint64Array | null {
   return ids && new Set(ids).size === rows.count ? ids : null;
 }
 
-/** Moves particles in place: from fractions of a box if `scaled`, by the boxes that they have crossed. */
+/** In place: converts fractions of the box to positions if `scaled`, and adds `images` times the edges of the box. */
 export type Place = (axes: Axes, images: Axes, scaled: boolean) => void;
 
 /** The particles of a frame. */

@@ -46,6 +46,7 @@ export interface SurfaceMessage {
   outerOf: Uint8Array;
   identities: Uint8Array;
   normals: Uint8Array;
+  cuts: Uint8Array;
   attributes: NamedValues[];
   step: number;
   measures: ShellMeasures;
@@ -75,6 +76,8 @@ export interface Surface {
   outerOf: Uint32Array;
   identities: BigUint64Array;
   measures: ShellMeasures;
+  /** Per point: 255 if a triangle on a wall or on a face of the box uses it, otherwise 0. Null if there is no such triangle. */
+  inCut: Uint8Array | null;
   /** Smallest x, y, z and largest x, y, z of each shell, relative to the origin. */
   boxes: Float32Array;
   attributes: PointValues[];
@@ -110,6 +113,7 @@ export function surfaceMessageOf(message: ReconstructedFrame): SurfaceMessage {
     outerOf: surface?.outerOf ?? none,
     identities: surface?.identities ?? none,
     normals: surface?.normals ?? none,
+    cuts: surface?.cuts ?? none,
     attributes: (surface?.attributes ?? []).map(({ name, components, values }) => ({ name, components, values })),
     step: surface?.step ?? 0,
     measures: {
@@ -257,6 +261,20 @@ function checkTriangles(triangles: Uint32Array, { pointOffsets, triangleOffsets 
   return edges.subarray(0, count).slice();
 }
 
+/** Marks the points of the triangles that cut a body. */
+function pointsInCut(bytes: Uint8Array, triangles: Uint32Array, points: number): Uint8Array | null {
+  if (bytes.length === 0) return null;
+  const cuts = bytes.length % 4 === 0 ? copyOf(Uint32Array, bytes) : null;
+  if (!cuts?.every((cut, k) => 3 * cut < triangles.length && (k === 0 || cuts[k - 1] < cut))) {
+    throw lost('cuts', `must be ascending numbers of the ${triangles.length / 3} triangles`);
+  }
+  const inCut = new Uint8Array(points);
+  for (const cut of cuts) {
+    for (let corner = 3 * cut; corner < 3 * cut + 3; ++corner) inCut[triangles[corner]] = 255;
+  }
+  return inCut;
+}
+
 function boxesOf(positions: Float32Array, offsets: Uint32Array): Float32Array {
   const boxes = new Float32Array(6 * (offsets.length - 1));
   for (let k = 0; k + 1 < offsets.length; ++k) {
@@ -297,7 +315,7 @@ function emptySurface(origin: [number, number, number]): Omit<Surface, 'particle
   return {
     origin, positions: new Float32Array(0), normals: new Float32Array(0), triangles: new Uint32Array(0),
     edges: new Uint32Array(0), pointOffsets: new Uint32Array(1), triangleOffsets: new Uint32Array(1),
-    outerOf: new Uint32Array(0), identities: new BigUint64Array(0), boxes: new Float32Array(0), attributes: [],
+    outerOf: new Uint32Array(0), identities: new BigUint64Array(0), boxes: new Float32Array(0), attributes: [], inCut: null,
     measures: { area: new Float64Array(0), volume: new Float64Array(0), particles: new Float64Array(0), parents: [] },
   };
 }
@@ -314,7 +332,8 @@ function decodeBodies(message: SurfaceMessage, codec: Codec): Omit<Surface, 'par
   const edges = checkTriangles(arrays.triangles, shells);
   const boxes = boxesOf(arrays.positions, shells.pointOffsets);
   const normals = arrays.normals ?? meanNormals(arrays.positions, arrays.triangles);
-  return { ...shells, ...arrays, normals, edges, boxes, measures: message.measures };
+  const inCut = pointsInCut(message.cuts, arrays.triangles, points);
+  return { ...shells, ...arrays, normals, edges, inCut, boxes, measures: message.measures };
 }
 
 /** Decodes a surface and the particles. Throws an Error with a sentence if the message contradicts itself. */
@@ -327,7 +346,7 @@ export function decodeSurface(message: SurfaceMessage, codec: Codec): Surface {
 
 /** The arrays of a surface, to hand over to another thread. */
 export function buffersOf(surface: Surface): ArrayBuffer[] {
-  const { positions, normals, triangles, edges, boxes, attributes, particles } = surface;
-  const all = [positions, normals, triangles, edges, boxes, particles, ...attributes.map(({ values }) => values)];
+  const { positions, normals, triangles, edges, inCut, boxes, attributes, particles } = surface;
+  const all = [positions, normals, triangles, edges, inCut, boxes, particles, ...attributes.map(({ values }) => values)];
   return [...new Set(all.flatMap((array) => (array ? [array.buffer as ArrayBuffer] : [])))];
 }

@@ -28,9 +28,10 @@ const MARGIN = 0.1;
 /** A drag over the height of the picture turns by this angle. */
 const TURN_RADIANS = Math.PI;
 const STEEPEST = Math.PI / 2;
-/** Limits of the picture's height, as shares of the fitted one: float32 resolves no less. */
+/** Limits of the picture's height, as shares of the content's diagonal. float32 resolves nothing smaller. */
 const NEAREST_ZOOM = 1e-4;
 const FARTHEST_ZOOM = 100;
+/** The same in world units, for any content. */
 const SMALLEST_HEIGHT = 1e-30;
 const LARGEST_HEIGHT = 1e30;
 

@@ -176,11 +176,13 @@ class Drawing implements SpaceDrawing {
     this.edgeGeometry = this.edges.geometry = new BufferGeometry();
     this.pointGeometry = this.points.geometry = new BufferGeometry();
     if (!surface) return;
-    const { positions, normals, triangles, particles } = surface;
+    const { positions, normals, triangles, inCut, particles } = surface;
     const places = new BufferAttribute(positions, 3);
     this.geometry.setAttribute('position', places);
     this.geometry.setAttribute('normal', normals instanceof Int8Array
       ? new BufferAttribute(normals, 4, true) : new BufferAttribute(normals, 3));
+    // Without this attribute, the shader reads 0 at each point.
+    if (inCut) this.geometry.setAttribute('inCut', new BufferAttribute(inCut, 1, true));
     this.geometry.setIndex(new BufferAttribute(triangles, 1));
     this.edgeGeometry.setAttribute('position', places);
     if (particles) this.pointGeometry.setAttribute('position', new BufferAttribute(particles, 3));

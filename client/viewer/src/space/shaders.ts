@@ -27,14 +27,17 @@ bool isCutAway() { return above() > 0.0; }`;
 export const SURFACE_VERTEX = `
 attribute vec4 tint;
 attribute float value;
+attribute float inCut;
 varying vec4 tintHere;
 varying float valueHere;
+varying float inCutHere;
 varying vec3 normalHere;
 varying vec3 seen;
 centroid varying vec3 place;
 void main() {
   tintHere = tint;
   valueHere = value;
+  inCutHere = inCut;
   place = position;
   normalHere = normalMatrix * normal;
   vec4 at = modelViewMatrix * vec4(position, 1.0);
@@ -53,6 +56,7 @@ uniform vec3 accent;
 uniform float ambient;
 varying vec4 tintHere;
 varying float valueHere;
+varying float inCutHere;
 varying vec3 normalHere;
 varying vec3 seen;
 ${CLIP}${VALUE_COLOUR}
@@ -69,7 +73,9 @@ void main() {
 #endif
   // Behind the clip plane, the first surface is seen from its inside where the plane cuts a body.
   bool isCut = hasCutFace && isInside;
-  vec3 normal = isFlat ? normalize(cross(dFdx(seen), dFdy(seen))) : normalize(normalHere) * (isInside ? -1.0 : 1.0);
+  // Walls and faces of the box are flat. A point on their rim has the normal of the free surface.
+  bool isFlatHere = isFlat || inCutHere > 0.999;
+  vec3 normal = isFlatHere ? normalize(cross(dFdx(seen), dFdy(seen))) : normalize(normalHere) * (isInside ? -1.0 : 1.0);
   // Points in the cut face have no number.
   vec3 base = mode == ${COLOUR_MODE.values} ? (isCut ? missing : colourOf(valueHere)) : tintHere.rgb;
   float ofShell = step(0.5, tintHere.a);

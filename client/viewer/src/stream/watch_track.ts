@@ -164,7 +164,7 @@ export class WatchTrack implements Track {
     this.call = call;
   }
 
-  /** The history is full up to the player's position. Later frames are fetched later. */
+  /** Ends the call: the history is full from the player's position on. Later frames are fetched when there is room. */
   private suspend(): void {
     this.call?.close();
     this.call = null;

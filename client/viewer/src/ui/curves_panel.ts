@@ -130,7 +130,7 @@ export class CurvesPanel {
     }
   });
 
-  /** `isDetailed`: captions have the value of every band. */
+  /** `isDetailed`: captions of stacked curves have the value of each line, not only their sum. */
   constructor(private readonly curves: readonly Curve[], private readonly isDetailed: boolean,
               private readonly goTo: (sequence: number) => void) {
     this.items = curves.map((curve) => this.makeItem(curve));

@@ -1,6 +1,6 @@
 // Tests the clip plane of surfaces, its cut faces, and the planes of sections. Leaves screenshots in build/screenshots.
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { test } from 'node:test';
 import { ballsOf, servesBalls, SpaceViewer, SURFACE } from './space_support.mjs';
@@ -92,6 +92,33 @@ test('cut faces have the colours of their bodies and hide what is behind them', 
   const [open, openToo] = await coloursAt(FACE[0], FACE[1]);
   assert.ok(apart(open, openToo) > 3, 'a translucent surface shows its inside');
   await shot('translucent');
+});
+
+/** A layer of 17 x 17 columns, 6 to 9 particles high, without an end along x and y. */
+function layer() {
+  const lines = ['x,y,z'];
+  for (let x = 0; x < 17; ++x) {
+    for (let y = 0; y < 17; ++y) {
+      const height = 7.5 + 1.5 * Math.sin(2 * Math.PI * x / 17) * Math.cos(2 * Math.PI * y / 17);
+      for (let z = 0; z < height; ++z) lines.push([x + 0.5, y + 0.5, z].join(','));
+    }
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+test('a face of a periodic box that cuts a layer is flat up to its rim', async () => {
+  const file = path.join(balls.world.folder, 'layer.csv');
+  writeFileSync(file, layer());
+  const producer = balls.world.replayOf(file, 'layer', '--surface', '--spacing', '1', '--periodic', 'x,y',
+    '--box', '0,17,0,17,-9,29', '--loop', '--rate', '5');
+  viewer = await SpaceViewer.open(balls.browser, balls.world.url, { hash: '#stream=layer' });
+  await viewer.drawsSurface();
+  await viewer.button('Pause').click();
+  // In the middle of the face y = 0, and less than a cell from its rim.
+  const [middle, ...rim] = await coloursAt([8.5, 0, 3.5], [5, 0, -0.35], [8.5, 0, -0.35], [12, 0, -0.35], [8.5, 0, 7.3]);
+  await shot('box');
+  for (const colour of rim) assert.ok(apart(middle, colour) < 5, `${middle} and ${colour}`);
+  await producer.stop();
 });
 
 test('the clip plane cuts the outlines of sections', async () => {
