@@ -1,4 +1,5 @@
 // `partiemc`: the command line. Connects flags with verbs.
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 #include <string_view>
@@ -18,6 +19,31 @@ namespace {
 
 using partiemc::client::Complain;
 
+bool IsFlagOfSplashsurf(std::string_view flag) {
+  constexpr std::string_view kShort[] = {"-a", "-c", "-d", "-e", "-l",
+                                         "-n", "-o", "-r", "-s", "-t"};
+  constexpr std::string_view kLong[] = {
+      "--particle-", "--smoothing-length", "--cube-size",   "--surface-threshold",
+      "--mesh-",     "--normals",          "--sph-normals", "--output-file"};
+  return std::ranges::count(kShort, flag) > 0 ||
+         std::ranges::any_of(kLong, [&](std::string_view name) { return flag.starts_with(name); });
+}
+
+// The arguments that no verb and no flag takes, in their order.
+std::string Unexpected(const CLI::App& app) {
+  std::string text;
+  bool is_of_splashsurf = false;
+  for (const std::string& argument : app.remaining(/*recurse=*/true)) {
+    text += (text.empty() ? "" : " ") + argument;
+    is_of_splashsurf |= IsFlagOfSplashsurf(argument);
+  }
+  text += ": not expected";
+  if (is_of_splashsurf) {
+    text += "; core/SURFACES.md has the counterparts of splashsurf's flags";
+  }
+  return text;
+}
+
 // Reports a wrong verb or flag and refers to the help of its verb. `first`: the first argument.
 int ComplainUsage(const CLI::App& app, const CLI::ParseError& error, std::string_view first) {
   std::string help = "partiemc", wrong = error.what();
@@ -28,6 +54,8 @@ int ComplainUsage(const CLI::App& app, const CLI::ParseError& error, std::string
       wrong += (wrong.ends_with(':') ? " " : ", ") + verb->get_name();
     }
   }
+  const bool is_unexpected = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+  if (is_unexpected && !given.empty()) wrong = Unexpected(app);
   for (const CLI::App* verb : given) help += " " + verb->get_name();
   return Complain(partiemc::client::kUsage, wrong + "; see `" + help + " --help`");
 }

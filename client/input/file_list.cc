@@ -149,6 +149,10 @@ absl::StatusOr<InputFiles> ListInput(const std::string& input) {
   const bool pattern = input.find_first_of("*?[") != std::string::npos;
   if (!fs::exists(status) && pattern) return ListPattern(input);
   if (!fs::exists(status)) {
+    if (const std::size_t at = input.find("{}"); at != std::string::npos) {
+      return absl::NotFoundError(Concat(input, ": {} is no pattern; write '",
+                                        std::string(input).replace(at, 2, "*"), "'"));
+    }
     return absl::NotFoundError(Concat(input, ": no such file or directory; check the path"));
   }
   InputFiles files{InputKind::kFile, fs::path(input).parent_path().string(),

@@ -156,6 +156,7 @@ void SummariseSurface(const ReconstructionParameters& parameters, const Frame& f
   statistics.dropped_holes = surface.statistics.dropped_cavities;
   statistics.dropped_components = surface.statistics.dropped_components;
   statistics.dropped_spray = surface.statistics.dropped_spray;
+  statistics.doubts = surface.statistics.doubts;
   statistics.triangles = surface.TriangleCount();
   statistics.spacing = *parameters.spacing;
   statistics.cell_size = parameters.cell_size * *parameters.spacing;

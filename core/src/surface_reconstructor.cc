@@ -19,6 +19,7 @@
 #include "attributes/plane_fit.h"
 #include "base/cancellation.h"
 #include "base/vec3.h"
+#include "bins/resolution.h"
 #include "frame/calibration.h"
 #include "frame/distinct_ids.h"
 #include "frame/frame_view.h"
@@ -26,6 +27,7 @@
 #include "frame/scale.h"
 #include "frame/wall_rules.h"
 #include "frame_lengths.h"
+#include "partiemc/doubt.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "periodic/lift.h"
@@ -37,6 +39,7 @@
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space/spacing_doubt.h"
 #include "space/surface_bytes.h"
 #include "space_cut/surface_cut.h"
 #include "space_identities/shell_identities.h"
@@ -111,15 +114,6 @@ ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   }
   in_space.sizes = parameters.sizes;  // Slices exclude own sizes, so Validate must not see them.
   return in_space;
-}
-
-/// With own sizes, weights do not contain volumes.
-double LightestVolume(const Frame& frame, const SurfaceParameters& parameters) {
-  const double h = parameters.spacing;
-  if (frame.volumes.empty() || parameters.sizes == Sizes::kOwn) return h * h * h;
-  float lightest = frame.volumes[0];
-  for (const float volume : frame.volumes) lightest = std::min(lightest, volume);
-  return lightest;
 }
 
 // Cleaning fills cavities below this volume, in cubed spacings: they are dents of the level set,
@@ -529,6 +523,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     return InStage(control.observer, stage, run);
   };
   Scale scale;
+  Doubts doubts;
   absl::Status status = in_stage(Stage::kBins, [&] {
     absl::Status checked = CheckFrame(given, in_space_, limits_, b.distinct_ids);
     if (checked.ok() && state != nullptr) checked = CheckCellSize(*state, cell_size);
@@ -570,12 +565,16 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
         copied.any ? std::optional(copied.faces) : SpaceBeforeWalls(parameters_);
     b.virtual_plane.volumes.clips_images = copied.any;
     SizeRange sizes;
+    absl::StatusOr<double> lightest = h * h * h;
     if (parameters_.sizes == Sizes::kOwn) {
       const auto range = RangeOfSizes(frame, in_space_, {.spacing = h, .cell_size = cell_size});
       if (!range.ok()) return range.status();
       sizes = *range;
+    } else {
+      lightest = LightestVolume(given, *lightest, doubts);
+      if (!lightest.ok()) return lightest.status();
     }
-    scale = MakeScale(in_space_, h, cell_size, LightestVolume(frame, parameters_), sizes);
+    scale = MakeScale(in_space_, h, cell_size, *lightest, sizes);
     checked = space::FindBricks(frame, scale, limits_, b.bins);
     size.bricks = bricks.size();
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
@@ -584,6 +583,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     b.bins.are_images_mirrored = !copied.any;
     const bool has_images = copied.any || !parameters_.wall_planes.empty();
     b.bins.first_image = has_images ? static_cast<std::uint32_t>(own_particles) : kNoIndex;
+    if (!checked.ok()) return checked;
+    if (AreCoarse(given, h * sizes.smallest)) doubts.Add(Doubt::kPositionsCoarse);
+    if (space::ContradictsSpacing(b.bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
     return checked;
   });
   if (!status.ok()) return status;
@@ -594,6 +596,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   in_stage(Stage::kField, [&] { space::SampleField(b.bins, scale, b.field); });
   in_stage(Stage::kRings,
            [&] { surface.statistics = FindCleanBodies(lifted, copied, parameters_, b); });
+  surface.statistics.doubts = doubts;
   status = in_stage(Stage::kCrossings, [&] {
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;

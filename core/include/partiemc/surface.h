@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "partiemc/attribute_values.h"
+#include "partiemc/doubt.h"
 #include "partiemc/surface_state.h"
 
 namespace partiemc {
@@ -29,6 +30,7 @@ struct SurfaceStatistics {
   std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
   std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
+  Doubts doubts;                         ///< Reasons to distrust the surface.
 
   friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
 };

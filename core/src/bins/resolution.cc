@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <string>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "frame/frame_view.h"
@@ -52,6 +54,14 @@ absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirector
   if (std::holds_alternative<std::span<const double>>(frame.positions)) return absl::OkStatus();
   if (StepAt(BoundOf(tiles, cell_size)) <= kDoubtfulStep * spacing) return absl::OkStatus();
   return CheckStep(frame, plane, spacing, doubts);
+}
+
+bool AreCoarse(const Frame& frame, double spacing) {
+  const auto* positions = std::get_if<std::span<const float>>(&frame.positions);
+  if (positions == nullptr) return false;
+  float largest = 0;
+  for (const float coordinate : *positions) largest = std::max(largest, std::abs(coordinate));
+  return StepAt(largest) > kDoubtfulStep * spacing;
 }
 
 absl::Status CheckStep(const Frame& frame, Plane plane, double spacing, Doubts& doubts) {

@@ -16,6 +16,10 @@ namespace partiemc {
 absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirectory& tiles,
                              double cell_size, double spacing, Doubts& doubts);
 
+/// Whether positions in space are float32 and a step is above 1/16 of the spacing. Cost: linear in
+/// particles.
+bool AreCoarse(const Frame& frame, double spacing);
+
 /// As CheckResolution, without tiles. Cost: linear in particles.
 absl::Status CheckStep(const Frame& frame, Plane plane, double spacing, Doubts& doubts);
 

@@ -21,7 +21,7 @@ std::string_view Explanation(Doubt doubt) {
     case Doubt::kSpacingProvisional:
       return "particles do not agree on a spacing yet, lengths are estimates; give the spacing";
     case Doubt::kSpacingContradicted:
-      return "distances of particles are above twice or below half the spacing; give the right one";
+      return "particles are about twice or half as far apart as the spacing says, or worse; give the right one";
     case Doubt::kVolumesContradictSpacing:
       return "volumes are above twice or below half the squared spacing; check their unit";
     case Doubt::kPositionsCoarse:

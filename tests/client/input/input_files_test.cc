@@ -165,6 +165,8 @@ TEST(InputFiles, WhatIsNotThereIsSaidWithAdvice) {
                 {"none.csv", "check the path"});
   ExpectRefused(ReadAll(directory.Path("*.vtp")).status, absl::StatusCode::kNotFound,
                 {"*.vtp", "check the pattern"});
+  ExpectRefused(ReadAll(directory.Path("f_{}.ply")).status, absl::StatusCode::kNotFound,
+                {"{} is no pattern", "f_*.ply'"});
   std::filesystem::create_directory(directory.Path("run"));
   ExpectRefused(ReadAll(directory.path()).status, absl::StatusCode::kNotFound,
                 {"holds no files", "run"});

@@ -1,4 +1,4 @@
-// The estimated spacing of particles in space.
+// The estimated spacing of particles in space, and doubts about the given one.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "partiemc/doubt.h"
 #include "partiemc/spacing.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 
 namespace partiemc {
@@ -81,6 +83,102 @@ TEST(SpacingInSpace, IsAbsentIfNoTwoParticlesDiffer) {
   particles.Add(Vec3{1, 2, 5});
   particles.Add(Vec3{1, std::nan(""), 4});
   EXPECT_EQ(EstimateSpacing(particles.AsFrame()), 2.0);
+}
+
+Doubts DoubtsOf(const Frame& frame, const SurfaceParameters& parameters) {
+  const auto reconstructor = SurfaceReconstructor::Create(parameters);
+  SurfaceWorkspace workspace;
+  Surface surface;
+  EXPECT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
+  return surface.statistics.doubts;
+}
+
+bool Contradicts(const SpaceParticles& particles, double spacing, double cell_size = 1) {
+  return DoubtsOf(particles.AsFrame(), {.spacing = spacing, .cell_size = cell_size})
+      .Has(Doubt::kSpacingContradicted);
+}
+
+// The densest lattice, of number density 1.
+SpaceParticles DensestBall(double radius) {
+  SpaceParticles ball;
+  const double half = std::cbrt(4) / 2;
+  const int most = static_cast<int>(radius / half) + 1;
+  for (int i = -most; i <= most; ++i) {
+    for (int j = -most; j <= most; ++j) {
+      for (int k = -most; k <= most; ++k) {
+        const Vec3 at = half * Vec3{1.0 * i, 1.0 * j, 1.0 * k};
+        if ((i + j + k) % 2 == 0 && Length(at) <= radius) ball.Add(at);
+      }
+    }
+  }
+  return ball;
+}
+
+TEST(SpacingDoubt, AFactorOfTwoOrMoreIsReportedInBodies) {
+  Random random(6);
+  const SpaceParticles bodies[] = {testing::Box(kLow, kHigh, 0, random),
+                                   testing::Ball({.3, .2, .1}, 8, .2, random), DensestBall(8),
+                                   Darts(.7, random)};
+  for (const SpaceParticles& body : bodies) {
+    for (const double factor : {2.0, 3.0, 8.0}) {
+      EXPECT_TRUE(Contradicts(body, 1 / factor)) << factor;
+      EXPECT_TRUE(Contradicts(body, factor)) << factor;
+    }
+    for (const double spacing : {.8, 1.0, 1.25}) EXPECT_FALSE(Contradicts(body, spacing));
+    EXPECT_FALSE(Contradicts(body, 1, .5));
+    EXPECT_TRUE(Contradicts(body, .5, .5));
+    EXPECT_TRUE(Contradicts(testing::Shuffled(body, random), .5));
+  }
+}
+
+TEST(SpacingDoubt, SprayDropsThreadsAndFilmsGiveNone) {
+  Random random(7);
+  SpaceParticles spray, drops, threads;
+  for (int k = 0; k < 400; ++k) {
+    const double x = random.Unit(), y = random.Unit(), z = random.Unit();
+    spray.Add(Vec3{30 * x, 30 * y, 30 * z});
+  }
+  for (int k = 0; k < 40; ++k) {
+    const Vec3 at{8.0 * (k % 5), 8.0 * (k / 5 % 4), 8.0 * (k / 20)};
+    drops.Add(testing::Ball(at, 1.3, .1, random));
+    threads.Add(testing::Box(at, at + Vec3{30, .5, .5}, .1, random));
+  }
+  for (const double spacing : {.5, 1.0, 2.0}) EXPECT_FALSE(Contradicts(spray, spacing));
+  EXPECT_FALSE(Contradicts(drops, 1));
+  EXPECT_FALSE(Contradicts(threads, 1));
+  for (const double height : {.5, 1.5, 2.5}) {
+    EXPECT_FALSE(Contradicts(testing::Box({-20, -20, 0}, {20, 20, height}, .1, random), 1));
+  }
+}
+
+TEST(SpacingDoubt, OwnSizesCountInTheirOwnSpacings) {
+  Random random(8);
+  SpaceParticles mixed = testing::Box(kLow, kHigh, 0, random);
+  mixed.volumes.assign(mixed.size(), 1);
+  const SpaceParticles coarse = testing::Box(kLow, kHigh, 0, random);
+  for (std::size_t k = 0; k < coarse.size(); ++k) {
+    mixed.Add(3 * coarse.At(k) + Vec3{60, 0, 0});
+    mixed.volumes.push_back(27);
+  }
+  const auto doubts_at = [&](double spacing) {
+    return DoubtsOf(mixed.AsFrame(), {.spacing = spacing, .sizes = Sizes::kOwn});
+  };
+  EXPECT_FALSE(doubts_at(2).Has(Doubt::kSpacingContradicted));
+  for (float& volume : mixed.volumes) volume *= 8;
+  EXPECT_TRUE(doubts_at(2).Has(Doubt::kSpacingContradicted));
+}
+
+TEST(SurfaceDoubts, VolumesAndCoarsePositionsAreReported) {
+  Random random(9);
+  SpaceParticles body = testing::Box(kLow, kHigh, 0, random);
+  body.volumes.assign(body.size(), 1);
+  EXPECT_TRUE(DoubtsOf(body.AsFrame(), {}).empty());
+  for (float& volume : body.volumes) volume = 3;
+  EXPECT_TRUE(DoubtsOf(body.AsFrame(), {}).Has(Doubt::kVolumesContradictSpacing));
+  std::vector<float> far;
+  for (const double coordinate : body.xyz) far.push_back(static_cast<float>(coordinate + 4e6));
+  const Frame frame{.positions = std::span<const float>(far), .components = 3};
+  EXPECT_TRUE(DoubtsOf(frame, {}).Has(Doubt::kPositionsCoarse));
 }
 
 TEST(SpacingInPlane, IsThatOfStreamsWithoutASpacing) {

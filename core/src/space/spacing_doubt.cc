@@ -1,0 +1,168 @@
+#include "space/spacing_doubt.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "base/vec3.h"
+#include "frame/near_ring.h"
+
+namespace partiemc::space {
+namespace {
+
+// Numbers of samples. If fewer than kCause of the first kAskedFirst samples contradict the spacing,
+// there is no doubt, and the check ends.
+constexpr std::size_t kAsked = 64;
+constexpr std::size_t kAskedFirst = 16;
+constexpr std::size_t kCause = 3;
+// Limit of the particles and bricks that the check visits.
+constexpr std::size_t kMostLooks = std::size_t{1} << 20;
+
+// Distances in spacings that contradict the spacing. The sixth nearest position is 1 spacing away on
+// the cubic lattice, 1.2 in disorder.
+constexpr double kMaxDistance = 1.7;
+constexpr double kMinDistance = 0.7;
+
+// The ten positions nearest to a point, as offsets.
+class NearShell {
+ public:
+  // The point itself and repeated positions are ignored.
+  void Add(const Vec3& offset) {
+    const double square = Dot(offset, offset);
+    if (square >= reach_square() || square == 0) return;
+    for (const Near& near : nearest_) {
+      if (near.square == square && near.offset == offset) return;
+    }
+    std::size_t k = kCount - 1;
+    for (; k > 0 && nearest_[k - 1].square > square; --k) nearest_[k] = nearest_[k - 1];
+    nearest_[k] = {offset, square};
+  }
+
+  // Offsets beyond this squared distance are ignored; infinite until ten offsets are known.
+  double reach_square() const { return nearest_[kCount - 1].square; }
+
+  // Whether the positions lie all around at similar distances: a lone particle, a thread or a film
+  // does not show the spacing.
+  bool IsAround() const {
+    if (!(reach_square() <= kMaxRatio * kMaxRatio * nearest_[1].square)) return false;
+    Vec3 sum;
+    double distances = 0;
+    for (const Near& near : nearest_) {
+      sum = sum + near.offset;
+      distances += std::sqrt(near.square);
+    }
+    return Length(sum) <= kMaxImbalance * distances;
+  }
+
+  double Distance() const { return std::sqrt(nearest_[kDeciding].square); }
+
+ private:
+  static constexpr std::size_t kCount = 10, kDeciding = 5;
+  // Of the distances of the farthest and the second nearest: 1.41 on the cubic lattice, 1.73 and
+  // more in a film of one layer.
+  static constexpr double kMaxRatio = 1.7;
+  // Of the mean offset, in mean distances: .3 at a flat free surface of the cubic lattice.
+  static constexpr double kMaxImbalance = 0.35;
+
+  struct Near {
+    Vec3 offset;
+    double square = std::numeric_limits<double>::infinity();
+  };
+  std::array<Near, kCount> nearest_;  // Nearest first.
+};
+
+class Probe {
+ public:
+  Probe(const SpaceBins& bins, const Scale& scale)
+      : bins_(bins), spacing_(scale.spacing), largest_(scale.sizes.largest) {}
+
+  // Whether the distances around a particle contradict the spacing.
+  bool Contradicts(std::uint32_t brick, std::uint32_t particle) {
+    const Sample at{
+        brick, {bins_.x[particle], bins_.y[particle], bins_.z[particle]}, SizeOf(particle)};
+    NearShell near;
+    Gather(brick, at, near);
+    const BrickNeighbours& neighbours = bins_.bricks.neighbours(brick);
+    for (const std::uint32_t other : neighbours) {
+      if (other != kNoIndex && other != brick) Gather(other, at, near);
+    }
+    const double widest = WidestPair(at);
+    if (widest * widest * near.reach_square() > kBrickSize * kBrickSize) {
+      looks_ += bins_.bricks.size();
+      for (std::uint32_t other = 0; other < bins_.bricks.size() && !IsExhausted(); ++other) {
+        if (std::ranges::count(neighbours, other) == 0) Gather(other, at, near);
+      }
+    }
+    if (!near.IsAround()) return false;
+    const double distance = near.Distance() / spacing_;
+    return distance > kMaxDistance || distance < kMinDistance;
+  }
+
+  bool IsExhausted() const { return looks_ > kMostLooks; }
+
+ private:
+  // A sampled particle: its position in its brick, in cells, and its size in spacings.
+  struct Sample {
+    std::uint32_t brick;
+    Vec3 place;
+    double size;
+  };
+
+  double SizeOf(std::uint32_t particle) const {
+    return bins_.size.empty() ? 1.0 : double{bins_.size[particle]};
+  }
+  // The largest mean size of the sample and another particle.
+  double WidestPair(const Sample& at) const { return (at.size + largest_) / 2; }
+
+  // Adds the particles of a brick, unless the whole brick lies farther than the ten nearest so far.
+  void Gather(std::uint32_t other, const Sample& at, NearShell& near) {
+    const std::uint32_t first = bins_.FirstOf(other), end = bins_.EndOf(other);
+    if (first == end) return;
+    const BrickCoordinate &from = bins_.bricks[at.brick], &to = bins_.bricks[other];
+    const Vec3 corner =
+        kBrickSize * Vec3{double{to.x} - from.x, double{to.y} - from.y, double{to.z} - from.z} -
+        at.place;
+    const auto across = [](double low) { return std::max({0.0, low, -low - kBrickSize}); };
+    const Vec3 away{across(corner.x), across(corner.y), across(corner.z)};
+    const double widest = WidestPair(at);
+    if (Dot(away, away) >= widest * widest * near.reach_square()) return;
+    looks_ += end - first;
+    for (std::uint32_t p = first; p < end; ++p) {
+      const Vec3 offset = corner + Vec3{bins_.x[p], bins_.y[p], bins_.z[p]};
+      near.Add(2 / (at.size + SizeOf(p)) * offset);
+    }
+  }
+
+  const SpaceBins& bins_;
+  double spacing_, largest_;
+  std::size_t looks_ = 0;
+};
+
+}  // namespace
+
+bool ContradictsSpacing(const SpaceBins& bins, const Scale& scale) {
+  const std::size_t count = bins.source.size();
+  const std::size_t most = std::min(kAsked, count);
+  Probe probe(bins, scale);
+  std::size_t asked = 0, contradicting = 0;
+  for (; asked < most && !probe.IsExhausted(); ++asked) {
+    if (asked == kAskedFirst && contradicting < kCause) return false;
+    // Multiples of an odd number modulo a power of 2, so that the first samples are spread over all
+    // particles, too.
+    const std::size_t place = asked * 37 % kAsked;
+    const auto particle =
+        static_cast<std::uint32_t>(count <= kAsked ? asked : count * place / kAsked);
+    std::uint32_t low = 0, high = static_cast<std::uint32_t>(bins.bricks.size());
+    while (high - low > 1) {
+      const std::uint32_t middle = low + (high - low) / 2;
+      (bins.FirstOf(middle) <= particle ? low : high) = middle;
+    }
+    if (probe.Contradicts(low, particle)) ++contradicting;
+  }
+  return AreEnough(contradicting, asked);
+}
+
+}  // namespace partiemc::space
