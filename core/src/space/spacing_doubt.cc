@@ -21,8 +21,8 @@ constexpr std::size_t kCause = 3;
 // Limit of the particles and bricks that the check visits.
 constexpr std::size_t kMostLooks = std::size_t{1} << 20;
 
-// Distances in spacings that contradict the spacing. The sixth nearest position is 1 spacing away on
-// the cubic lattice, 1.2 in disorder.
+// Distances in spacings that contradict the spacing. The sixth nearest position is 1 spacing away
+// on the cubic lattice, 1.2 in disorder.
 constexpr double kMaxDistance = 1.7;
 constexpr double kMinDistance = 0.7;
 
@@ -61,10 +61,11 @@ class NearShell {
 
  private:
   static constexpr std::size_t kCount = 10, kDeciding = 5;
-  // Of the distances of the farthest and the second nearest: 1.41 on the cubic lattice, 1.73 and
-  // more in a film of one layer.
+  // Largest ratio of the distances of the farthest and the second nearest. The cubic lattice has
+  // 1.41, a film of one layer 1.73 or more.
   static constexpr double kMaxRatio = 1.7;
-  // Of the mean offset, in mean distances: .3 at a flat free surface of the cubic lattice.
+  // Largest length of the mean offset, in mean distances. A flat free surface of the cubic lattice
+  // has .3.
   static constexpr double kMaxImbalance = 0.35;
 
   struct Near {
