@@ -26,6 +26,12 @@ constexpr std::uint32_t LengthTag(int field) {
   return WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_LENGTH_DELIMITED);
 }
 
+// Sizes of parsed fields, at most. Arrays of numbers grow by doubling.
+constexpr std::uint64_t kBytesOfMessage = 1024, kBytesOfField = 64, kBytesOfPackedByte = 16;
+
+// Parsers read at most as many messages inside each other.
+constexpr int kMostNested = 100;
+
 std::uint64_t LengthFieldBytes(int field, std::uint64_t bytes) {
   return CodedOutputStream::VarintSize32(LengthTag(field)) +
          CodedOutputStream::VarintSize64(bytes) + bytes;
@@ -51,6 +57,35 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
       input.PopLimit(limit);
     } else if (!WireFormatLite::SkipField(&input, tag)) {
       return false;
+    }
+  }
+  return true;
+}
+
+// Adds what the fields in `input` take to `bytes`. Returns false for a malformed message.
+bool AddParsedBytes(CodedInputStream& input, const google::protobuf::Descriptor& type, int nested,
+                    std::uint64_t& bytes) {
+  while (const std::uint32_t tag = input.ReadTag()) {
+    bytes += kBytesOfField;
+    const auto* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    if (WireFormatLite::GetTagWireType(tag) != WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
+      if (!WireFormatLite::SkipField(&input, tag)) return false;
+      continue;
+    }
+    int length = 0;
+    if (!input.ReadVarintSizeAsInt(&length)) return false;
+    if (field != nullptr && field->message_type() != nullptr) {
+      bytes += kBytesOfMessage;
+      if (nested == kMostNested) return false;
+      const auto limit = input.PushLimit(length);
+      if (!AddParsedBytes(input, *field->message_type(), nested + 1, bytes)) return false;
+      if (input.BytesUntilLimit() != 0) return false;
+      input.PopLimit(limit);
+    } else {
+      if (field != nullptr && field->is_packable()) {
+        bytes += kBytesOfPackedByte * static_cast<std::uint64_t>(length);
+      }
+      if (!input.Skip(length)) return false;
     }
   }
   return true;
@@ -173,6 +208,14 @@ bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& t
   int fields = 0;
   CountFields(input, type, fields);
   return fields <= kMaxFields;
+}
+
+std::uint64_t ParsedBytes(std::string_view bytes, const google::protobuf::Descriptor& type) {
+  CodedInputStream input(reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                         static_cast<int>(bytes.size()));
+  std::uint64_t parsed = kBytesOfMessage;
+  AddParsedBytes(input, type, 0, parsed);
+  return parsed;
 }
 
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last) {

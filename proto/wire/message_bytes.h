@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "partiemc/frame.h"
 #include "partiemc/v1/reconstruction.pb.h"
@@ -24,6 +25,10 @@ inline constexpr int kMaxFields = 4096;
 /// the first malformed field. Parsing such a message takes about as much memory as its bytes. Skips
 /// the contents of strings.
 bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& type);
+
+/// Estimate of the memory that a message of `type` takes, parsed from `bytes`, beside the contents
+/// of its strings. Never too low. Reads up to the first malformed field, as a parser does.
+std::uint64_t ParsedBytes(std::string_view bytes, const google::protobuf::Descriptor& type);
 
 /// The number of the set field of a message that consists of a oneof with the fields 1 to `last`; 0
 /// if none is set. Empty if `bytes` is malformed or has more than kMaxFields fields. Does not check

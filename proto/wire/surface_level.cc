@@ -1,11 +1,13 @@
 #include "wire/surface_level.h"
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "partiemc/result.h"
 #include "partiemc/status.h"
+#include "wire/result_parts.h"
 #include "wire/surface_codec.h"
 
 namespace partiemc::wire {
@@ -20,9 +22,27 @@ std::uint64_t LastOf(const std::string& offsets) {
   return last;
 }
 
+// Refuses counts that the arrays of no coordinate format can hold, before memory is reserved for
+// them.
+absl::Status CheckCounts(const v1::Surface& surface) {
+  // The vertex codec compresses 12 bytes of a point to a 64th at least, and the index codec stores
+  // at least a byte for each triangle (compact_surface.cc).
+  constexpr std::uint64_t kMostPointsOfByte = 6;
+  if (LastOf(surface.point_offsets()) > kMostPointsOfByte * surface.points().size()) {
+    return Lost("surface.point_offsets", "gives more points than surface.points can hold");
+  }
+  if (LastOf(surface.triangle_offsets()) > surface.triangles().size()) {
+    return Lost("surface.triangle_offsets", "gives more triangles than surface.triangles can hold");
+  }
+  return absl::OkStatus();
+}
+
 std::uint64_t BytesOfLevel(const v1::Surface& surface) {
   std::uint64_t values = 0;
-  for (const v1::NamedAttribute& attribute : surface.attributes()) values += attribute.components();
+  // More components are refused later.
+  for (const v1::NamedAttribute& attribute : surface.attributes()) {
+    values += std::min(attribute.components(), 3u);
+  }
   return LevelBytes(LastOf(surface.point_offsets()), LastOf(surface.triangle_offsets()), values);
 }
 
@@ -56,7 +76,8 @@ absl::Status ReplaceByLevel(const LevelOfDetail& level,
                             const std::atomic<bool>* cancelled, v1::ReconstructedFrame& message) {
   if (!message.has_surface()) return absl::OkStatus();
   v1::Surface& surface = *message.mutable_surface();
-  absl::Status status = reserve(BytesOfLevel(surface));
+  absl::Status status = CheckCounts(surface);
+  if (status.ok()) status = reserve(BytesOfLevel(surface));
   Surface decoded;
   if (status.ok()) status = DecodeSurface(message, decoded);
   if (!status.ok()) return status;

@@ -25,8 +25,9 @@ std::optional<SurfaceLevel> LevelOf(const v1::ReconstructedFrame& message);
 /// and step. All other fields, measures and identities stay. A message without a surface stays as
 /// it is.
 /// `reserve` is called once, with an estimate of the memory; its error is returned.
-/// Runs in the caller's Arena. Errors: DATA_LOSS for a malformed surface; CANCELLED. After an error
-/// `message` is unspecified. May throw std::bad_alloc.
+/// Runs in the caller's Arena. Errors: DATA_LOSS for a malformed surface, and as MakeLevel;
+/// OUT_OF_RANGE (RESOLUTION) if a compact level does not fit its `step`. After an error `message`
+/// is unspecified. May throw std::bad_alloc.
 absl::Status ReplaceByLevel(const LevelOfDetail& level,
                             absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve,
                             const std::atomic<bool>* cancelled, v1::ReconstructedFrame& message);

@@ -6,10 +6,12 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "server/compute/memory_budget.h"
 #include "server/relay/watched_result.h"
+#include "wire/message_bytes.h"
 #include "wire/surface_level.h"
 
 namespace partiemc::server {
@@ -46,6 +48,15 @@ class Reservation {
   bool may_fit_later_ = true;
 };
 
+absl::Status Invalid(const WatchedResult& result, absl::string_view fault) {
+  if (result.origin == WatchedResult::Origin::kHere) return absl::InternalError(fault);
+  return ViolationError(
+      absl::StatusCode::kDataLoss,
+      {std::string(kReasonInvalidResult), kField, std::string(fault),
+       "must be of a valid surface, which the replica of the stream has not sent; "
+       "watch without a level"});
+}
+
 absl::StatusOr<LevelQueue::Frame> MakeOrThrow(const LevelQueue::Frame& exact,
                                               const LevelOfDetail& level,
                                               const std::atomic<bool>& cancelled,
@@ -54,13 +65,18 @@ absl::StatusOr<LevelQueue::Frame> MakeOrThrow(const LevelQueue::Frame& exact,
   absl::Status status = reservation.Take(kCopies * result.bytes.size());
   if (!status.ok()) return status;
   v1::ReconstructedFrame frame;
-  if (!frame.ParseFromString(result.bytes.ToString())) {
-    return absl::InternalError("a result for watchers cannot be parsed");
+  {
+    const std::string bytes = result.bytes.ToString();
+    status = reservation.Take(wire::ParsedBytes(bytes, *v1::ReconstructedFrame::descriptor()));
+    if (!status.ok()) return status;
+    if (!frame.ParseFromString(bytes)) return Invalid(result, "a result that cannot be parsed");
   }
   if (!frame.has_surface()) return exact;
   status = wire::ReplaceByLevel(
       level, [&](std::uint64_t bytes) { return reservation.Take(bytes); }, &cancelled, frame);
-  if (absl::IsDataLoss(status)) return absl::InternalError(status.message());
+  if (absl::IsDataLoss(status) || absl::IsOutOfRange(status)) {
+    return Invalid(result, status.message());
+  }
   if (!status.ok()) return status;
   return std::make_shared<WatchedResult>(wire::WatchedBytes(frame.SerializeAsString()));
 }

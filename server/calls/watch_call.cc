@@ -29,12 +29,6 @@ absl::StatusOr<WatchMode> DecodeMode(v1::WatchMode mode) {
   }
 }
 
-absl::Status NoLevel(std::string rule) {
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(wire::kReasonUnsupported), "open.level_of_detail", "set", std::move(rule)});
-}
-
 }  // namespace
 
 WatchCall::WatchCall(ArrivedCall call, const ServerContext& context)
@@ -128,40 +122,43 @@ void WatchCall::StartOpen() {
 
 absl::Status WatchCall::OpenHere(const StreamSummary& stream) {
   const StreamDescription& description = stream.description;
-  if (auto status = JoinLevel(description); !status.ok()) return status;
+  terms_.broadcaster = description.broadcaster;
+  const bool has_surfaces = description.parameters.output == Output::kSurface;
+  if (auto status = JoinLevel(has_surfaces); !status.ok()) return status;
   if (auto status = TakePlace(stream.id, description.name); !status.ok()) return status;
   v1::WatchOpened& opened = *opened_.mutable_opened();
   opened.set_lineage(stream.lineage);
   wire::EncodeParameters(description.parameters, *opened.mutable_parameters());
   opened.mutable_labels()->insert(description.labels.begin(), description.labels.end());
-  terms_.broadcaster = description.broadcaster;
   return absl::OkStatus();
 }
 
-absl::Status WatchCall::JoinLevel(const StreamDescription& description) {
+// Joins the level that the watcher requests, if any, of the stream in terms_.
+absl::Status WatchCall::JoinLevel(bool has_surfaces) {
   if (!parsed_.open().has_level_of_detail()) return absl::OkStatus();
-  if (description.parameters.output != Output::kSurface) {
-    return NoLevel("must be absent: the stream has outlines, not surfaces");
+  if (!has_surfaces) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {std::string(wire::kReasonUnsupported), "open.level_of_detail", "set",
+                           "must be absent: the stream has outlines, not surfaces"});
   }
   auto level = wire::DecodeLevelOfDetail(parsed_.open().level_of_detail());
   if (!level.ok()) return level.status();
-  auto seat = context().levels.Join(description.broadcaster.get(), *level);
+  auto seat = context().levels.Join(terms_.broadcaster.get(), *level);
   if (seat.ok()) level_ = *std::move(seat);
   return seat.status();
 }
 
 absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
-  if (parsed_.open().has_level_of_detail()) {
-    return NoLevel("must be absent for a stream of another replica: watch it there");
-  }
   const v1::StreamSummary& stream = found.stream.summary();
+  terms_.broadcaster = found.broadcaster;
+  const bool has_surfaces = stream.parameters().output() == v1::OUTPUT_SURFACE;
+  if (auto status = JoinLevel(has_surfaces); !status.ok()) return status;
   if (auto status = TakePlace(stream.stream_id(), stream.stream_name()); !status.ok())
     return status;
   v1::WatchOpened& opened = *opened_.mutable_opened();
   opened.set_lineage(found.stream.lineage());
   *opened.mutable_parameters() = stream.parameters();
   *opened.mutable_labels() = stream.labels();
-  terms_.broadcaster = found.broadcaster;
   return absl::OkStatus();
 }
 

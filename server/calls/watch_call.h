@@ -44,7 +44,7 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   void Finish(const absl::Status& status) override;
 
   absl::StatusOr<WatchTerms> ReadTerms() const;
-  absl::Status JoinLevel(const StreamDescription& description);
+  absl::Status JoinLevel(bool has_surfaces);
   absl::Status OpenHere(const StreamSummary& stream);
   absl::Status OpenRemote(const Relay::Found& found);
   absl::Status TakePlace(const std::string& stream_id, const std::string& stream_name);

@@ -93,7 +93,8 @@ void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
   SetOldest(result.oldest_sequence());
   if (result.first() && result.fetch() == fetch_.fetch()) DeliverUpTo(result.number() - 1);
   if (next_number_ != 0 && result.number() < next_number_) return;
-  const Published published{std::make_shared<WatchedResult>(wire::WatchedBytes(result.frame())),
+  const Published published{std::make_shared<WatchedResult>(wire::WatchedBytes(result.frame()),
+                                                            WatchedResult::Origin::kOtherReplica),
                             result.number(), result.sequence()};
   if (result.number() == next_number_) {
     Deliver(published);

@@ -1,10 +1,13 @@
-// A server's response as decoded by the client: any accepted response is consistent.
+// A server's response as decoded by the client: any accepted response is consistent. As decoded by
+// another replica: any level of detail is consistent, too.
 #include <cmath>
 
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
 #include "partiemc/partiemc.h"
 #include "wire/codec.h"
+#include "wire/message_bytes.h"
+#include "wire/surface_level.h"
 
 namespace partiemc::fuzz {
 namespace {
@@ -55,11 +58,37 @@ void RequireWhole(const Result& result) {
   }
 }
 
+// A server makes levels of the messages of other replicas.
+void RequireLevel(const v1::ReconstructedFrame& message, const LevelOfDetail& level) {
+  v1::ReconstructedFrame made = message;
+  const auto grant = [](std::uint64_t) { return absl::OkStatus(); };
+  const absl::Status status = wire::ReplaceByLevel(level, grant, nullptr, made);
+  if (!status.ok()) {
+    return Require(absl::IsDataLoss(status) || absl::IsOutOfRange(status),
+                   "a level that cannot be made is DATA_LOSS, or too fine");
+  }
+  if (!message.has_surface()) return;
+  wire::ReconstructedFrame exact, coarse;
+  if (!wire::DecodeResult(message, exact).ok()) return;
+  RequireOk(wire::DecodeResult(made, coarse), "a level can be decoded");
+  const Surface &from = exact.result.surface, &to = coarse.result.surface;
+  Require(to.outer_of == from.outer_of && to.measures.size() == from.measures.size() &&
+              to.TriangleCount() <= from.TriangleCount(),
+          "a level has the shells of the surface, and no more triangles");
+}
+
 }  // namespace
 
 void AttackResultMessage(Bytes bytes) {
   v1::ReconstructedFrame message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+  Require(message.SpaceUsedLong() <=
+              bytes.size() +
+                  wire::ParsedBytes({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                                    *v1::ReconstructedFrame::descriptor()),
+          "the memory of a parsed message is bounded");
+  RequireLevel(message, {.max_error = .1, .max_triangles = {}});
+  RequireLevel(message, {.max_error = {}, .max_triangles = 8});
   wire::ReconstructedFrame frame;
   const absl::Status status = wire::DecodeResult(message, frame);
   if (!status.ok()) {

@@ -5,6 +5,8 @@
 #include <grpcpp/support/slice.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <cstdio>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -192,6 +194,47 @@ TEST(MessageBytes, FieldsAreCountedWithThoseOfMessagesAndUnknownOnes) {
   request.mutable_frame()->clear_scalars();
   request.mutable_frame()->set_positions(Repeated(unknown, 2 * kMaxFields));
   EXPECT_TRUE(RequestHasFewFields(request.SerializeAsString()));
+}
+
+TEST(MessageBytes, ParsedBytesAreNeverTooFew) {
+  constexpr int kMany = 10'000;
+  const auto parses = [](const std::string& bytes) {
+    v1::ReconstructedFrame parsed;
+    EXPECT_TRUE(parsed.ParseFromString(bytes));
+    const std::uint64_t most = ParsedBytes(bytes, *v1::ReconstructedFrame::descriptor());
+    std::printf("%zu bytes, parsed %zu, at most %zu\n", bytes.size(), parsed.SpaceUsedLong(),
+                static_cast<std::size_t>(most));
+    return parsed.SpaceUsedLong() <= most + bytes.size() && parsed.SpaceUsedLong() > bytes.size();
+  };
+  v1::ReconstructedFrame measures, sections, parents, attributes, rings, array;
+  for (int k = 0; k < kMany; ++k) {
+    measures.mutable_surface()->add_measures();
+    sections.add_sections();
+    attributes.mutable_surface()->add_attributes()->set_name("of a length that is allocated");
+    rings.mutable_rings()->add_measures();
+  }
+  auto& identities = *parents.mutable_surface()->add_measures()->mutable_parent_identities();
+  for (int k = 0; k < 100 * kMany; ++k) identities.Add(1);
+  for (const auto& message : {measures, sections, parents, attributes, rings}) {
+    EXPECT_TRUE(parses(message.SerializeAsString()));
+  }
+  EXPECT_TRUE(parses(Repeated(Field(11, ""), kMany))) << "unknown fields";
+  array.mutable_surface()->set_points(std::string(1 << 20, 'x'));
+  EXPECT_LT(ParsedBytes(array.SerializeAsString(), *v1::ReconstructedFrame::descriptor()), 1 << 13);
+}
+
+TEST(MessageBytes, ParsedBytesOfDeepMessagesNeedNoDeepStack) {
+  std::string deep;
+  for (int k = 0; k < 400; ++k) {
+    std::string length;
+    for (std::size_t rest = deep.size(); length.empty() || rest > 0; rest >>= 7) {
+      length += static_cast<char>((rest & 0x7f) | (rest > 0x7f ? 0x80 : 0));
+    }
+    deep = "\xba\x01" + length + deep;  // Field 23, sections.
+  }
+  v1::ReconstructedFrame message;
+  EXPECT_FALSE(message.ParseFromString(deep));
+  EXPECT_LT(ParsedBytes(deep, *v1::ReconstructedFrame::descriptor()), 120 * 1100);
 }
 
 TEST(MessageBytes, WhatIsNoMessageIsCountedAsFarAsAParserComes) {

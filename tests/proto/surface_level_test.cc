@@ -232,5 +232,113 @@ TEST(Level, OfAMalformedSurfaceIsDataLoss) {
   EXPECT_TRUE(absl::IsDataLoss(ReplaceByLevel(MaxError(.1), Grant, nullptr, message)));
 }
 
+// A tetrahedron at `at`.
+void AddTetrahedron(double at, Surface& surface) {
+  const auto first = static_cast<std::uint32_t>(surface.PointCount());
+  surface.points.insert(surface.points.end(), {at, 0, 0, at + 1, 0, 0, at, 1, 0, at, 0, 1});
+  for (const std::uint32_t corner : {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3}) {
+    surface.triangles.push_back(first + corner);
+  }
+}
+void EndShell(Surface& surface) {
+  surface.point_offsets.push_back(static_cast<std::uint32_t>(surface.PointCount()));
+  surface.triangle_offsets.push_back(static_cast<std::uint32_t>(surface.TriangleCount()));
+  surface.outer_of.push_back(kNoShell);
+  surface.measures.emplace_back();
+}
+// Why there is no level.
+std::string FaultOf(Surface surface, double spacing = 1) {
+  const absl::Status status = MakeLevel(MaxError(.1), spacing, nullptr, surface).status();
+  EXPECT_TRUE(status.ok() || absl::IsDataLoss(status)) << status;
+  return std::string(status.message());
+}
+
+TEST(Level, OfASurfaceThatIsNotManifoldIsRefused) {
+  Surface good;
+  AddTetrahedron(0, good);
+  EndShell(good);
+  EXPECT_EQ(FaultOf(good), "");
+  Surface open = good, twice = good, unused = good, two = good;
+  open.triangles.resize(9), open.triangle_offsets[1] = 3;
+  EXPECT_EQ(FaultOf(open), "surface: shell 0 is not closed, or not manifold");
+  std::copy_n(twice.triangles.begin(), 3, twice.triangles.begin() + 3);
+  EXPECT_EQ(FaultOf(twice), "surface: shell 0 is not closed, or not manifold");
+  unused.points.insert(unused.points.end(), {5, 5, 5}), unused.point_offsets[1] = 5;
+  EXPECT_EQ(FaultOf(unused), "surface: shell 0 is not connected");
+  AddTetrahedron(3, two);
+  two.point_offsets[1] = 8, two.triangle_offsets[1] = 8;
+  EXPECT_EQ(FaultOf(two), "surface: shell 0 is not connected");
+}
+
+TEST(Level, OfCoordinatesWithoutAMeaningIsRefused) {
+  Surface surface;
+  AddTetrahedron(0, surface);
+  EndShell(surface);
+  for (const double spacing : {0.0, -1.0, std::nan(""), HUGE_VAL, 1e-300, 1e-13}) {
+    EXPECT_NE(FaultOf(surface, spacing), "") << spacing;
+  }
+  for (const double coordinate : {std::nan(""), HUGE_VAL, -1e200, 1e-200, 1e13}) {
+    surface.points[4] = coordinate;
+    EXPECT_NE(FaultOf(surface), "") << coordinate;
+  }
+}
+
+// Closed, but no surface of particles: its simplification or its check would take hours.
+TEST(Level, OfASurfaceThatTakesTooMuchWorkIsRefused) {
+  Surface pile;  // All pairs of shells touch.
+  for (int k = 0; k < 40'000; ++k) {
+    AddTetrahedron(1e-9 * k, pile);
+    EndShell(pile);
+  }
+  EXPECT_EQ(FaultOf(pile), "surface: too many triangles are large or overlap");
+  Surface dolls;  // Each shell contains all smaller ones.
+  for (int k = 0; k < 40'000; ++k) {
+    const double size = 1 + 1e-4 * k;
+    AddTetrahedron(0, dolls);
+    for (std::size_t i = dolls.points.size() - 12; i < dolls.points.size(); ++i) {
+      dolls.points[i] = size * (dolls.points[i] - .25);
+    }
+    EndShell(dolls);
+  }
+  EXPECT_EQ(FaultOf(dolls), "surface: too many triangles are large or overlap");
+  Surface fan;  // Two points have all triangles.
+  constexpr std::uint32_t kCorners = 100'000;
+  fan.points = {0, 0, 1, 0, 0, -1};
+  for (std::uint32_t k = 0; k < kCorners; ++k) {
+    const double turn = 2 * 3.141592653589793 * k / kCorners;
+    fan.points.insert(fan.points.end(), {100 * std::cos(turn), 100 * std::sin(turn), 0});
+    const std::uint32_t a = 2 + k, b = 2 + (k + 1) % kCorners;
+    fan.triangles.insert(fan.triangles.end(), {0, a, b, 1, b, a});
+  }
+  EndShell(fan);
+  EXPECT_EQ(FaultOf(fan), "surface: too many triangles at a point");
+  Surface large;  // Triangles of a million spacings.
+  for (int k = 0; k < 1000; ++k) {
+    AddTetrahedron(2 * k, large);
+    for (std::size_t i = large.points.size() - 12; i < large.points.size(); ++i) {
+      large.points[i] *= 1e6;
+    }
+    EndShell(large);
+  }
+  EXPECT_EQ(FaultOf(large), "");
+}
+
+// Self-intersections stay, because rounding can make them.
+TEST(Level, OfASurfaceThatIntersectsItselfKeepsItsTrianglesThere) {
+  v1::ReconstructedFrame message;
+  ASSERT_TRUE(EncodeResult(Scene(5), {}, {}, message).ok());
+  Surface surface = Decoded(message);
+  const std::size_t all = surface.TriangleCount();
+  const std::uint32_t moved = surface.triangles[0], onto = surface.triangles[1];
+  std::copy_n(surface.points.begin() + 3 * onto, 3, surface.points.begin() + 3 * moved);
+  EXPECT_FALSE(Validate(surface).ok()) << "two triangles are degenerate";
+  const auto made = MakeLevel(MaxError(.1), .5, nullptr, surface);
+  ASSERT_TRUE(made.ok()) << made.status();
+  EXPECT_LT(2 * surface.TriangleCount(), all);
+  surface.points[0] += 3;
+  EXPECT_FALSE(Validate(surface).ok());
+  EXPECT_TRUE(MakeLevel(MaxError(.3), .5, nullptr, surface).ok());
+}
+
 }  // namespace
 }  // namespace partiemc::wire

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "relay/forging_peer.h"
+#include "relay/nats_process.h"
 #include "server/merging_balls.h"
 #include "service/error_testing.h"
 #include "support/temporary_folder.h"
@@ -149,6 +151,28 @@ TEST_F(WatchRefused, MEMORY_BUDGET) {
   request.mutable_frame()->set_sequence(1);
   ASSERT_TRUE(producer_->SendAndReceive(request).has_frame());
   Expect(watcher, StatusCode::RESOURCE_EXHAUSTED, "MEMORY_BUDGET");
+}
+
+TEST_F(WatchRefused, INVALID_RESULT) {
+  const NatsProcess nats;
+  options_.nats = nats.url();
+  Serve();
+  ForgingPeer peer(nats.url(), "tank");
+  peer.Publish("no message");
+  ASSERT_TRUE(Eventually([&] {
+    WatchClient exact(channel_, "tank", v1::WATCH_MODE_EVERY, 9);
+    return exact.Receive().has_opened();
+  }));
+  v1::LevelOfDetail level;
+  level.set_max_error(.1);
+  // The place of the former watcher may not be free yet.
+  ASSERT_TRUE(Eventually([&] {
+    WatchClient watcher(channel_);
+    watcher.Send(RequestOf(level));
+    watcher.Finish();
+    return watcher.reason() != "TOO_MANY_WATCHERS";
+  }));
+  ExpectOfLevel(level, StatusCode::DATA_LOSS, "INVALID_RESULT");
 }
 
 TEST_F(WatchRefused, NO_SUCH_STREAM) {

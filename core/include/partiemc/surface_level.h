@@ -44,12 +44,14 @@ std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
                          std::uint64_t attribute_values);
 
 /// Simplifies `surface` to a level, and returns its error. The remaining points keep their bits,
-/// normals and attributes; measures stay those of the exact surface. S1, S2 and S4 hold, and S3
-/// between all triangles that the simplification has changed.
-/// Requires: a valid level; S1 to S4, `spacing` > 0; normals may be absent. Rounded coordinates may
-/// break S3; such triangles stay.
+/// normals and attributes; measures stay those of the exact surface. S1 and S2 hold, S4 as in the
+/// exact surface, and S3 between all triangles that the simplification has changed.
+/// Requires: a valid level; indices, offsets and sizes of arrays as in a Surface; normals may be
+/// absent. Rounded coordinates may break S3; such triangles stay.
 /// Runs in the caller's Arena. Deterministic for any number of threads. Errors: CANCELLED after
-/// `cancelled` was set; then `surface` is unspecified. May throw std::bad_alloc.
+/// `cancelled` was set; DATA_LOSS for a surface that breaks S1 or S2, for coordinates that are not
+/// finite or too large, a `spacing` that is no length, and a surface so unlike a result that its
+/// simplification takes too much time. Then `surface` is unspecified. May throw std::bad_alloc.
 absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
                                  const std::atomic<bool>* cancelled, Surface& surface);
 

@@ -15,6 +15,10 @@
 namespace partiemc {
 namespace {
 
+// Units of WorkLimit: of a triangle above or below a point, and of a shell around another one,
+// whose number takes memory.
+constexpr std::uint64_t kWorkOfTriangle = 8, kWorkOfContaining = 1 << 10;
+
 // --- Orientation --------------------------------------------------------------------------------
 
 /// An exact sum of any number of doubles (Shewchuk's Grow-Expansion).
@@ -122,8 +126,13 @@ class Columns {
       top = std::max(top, surface.points[3 * k + 1]);
     }
     side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(count))), 1, 1024);
-    width_ = (right - left_) / side_;
-    height_ = (top - bottom_) / side_;
+    // Long triangles, and narrow surfaces, reach many columns.
+    constexpr double kMostColumns = 16;  // For each triangle.
+    for (;; side_ /= 2) {
+      width_ = (right - left_) / side_;
+      height_ = (top - bottom_) / side_;
+      if (side_ == 1 || Reached(surface) <= kMostColumns * static_cast<double>(count)) break;
+    }
     triangles_.resize(static_cast<std::size_t>(side_) * side_);
     for (std::uint32_t t = 0; t < count; ++t) AddTriangle(surface, t);
   }
@@ -139,13 +148,31 @@ class Columns {
   int Row(double y) const {
     return height_ > 0 ? std::clamp(static_cast<int>((y - bottom_) / height_), 0, side_ - 1) : 0;
   }
-  void AddTriangle(const Surface& surface, std::uint32_t t) {
+  /// The columns that a triangle reaches.
+  struct Range {
+    int first_row, last_row, first_column, last_column;
+  };
+  Range RangeOf(const Surface& surface, std::uint32_t t) const {
     const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
     const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
     const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
-    for (int row = Row(std::min({a.y, b.y, c.y})); row <= Row(std::max({a.y, b.y, c.y})); ++row) {
-      for (int column = Column(std::min({a.x, b.x, c.x}));
-           column <= Column(std::max({a.x, b.x, c.x})); ++column) {
+    return {Row(std::min({a.y, b.y, c.y})), Row(std::max({a.y, b.y, c.y})),
+            Column(std::min({a.x, b.x, c.x})), Column(std::max({a.x, b.x, c.x}))};
+  }
+  /// The number of columns that triangles reach, summed over the triangles.
+  double Reached(const Surface& surface) const {
+    double reached = 0;
+    for (std::uint32_t t = 0; t < surface.TriangleCount(); ++t) {
+      const Range range = RangeOf(surface, t);
+      reached +=
+          (1.0 + range.last_row - range.first_row) * (1.0 + range.last_column - range.first_column);
+    }
+    return reached;
+  }
+  void AddTriangle(const Surface& surface, std::uint32_t t) {
+    const Range range = RangeOf(surface, t);
+    for (int row = range.first_row; row <= range.last_row; ++row) {
+      for (int column = range.first_column; column <= range.last_column; ++column) {
         triangles_[static_cast<std::size_t>(row) * side_ + column].push_back(t);
       }
     }
@@ -190,7 +217,7 @@ std::vector<int> OrientationsOf(const Surface& surface) {
   return orientations;
 }
 
-std::vector<std::uint32_t> ShellsAround(const Surface& surface) {
+std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit) {
   std::vector<std::uint32_t> around(surface.ShellCount(), kNoShell);
   if (around.size() < 2) return around;
   std::vector<std::uint32_t> shell_of(surface.TriangleCount());
@@ -199,10 +226,15 @@ std::vector<std::uint32_t> ShellsAround(const Surface& surface) {
               shell_of.begin() + surface.triangle_offsets[shell + 1], shell);
   }
   const Columns columns(surface);
+  WorkCounter work(limit);
   std::vector<std::vector<std::uint32_t>> containing;
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
+    const Vec3 first = Vec3At(surface.points, surface.point_offsets[shell]);
+    work.Add(kWorkOfTriangle * columns.At(first).size());
     containing.push_back(Containing(surface, columns, shell_of, shell));
+    work.Add(kWorkOfContaining * containing.back().size());
   }
+  work.Finish();
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
     // Of the shells around `shell`, the innermost is contained in the most shells, because it lies
     // in all others.

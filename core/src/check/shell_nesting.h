@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "check/work_limit.h"
 #include "partiemc/surface.h"
 
 namespace partiemc {
@@ -13,7 +14,7 @@ namespace partiemc {
 std::vector<int> OrientationsOf(const Surface& surface);
 
 /// By shell: the innermost shell around it, or kNoShell. Exact. Requires: S1 to S3. Cost: for each
-/// shell, the triangles above and below one of its points.
-std::vector<std::uint32_t> ShellsAround(const Surface& surface);
+/// shell, the triangles above and below one of its points; counts in `limit`, if it is given.
+std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit = nullptr);
 
 }  // namespace partiemc

@@ -27,6 +27,9 @@ class TriangleGrid {
   /// Replaces the triangles, and keeps the buffers. Requires: finite coordinates.
   void Build(std::span<const double> points, std::span<const std::uint32_t> triangles);
 
+  /// The number of pairs of triangles in the same cell, which ForEachPair looks at.
+  std::uint64_t PairsOfCells() const;
+
   /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until `visit`
   /// returns false. The order of the pairs is fixed.
   template <typename Visit>
@@ -119,6 +122,15 @@ inline double TriangleGrid::Reached() const {
     reached += cells;
   }
   return reached;
+}
+
+inline std::uint64_t TriangleGrid::PairsOfCells() const {
+  std::uint64_t pairs = 0;
+  for (std::size_t first = 0, last = 0; first < entries_.size(); first = last) {
+    while (last < entries_.size() && entries_[last].cell == entries_[first].cell) ++last;
+    pairs += std::uint64_t{last - first} * (last - first - 1) / 2;
+  }
+  return pairs;
 }
 
 inline bool TriangleGrid::IsFirstOf(std::uint64_t cell, const Box& a, const Box& b) const {

@@ -19,6 +19,9 @@ namespace {
 // whose rounding exceeds smaller errors. A side of 8,000 errors left three times as many triangles.
 constexpr double kBlock = 1000;
 
+// In extents. A larger error has the same effect.
+constexpr double kMostError = 1e30;
+
 double ExtentOf(const Box& box) {
   const Vec3 size = box.high - box.low;
   return std::max({size.x, size.y, size.z});
@@ -37,6 +40,7 @@ void SimplifyBlock(std::span<const double> points, double error,
   }
   const Box box = BoxOf(points, used);
   const double extent = ExtentOf(box);
+  if (extent == 0) return;  // Rounded coordinates.
   std::vector<float> positions;
   positions.reserve(3 * used.size());
   for (const std::uint32_t point : used) {
@@ -48,8 +52,8 @@ void SimplifyBlock(std::span<const double> points, double error,
   std::vector<std::uint32_t> output(triangles.size());
   output.resize(meshopt_simplify(output.data(), triangles.data(), triangles.size(),
                                  positions.data(), used.size(), 3 * sizeof(float), 0,
-                                 static_cast<float>(error / extent), meshopt_SimplifyLockBorder,
-                                 nullptr));
+                                 static_cast<float>(std::min(error / extent, kMostError)),
+                                 meshopt_SimplifyLockBorder, nullptr));
   for (std::uint32_t& point : output) point = used[point];
   triangles.swap(output);
 }

@@ -11,6 +11,9 @@
 namespace partiemc::simplify {
 namespace {
 
+// Units of WorkLimit.
+constexpr std::uint64_t kWorkOfPoint = 8;
+
 double SquareToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 along = b - a;
   const double t = std::clamp(Dot(p - a, along) / Dot(along, along), 0.0, 1.0);
@@ -45,8 +48,9 @@ struct Removed {
 
 void FindFarPoints(std::span<const double> points, PointRange range,
                    std::span<const std::uint32_t> triangles, double distance, double cell,
-                   std::vector<std::uint32_t>& far) {
+                   std::vector<std::uint32_t>& far, WorkLimit* limit) {
   far.clear();
+  WorkCounter work(limit);
   std::vector<std::uint8_t> is_kept(range.last - range.first, 0);
   for (const std::uint32_t point : triangles) is_kept[point - range.first] = 1;
   const Vec3 origin = Vec3At(points, range.first);
@@ -69,18 +73,31 @@ void FindFarPoints(std::span<const double> points, PointRange range,
     const Removed high = removed_at(box.high + reach, 0);
     const Vec3 a = Vec3At(points, triangles[t]), b = Vec3At(points, triangles[t + 1]),
                c = Vec3At(points, triangles[t + 2]);
-    for (std::int64_t z = low.z; z <= high.z; ++z) {
-      for (std::int64_t y = low.y; y <= high.y; ++y) {
-        auto of_row = std::lower_bound(removed.begin(), removed.end(), Removed{z, y, low.x, 0});
-        for (; of_row != removed.end() && of_row->z == z && of_row->y == y && of_row->x <= high.x;
-             ++of_row) {
-          if (of_row->is_near) continue;
-          const Vec3 p = Vec3At(points, of_row->point);
-          of_row->is_near = SquareToTriangle(p, a, b, c) <= distance * distance;
+    const auto from = [&](std::int64_t z, std::int64_t y) {
+      return std::lower_bound(removed.begin(), removed.end(), Removed{z, y, low.x, 0});
+    };
+    // Skips rows of cells without points, of which a large box has many.
+    auto point = from(low.z, low.y);
+    while (point != removed.end() && point->z <= high.z) {
+      work.Add(kWorkOfPoint);
+      if (point->y < low.y) {
+        point = from(point->z, low.y);
+      } else if (point->y > high.y) {
+        point = from(point->z + 1, low.y);
+      } else if (point->x < low.x) {
+        point = from(point->z, point->y);
+      } else if (point->x > high.x) {
+        point = from(point->z, point->y + 1);
+      } else {
+        if (!point->is_near) {
+          point->is_near =
+              SquareToTriangle(Vec3At(points, point->point), a, b, c) <= distance * distance;
         }
+        ++point;
       }
     }
   }
+  work.Finish();
   for (const Removed& point : removed) {
     if (!point.is_near) far.push_back(point.point);
   }

@@ -1,13 +1,20 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
+#include "base/predicates_in_space.h"
+#include "check/work_limit.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_level.h"
+#include "simplify/mesh_faults.h"
 #include "simplify/simplify.h"
 #include "space/surface_bytes.h"
 
@@ -29,10 +36,61 @@ absl::Status OutOfRange(std::string field, std::string value, std::string rule) 
       {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
 }
 
+// Limits for surfaces that no core has made, for each triangle. Triangles of results take WORK
+// units at most, and the squares of the numbers of triangles at their points are DEGREES.
+constexpr std::uint64_t kMostWork = 1 << 14, kMostDegrees = 1 << 8;
+constexpr std::uint64_t kFewTriangles = 1 << 12;
+// Largest coordinate in spacings.
+constexpr double kFarthestCoordinate = 0x1p40;
+
+template <typename... Parts>
+absl::Status Unfit(const Parts&... parts) {
+  return absl::DataLossError(absl::StrCat("surface: ", parts...));
+}
+
+std::uint64_t AtLeastFew(const Surface& surface) {
+  return std::max<std::uint64_t>(surface.TriangleCount(), kFewTriangles);
+}
+
+// Checks what Simplify requires of a surface with the right indices and sizes: the domain of the
+// exact arithmetic, S1 and S2.
+absl::Status Check(const Surface& surface, double spacing) {
+  if (!(spacing > 0) || !InSpaceDomain(spacing)) {
+    return Unfit("the spacing ", ShortestNumber(spacing), " is no length");
+  }
+  for (const double coordinate : surface.points) {
+    if (InSpaceDomain(coordinate) && std::abs(coordinate) <= kFarthestCoordinate * spacing)
+      continue;
+    return Unfit("a point has the coordinate ", ShortestNumber(coordinate), ", with the spacing ",
+                 ShortestNumber(spacing));
+  }
+  std::vector<std::uint32_t> degrees(surface.PointCount(), 0);
+  for (const std::uint32_t point : surface.triangles) ++degrees[point];
+  std::uint64_t squares = 0;
+  for (const std::uint32_t degree : degrees) squares += std::uint64_t{degree} * degree;
+  if (squares > kMostDegrees * AtLeastFew(surface)) return Unfit("too many triangles at a point");
+  std::vector<simplify::Box> faults;
+  for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    const std::size_t first = surface.triangle_offsets[shell];
+    const auto triangles =
+        std::span<const std::uint32_t>(surface.triangles)
+            .subspan(3 * first, 3 * (surface.triangle_offsets[shell + 1] - first));
+    ThrowIfCancelled();
+    simplify::FindManifoldFaults(surface.points, triangles, faults);
+    if (!faults.empty()) return Unfit("shell ", shell, " is not closed, or not manifold");
+    if (!simplify::IsConnected(triangles,
+                               surface.point_offsets[shell + 1] - surface.point_offsets[shell])) {
+      return Unfit("shell ", shell, " is not connected");
+    }
+  }
+  return absl::OkStatus();
+}
+
 // Keeps the measures of the exact surface.
 void SimplifyBy(double error, double spacing, Surface& surface) {
   std::vector<ShellMeasures> exact = surface.measures;
-  simplify::Simplify({.error = error * spacing, .spacing = spacing}, surface);
+  WorkLimit work(kMostWork * AtLeastFew(surface));
+  simplify::Simplify({.error = error * spacing, .spacing = spacing, .work = &work}, surface);
   surface.measures = std::move(exact);
 }
 
@@ -87,6 +145,7 @@ absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
   const std::size_t exact = surface.TriangleCount();
   double error = 0;
   try {
+    if (absl::Status status = Check(surface, spacing); !status.ok()) return status;
     if (level.max_error) {
       error = *level.max_error;
       SimplifyBy(error, spacing, surface);
@@ -95,6 +154,8 @@ absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
     }
   } catch (const Cancelled&) {
     return absl::CancelledError("the level of detail was cancelled");
+  } catch (const TooMuchWork&) {
+    return Unfit("too many triangles are large or overlap");
   }
   return surface.TriangleCount() < exact ? error : 0;
 }

@@ -10,6 +10,9 @@
 namespace partiemc::simplify {
 namespace {
 
+// Units of WorkLimit. A contact also takes memory, so that its number must be far smaller.
+constexpr std::uint64_t kWorkOfPair = 32, kWorkOfContact = 1 << 12;
+
 Triangle TriangleAt(std::span<const std::uint32_t> triangles, std::size_t triangle) {
   return {triangles[3 * triangle], triangles[3 * triangle + 1], triangles[3 * triangle + 2]};
 }
@@ -105,27 +108,42 @@ bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points) {
 }
 
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
-                  std::span<const std::uint8_t> is_new, TriangleGrid& grid,
-                  std::vector<Contact>& contacts) {
+                  std::span<const std::uint8_t> kinds, TriangleGrid& grid,
+                  std::vector<Contact>& contacts, WorkLimit* limit) {
   contacts.clear();
+  std::vector<std::uint32_t> flat;  // Degenerate triangles that are not new. Rare.
   for (std::uint32_t t = 0; t < triangles.size() / 3; ++t) {
     const Triangle corners = TriangleAt(triangles, t);
-    if (is_new[t] == 0 || !AreCollinear(Vec3At(points, corners[0]), Vec3At(points, corners[1]),
-                                        Vec3At(points, corners[2]))) {
+    if (!AreCollinear(Vec3At(points, corners[0]), Vec3At(points, corners[1]),
+                      Vec3At(points, corners[2]))) {
       continue;
     }
-    contacts.push_back({t, t, BoxOf(points, corners)});
+    if (kinds[t] == kNew) {
+      contacts.push_back({t, t, BoxOf(points, corners)});
+    } else {
+      flat.push_back(t);
+    }
   }
   if (!contacts.empty()) return;
+  const auto is_flat = [&](std::uint32_t t) {
+    return !flat.empty() && std::binary_search(flat.begin(), flat.end(), t);
+  };
   grid.Build(points, triangles);
+  if (limit != nullptr) limit->Take(grid.PairsOfCells());
+  WorkCounter work(limit);
   grid.ForEachPair([&](std::uint32_t a, std::uint32_t b) {
-    if (is_new[a] == 0 && is_new[b] == 0) return true;
+    const int kind = kinds[a] | kinds[b];
+    if ((kind & kNew) == 0 && kind != (kKept | kChanged)) return true;
+    if (is_flat(a) || is_flat(b)) return true;
+    work.Add(kWorkOfPair);
     const Triangle first = TriangleAt(triangles, a), second = TriangleAt(triangles, b);
     if (TrianglesCollide(points, first, second)) {
+      work.Add(kWorkOfContact);
       contacts.push_back({a, b, Intersection(BoxOf(points, first), BoxOf(points, second))});
     }
     return true;
   });
+  work.Finish();
 }
 
 }  // namespace partiemc::simplify

@@ -7,6 +7,7 @@
 
 #include "base/vec3.h"
 #include "check/triangle_grid.h"
+#include "check/work_limit.h"
 
 namespace partiemc::simplify {
 
@@ -34,12 +35,21 @@ struct Contact {
   Box box;  ///< Holds where they touch.
 };
 
-/// Finds degenerate triangles or, if there are none, pairs of triangles that intersect. Exact.
-/// Only triangles with `is_new` set are checked, against all others.
-/// Requires: S1, coordinates in the domain of predicates_in_space.h.
-/// Cost: n log n in the triangles if they are of similar size. `grid`: a warm buffer.
+/// FindContacts compares a kNew triangle with all others, and a kKept with a kChanged one.
+enum TriangleKind : std::uint8_t {
+  kOld = 0,
+  kNew = 1,
+  kKept = 2,     ///< New here, but has not changed since the last guarantee.
+  kChanged = 4,  ///< Has changed since the last guarantee, but was compared.
+};
+
+/// Finds kNew triangles that are degenerate or, if there are none, pairs of triangles that
+/// intersect. Exact. Skips other degenerate triangles.
+/// Requires: S1, coordinates in the domain of predicates_in_space.h. `kinds` are TriangleKind.
+/// Cost: n log n in the triangles if they are of similar size; counts in `limit`, if it is given.
+/// `grid`: a warm buffer.
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
-                  std::span<const std::uint8_t> is_new, TriangleGrid& grid,
-                  std::vector<Contact>& contacts);
+                  std::span<const std::uint8_t> kinds, TriangleGrid& grid,
+                  std::vector<Contact>& contacts, WorkLimit* limit = nullptr);
 
 }  // namespace partiemc::simplify

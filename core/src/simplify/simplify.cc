@@ -33,6 +33,9 @@ constexpr double kFarthestCell = 1 << 30;
 constexpr double kMostCells = 1 << 12;
 // Least side of the blocks in which a shell is simplified, in spacings.
 constexpr double kLeastBlock = 16;
+// Units of WorkLimit: of a triangle in each round, and of a cell where triangles stay. A cell also
+// takes memory, so that the number of cells must be far smaller.
+constexpr std::uint64_t kWorkOfTriangle = 64, kWorkOfCell = 1 << 12;
 // A closed surface has at least four triangles.
 constexpr std::size_t kLeastIndices = 12;
 
@@ -53,6 +56,7 @@ class Simplifier {
         shells_(static_cast<std::uint32_t>(certified.ShellCount())),
         triangles_(certified.triangles),
         triangle_count_(shells_, 0),
+        changed_count_(shells_, 0),
         attempts_(shells_, 0),
         progress_(shells_, Progress::kToSimplify),
         faults_(shells_) {}
@@ -87,6 +91,9 @@ class Simplifier {
   void CopyCertified(std::uint32_t shell);
   void FindFaults(std::uint32_t shell);
   void Compact(Surface& simplified);
+  void Count(std::uint64_t work) {
+    if (limits_.work != nullptr) limits_.work->Take(work);
+  }
 
   /// Marks the cells near a fault of the shell, which is simplified again.
   void Repeat(std::uint32_t shell, const Box& fault);
@@ -108,6 +115,8 @@ class Simplifier {
   /// triangles do.
   std::vector<std::uint32_t> triangles_;
   std::vector<std::size_t> triangle_count_;  // By shell, as all below.
+  /// The number of triangles that may differ from the certified ones. They are the first ones.
+  std::vector<std::size_t> changed_count_;
   std::vector<int> attempts_;
   std::vector<Progress> progress_;
   std::vector<std::vector<Box>> faults_;
@@ -119,12 +128,14 @@ class Simplifier {
 void Simplifier::CopyCertified(std::uint32_t shell) {
   const std::span<const std::uint32_t> certified = CertifiedOf(shell);
   triangle_count_[shell] = certified.size() / 3;
+  changed_count_[shell] = 0;
   std::ranges::copy(certified, TrianglesOf(shell).begin());
   attempts_[shell] = kMostAttempts + 1;
 }
 
 void Simplifier::SimplifyShell(std::uint32_t shell) {
   progress_[shell] = Progress::kSimplified;
+  Count(kWorkOfTriangle * (CertifiedOf(shell).size() / 3));
   if (attempts_[shell] >= kMostAttempts) return CopyCertified(shell);
   const auto [first, last] = PointsOf(shell);
   const std::span<const std::uint32_t> certified = CertifiedOf(shell);
@@ -147,6 +158,7 @@ void Simplifier::SimplifyShell(std::uint32_t shell) {
   if (indices < kLeastIndices) return CopyCertified(shell);
   ++attempts_[shell];
   triangle_count_[shell] = indices / 3;
+  changed_count_[shell] = changed.size() / 3;
   std::ranges::copy(kept, std::ranges::copy(changed, TrianglesOf(shell).begin()).out);
 }
 
@@ -159,7 +171,7 @@ void Simplifier::FindFaults(std::uint32_t shell) {
   const PointRange range = PointsOf(shell);
   std::vector<std::uint32_t> far;
   FindFarPoints(certified_.points, range, triangles, kFarthest * limits_.error, limits_.spacing,
-                far);
+                far, limits_.work);
   for (const std::uint32_t point : far) {
     const Vec3 at = Vec3At(certified_.points, point);
     faults.push_back({at, at});
@@ -181,11 +193,13 @@ void Simplifier::Repeat(std::uint32_t shell, const Box& fault) {
   const space::BrickCoordinate high = CellOf(fault.high + Vec3{margin, margin, margin});
   const double cells = (1.0 + high.x - low.x) * (1.0 + high.y - low.y) * (1.0 + high.z - low.z);
   if (cells > kMostCells) return GiveUp(shell);
+  const std::size_t before = kept_cells_.size();
   for (std::int32_t z = low.z; z <= high.z; ++z) {
     for (std::int32_t y = low.y; y <= high.y; ++y) {
       for (std::int32_t x = low.x; x <= high.x; ++x) kept_cells_.Insert({z, y, x});
     }
   }
+  Count(static_cast<std::uint64_t>(8 * cells) + kWorkOfCell * (kept_cells_.size() - before));
 }
 
 bool Simplifier::RepeatFaultyShells() {
@@ -203,6 +217,7 @@ bool Simplifier::RepeatFaultyShells() {
 }
 
 void Simplifier::Compact(Surface& simplified) {
+  Count(kWorkOfTriangle * certified_.TriangleCount());
   simplified.triangles.clear();
   simplified.triangle_offsets = {0};
   for (std::uint32_t shell = 0; shell < shells_; ++shell) {
@@ -230,15 +245,18 @@ void Simplifier::Compact(Surface& simplified) {
 
 bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
   std::vector<std::uint32_t> shell_of;
-  std::vector<std::uint8_t> is_new;
+  std::vector<std::uint8_t> kinds;
   for (std::uint32_t shell = 0; shell < shells_; ++shell) {
     const std::size_t last = simplified.triangle_offsets[shell + 1];
+    const bool is_new = progress_[shell] == Progress::kSimplified;
     shell_of.resize(last, shell);
-    is_new.resize(last, progress_[shell] == Progress::kSimplified ? 1 : 0);
+    // Certified triangles do not touch each other, unless rounding has broken S3. Then they stay.
+    kinds.resize(kinds.size() + changed_count_[shell], is_new ? kNew : kChanged);
+    kinds.resize(last, is_new ? kKept : kOld);
   }
   std::vector<Contact> contacts;
   TriangleGrid grid;
-  FindContacts(simplified.points, simplified.triangles, is_new, grid, contacts);
+  FindContacts(simplified.points, simplified.triangles, kinds, grid, contacts, limits_.work);
   // While there are degenerate triangles, no pairs are compared.
   const bool has_compared = contacts.empty() || contacts[0].a != contacts[0].b;
   for (std::uint32_t shell = 0; shell < shells_ && has_compared; ++shell) {
@@ -256,9 +274,9 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
 
 /// A shell may have passed another shell without touching it afterwards.
 bool Simplifier::GiveUpMovedShells(const Surface& simplified) {
-  if (around_.empty()) around_ = ShellsAround(certified_);
+  if (around_.empty()) around_ = ShellsAround(certified_, limits_.work);
   const std::vector<int> turns = OrientationsOf(simplified);
-  const std::vector<std::uint32_t> around = ShellsAround(simplified);
+  const std::vector<std::uint32_t> around = ShellsAround(simplified, limits_.work);
   bool has_moved = false, gives_up = false;
   const auto give_up = [&](std::uint32_t shell) {
     if (shell == kNoShell || attempts_[shell] > kMostAttempts) return;
@@ -281,6 +299,7 @@ SimplifyReport Simplifier::Run(Surface& simplified) {
   do {
     do {
       ThrowIfCancelled();
+      Count(shells_);
       ParallelFor(shells_, [&](std::uint32_t shell) {
         if (progress_[shell] == Progress::kToSimplify) SimplifyShell(shell);
       });

@@ -4,13 +4,15 @@
 
 #include <cstdint>
 
+#include "check/work_limit.h"
 #include "partiemc/surface.h"
 
 namespace partiemc::simplify {
 
 struct SimplifyLimits {
-  double error = 0;    ///< Limit of the root mean square error, in world units.
-  double spacing = 1;  ///< World units.
+  double error = 0;           ///< Limit of the root mean square error, in world units.
+  double spacing = 1;         ///< World units.
+  WorkLimit* work = nullptr;  ///< Exceeding it throws TooMuchWork. Null: no limit.
 };
 
 /// No removed point is farther from the simplified shell than this multiple of the error.
@@ -24,7 +26,8 @@ struct SimplifyReport {
 /// Removes points, and connects the others by fewer triangles. The other points keep their bits,
 /// their order, normals and attributes; shells keep their order. Sets area, volume and centroid.
 /// No triangle is a cut afterwards.
-/// Requires: S1 to S5, except that normals and attributes may have no values yet.
+/// Requires: S1 to S5, except that normals and attributes may have no values yet. If coordinates
+/// are rounded, S3 and S4 may be broken: then the triangles there stay.
 /// Deterministic for any number of threads. Allocates memory in each call.
 /// Cost: n log n in the triangles for each round; usually one to three rounds.
 SimplifyReport Simplify(const SimplifyLimits& limits, Surface& surface);
