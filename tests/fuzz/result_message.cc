@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "fuzz/require.h"
+#include "fuzz/single_thread.h"
 #include "fuzz/targets.h"
 #include "partiemc/partiemc.h"
 #include "wire/codec.h"
@@ -80,6 +81,7 @@ void RequireLevel(const v1::ReconstructedFrame& message, const LevelOfDetail& le
 }  // namespace
 
 void AttackResultMessage(Bytes bytes) {
+  const SingleThread single_thread;
   v1::ReconstructedFrame message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
   Require(message.SpaceUsedLong() <=
