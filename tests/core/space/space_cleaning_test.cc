@@ -14,6 +14,7 @@
 #include "space/cleaning.h"
 #include "space/field.h"
 #include "space/space_particles.h"
+#include "space/surface_of.h"
 #include "support/tries.h"
 
 namespace partiemc::space {
@@ -22,6 +23,7 @@ namespace {
 using support::Random;
 using testing::Ball;
 using testing::SpaceParticles;
+using testing::SurfaceOf;
 
 /// Sides of 16 x 16 x 16 nodes in eight bricks.
 struct Sides {
@@ -145,16 +147,6 @@ TEST(SpaceCleaning, DropsBodiesWithoutParticles) {
   EXPECT_EQ(again.first, bodies.first);
   ASSERT_EQ(again.parts.size(), bodies.parts.size());
   EXPECT_EQ(again.parts[0].body, bodies.parts[0].body);
-}
-
-Surface SurfaceOf(const SpaceParticles& particles, const SurfaceParameters& parameters) {
-  const auto reconstructor = SurfaceReconstructor::Create(parameters);
-  SurfaceWorkspace workspace;
-  Surface surface;
-  EXPECT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
-  const absl::Status status = Validate(surface);
-  EXPECT_TRUE(status.ok()) << status.message();
-  return surface;
 }
 
 std::uint64_t Dropped(const Surface& surface) {

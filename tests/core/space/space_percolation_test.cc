@@ -19,6 +19,7 @@
 #include "base/vec3.h"
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
+#include "space/surface_of.h"
 #include "space/surface_stream.h"
 #include "support/tries.h"
 
@@ -28,6 +29,7 @@ namespace {
 using support::Known;
 using support::Random;
 using testing::SpaceParticles;
+using testing::SurfaceOf;
 using testing::SurfaceStream;
 using testing::TrackedParticles;
 
@@ -52,19 +54,6 @@ Particles Wrapped(Particles particles, const PeriodicBox& box) {
 
 double Coordinate(const Surface& surface, std::size_t point, std::size_t axis) {
   return surface.points[3 * point + axis];
-}
-
-Surface SurfaceOf(const SpaceParticles& particles, const SurfaceParameters& parameters) {
-  SurfaceWorkspace workspace;
-  Surface surface;
-  const auto reconstructor = SurfaceReconstructor::Create(parameters);
-  EXPECT_TRUE(reconstructor.ok()) << reconstructor.status();
-  if (!reconstructor.ok()) return surface;
-  const absl::Status status = reconstructor->Reconstruct(particles.AsFrame(), workspace, surface);
-  EXPECT_TRUE(status.ok()) << status;
-  const absl::Status valid = Validate(surface);
-  EXPECT_TRUE(valid.ok()) << valid;
-  return surface;
 }
 
 Surface InBox(const SpaceParticles& particles, const PeriodicBox& box) {

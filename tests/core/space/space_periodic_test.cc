@@ -13,6 +13,7 @@
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
+#include "space/surface_of.h"
 #include "space/surface_stream.h"
 
 namespace partiemc {
@@ -47,12 +48,7 @@ SpaceParticles BallAt(const Vec3& centre, double radius) {
 }
 
 Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
-  SurfaceWorkspace workspace;
-  Surface surface;
-  const absl::Status status = SurfaceReconstructor::Create(parameters)
-                                  ->Reconstruct(particles.AsFrame(), workspace, surface);
-  EXPECT_TRUE(status.ok()) << status;
-  return surface;
+  return testing::SurfaceOf(particles, parameters);
 }
 
 class PeriodicSurface : public ::testing::TestWithParam<SurfacePlacement> {};

@@ -20,6 +20,7 @@
 #include "space/exact_shapes.h"
 #include "space/shells.h"
 #include "space/space_particles.h"
+#include "space/surface_of.h"
 #include "space/surface_stream.h"
 #include "support/tries.h"
 
@@ -29,14 +30,7 @@ namespace {
 using support::Random;
 using testing::Sampler;
 using testing::SpaceParticles;
-
-Surface Reconstruct(const SpaceParticles& particles, const SurfaceParameters& parameters) {
-  const auto reconstructor = SurfaceReconstructor::Create(parameters);
-  SurfaceWorkspace workspace;
-  Surface surface;
-  EXPECT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
-  return surface;
-}
+using testing::SurfaceOf;
 
 double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 along = b - a;
@@ -107,7 +101,7 @@ TEST_P(SpaceSimplify, KeepsS1ToS5) {
   const std::uint64_t frames = testing::Frames(40);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     SCOPED_TRACE(seed);
-    const Surface all = Reconstruct(testing::RandomSpaceScene(seed), {.placement = GetParam()});
+    const Surface all = SurfaceOf(testing::RandomSpaceScene(seed), {.placement = GetParam()});
     shells += all.ShellCount();
     triangles += all.TriangleCount();
     for (std::size_t e = 0; e < kErrors.size(); ++e) {
@@ -145,14 +139,14 @@ TEST_P(SpaceSimplify, HasTheSameBitsForAnyThreadsAndOrder) {
   particles.Add(testing::Ball({12, 3, 1}, 4, .1, random));
   particles.Add(testing::Box({-9, -9, -12}, {9, 9, -10}, .4, random));
   const SurfaceParameters parameters{.placement = GetParam(), .simplify = .3};
-  const Surface expected = Reconstruct(particles, parameters);
+  const Surface expected = SurfaceOf(particles, parameters);
   EXPECT_LT(2 * expected.TriangleCount(),
-            Reconstruct(particles, {.placement = GetParam()}).TriangleCount());
+            SurfaceOf(particles, {.placement = GetParam()}).TriangleCount());
   for (const unsigned threads : {1u, 2u, 7u}) {
     // Otherwise there are no more workers than processors.
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
     const SpaceParticles shuffled = testing::Shuffled(particles, random);
-    Arena(threads).Execute([&] { EXPECT_EQ(Reconstruct(shuffled, parameters), expected); });
+    Arena(threads).Execute([&] { EXPECT_EQ(SurfaceOf(shuffled, parameters), expected); });
   }
 }
 
@@ -357,7 +351,7 @@ TEST(Simplify, LeavesFewTrianglesWithinItsError) {
   for (int shape = 0; shape < support::Tries(4); ++shape) {
     Random random(7);
     const SpaceParticles particles = ShapeOf(shape, random);
-    const Surface all = Reconstruct(particles, {.placement = SurfacePlacement::kVirtualPlane});
+    const Surface all = SurfaceOf(particles, {.placement = SurfacePlacement::kVirtualPlane});
     for (std::size_t e = 0; e < errors.size(); ++e) {
       Surface simplified = all;
       const auto report = simplify::Simplify({.error = errors[e], .spacing = 1}, simplified);

@@ -18,6 +18,7 @@
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
+#include "space/surface_of.h"
 #include "support/random.h"
 #include "support/tries.h"
 
@@ -26,19 +27,7 @@ namespace {
 
 using support::Random;
 using testing::SpaceParticles;
-
-Surface SurfaceOf(const SpaceParticles& particles, const SurfaceParameters& parameters,
-                  SurfaceWorkspace& workspace) {
-  Surface surface;
-  const auto reconstructor = SurfaceReconstructor::Create(parameters);
-  EXPECT_TRUE(reconstructor.ok()) << reconstructor.status();
-  if (!reconstructor.ok()) return surface;
-  const absl::Status status = reconstructor->Reconstruct(particles.AsFrame(), workspace, surface);
-  EXPECT_TRUE(status.ok()) << status;
-  const absl::Status valid = Validate(surface);
-  EXPECT_TRUE(valid.ok()) << valid;
-  return surface;
-}
+using testing::SurfaceOf;
 
 Surface AtWalls(const SpaceParticles& particles, const std::vector<WallPlane>& walls) {
   SurfaceWorkspace workspace;
