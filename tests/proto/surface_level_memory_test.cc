@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <span>
 #include <utility>
 #include <vector>
@@ -65,8 +66,9 @@ TEST_P(LevelMemory, IsReservedBeforeItIsTaken) {
       };
       ASSERT_TRUE(ReplaceByLevel(level, reserve, nullptr, message).ok());
       const std::size_t taken = support::peak_bytes - before;
+      std::printf("%.2f times\n", static_cast<double>(reserved) / static_cast<double>(taken));
       EXPECT_LE(taken, reserved);
-      EXPECT_GE(2.5 * static_cast<double>(taken), static_cast<double>(reserved));
+      EXPECT_GE(4 * static_cast<double>(taken), static_cast<double>(reserved));
     }
   }
 }

@@ -312,6 +312,12 @@ TEST(Level, OfASurfaceThatTakesTooMuchWorkIsRefused) {
   }
   EndShell(fan);
   EXPECT_EQ(FaultOf(fan), "surface: too many triangles at a point");
+  Surface row;  // Many shells in a row, apart from each other.
+  for (int k = 0; k < 40'000; ++k) {
+    AddTetrahedron(3.0 * k, row);
+    EndShell(row);
+  }
+  EXPECT_EQ(FaultOf(row), "");
   Surface large;  // Triangles of a million spacings.
   for (int k = 0; k < 1000; ++k) {
     AddTetrahedron(2 * k, large);

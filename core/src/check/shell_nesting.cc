@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 
 #include "base/expansion.h"
@@ -125,32 +126,34 @@ class Columns {
       bottom_ = std::min(bottom_, surface.points[3 * k + 1]);
       top = std::max(top, surface.points[3 * k + 1]);
     }
-    side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(count))), 1, 1024);
-    // Long triangles, and narrow surfaces, reach many columns.
-    constexpr double kMostColumns = 16;  // For each triangle.
-    for (;; side_ /= 2) {
-      width_ = (right - left_) / side_;
-      height_ = (top - bottom_) / side_;
-      if (side_ == 1 || Reached(surface) <= kMostColumns * static_cast<double>(count)) break;
+    // The bounds give at most a column for each triangle, also for long and narrow surfaces.
+    const double width = right - left_, height = top - bottom_, all = static_cast<double>(count);
+    edge_ = std::max({2 * std::sqrt(width / all * height), 4 * std::max(width, height) / all,
+                      std::numeric_limits<double>::min()});
+    constexpr double kMostReached = 16;  // Columns for each triangle.
+    for (;; edge_ *= 2) {
+      columns_ = 1 + static_cast<std::uint64_t>(width / edge_);
+      rows_ = 1 + static_cast<std::uint64_t>(height / edge_);
+      if (columns_ * rows_ == 1 || Reached(surface) <= kMostReached * all) break;
     }
-    triangles_.resize(static_cast<std::size_t>(side_) * side_);
+    triangles_.resize(columns_ * rows_);
     for (std::uint32_t t = 0; t < count; ++t) AddTriangle(surface, t);
   }
 
   const std::vector<std::uint32_t>& At(const Vec3& p) const {
-    return triangles_[static_cast<std::size_t>(Row(p.y)) * side_ + Column(p.x)];
+    return triangles_[Row(p.y) * columns_ + Column(p.x)];
   }
 
  private:
-  int Column(double x) const {
-    return width_ > 0 ? std::clamp(static_cast<int>((x - left_) / width_), 0, side_ - 1) : 0;
+  std::uint64_t Column(double x) const {
+    return std::min(static_cast<std::uint64_t>((x - left_) / edge_), columns_ - 1);
   }
-  int Row(double y) const {
-    return height_ > 0 ? std::clamp(static_cast<int>((y - bottom_) / height_), 0, side_ - 1) : 0;
+  std::uint64_t Row(double y) const {
+    return std::min(static_cast<std::uint64_t>((y - bottom_) / edge_), rows_ - 1);
   }
   /// The columns that a triangle reaches.
   struct Range {
-    int first_row, last_row, first_column, last_column;
+    std::uint64_t first_row, last_row, first_column, last_column;
   };
   Range RangeOf(const Surface& surface, std::uint32_t t) const {
     const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
@@ -164,22 +167,22 @@ class Columns {
     double reached = 0;
     for (std::uint32_t t = 0; t < surface.TriangleCount(); ++t) {
       const Range range = RangeOf(surface, t);
-      reached +=
-          (1.0 + range.last_row - range.first_row) * (1.0 + range.last_column - range.first_column);
+      reached += static_cast<double>((range.last_row - range.first_row + 1) *
+                                     (range.last_column - range.first_column + 1));
     }
     return reached;
   }
   void AddTriangle(const Surface& surface, std::uint32_t t) {
     const Range range = RangeOf(surface, t);
-    for (int row = range.first_row; row <= range.last_row; ++row) {
-      for (int column = range.first_column; column <= range.last_column; ++column) {
-        triangles_[static_cast<std::size_t>(row) * side_ + column].push_back(t);
+    for (std::uint64_t row = range.first_row; row <= range.last_row; ++row) {
+      for (std::uint64_t column = range.first_column; column <= range.last_column; ++column) {
+        triangles_[row * columns_ + column].push_back(t);
       }
     }
   }
 
-  double left_ = 0, bottom_ = 0, width_ = 0, height_ = 0;
-  int side_ = 1;
+  double left_ = 0, bottom_ = 0, edge_ = 1;
+  std::uint64_t columns_ = 1, rows_ = 1;
   std::vector<std::vector<std::uint32_t>> triangles_;
 };
 
