@@ -130,7 +130,7 @@ class Columns {
     const double width = right - left_, height = top - bottom_, all = static_cast<double>(count);
     edge_ = std::max({2 * std::sqrt(width / all * height), 4 * std::max(width, height) / all,
                       std::numeric_limits<double>::min()});
-    constexpr double kMostReached = 16;  // Columns for each triangle.
+    constexpr double kMostReached = 6;  // Columns for each triangle.
     for (;; edge_ *= 2) {
       columns_ = 1 + static_cast<std::uint64_t>(width / edge_);
       rows_ = 1 + static_cast<std::uint64_t>(height / edge_);
