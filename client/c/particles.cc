@@ -80,6 +80,15 @@ void SetCoordinates(partiemc_particles* particles, const T* coordinates, std::si
 
 }  // namespace
 
+std::optional<PeriodicBox> BoxOf(const double* numbers) {
+  if (numbers == nullptr) return std::nullopt;
+  PeriodicBox box;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (numbers[2 * k + 1] != 0) box.axes[k] = PeriodicAxis{numbers[2 * k], numbers[2 * k + 1]};
+  }
+  return box;
+}
+
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes) {
   if (particles == nullptr) {
@@ -115,6 +124,7 @@ absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* partic
     }
   }
   arrays.attributes = attributes;
+  arrays.box = BoxOf(given.box);
   return arrays;
 }
 

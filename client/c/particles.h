@@ -1,11 +1,13 @@
 // Converts the arrays of a C program to the client's arrays.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "partiemc/c/partiemc.h"
 #include "partiemc/client/particle_arrays.h"
+#include "partiemc/parameters.h"
 
 namespace partiemc::c {
 
@@ -14,5 +16,9 @@ namespace partiemc::c {
 /// is not allowed for it. Reason COUNT: an array has no address.
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes);
+
+/// Converts the lower end and the length of each axis; a length of 0 is no periodic axis. Null: no
+/// box.
+std::optional<PeriodicBox> BoxOf(const double* numbers);
 
 }  // namespace partiemc::c

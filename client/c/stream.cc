@@ -70,15 +70,6 @@ std::optional<SlicePlane> SliceOf(const double* numbers) {
 }
 
 // Reads six numbers; empty for a null pointer.
-std::optional<PeriodicBox> BoxOf(const double* numbers) {
-  if (numbers == nullptr) return std::nullopt;
-  PeriodicBox box;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (numbers[2 * k + 1] != 0) box.axes[k] = PeriodicAxis{numbers[2 * k], numbers[2 * k + 1]};
-  }
-  return box;
-}
-
 std::vector<Wall> WallsOf(const partiemc_options& options) {
   std::vector<Wall> walls(options.wall_count);
   const double* point = options.walls;

@@ -211,15 +211,15 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
       app.add_option(
              "--periodic", flags.periodic,
              "Periodic axes of the results: a body that crosses the box is one body, and an "
-             "outline or a surface that reaches its own image is cut at the box. The box is "
-             "that of the LAMMPS dump, or --box")
+             "outline or a surface that reaches its own image is cut at the box. Each frame has "
+             "the box of the LAMMPS dump, or --box")
           ->type_name("x,y,z")
           ->group(kGroup);
   app.add_option("--box", flags.box, "Bounds of the periodic box in world units")
       ->type_name("X0,X1,Y0,Y1[,Z0,Z1]")
       ->needs(periodic)
       ->group(kGroup);
-  app.add_flag("--wrap", flags.wrap, "Cut all outlines at the periodic box")
+  app.add_flag("--wrap", flags.wrap, "Cut all outlines and surfaces at the periodic box")
       ->needs(periodic)
       ->group(kGroup);
   app.add_option("--noise-filter", flags.noise_filter,

@@ -42,7 +42,7 @@ class FileSequence final : public Sequence {
   FileSequence(Recording recording, const SequenceOptions& options)
       : recording_(std::move(recording)),
         projection_(options.in_space),
-        requires_one_box_(options.requires_one_box) {}
+        requires_box_(options.requires_box) {}
 
   // Opens the first file, so that its errors are reported at once. Required before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
@@ -121,7 +121,7 @@ class FileSequence final : public Sequence {
   }
 
   absl::Status CheckBox(const RecordedFrame& frame) {
-    if (!requires_one_box_) return absl::OkStatus();
+    if (!requires_box_) return absl::OkStatus();
     const auto refuse = [&](std::string_view fault) {
       return absl::FailedPreconditionError(Concat(frame.source, ": ", fault));
     };
@@ -129,11 +129,7 @@ class FileSequence final : public Sequence {
     if (frame.box->is_tilted) {
       return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
     }
-    if (!first_box_) first_box_ = frame.box;
-    if (*first_box_ == *frame.box) return absl::OkStatus();
-    return refuse(
-        "its box differs from the box of the first frame; --periodic requires one box for all "
-        "frames");
+    return absl::OkStatus();
   }
 
   absl::Status SelectsNothing() const {
@@ -206,8 +202,7 @@ class FileSequence final : public Sequence {
   std::size_t index_ = 0;  // Index of the next frame.
   ParticleRows rows_;
   PlaneProjection projection_;
-  bool requires_one_box_;
-  std::optional<RecordedBox> first_box_;
+  bool requires_box_;
   absl::Status failure_;
   std::uint64_t selected_ = 0;    // Particles of all frames.
   std::uint64_t unselected_ = 0;  // Particles that --select left out.

@@ -77,8 +77,8 @@ struct SequenceOptions {
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
   bool in_space = false;
 
-  /// Refuse a frame whose box differs from the box of the first frame, is absent or is tilted.
-  bool requires_one_box = false;
+  /// Refuse a frame whose box is absent or tilted.
+  bool requires_box = false;
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present. A

@@ -110,7 +110,7 @@ absl::StatusOr<wire::AttributeRows> RowsOf(const AttributeArrays& attribute, std
 }  // namespace
 
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time) {
-  const auto& [count, x, y, z, volumes, ids, vx, vy, vz, attributes] = particles;
+  const auto& [count, x, y, z, volumes, ids, vx, vy, vz, attributes, box] = particles;
   if (!std::isfinite(time)) {
     return ViolationError(absl::StatusCode::kInvalidArgument,
                           {.reason = std::string(kReasonNotFinite),
@@ -119,8 +119,10 @@ absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double t
                            .rule = "must be finite"});
   }
   wire::FrameRows rows;
-  rows.scalars = {
-      .positions = std::span<const float>(), .components = z.empty() ? 2 : 3, .time = time};
+  rows.scalars = {.positions = std::span<const float>(),
+                  .components = z.empty() ? 2 : 3,
+                  .time = time,
+                  .box = box};
   const bool is_double = IsDouble(x) || IsDouble(y) || IsDouble(z);
   if (is_double) rows.scalars.positions = std::span<const double>();
   for (const AttributeArrays& one : attributes) {

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/python/errors.h"
+#include "client/python/parameters.h"
 #include "partiemc/status.h"
 
 namespace partiemc::python {
@@ -63,7 +64,7 @@ bool IsTuple(const py::object& given) {
 
 PythonParticles::PythonParticles(const py::object& positions, const py::object& volumes,
                                  const py::object& ids, const py::object& velocities,
-                                 const py::object& attributes) {
+                                 const py::object& attributes, const py::object& box) {
   const auto place = Columns(positions, "positions");
   arrays_.x = place[0];
   arrays_.y = place[1];
@@ -76,6 +77,13 @@ PythonParticles::PythonParticles(const py::object& positions, const py::object& 
                     "must be a dict of names and arrays"));
     }
     TakeAttributes(attributes);
+  }
+  if (!box.is_none()) {
+    if (!py::isinstance<py::dict>(box)) {
+      Raise(Invalid("UNSUPPORTED", "box", py::str(py::type::of(box).attr("__name__")),
+                    "must be a dict of periodic axes with their bounds"));
+    }
+    arrays_.box = BoxOf(box);
   }
   if (velocities.is_none()) return;
   const auto velocity = Columns(velocities, "velocities");

@@ -19,10 +19,12 @@ class PythonParticles {
  public:
   /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes` and
   /// `ids`: N. `velocities`: like positions. `attributes`: a dict from names to (N,), (N, 2), (N,
-  /// 3), or tuples. None: absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
+  /// 3), or tuples. `box`: a dict of periodic axes with their bounds. None: absent. Raises
+  /// partiemc.Error (reasons COUNT, UNSUPPORTED).
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
                   const pybind11::object& ids, const pybind11::object& velocities,
-                  const pybind11::object& attributes);
+                  const pybind11::object& attributes,
+                  const pybind11::object& box = pybind11::none());
   PythonParticles(const PythonParticles&) = delete;  // Holds views into itself.
   PythonParticles& operator=(const PythonParticles&) = delete;
 

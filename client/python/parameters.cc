@@ -111,23 +111,7 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
     if (wraps) Raise(Invalid("UNSUPPORTED", "wrap", "True", "requires a periodic box (box=)"));
     return;
   }
-  box.emplace();
-  for (const auto& [key, value] : *given) {
-    std::size_t axis = std::string_view::npos;
-    std::pair<double, double> bounds;
-    try {
-      const auto name = key.cast<std::string>();
-      if (name.size() == 1) axis = std::string_view("xyz").find(name);
-      bounds = value.cast<std::pair<double, double>>();
-    } catch (const py::cast_error&) {
-      axis = std::string_view::npos;
-    }
-    if (axis == std::string_view::npos) {
-      Raise(Invalid("UNSUPPORTED", "box", py::repr(*given).cast<std::string>(),
-                    "must be a dict of periodic axes with their bounds, {\"x\": (0, 10)} say"));
-    }
-    box->axes[axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
-  }
+  box = BoxOf(*given);
   box->wraps = wraps;
 }
 
@@ -209,6 +193,27 @@ py::object ToPython(const std::optional<SlicePlane>& slice) {
 }
 
 }  // namespace
+
+PeriodicBox BoxOf(const py::dict& given) {
+  PeriodicBox box;
+  for (const auto& [key, value] : given) {
+    std::size_t axis = std::string_view::npos;
+    std::pair<double, double> bounds;
+    try {
+      const auto name = key.cast<std::string>();
+      if (name.size() == 1) axis = std::string_view("xyz").find(name);
+      bounds = value.cast<std::pair<double, double>>();
+    } catch (const py::cast_error&) {
+      axis = std::string_view::npos;
+    }
+    if (axis == std::string_view::npos) {
+      Raise(Invalid("UNSUPPORTED", "box", py::repr(given).cast<std::string>(),
+                    "must be a dict of periodic axes with their bounds, {\"x\": (0, 10)} say"));
+    }
+    box.axes[axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
+  }
+  return box;
+}
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
   ReconstructionParameters parameters;

@@ -13,6 +13,8 @@ namespace partiemc::python {
 /// Takes the reconstruction parameters; None means not given. Raises partiemc.Error if a value is
 /// an unknown name, for example of a placement. Raises TypeError for a value of the wrong type.
 ReconstructionParameters TakeParameters(pybind11::dict arguments);
+/// Converts a dict of periodic axes with their bounds. Raises partiemc.Error for another dict.
+PeriodicBox BoxOf(const pybind11::dict& given);
 /// Takes tls, ca_file, cert_file, key_file, token and token_file. Setting a certificate enables
 /// TLS.
 client::Credentials TakeCredentials(pybind11::dict arguments);

@@ -43,8 +43,8 @@ class Sequence {
   std::shared_ptr<PythonResult> Reconstruct(const py::object& positions, std::optional<double> time,
                                             const py::object& volumes, const py::object& ids,
                                             const py::object& velocities,
-                                            const py::object& attributes) {
-    const PythonParticles particles(positions, volumes, ids, velocities, attributes);
+                                            const py::object& attributes, const py::object& box) {
+    const PythonParticles particles(positions, volumes, ids, velocities, attributes, box);
     const auto result = results_->Take();
     absl::Status status;
     {
@@ -137,8 +137,9 @@ void DefineReconstructor(py::module_& module) {
            "fill='greedy', ...): see partiemc.reconstruct.")
       .def("reconstruct", &Sequence::Reconstruct, "positions"_a, "time"_a = py::none(),
            py::kw_only(), "volumes"_a = py::none(), "ids"_a = py::none(),
-           "velocities"_a = py::none(), "attributes"_a = py::none(),
-           "Reconstructs the next frame; `time` defaults to the number of earlier frames. See "
+           "velocities"_a = py::none(), "attributes"_a = py::none(), "box"_a = py::none(),
+           "Reconstructs the next frame; `time` defaults to the number of earlier frames. `box` is "
+           "the periodic box of this frame, with the axes of the parameter `box`. See "
            "partiemc.reconstruct for the arrays. Raises partiemc.Error; a refused frame changes "
            "nothing.")
       .def("reset", &Sequence::Reset, "Discards the state of earlier frames.")

@@ -76,8 +76,9 @@ class ProducerStream {
 
   std::optional<std::uint64_t> Send(const py::object& positions, std::optional<double> time,
                                     const py::object& volumes, const py::object& ids,
-                                    const py::object& velocities, const py::object& attributes) {
-    const PythonParticles particles(positions, volumes, ids, velocities, attributes);
+                                    const py::object& velocities, const py::object& attributes,
+                                    const py::object& box) {
+    const PythonParticles particles(positions, volumes, ids, velocities, attributes, box);
     absl::StatusOr<std::uint64_t> sent = 0;
     {
       const py::gil_scoped_release others_may_run;
@@ -316,10 +317,11 @@ void DefineStreams(py::module_& module) {
       .def(py::init<const std::optional<std::string>&, bool, py::dict>())
       .def("send", &ProducerStream::Send, "positions"_a, "time"_a = py::none(), py::kw_only(),
            "volumes"_a = py::none(), "ids"_a = py::none(), "velocities"_a = py::none(),
-           "attributes"_a = py::none(),
+           "attributes"_a = py::none(), "box"_a = py::none(),
            "Sends a frame and returns its number. The arrays (see partiemc.reconstruct) are copied "
            "once, into the message, before it returns. `time` defaults to the number of earlier "
-           "frames.\n\nWaits while `window` frames are sent and not received: a program with "
+           "frames. `box` is the periodic box of this frame, with the axes of the parameter "
+           "`box`.\n\nWaits while `window` frames are sent and not received: a program with "
            "one thread must receive when in_flight has reached window; otherwise partiemc.Error "
            "with reason SEND_TIMEOUT after half a second. With latest=True it never waits and "
            "returns None.")

@@ -280,10 +280,19 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   }
   if (percolates) RemoveGoneRings(percolation, b.topology, b.placed, result.rings);
   InStage(observer, Stage::kIdentities, [&] {
-    ContinueRings(
-        {frame, parameters.plane, b.bins, b.crossings, b.topology, b.placed, scale.cell_size,
-         PeriodsOf(parameters, frame, scale.cell_size), percolates ? &percolation : nullptr},
-        previous.history, b.identity_scratch, b.next_history, result.rings);
+    ContinueRings({frame,
+                   parameters.plane,
+                   b.bins,
+                   b.crossings,
+                   b.topology,
+                   b.placed,
+                   scale.cell_size,
+                   PeriodsOf(parameters, task.frame, scale.cell_size),
+                   percolates ? &percolation : nullptr,
+                   {},
+                   MotionInPlane(parameters, task.frame, previous.history.box, scale.cell_size),
+                   BoxToStore(parameters.box, task.frame.box)},
+                  previous.history, b.identity_scratch, b.next_history, result.rings);
   });
   if (percolates) {
     const double spacing = scale.spacing * scale.cell_size;

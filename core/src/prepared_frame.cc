@@ -10,6 +10,7 @@
 #include "bins/resolution.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"
+#include "periodic/frame_box.h"
 
 namespace partiemc {
 namespace {
@@ -63,12 +64,16 @@ absl::Status Filter(const PreparationInput& input, const Lengths& lengths,
                     Frame& frame) {
   absl::Status status = CheckHistory(input.state.noise, axes.size());
   if (!status.ok()) return status;
+  const std::optional<PeriodicBox>&of_stream = input.parameters.box, &box = input.given.box;
+  const BoxMotion motion = MotionOf(of_stream, input.state.noise.box, box, 1);
   status = FilterNoise({.frame = input.given,
                         .axes = axes,
                         .weight = *input.parameters.noise_filter,
                         .spacing = lengths.spacing,
                         .cell_size = lengths.cell_size,
-                        .box = input.parameters.box,
+                        .box = box,
+                        .motion = motion,
+                        .box_to_store = BoxToStore(of_stream, box),
                         .previous = input.state.noise,
                         .reserve =
                             [&](std::uint64_t bytes) {
@@ -88,11 +93,11 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
   const double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
   absl::Status status =
       Lift({.frame = frame,
-            .box = *parameters.box,
+            .box = *input.given.box,
             .axes = axes,
             .range = 2 * radius,
             .margin = margin,
-            .wraps = parameters.box->wraps,
+            .wraps = input.given.box->wraps,
             .reserve =
                 [&](std::uint64_t bytes) {
                   return memory.ReserveParticles(bytes, "particles in a periodic box");
@@ -102,8 +107,8 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const auto axis = static_cast<std::size_t>(axes[k]);
     if (!prepared.lifted.percolates[axis]) continue;
-    prepared.window.axes[k] = parameters.box->axes[axis];
-    prepared.reach[k] = std::min(margin, parameters.box->axes[axis]->length) - kCopyEnd * radius;
+    prepared.window.axes[k] = input.given.box->axes[axis];
+    prepared.reach[k] = std::min(margin, input.given.box->axes[axis]->length) - kCopyEnd * radius;
   }
   frame = prepared.lifted.frame;
   return status;
@@ -130,7 +135,8 @@ absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
     if (!status.ok() && !lengths.is_provisional) return status;
   }
   if (parameters.box) {
-    status = Validate(*parameters.box, parameters.kernel_radius, lengths.spacing);
+    status = CheckBoxLengths(parameters.box, *input.given.box, parameters.kernel_radius,
+                             lengths.spacing);
     if (!status.ok()) return status;
   }
   std::array<int, 3> all_axes;
@@ -145,14 +151,23 @@ absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
   return LiftFrame(input, lengths.spacing, axes, memory, scratch.lift, frame, prepared);
 }
 
+BoxMotion MotionInPlane(const ReconstructionParameters& parameters, const Frame& frame,
+                        const std::optional<PeriodicBox>& before, double cell_size) {
+  const BoxMotion in_space = MotionOf(parameters.box, before, frame.box, cell_size);
+  if (!in_space.any) return in_space;
+  const Axes axes = AxesOf(frame, parameters.plane);
+  const auto along = [&](int axis) { return in_space.axes[static_cast<std::size_t>(axis)]; };
+  return {.axes = {along(axes.first), along(axes.second), {}}, .any = true};
+}
+
 LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
                          double cell_size) {
   LatticePeriods periods;
-  if (!parameters.box) return periods;
+  if (!frame.box) return periods;
   const Axes axes = AxesOf(frame, parameters.plane);
   const std::array<int, 2> in_plane{axes.first, axes.second};
   for (std::size_t k = 0; k < in_plane.size(); ++k) {
-    const auto& axis = parameters.box->axes[static_cast<std::size_t>(in_plane[k])];
+    const auto& axis = frame.box->axes[static_cast<std::size_t>(in_plane[k])];
     if (axis) periods.cells[k] = axis->length / cell_size;
   }
   return periods;

@@ -15,6 +15,7 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
+#include "periodic/frame_box.h"
 #include "periodic/lift.h"
 #include "periodic/run_periods.h"
 #include "rings/percolation.h"
@@ -38,7 +39,7 @@ struct Prepared {
 struct PreparationInput {
   const ReconstructionParameters& parameters;
   const FrameLimits& limits;
-  const Frame& given;
+  const Frame& given;  ///< After ResolveBox.
   const State& state;
 };
 
@@ -54,7 +55,12 @@ inline bool IsPrepared(const ReconstructionParameters& parameters) {
   return parameters.noise_filter || (parameters.box && parameters.output == Output::kOutline);
 }
 
-/// The periods of the lattice; without a box, none.
+/// The motion of the box since the last frame, whose box is `before` (RingHistory::box): in cells,
+/// along the axes of the plane. `frame`: after ResolveBox.
+BoxMotion MotionInPlane(const ReconstructionParameters& parameters, const Frame& frame,
+                        const std::optional<PeriodicBox>& before, double cell_size);
+
+/// The periods of the lattice; without a box, none. `frame`: after ResolveBox.
 LatticePeriods PeriodsOf(const ReconstructionParameters& parameters, const Frame& frame,
                          double cell_size);
 

@@ -23,6 +23,7 @@
 #include "outline_stages.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
+#include "periodic/frame_box.h"
 #include "prepared_frame.h"
 #include "walls/wall_corners.h"
 #include "workspace.h"
@@ -245,6 +246,8 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   FrameMemory memory(control.memory);
   const State unseen;
   Frame frame = given;
+  status = ResolveBox(parameters_.box, frame);
+  if (!status.ok()) return status;
   if (HasPhases(parameters_)) {
     status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
     if (!status.ok()) return status;

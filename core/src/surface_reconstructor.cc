@@ -30,6 +30,7 @@
 #include "partiemc/doubt.h"
 #include "partiemc/state.h"
 #include "partiemc/status.h"
+#include "periodic/frame_box.h"
 #include "periodic/lift.h"
 #include "simplify/simplify.h"
 #include "space/bins.h"
@@ -145,7 +146,7 @@ CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& li
   for (std::size_t k = 0; k < 3; ++k) {
     if (!lifted.percolates[k]) continue;
     box.any = true;
-    const PeriodicAxis& axis = *parameters.box->axes[k];
+    const PeriodicAxis& axis = *lifted.frame.box->axes[k];
     const double reach = std::min(kCopyMargin * radius, axis.length) - kCopyEnd * radius;
     low[k] = axis.origin, high[k] = axis.origin + axis.length;
     least[k] = low[k] - reach, most[k] = high[k] + reach;
@@ -179,7 +180,8 @@ SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& co
                          .low = copied.complete.low,
                          .high = copied.complete.high,
                          .spacing = h,
-                         .cell_size = parameters.cell_size * h},
+                         .cell_size = parameters.cell_size * h,
+                         .wraps = lifted.frame.box->wraps},
                         b.body_images, b.bodies);
   }
   // Bodies without particles have no particle that says where they end.
@@ -209,6 +211,7 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
 /// walls.
 void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& bodies,
                space::SurfaceSize& size) {
+  const bool wraps = frame.box && frame.box->wraps;
   std::uint64_t in_bodies = 0;
   for (std::uint32_t index = 0; index < bodies.bodies.size(); ++index) {
     const space::Body& body = bodies.bodies[index];
@@ -216,7 +219,10 @@ void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& b
     in_bodies += body.particles;
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
-  const std::uint64_t alone = particles - in_bodies;
+  // In a box that wraps, copies may become ellipsoids, too.
+  const std::uint64_t alone =
+      wraps ? static_cast<std::uint64_t>(std::ranges::count(bodies.body_of_particle, kNoIndex))
+            : particles - in_bodies;
   size.bodies = bodies.bodies.size() + alone;
   size.samples = frame.ids.empty() ? 0 : size.samples + alone;
   for (const Attribute& attribute : frame.attributes) size.attribute_values += attribute.components;
@@ -394,31 +400,60 @@ bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface
                            scratch.cut, scratch.pieces, surface);
 }
 
+/// Sets the bodies of the shells that are ellipsoids, for FindCutShells.
+void NameDrops(SurfaceWorkspace::Buffers& b) {
+  for (const space::Drops::Drop& drop : b.drops.drops) {
+    if (drop.is_taken) b.mesh.body_of_shell[b.mesh.shell_of[drop.first_vertex]] = drop.body;
+  }
+}
+
+/// Adds the ellipsoids of particles without a body to the shells that are cut. A particle
+/// and its copies are one body.
+void CutLoneDrops(const LiftedFrame& lifted, SurfaceWorkspace::Buffers& b) {
+  space::CutShells& cut = b.cut_shells;
+  cut.first.assign(lifted.particles, kNoShell);
+  for (const bool finds_first : {true, false}) {
+    for (const space::Drops::Drop& drop : b.drops.drops) {
+      if (!drop.is_taken || drop.body != kNoIndex) continue;
+      const std::uint32_t shell = b.mesh.shell_of[drop.first_vertex];
+      std::uint32_t& first = cut.first[lifted.OriginalOf(b.bins.source[drop.particle])];
+      if (finds_first) {
+        first = std::min(first, shell);
+        continue;
+      }
+      cut.any = true;
+      cut.is_cut[shell] = space::CutShells::kLoneDrop;
+      cut.outer_of[shell] = first;
+    }
+  }
+}
+
 /// Cuts the bodies that percolate at the faces of the box. Returns false if CutSurface does.
-bool CutAtBox(const SurfaceParameters& parameters, const CopiedBox& box,
-              const space::CutShells& shells, PlaneCuts& scratch, Surface& surface) {
+bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
+              PlaneCuts& scratch, Surface& surface) {
   if (!shells.any) return true;
+  const std::array<double, 3> low{box.faces.low.x, box.faces.low.y, box.faces.low.z};
+  const std::array<double, 3> high{box.faces.high.x, box.faces.high.y, box.faces.high.z};
   scratch.planes.clear();
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     if (!box.has_copies[k]) continue;
-    const PeriodicAxis& periodic = *parameters.box->axes[k];
-    scratch.planes.push_back({axis, periodic.origin, true});
-    scratch.planes.push_back({axis, periodic.origin + periodic.length, false});
+    scratch.planes.push_back({axis, low[k], true});
+    scratch.planes.push_back({axis, high[k], false});
   }
   return space::CutSurface({.planes = scratch.planes,
                             .is_cut = shells.is_cut,
                             .body_of = shells.outer_of,
-                            .spacing = parameters.spacing},
+                            .spacing = spacing},
                            scratch.cut, scratch.pieces, surface);
 }
 
 /// The periods of the lattice; without a box, none.
-LatticePeriods PeriodsOf(const SurfaceParameters& parameters, double cell_size) {
+LatticePeriods PeriodsOf(const std::optional<PeriodicBox>& box, double cell_size) {
   LatticePeriods periods;
-  if (!parameters.box) return periods;
+  if (!box) return periods;
   for (std::size_t k = 0; k < 3; ++k) {
-    const auto& axis = parameters.box->axes[k];
+    const auto& axis = box->axes[k];
     if (axis) periods.cells[k] = axis->length / cell_size;
   }
   return periods;
@@ -428,6 +463,7 @@ LatticePeriods PeriodsOf(const SurfaceParameters& parameters, double cell_size) 
 void EndIdentities(const Frame& frame, const ShellHistory& previous, ShellHistory& next) {
   next.identities_given = previous.identities_given;
   next.time.reset();
+  next.box.reset();
   if (std::isfinite(frame.time)) next.time = frame.time;
   next.shells.clear();
   next.runs.clear();
@@ -510,7 +546,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   const double h = parameters_.spacing, cell_size = parameters_.cell_size * h;
   const SurfacePlacement placement = parameters_.placement;
   const space::BrickDirectory& bricks = b.bins.bricks;
-  LiftedFrame lifted{.frame = given};
+  Frame framed = given;
+  if (absl::Status status = ResolveBox(parameters_.box, framed); !status.ok()) return status;
+  const bool wraps = framed.box && framed.box->wraps;
+  LiftedFrame lifted{.frame = framed};
   CopiedBox copied;
   std::size_t own_particles = given.ParticleCount();
   const Frame& frame = lifted.frame;
@@ -530,11 +569,14 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (!checked.ok() || frame.ParticleCount() == 0) return checked;
     if (parameters_.box) {
       constexpr std::array kAxes = {0, 1, 2};
-      checked = Lift({.frame = given,
-                      .box = *parameters_.box,
+      checked = CheckBoxLengths(parameters_.box, *framed.box, parameters_.kernel_radius, h);
+      if (!checked.ok()) return checked;
+      checked = Lift({.frame = framed,
+                      .box = *framed.box,
                       .axes = kAxes,
                       .range = 2 * parameters_.kernel_radius * h,
                       .margin = kCopyMargin * parameters_.kernel_radius * h,
+                      .wraps = framed.box->wraps,
                       .reserve =
                           [&](std::uint64_t bytes) {
                             size.lift_bytes = bytes;
@@ -618,12 +660,12 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (!placed.ok() || placement == SurfacePlacement::kQef) return placed;
     space::NormalsFromTriangles(space::NormalWeights::kSphere, b.positions, b.mesh.triangles,
                                 b.normals);
-    space::ReplaceDrops(
-        {frame, b.bins, scale, b.bodies, b.certificate.nodes, b.virtual_plane.volumes.body_of},
-        {.most_particles = parameters_.max_drop_particles,
-         .least_particles = parameters_.min_component_particles,
-         .least_volume = parameters_.min_component_volume * h * h * h},
-        b.drops, b.positions, b.normals, b.mesh.triangles);
+    space::ReplaceDrops({frame, b.bins, scale, b.bodies, b.certificate.nodes,
+                         b.virtual_plane.volumes.body_of, wraps},
+                        {.most_particles = parameters_.max_drop_particles,
+                         .least_particles = parameters_.min_component_particles,
+                         .least_volume = parameters_.min_component_volume * h * h * h},
+                        b.drops, b.positions, b.normals, b.mesh.triangles);
     return absl::OkStatus();
   });
   if (!status.ok()) return status;
@@ -633,7 +675,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                            b.mesh, surface);
     b.cut_shells.any = false;
     if (copied.any) {
+      if (wraps) NameDrops(b);
       space::FindCutShells(b.bodies, b.mesh.body_of_shell, surface, b.cut_shells);
+      if (wraps) CutLoneDrops(lifted, b);
     }
     for (const space::Drops::Drop& drop : b.drops.drops) {
       if (!drop.is_taken) continue;
@@ -644,8 +688,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     in_stage(Stage::kIdentities, [&] {
       space::ContinueShells(
           {frame, b.bins, b.field, b.crossings, b.bodies, b.drops, b.thin, b.mesh.shell_of,
-           cell_size, PeriodsOf(parameters_, cell_size), &b.cut_shells,
-           (1 / cell_size) * copied.faces.low, (1 / cell_size) * copied.faces.high},
+           cell_size, PeriodsOf(framed.box, cell_size), &b.cut_shells,
+           (1 / cell_size) * copied.faces.low, (1 / cell_size) * copied.faces.high,
+           MotionOf(parameters_.box, state->history.box, framed.box, cell_size),
+           BoxToStore(parameters_.box, framed.box)},
           state->history, b.identities, b.next_history, surface);
     });
   }
@@ -660,9 +706,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its walls");
   }
   if (copied.any) {
-    const bool is_cut = in_stage(Stage::kMesh, [&] {
-      return CutAtBox(parameters_, copied, b.cut_shells, b.plane_cuts, surface);
-    });
+    const bool is_cut = in_stage(
+        Stage::kMesh, [&] { return CutAtBox(h, copied, b.cut_shells, b.plane_cuts, surface); });
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its box");
   }
   if (!frame.attributes.empty()) {

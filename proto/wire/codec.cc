@@ -555,6 +555,7 @@ absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message) {
   frame.ids = ViewBytes<std::uint64_t>(message.ids());
   frame.velocities = ViewBytes<float>(message.velocities());
   frame.time = message.time();
+  if (message.has_box()) frame.box = FromWire(message.box());
   if (layout.component_bytes == sizeof(float)) {
     frame.positions = ViewBytes<float>(positions);
   } else {
@@ -580,6 +581,8 @@ void EncodeFrame(const Frame& frame, v1::ParticleFrame& message) {
     AssignBytes(attribute.values, *scalar.mutable_values());
   }
   message.set_time(frame.time);
+  message.clear_box();
+  if (frame.box) *message.mutable_box() = ToWire(*frame.box);
 }
 
 void EncodeFrameError(const absl::Status& status, std::uint64_t sequence,

@@ -130,7 +130,10 @@ bool FindSequence(grpc::ByteBuffer& bytes, google::protobuf::uint64& sequence) {
 
 // The scalar fields of `frame`.
 Frame ScalarsOf(const Frame& frame) {
-  Frame scalars{.positions = frame.positions, .components = frame.components, .time = frame.time};
+  Frame scalars{.positions = frame.positions,
+                .components = frame.components,
+                .time = frame.time,
+                .box = frame.box};
   std::visit([](auto& view) { view = {}; }, scalars.positions);  // Of the same type.
   return scalars;
 }

@@ -54,7 +54,7 @@ grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
 FrameRows RowsOf(const Frame& frame);
 
 /// A ReconstructRequest with a frame. The same bytes as EncodeFrame and ToBytes, but copied
-/// directly from the caller's arrays.
+/// directly from the caller's arrays. A box comes before the arrays.
 class FrameRequest {
  public:
   /// A view of `frame`. Requires: frame.components is 2 or 3.

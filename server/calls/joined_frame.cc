@@ -98,6 +98,16 @@ absl::Status CheckTime(std::size_t k, double time, double frame_time) {
                   absl::StrCat("must be 0 or that of part 0, ", frame_time));
 }
 
+// The bytes of a box; empty if the part has none.
+std::string BoxBytesOf(const v1::ParticleFrame& part) {
+  return part.has_box() ? part.box().SerializeAsString() : std::string();
+}
+
+absl::Status CheckBox(std::size_t k, const v1::ParticleFrame& part, const std::string& box) {
+  if (!part.has_box() || (!box.empty() && BoxBytesOf(part) == box)) return absl::OkStatus();
+  return Mismatch(k, "box", "another box", "must be absent or that of part 0");
+}
+
 // Returns part number `k`. Part 0 is `frame` itself; `parts` starts with part 1.
 const v1::ParticleFrame& PartOf(std::size_t k, const v1::ParticleFrame& frame,
                                 std::span<const v1::ParticleFrame> parts) {
@@ -110,9 +120,13 @@ absl::Status CheckParts(std::span<const v1::ParticleFrame> parts,
                         std::span<const std::string> attributes, const v1::ParticleFrame& frame,
                         std::size_t& first) {
   first = parts.size() + 1;
+  const std::string box = BoxBytesOf(frame);
   for (std::size_t k = 0; k <= parts.size(); ++k) {
     const v1::ParticleFrame& part = PartOf(k, frame, parts);
     if (auto status = CheckTime(k, part.time(), frame.time()); !status.ok()) return status;
+    if (k > 0) {
+      if (auto status = CheckBox(k, part, box); !status.ok()) return status;
+    }
     if (part.positions().empty()) continue;
     wire::AttributeViews views;
     const auto decoded = wire::DecodeFrame(part, attributes, views);
@@ -219,10 +233,14 @@ absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::
   if (first > 0) {  // Its particles become part 0's.
     const std::uint64_t sequence = frame.sequence();
     const double time = frame.time();
+    v1::PeriodicBox box = frame.box();
+    const bool has_box = frame.has_box();
     frame.Swap(&parts[first - 1]);
     parts[first - 1].Clear();
     frame.set_sequence(sequence);
     frame.set_time(time);
+    frame.clear_box();
+    if (has_box) frame.mutable_box()->Swap(&box);
   }
   KeepNamed(attributes, frame);
   AppendAll([](v1::ParticleFrame& part) { return part.mutable_positions(); }, parts, frame);

@@ -231,6 +231,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("attributes");
   response.add_capabilities("attribute-meshes");
   if (context_.limits.max_parts > 0) response.add_capabilities("parts");
+  response.add_capabilities("frame-boxes");
   response.add_capabilities("grains");
   response.add_capabilities("particle-sizes");
   response.add_capabilities("phases");
@@ -245,6 +246,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   response.add_capabilities("wall-phases");
   response.add_capabilities("wall-planes");
   response.add_capabilities("surface-sizes");
+  response.add_capabilities("wrapped-surfaces");
   if (context_.relay != nullptr) response.add_capabilities("relay");
   response.add_capabilities("watch");
   if (context_.limits.history_bytes > 0) response.add_capabilities("history");

@@ -207,6 +207,31 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
   EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
 }
 
+// Each frame has another box.
+TEST(WarmFrameBox, AllocatesNothing) {
+  const auto reconstructor =
+      Reconstructor::Create({.spacing = 1.0,
+                             .sections = {{.isovalue = .4}},
+                             .box = PeriodicBox{.axes = {PeriodicAxis{0, 90}, PeriodicAxis{0, 80}}},
+                             .noise_filter = .5});
+  ASSERT_TRUE(reconstructor.ok());
+  std::vector<Particles> frames;
+  for (int k = 0; k < 4; ++k) {
+    frames.push_back(support::Disc(12, 3.0 * k, 2.0 * k));
+    frames[k].Add(support::Lattice(90, 5 + k, .3, 40));
+    for (std::size_t id = 0; id < frames[k].size(); ++id) frames[k].ids.push_back(id);
+  }
+  State state;
+  Result result;
+  ExpectWarm(frames.size(), 40, 1, [&](std::size_t k, Workspace& workspace) {
+    Frame frame = frames[k].AsFrame();
+    frame.box = PeriodicBox{
+        .axes = {PeriodicAxis{.1 * k, 90 + .9 * k}, PeriodicAxis{-.1 * k, 80 - .7 * k}}};
+    return reconstructor->Reconstruct(frame, state, workspace, result);
+  });
+  EXPECT_TRUE(state.history.box.has_value());
+}
+
 // Bodies that slide along a floor around an obstacle, with walls as lines and as particles.
 class WarmFrameAtWalls : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(AreParticles, WarmFrameAtWalls, testing::Bool(),

@@ -133,12 +133,17 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
                                           testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
 // A layer that percolates, with a drop and lone particles; then without the layer, so that nothing
-// is copied or cut.
-TEST(WarmPeriodicSurface, AllocatesNothing) {
+// is copied or cut unless the box wraps. Each frame has another box.
+class WarmPeriodicSurface : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Wraps, WarmPeriodicSurface, testing::Bool(),
+                         testing::PrintToStringParamName());
+
+TEST_P(WarmPeriodicSurface, AllocatesNothing) {
   const SurfaceParameters parameters{
       .placement = SurfacePlacement::kVirtualPlane,
       .kernel_radius = 2,
-      .box = PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{0, 12.5}}}};
+      .box =
+          PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{0, 12.5}}, .wraps = GetParam()}};
   const auto reconstructor = SurfaceReconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   std::vector<std::vector<double>> frames;
@@ -161,10 +166,11 @@ TEST(WarmPeriodicSurface, AllocatesNothing) {
   for (int round = 0; round < 4; ++round) {
     before = allocations;
     for (std::size_t k = 0; k < frames.size(); ++k) {
-      const absl::Status status =
-          reconstructor->Reconstruct(tracked.At(k), state, workspace, surface);
+      Frame frame = tracked.At(k);
+      frame.box = PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{.1 * k, 12.5 + .1 * k}}};
+      const absl::Status status = reconstructor->Reconstruct(frame, state, workspace, surface);
       ASSERT_TRUE(status.ok()) << status;
-      ASSERT_EQ(surface.cuts.empty(), k == 3);
+      ASSERT_EQ(surface.cuts.empty(), k == 3 && !GetParam());
     }
   }
   EXPECT_EQ(allocations - before, 0u);
@@ -319,6 +325,16 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
                              {"column", lattice(6, 6, 60), box(0, 0, 60)},
                              {"columns", columns, box(0, 0, 12)},
                              {"noise", noise, box(20, 20, 20)}};
+  for (Case tested : std::vector(cases)) {
+    tested.name += ", wrapped";
+    tested.box.wraps = true;
+    cases.push_back(tested);
+  }
+  std::vector<double> spray;
+  for (int p = 0; p < 1'500; ++p) spray.push_back(random.Uniform(0, 40));
+  PeriodicBox wrapped = box(40, 40, 40);
+  wrapped.wraps = true;
+  cases.push_back({"spray, wrapped", spray, wrapped});
   for (const Case& tested : cases) {
     for (const SurfacePlacement placement :
          {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,

@@ -225,6 +225,21 @@ ReconstructionParameters HostileParameters(Choices& choices) {
   return parameters;
 }
 
+namespace {
+
+// Each third frame of a stream with a box has a box of its own. No choice, so that the corpus keeps
+// its meaning.
+Frame WithBox(Frame frame, const std::optional<PeriodicBox>& of_stream, int k) {
+  if (!of_stream || k % 3 != 1) return frame;
+  frame.box = of_stream;
+  for (auto& axis : frame.box->axes) {
+    if (axis) axis = PeriodicAxis{axis->origin - .03 * axis->length, 1.07 * axis->length};
+  }
+  return frame;
+}
+
+}  // namespace
+
 void AttackStream(Choices& choices, const ReconstructionParameters& parameters, State state,
                   int frames) {
   const SingleThread single_thread;
@@ -236,10 +251,10 @@ void AttackStream(Choices& choices, const ReconstructionParameters& parameters, 
   static auto* const workspace = new Workspace;  // Its history never changes a result.
   Result result, again;
   for (int k = 0; k < frames; ++k) {
-    const HostileFrame frame(choices, parameters.spacing.value_or(1));
+    const HostileFrame hostile(choices, parameters.spacing.value_or(1));
+    const Frame frame = WithBox(hostile.AsFrame(), parameters.box, k);
     const State before = state;
-    const absl::Status status =
-        reconstructor->Reconstruct(frame.AsFrame(), state, *workspace, result);
+    const absl::Status status = reconstructor->Reconstruct(frame, state, *workspace, result);
     if (!status.ok()) {
       RequireNoTrace(status, result, before, state);
       continue;
@@ -251,7 +266,7 @@ void AttackStream(Choices& choices, const ReconstructionParameters& parameters, 
     RequireOk(restored.status(), "a state reads back");
     Require(Serialize(*restored) == bytes, "a state reads back the same");
     Workspace fresh;
-    RequireOk(reconstructor->Reconstruct(frame.AsFrame(), *restored, fresh, again),
+    RequireOk(reconstructor->Reconstruct(frame, *restored, fresh, again),
               "a restored stream takes the same frame");
     Require(result == again && Serialize(*restored) == Serialize(state),
             "a stream goes on from a restored state bit for bit");

@@ -298,6 +298,9 @@ void ExpectFrameComesBack(int components) {
     frame.ids = ids;
     frame.velocities = velocities;
     frame.time = 0.1;
+    if (particles % 2 == 1) {
+      frame.box = PeriodicBox{.axes = {PeriodicAxis{-1, 2.5}, std::nullopt, PeriodicAxis{0, 7}}};
+    }
     v1::ParticleFrame message;
     EncodeFrame(frame, message);
     const auto decoded = DecodeFrame(message);
@@ -311,6 +314,7 @@ void ExpectFrameComesBack(int components) {
     EXPECT_EQ(std::vector<float>(decoded->velocities.begin(), decoded->velocities.end()),
               velocities);
     EXPECT_EQ(decoded->time, 0.1);
+    EXPECT_EQ(decoded->box, frame.box);
   }
 }
 
@@ -345,6 +349,7 @@ TEST(FrameMessage, EncodingAgainReplacesWhatWasThere) {
   message.set_volumes("left over");
   message.set_ids("left over");
   message.set_velocities("left over");
+  message.mutable_box();
   Frame frame;
   const std::vector<float> positions = {1, 2, 3};
   frame.positions = std::span<const float>(positions);
@@ -355,6 +360,7 @@ TEST(FrameMessage, EncodingAgainReplacesWhatWasThere) {
   EXPECT_TRUE(message.volumes().empty());
   EXPECT_TRUE(message.ids().empty());
   EXPECT_TRUE(message.velocities().empty());
+  EXPECT_FALSE(message.has_box());
 }
 
 TEST(FrameMessage, AFormatThatIsNotGivenIsNotGuessed) {

@@ -57,7 +57,8 @@ void ExpectSameAsMessage(int components, std::size_t particles) {
                     .ids = ids,
                     .velocities = velocities,
                     .attributes = attributes,
-                    .time = 0.25};
+                    .time = 0.25,
+                    .box = PeriodicBox{.axes = {PeriodicAxis{-1, 7.5}, std::nullopt, {}}}};
   v1::ReconstructRequest expected;
   EncodeFrame(frame, *expected.mutable_frame());
   expected.mutable_frame()->set_sequence(300);

@@ -161,6 +161,29 @@ TEST(JoinParts, TheFirstPartThatDoesNotFitTheOthersIsNamed) {
             "PART_MISMATCH parts[2].scalars");
 }
 
+TEST(JoinParts, TheBoxIsThatOfPartZero) {
+  const auto with_box = [](v1::ParticleFrame& frame, double length) {
+    frame.mutable_box()->mutable_x()->set_length(length);
+  };
+  const auto both = [&](double length) {
+    return Refusal([&](auto& frame, auto& parts) {
+      with_box(frame, 5);
+      with_box(parts[0], length);
+    });
+  };
+  EXPECT_EQ(both(5), "");
+  EXPECT_EQ(both(6), "PART_MISMATCH parts[1].box");
+  EXPECT_EQ(Refusal([&](auto&, auto& parts) { with_box(parts[1], 5); }),
+            "PART_MISMATCH parts[2].box");
+  // Part 0 has no particles.
+  v1::ParticleFrame frame;
+  with_box(frame, 5);
+  std::vector<v1::ParticleFrame> parts = {FrameOf(RandomParticles(10, 255))};
+  ASSERT_TRUE(JoinParts(parts, {}, frame).ok());
+  EXPECT_EQ(frame.box().x().length(), 5);
+  EXPECT_FALSE(frame.positions().empty());
+}
+
 TEST(JoinParts, APartThatIsNoFrameByItselfIsNamed) {
   EXPECT_EQ(Refusal([](auto&, auto& parts) { parts[1].mutable_ids()->pop_back(); }),
             "BYTE_COUNT parts[2].ids");

@@ -12,16 +12,29 @@ double TimeOf(const RecordedFrame& recorded) {
   return recorded.time.value_or(recorded.step.value_or(static_cast<double>(recorded.index)));
 }
 
+// The recorded box along the periodic axes of the stream, if it differs from the box of the stream.
+std::optional<PeriodicBox> BoxOf(const RecordedFrame& recorded,
+                                 const std::optional<PeriodicBox>& of_stream) {
+  if (!of_stream || !recorded.box) return std::nullopt;
+  PeriodicBox box = *of_stream;
+  for (std::size_t k = 0; k < box.axes.size(); ++k) {
+    const double low = recorded.box->low[k], high = recorded.box->high[k];
+    if (box.axes[k]) box.axes[k] = PeriodicAxis{low, high - low};
+  }
+  return box == *of_stream ? std::nullopt : std::optional(box);
+}
+
 }  // namespace
 
 FrameFeeder::FrameFeeder(Sequence& input, FrameStream& stream,
                          std::optional<double> frames_per_second, SendPolicy policy,
-                         std::vector<std::string> attributes)
+                         std::vector<std::string> attributes, std::optional<PeriodicBox> box)
     : input_(input),
       stream_(stream),
       frames_per_second_(frames_per_second),
       policy_(policy),
-      attribute_names_(std::move(attributes)) {
+      attribute_names_(std::move(attributes)),
+      box_(box) {
   reader_ = std::thread([this] { Read(); });
   sender_ = std::thread([this] { SendAll(); });
 }
@@ -120,7 +133,8 @@ Frame FrameFeeder::View(const RecordedFrame& recorded) {
   Frame frame{.positions = std::span<const double>(recorded.positions),
               .components = recorded.components,
               .volumes = recorded.volumes,
-              .ids = recorded.ids};
+              .ids = recorded.ids,
+              .box = BoxOf(recorded, box_)};
   // Velocities are sent only with times. Without times the interval between two frames is unknown.
   if (recorded.time) frame.velocities = recorded.velocities;
   ViewAttributes(recorded);

@@ -41,9 +41,10 @@ class FrameFeeder {
 
   /// Starts both threads. Requires: `input` and `stream` outlive this object. If
   /// `frames_per_second` is absent, frames are sent as fast as possible. `attributes` names the
-  /// attributes to send.
+  /// attributes to send. `box`: the box of the stream, if frames have their own recorded boxes.
   FrameFeeder(Sequence& input, FrameStream& stream, std::optional<double> frames_per_second,
-              SendPolicy policy, std::vector<std::string> attributes);
+              SendPolicy policy, std::vector<std::string> attributes,
+              std::optional<PeriodicBox> box);
   /// Calls Stop and Join.
   ~FrameFeeder();
 
@@ -82,6 +83,7 @@ class FrameFeeder {
   BoundedQueue<FramePointer> read_ahead_{2};
   absl::Status input_status_;  // Owned by the reader thread until Join.
   const std::vector<std::string> attribute_names_;
+  const std::optional<PeriodicBox> box_;
   std::vector<float> as_float32_;      // Owned by the sender thread.
   std::vector<Attribute> attributes_;  // Likewise.
 

@@ -273,7 +273,7 @@ absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) 
 
 int Replay(const ReplayFlags& given) {
   ReplayFlags flags = given;
-  flags.sequence.requires_one_box = !flags.periodic.empty() && flags.box.empty();
+  flags.sequence.requires_box = !flags.periodic.empty() && flags.box.empty();
   // The reader keeps this attribute, too.
   std::vector<std::string>& attributes = flags.sequence.attributes;
   const std::string phases = PhaseAttributeOf(flags);
@@ -329,7 +329,8 @@ int Replay(const ReplayFlags& given) {
   const Clock::time_point start = Clock::now();
   FrameFeeder feeder(*input->frames, **stream, *rate,
                      flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock,
-                     flags.sequence.attributes);
+                     flags.sequence.attributes,
+                     flags.sequence.requires_box ? parameters->box : std::nullopt);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
   const ReplayEnd ended = receiver.Run();
   if (ended.code != kGood) feeder.Stop();

@@ -77,7 +77,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses the box is
         one body, and results are unwrapped. An outline or a surface that reaches its own image is
         cut at the faces (`rings.cuts`, `surface.cuts`).
-    wrap: with a box: every outline is cut at the faces, so nothing lies beyond them.
+        A Reconstructor and a Stream take another box for each frame, with the same axes.
+    wrap: with a box: every outline and surface is cut at the faces, so nothing lies beyond them.
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
         weight, in (0, 1], of the given positions; 0.5 is a good value. Requires ids.
     walls: walls at which the outline is cut, with the fluid on their left: for each the coordinates
@@ -187,14 +188,14 @@ def read_pysph(path, *, array="fluid"):
 
 
 # The arguments of Stream.send.
-_SENT = {"positions", "time", "volumes", "ids", "velocities", "attributes"}
+_SENT = {"positions", "time", "volumes", "ids", "velocities", "attributes", "box"}
 
 
 def _map(self, frames, times=None):
     """Yields the results of `frames`, an iterable, in order.
 
     A frame is its positions, or a dict of arguments of send: {"positions": positions, "ids": ids,
-    "volumes": volumes, "velocities": velocities, "attributes": {...}, "time": time}.
+    "volumes": volumes, "velocities": velocities, "attributes": {...}, "time": time, "box": box}.
     times: an iterable, for frames without a time; 0, 1, ... if None.
 
     Sends up to a window of frames ahead, in one thread. With latest=True it never waits to send:

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "partiemc/parameters.h"
 
 namespace partiemc {
 
@@ -50,6 +52,12 @@ struct Frame {
 
   /// Simulation time. Velocities are used only if the time increases from frame to frame.
   double time = 0;
+
+  /// The periodic box of this frame, instead of ReconstructionParameters::box. Requires a box of
+  /// the stream with the same periodic axes; lengths have the same limits. `wraps` is ignored: the
+  /// stream's applies. Identities and the noise filter expect that particles move with the box
+  /// (core/PERIODIC.md, "Boxes that change").
+  std::optional<PeriodicBox> box = std::nullopt;
 
   // Ids, velocities and time influence only the identities and parents of rings
   // (core/IDENTITIES.md).

@@ -105,8 +105,8 @@ struct PeriodicAxis {
 struct PeriodicBox {
   std::array<std::optional<PeriodicAxis>, 3> axes{};
 
-  /// Whether results are wrapped: every outline is cut at the faces, so nothing lies beyond them.
-  /// Only for outlines with KeepsGuarantees.
+  /// Whether results are wrapped: every outline or surface is cut at the faces, so nothing lies
+  /// beyond them. Requires a placement with KeepsGuarantees.
   bool wraps = false;
 
   static constexpr double kMostSpacings = 1e8;  ///< Limit of a length, in spacings.
@@ -270,7 +270,7 @@ struct ReconstructionParameters {
   /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
   /// (PERCOLATES). A length must be at least four kernel radii and at most kMostSpacings
   /// spacings. For outlines, the box may have the axes of the plane of the particles. Excludes
-  /// slices.
+  /// slices. A frame may have another box (Frame::box).
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md):

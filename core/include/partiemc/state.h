@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/surface_state.h"
 
@@ -61,8 +62,10 @@ struct ParticleSample {
 struct RingHistory {
   std::uint64_t identities_given = 0;  ///< The largest identity so far. No identity is reused.
   std::optional<double> time;          ///< Time of the last frame, finite.
-  std::vector<KnownRing> rings;        ///< Sorted by identity.
-  std::vector<NodeRun> runs;  ///< Disjoint, by row, then column. Each ring has at least one run.
+  /// The box of the last frame (Frame::box), without `wraps`. Absent: the box of the stream.
+  std::optional<PeriodicBox> box;
+  std::vector<KnownRing> rings;  ///< Sorted by identity.
+  std::vector<NodeRun> runs;     ///< Disjoint, by row, then column. Each ring has at least one run.
   std::vector<ParticleSample>
       samples;  ///< Sorted by hash. Of each outer ring, the particles with the lowest hashes.
 
@@ -75,6 +78,7 @@ struct NoiseHistory {
   std::vector<std::uint64_t> ids;  ///< Ascending.
   std::vector<double> given;       ///< Given coordinates, world units: 2 or 3 per particle.
   std::vector<float> offsets;      ///< Filtered minus given coordinates, in cells; as `given`.
+  std::optional<PeriodicBox> box;  ///< As RingHistory::box.
 
   friend bool operator==(const NoiseHistory&, const NoiseHistory&) = default;
 };
@@ -108,7 +112,7 @@ struct State {
 /// normal, 32 per ring, 16 per run, 20 per sample. A state with sections takes 24 bytes, and for
 /// each outline 8 bytes plus the size of its state. A state of a stream of surfaces does the same,
 /// with the surface in place of the first outline. A noise filter adds 48 bytes, and 32 per
-/// particle of an outline or 44 per particle in space.
+/// particle of an outline or 44 per particle in space. Each box of a last frame adds 48 bytes.
 std::string Serialize(const State& state);
 
 /// The size of Serialize(state), without writing it.

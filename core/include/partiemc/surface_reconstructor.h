@@ -59,7 +59,8 @@ struct SurfaceParameters {
   double min_component_volume = 0;
   std::uint64_t min_component_particles = 0;
 
-  /// As ReconstructionParameters::box. `max_tiles` counts copies of bodies that reach their image.
+  /// As ReconstructionParameters::box; Frame::box replaces it. `max_tiles` counts copies of bodies
+  /// that reach their image.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// As ReconstructionParameters::wall_planes.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "partiemc/parameters.h"
 
 namespace partiemc {
 
@@ -52,6 +53,7 @@ struct ShellSample {
 struct ShellHistory {
   std::uint64_t identities_given = 0;  ///< The largest identity so far. No identity is reused.
   std::optional<double> time;          ///< Time of the last frame, finite.
+  std::optional<PeriodicBox> box;      ///< As RingHistory::box.
   std::vector<KnownShell> shells;      ///< Sorted by identity.
   std::vector<ShellRun> runs;  ///< Disjoint, by layer, row, node. Each shell has at least one run.
   /// Sorted by hash. Each outer shell has its kMaxSamples particles with the lowest hashes.
@@ -71,7 +73,7 @@ struct SurfaceState {
 };
 
 /// Writes a state with version and checksum; same bytes on every machine. Size: 64 bytes, 40 per
-/// shell, 20 per run, 24 per sample.
+/// shell, 20 per run, 24 per sample, 48 for a box.
 std::string Serialize(const SurfaceState& state);
 
 /// The size of Serialize(state), without writing it.

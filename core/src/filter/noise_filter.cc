@@ -87,14 +87,15 @@ void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScrat
   });
 }
 
-// The displacement since the last frame in spacings, to the nearest image in a periodic box.
+// The displacement since the last frame in spacings, to the nearest image in a periodic box. The
+// motion with the box does not count.
 Vec3 DisplacementOf(const NoiseFilterInput& input, const MotionGrid& grid,
                     const NoiseFilterScratch& s, std::size_t rank) {
   const std::size_t axes = input.axes.size();
   return VectorOf(axes, [&](std::size_t axis) {
-    const double moved =
-        (s.next.given[rank * axes + axis] - input.previous.given[s.last[rank] * axes + axis]) /
-        input.spacing;
+    double last = input.previous.given[s.last[rank] * axes + axis];
+    if (input.motion.any) last = input.motion.At(static_cast<std::size_t>(input.axes[axis]), last);
+    const double moved = (s.next.given[rank * axes + axis] - last) / input.spacing;
     const double length = grid.length[axis];
     return length > 0 ? moved - length * Floor(moved / length + .5) : moved;
   });
@@ -109,9 +110,11 @@ Vec3 PositionOf(const NoiseFilterInput& input, const NoiseFilterScratch& s, std:
 
 // Starts the next history with the given positions.
 template <typename Real>
-void StartHistory(const Frame& frame, std::span<const Real> positions, const Coordinates& at,
-                  NoiseFilterScratch& s) {
+void StartHistory(const NoiseFilterInput& input, std::span<const Real> positions,
+                  const Coordinates& at, NoiseFilterScratch& s) {
+  const Frame& frame = input.frame;
   const std::size_t axes = at.AxisCount(), count = s.particles.size();
+  s.next.box = count > 0 ? input.box_to_store : std::nullopt;
   ResizeExactly(count, s.next.ids);
   ResizeExactly(count * axes, s.next.given);
   s.next.offsets.reserve(count * axes);
@@ -225,8 +228,7 @@ absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& s, F
   const MotionGrid grid = MakeMotionGrid(input.axes, input.box, input.spacing);
   SortById(input.frame, s);
   FindLast(input.frame, input.previous, s);
-  std::visit([&](auto positions) { StartHistory(input.frame, positions, at, s); },
-             input.frame.positions);
+  std::visit([&](auto positions) { StartHistory(input, positions, at, s); }, input.frame.positions);
   const std::size_t cells = FindCells(input, grid, s);
   status = input.reserve(bytes + kBytesPerMotionCell * cells);
   if (!status.ok()) return status;

@@ -13,6 +13,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/state.h"
 #include "periodic/cell_groups.h"
+#include "periodic/frame_box.h"
 
 namespace partiemc {
 
@@ -50,6 +51,8 @@ struct NoiseFilterInput {
   double weight;              ///< ReconstructionParameters::noise_filter.
   double spacing, cell_size;  ///< World units. The cell size is the same for all frames.
   const std::optional<PeriodicBox>& box;
+  const BoxMotion& motion;  ///< Motion of the box since the last frame. World units.
+  std::optional<PeriodicBox> box_to_store;  ///< For NoiseHistory::box.
   const NoiseHistory& previous;
   /// Called twice with the bytes that the filter requires, before they are allocated: a lower bound
   /// by particles, then the sum. Its error ends the filter.

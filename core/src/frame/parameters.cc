@@ -169,9 +169,9 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
   if (auto status = Validate(*p.box, p.kernel_radius, p.spacing.value_or(0)); !status.ok()) {
     return status;
   }
-  if (p.box->wraps && (p.output == Output::kSurface || !KeepsGuarantees(p.placement))) {
+  if (p.box->wraps && !KeepsGuarantees(p.placement)) {
     return Refused("box.wraps", "true",
-                   "must be false for surfaces and farthest-particle, which cannot be cut");
+                   "must be false for farthest-particle, whose rings cannot be cut");
   }
   constexpr std::string_view kRule =
       "must be absent with a periodic box: a plane cuts only one image of a body";

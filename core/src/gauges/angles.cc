@@ -69,7 +69,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
 
 }  // namespace
 
-std::vector<double> ContactAngles(const Result& result, const Wall& wall) {
+std::vector<double> ContactAngles(const Result& result, const WallLine& wall) {
   const std::optional<std::size_t> ring = LargestRing(result.rings);
   if (!ring) return {NAN, NAN, NAN, NAN};
   const double length = std::hypot(wall.direction.x, wall.direction.y);

@@ -9,13 +9,13 @@
 namespace partiemc {
 
 /// A straight wall. The body is on the left of its direction.
-struct Wall {
+struct WallLine {
   Point origin, direction;
   double reach = 0;  ///< A circle is fitted to the outline within this distance of a contact.
 };
 
 /// The values of GaugeKind::kContact.
-std::vector<double> ContactAngles(const Result& result, const Wall& wall);
+std::vector<double> ContactAngles(const Result& result, const WallLine& wall);
 
 /// The values of GaugeKind::kRepose.
 std::vector<double> AnglesOfRepose(const Result& result);

@@ -204,12 +204,15 @@ void WriteHistory(const IdentityInput& input, IdentityScratch& s, RingHistory& n
   std::ranges::sort(next.samples, {}, &ParticleSample::hash);
   next.time.reset();
   if (std::isfinite(input.frame.time)) next.time = input.frame.time;
+  next.box = input.box_to_store;
 }
 
 }  // namespace
 
-void ContinueRings(const IdentityInput& input, const RingHistory& previous,
-                   IdentityScratch& scratch, RingHistory& next, Rings& rings) {
+void ContinueRings(const IdentityInput& input, const RingHistory& last, IdentityScratch& scratch,
+                   RingHistory& next, Rings& rings) {
+  if (input.box_motion.any) MoveWithBox(input.box_motion, last, scratch.carried);
+  const RingHistory& previous = input.box_motion.any ? scratch.carried : last;
   CollectRuns(input, scratch, next.runs);
   ShareNumbers(input, scratch);
   FillNumberedRings(input, scratch);

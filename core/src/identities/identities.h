@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "bins/bins.h"
@@ -14,6 +15,7 @@
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
 #include "partiemc/state.h"
+#include "periodic/frame_box.h"
 #include "rings/percolation.h"
 #include "rings/rings.h"
 #include "vertices/vertices.h"
@@ -30,6 +32,7 @@ struct IdentityScratch {
   std::vector<std::uint64_t> particle_count;     // By number.
   std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;
+  RingHistory carried;  // The last frame, moved with its box.
   RelationScratch relation_scratch;
   std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By ring of the last frame.
@@ -50,6 +53,9 @@ struct IdentityInput {
   LatticePeriods periods = {};
   const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
   ParticleSubset subset = {};                ///< The particles that count.
+  /// Motion of the periodic box since the last frame, in cells, along the axes of the plane.
+  BoxMotion box_motion = {};
+  std::optional<PeriodicBox> box_to_store = std::nullopt;  ///< For RingHistory::box.
 };
 
 /// Assigns an identity and parents to every ring of `rings`, and writes `next`, the history for the

@@ -48,6 +48,19 @@ void WrapRuns(std::span<const NodeRun> runs, const LatticePeriods& periods,
   std::sort(wrapped.begin(), wrapped.end(), ComesBefore);
 }
 
+void MoveWithBox(const BoxMotion& motion, const RingHistory& history, RingHistory& moved) {
+  moved = history;
+  for (NodeRun& run : moved.runs) {
+    run.row = motion.NodeAt(1, run.row);
+    motion.MoveRun(0, run.first, run.last);
+  }
+  std::sort(moved.runs.begin(), moved.runs.end(), ComesBefore);
+  for (ParticleSample& sample : moved.samples) {
+    sample.column = motion.NodeAt(0, sample.column);
+    sample.row = motion.NodeAt(1, sample.row);
+  }
+}
+
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared) {
   SweepSharedNodes<NodeRun>(a_runs, b_runs, newest, shared);

@@ -7,6 +7,7 @@
 
 #include "identities/shared_nodes.h"
 #include "partiemc/state.h"
+#include "periodic/frame_box.h"
 #include "periodic/run_periods.h"
 
 namespace partiemc {
@@ -29,6 +30,10 @@ void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of
 /// split at faces. Runs of holes may then overlap other runs.
 void WrapRuns(std::span<const NodeRun> runs, const LatticePeriods& periods,
               std::vector<NodeRun>& wrapped);
+
+/// Sets `moved` to `history` after the motion of its box: each run moves with its middle node, each
+/// sample to the nearest node. Moved runs may overlap.
+void MoveWithBox(const BoxMotion& motion, const RingHistory& history, RingHistory& moved);
 
 /// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b. `newest`
 /// is scratch: by ring of `a_runs`, the index in `shared` of the ring's newest pair.

@@ -75,6 +75,11 @@ struct LiftedFrame {
   std::size_t particles = 0;  ///< Number of given particles.
   std::span<const std::uint32_t> originals;  ///< By copy: the index of the given particle.
   std::array<bool, 3> percolates{};          ///< Axes along which a cluster percolates.
+
+  /// The given particle of a particle of `frame`.
+  std::uint32_t OriginalOf(std::uint32_t particle) const {
+    return particle < particles ? particle : originals[particle - particles];
+  }
 };
 
 /// Moves each particle by whole lengths of the box, so that clusters are contiguous and the centre

@@ -28,6 +28,7 @@ struct Body {
   std::uint64_t images = 0;     ///< The same for mirror images behind walls, or for copies.
   double volume = 0;            ///< Volume of these particles, world units cubed.
   BodyFate fate = BodyFate::kWhole;
+  bool is_complete = false;  ///< It is cut, but this image lacks no part. Only in a box that wraps.
   /// The first body that is an image of the same body. ChooseImages gives all of them the particles
   /// and the volume of the whole body.
   std::uint32_t first_image = kNoIndex;

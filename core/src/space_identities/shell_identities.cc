@@ -44,7 +44,7 @@ void WriteIdentities(const ShellHistory& previous, const ShellIdentityScratch& s
 
 /// Writes the history: shells sorted by identity, and runs and samples with indices of these
 /// shells.
-void WriteShellHistory(const Frame& frame, ShellIdentityScratch& s, ShellHistory& next) {
+void WriteShellHistory(const ShellInput& input, ShellIdentityScratch& s, ShellHistory& next) {
   const std::vector<KnownShell>& shells = s.shells.shells;
   std::vector<std::uint32_t>& by_identity = s.by_identity;
   by_identity.resize(shells.size());
@@ -62,13 +62,16 @@ void WriteShellHistory(const Frame& frame, ShellIdentityScratch& s, ShellHistory
   for (ShellSample& sample : next.samples) sample.shell = s.rank[sample.shell];
   std::ranges::sort(next.samples, {}, &ShellSample::hash);
   next.time.reset();
-  if (std::isfinite(frame.time)) next.time = frame.time;
+  if (std::isfinite(input.frame.time)) next.time = input.frame.time;
+  next.box = input.box_to_store;
 }
 
 }  // namespace
 
-void ContinueShells(const ShellInput& input, const ShellHistory& previous,
+void ContinueShells(const ShellInput& input, const ShellHistory& last,
                     ShellIdentityScratch& scratch, ShellHistory& next, Surface& surface) {
+  if (input.box_motion.any) MoveWithBox(input.box_motion, last, scratch.carried);
+  const ShellHistory& previous = input.box_motion.any ? scratch.carried : last;
   NumberShells(input, surface, scratch.shells, next.runs);
   FollowShells(input.frame, input.bins, previous, scratch.shells, scratch.tracks);
   RelateShells(previous,
@@ -82,7 +85,7 @@ void ContinueShells(const ShellInput& input, const ShellHistory& previous,
                scratch.relation_scratch, scratch.relations);
   AssignShellIdentities(previous, scratch, next);
   WriteIdentities(previous, scratch, surface);
-  WriteShellHistory(input.frame, scratch, next);
+  WriteShellHistory(input, scratch, next);
 }
 
 }  // namespace partiemc::space

@@ -16,6 +16,7 @@ namespace partiemc::space {
 struct ShellIdentityScratch {
   NumberedShells shells;
   ShellTracks tracks;
+  ShellHistory carried;  // The last frame, moved with its box.
   ShellRelationScratch relation_scratch;
   std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By shell of the last frame.

@@ -172,6 +172,21 @@ void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, const Compar
 
 }  // namespace
 
+void MoveWithBox(const BoxMotion& motion, const ShellHistory& history, ShellHistory& moved) {
+  moved = history;
+  for (ShellRun& run : moved.runs) {
+    run.layer = motion.NodeAt(2, run.layer);
+    run.row = motion.NodeAt(1, run.row);
+    motion.MoveRun(0, run.first, run.last);
+  }
+  std::sort(moved.runs.begin(), moved.runs.end(), ComesBefore);
+  for (ShellSample& sample : moved.samples) {
+    sample.x = motion.NodeAt(0, sample.x);
+    sample.y = motion.NodeAt(1, sample.y);
+    sample.z = motion.NodeAt(2, sample.z);
+  }
+}
+
 void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& s,
                   std::vector<Relation>& relations) {
   Evidence& e = s.evidence;

@@ -8,6 +8,7 @@
 #include "identities/relations.h"
 #include "identities/shared_nodes.h"
 #include "partiemc/surface_state.h"
+#include "periodic/frame_box.h"
 #include "periodic/run_periods.h"
 #include "space_identities/shell_tracks.h"
 
@@ -34,6 +35,9 @@ struct ShellRelationScratch {
   std::vector<std::uint32_t> newest;  // For SweepSharedNodes.
   Evidence evidence;
 };
+
+/// Sets `moved` to `history` after the motion of its box, as MoveWithBox for rings.
+void MoveWithBox(const BoxMotion& motion, const ShellHistory& history, ShellHistory& moved);
 
 /// Finds the related shells by the rules for rings (core/IDENTITIES.md). Shells move by the
 /// displacement of their samples, else by their velocities, else not at all; then the nodes that

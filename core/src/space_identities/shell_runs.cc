@@ -65,7 +65,7 @@ void ListEdges(const ShellInput& input, NumberedShells& shells) {
     }
   }
   for (const Drops::Drop& drop : input.drops.drops) {
-    if (!drop.is_taken || drop.body != kNoIndex) continue;
+    if (!drop.is_taken || drop.body != kNoIndex || input.bins.IsImage(drop.particle)) continue;
     const auto node = [](double cells) { return static_cast<std::int32_t>(std::floor(cells)); };
     const std::int32_t x = node(drop.origin.x), y = node(drop.origin.y), z = node(drop.origin.z);
     const std::uint32_t shell = input.shell_of[drop.first_vertex];
@@ -158,7 +158,8 @@ void CollectRuns(const ShellInput& input, const Surface& surface, NumberedShells
     }
     const std::uint32_t stand_in = shells.stand_in[shell];
     ShellRun run{to.layer, to.row, from.node + 1, to.node, kNoShell};
-    if (stand_in == kNoShell || (IsCut(input, shell) && !box.Clip(run))) continue;
+    const bool is_clipped = IsCut(input, shell) && input.cut->is_cut[shell] != CutShells::kLoneDrop;
+    if (stand_in == kNoShell || (is_clipped && !box.Clip(run))) continue;
     run.shell = NumberOf(stand_in, shells);
     runs.push_back(run);
   }
@@ -184,7 +185,7 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
     ++shells.particles[number];
   }
   for (const Drops::Drop& drop : input.drops.drops) {
-    if (!drop.is_taken || drop.body != kNoIndex) continue;
+    if (!drop.is_taken || drop.body != kNoIndex || input.bins.IsImage(drop.particle)) continue;
     const std::uint32_t number = shells.number[input.shell_of[drop.first_vertex]];
     shells.of_particle[drop.particle] = number;
     ++shells.particles[number];

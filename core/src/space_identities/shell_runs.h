@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "identities/shared_nodes.h"
 #include "partiemc/frame.h"
 #include "partiemc/surface.h"
+#include "periodic/frame_box.h"
 #include "periodic/run_periods.h"
 #include "space/bins.h"
 #include "space/bodies.h"
@@ -42,7 +44,9 @@ struct ShellInput {
   LatticePeriods periods = {};
   /// With copies of particles: the shells that will be cut. Empty or null otherwise.
   const CutShells* cut = nullptr;
-  Vec3 low = {}, high = {};  ///< Then: the box in cells; infinite along axes without copies.
+  Vec3 low = {}, high = {};   ///< Then: the box in cells; infinite along axes without copies.
+  BoxMotion box_motion = {};  ///< Motion of the box since the last frame, in cells.
+  std::optional<PeriodicBox> box_to_store = std::nullopt;  ///< For ShellHistory::box.
 };
 
 /// The shells of a frame, numbered from 0 in the order of their first runs: by layer, row, node.

@@ -97,8 +97,9 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
     s.images[std::max(a, b)].set = std::min(a, b);
   }
   for (std::uint32_t p = 0; p < count; ++p) {
-    if (input.bins.IsImage(p) || bodies.body_of_particle[p] != kNoIndex) continue;
-    if (s.body_of[input.bins.source[p]] != kNoIndex) bodies.body_of_particle[p] = kDroppedBody;
+    if (bodies.body_of_particle[p] != kNoIndex || (input.bins.IsImage(p) && !input.wraps)) continue;
+    const std::uint32_t original = input.lifted.OriginalOf(input.bins.source[p]);
+    if (s.body_of[original] != kNoIndex) bodies.body_of_particle[p] = kDroppedBody;
   }
   for (std::uint32_t body = 0; body < s.images.size(); ++body) {
     const std::uint32_t root = RootOf(s.images, body);
@@ -143,8 +144,10 @@ void ChooseImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodi
     Body& body = bodies.bodies[index];
     body.particles = set.particles;
     body.volume = set.volume;
-    if (!set.has_copies || set.best == index) continue;
-    body.fate = set.best == kNoIndex ? BodyFate::kCut : BodyFate::kGone;
+    if (!set.has_copies || (set.best == index && !input.wraps)) continue;
+    body.fate = input.wraps || set.best == kNoIndex ? BodyFate::kCut : BodyFate::kGone;
+    body.is_complete = input.wraps && IsComplete(input, s.images[index]) &&
+                       s.images[index].given + body.images == set.particles;
     body.first_image = root;
   }
 }

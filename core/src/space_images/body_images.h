@@ -21,6 +21,7 @@ struct BodyImageInput {
   /// Bodies within these planes are complete; infinite along axes without copies. World units.
   Vec3 low, high;
   double spacing, cell_size;  ///< World units.
+  bool wraps = false;         ///< PeriodicBox::wraps.
 };
 
 /// Warm buffers of ChooseImages.
@@ -44,17 +45,22 @@ struct BodyImageScratch {
 ///   - A body without copies remains whole.
 ///   - Among the images within the planes, the image with the most given particles remains whole,
 ///     at a tie the first one. The other images are dropped.
-///   - If there is no such image, or it lacks particles of the body, all images are cut.
+///   - If there is no such image, or it lacks particles of the body, all images are cut. If the box
+///     wraps, this is so for all bodies with copies.
 /// Sets the particles and the volume of each body to the sum of all its images. If a particle has
 /// no body but its copy has one, it belongs to this body, and its own body is kDroppedBody, so that
-/// it does not become a drop. Bodies without particles remain whole.
+/// it does not become a drop; in a box that wraps, the same for copies. Bodies without particles
+/// remain whole.
 /// Requires: FindBodies. Deterministic. Cost: linear in particles and parts.
 void ChooseImages(const BodyImageInput& input, BodyImageScratch& scratch, Bodies& bodies);
 
 /// The shells of the bodies that are cut.
 struct CutShells {
   bool any = false;
-  std::vector<std::uint8_t> is_cut;     ///< By shell.
+  /// By shell: not 0. kLoneDrop for the ellipsoid of a particle without a body, which counts for
+  /// identities although its node may lie outside of the box.
+  std::vector<std::uint8_t> is_cut;
+  static constexpr std::uint8_t kLoneDrop = 2;
   std::vector<std::uint32_t> outer_of;  ///< By shell: the first outer shell of its body.
   std::vector<std::uint32_t> first;     ///< Scratch: by body.
 };

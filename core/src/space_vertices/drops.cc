@@ -131,8 +131,9 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
   drops.drop_of.assign(bodies.bodies.size(), kNoIndex);
   for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
     const std::uint64_t particles = bodies.bodies[body].particles;
-    // A body that is cut is longer than the box.
-    if (particles == 0 || particles > limits.most_particles || bodies.IsCut(body)) continue;
+    // A body that is cut is longer than the box, or the box wraps.
+    const bool is_whole = !bodies.IsCut(body) || bodies.bodies[body].is_complete;
+    if (particles == 0 || particles > limits.most_particles || !is_whole) continue;
     drops.drop_of[body] = static_cast<std::uint32_t>(drops.drops.size());
     Drops::Drop& drop = drops.drops.emplace_back();
     drop.body = body;
@@ -147,7 +148,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       const std::uint32_t body = bodies.body_of_particle[p];
       if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
       const bool is_image = bins.IsImage(p);
-      if (body == kNoIndex && is_image) continue;
+      if (body == kNoIndex && is_image && !input.takes_copies) continue;
       const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
       const Vec3 at = origin + within;
       const double volume =

@@ -36,6 +36,7 @@ struct DropsInput {
   const Bodies& bodies;
   const MovedNodes& nodes;
   std::span<const std::uint32_t> body_of;  ///< By vertex of SpaceCrossings.
+  bool takes_copies = false;  ///< Copies without a body become drops, too: the box wraps.
 };
 
 struct Drops {

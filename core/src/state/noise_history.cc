@@ -13,7 +13,7 @@
 namespace partiemc {
 namespace {
 
-constexpr std::uint32_t kNoiseVersion = 1;
+constexpr std::uint32_t kNoiseVersion = 1, kNoiseVersionWithBox = 2;
 constexpr std::array<ArrayKind, 3> kNoiseKinds = {{{"ids", 8}, {"coordinates", 8}, {"offsets", 4}}};
 constexpr std::size_t kNoiseHeaderBytes = 4 + 4 + 8;
 constexpr std::size_t kCountBytes = 8 * kNoiseKinds.size();
@@ -49,7 +49,7 @@ absl::Status CheckNoise(const NoiseHistory& noise) {
 }  // namespace
 
 std::size_t SerializedNoiseBytes(const NoiseHistory& noise, std::size_t state_bytes) {
-  return kNoiseHeaderBytes + state_bytes + kCountBytes +
+  return kNoiseHeaderBytes + state_bytes + BoxBytes(noise.box) + kCountBytes +
          BytesOf(kNoiseKinds, NoiseCountsOf(noise)) + kChecksumBytes;
 }
 
@@ -57,9 +57,10 @@ std::string SerializeWithNoise(const NoiseHistory& noise, std::string_view state
   std::string bytes;
   bytes.reserve(SerializedNoiseBytes(noise, state_bytes.size()));
   PutNumber(kWithNoiseMagic, bytes);
-  PutNumber(kNoiseVersion, bytes);
+  PutNumber(noise.box ? kNoiseVersionWithBox : kNoiseVersion, bytes);
   PutNumber(std::uint64_t{state_bytes.size()}, bytes);
   bytes += state_bytes;
+  PutBox(noise.box, bytes);
   for (const std::uint64_t count : NoiseCountsOf(noise)) PutNumber(count, bytes);
   PutArrays(
       NoiseArraysOf(noise), [](const auto& number) { return std::tie(number); }, bytes);
@@ -72,12 +73,17 @@ absl::StatusOr<std::string_view> TakeNoise(std::string_view bytes, NoiseHistory&
     return Corrupt(absl::StrCat(bytes.size(), " bytes"), kAsWritten);
   }
   std::string_view rest = bytes.substr(4, bytes.size() - 4 - kChecksumBytes);
-  if (absl::Status status = TakeVersion(rest, kNoiseVersion); !status.ok()) return status;
+  const auto has_box = TakeVersion(rest, kNoiseVersion, kNoiseVersionWithBox);
+  if (!has_box.ok()) return has_box.status();
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   const auto state_bytes = TakeNumber<std::uint64_t>(rest);
-  if (state_bytes > rest.size() - kCountBytes) return Corrupt("a state cut off", kAsWritten);
+  const std::size_t after = kCountBytes + (*has_box ? kBoxBytes : 0);
+  if (rest.size() < after || state_bytes > rest.size() - after) {
+    return Corrupt("a state cut off", kAsWritten);
+  }
   const std::string_view state = rest.substr(0, state_bytes);
   rest.remove_prefix(state_bytes);
+  if (absl::Status status = TakeBox(*has_box, rest, noise.box); !status.ok()) return status;
   const auto counts = TakeCounts(kNoiseKinds, rest);
   if (!counts.ok()) return counts.status();
   TakeArrays(

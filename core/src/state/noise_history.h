@@ -1,6 +1,6 @@
 // The bytes of a NoiseHistory around the bytes of the other state. Little-endian layout: magic,
-// version, the number of bytes of the other state, these bytes, the numbers of ids, coordinates and
-// offsets, these arrays, checksum.
+// version, the number of bytes of the other state, these bytes, the box in the second version, the
+// numbers of ids, coordinates and offsets, these arrays, checksum.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // The bytes of a state. Little-endian layout: magic, version, cell size and spacing (0: none), area
-// offset and time (kAbsent: none), largest identity, the numbers of normals, rings, runs and
-// samples, these arrays, checksum.
+// offset and time (kAbsent: none), largest identity, the box if the version is kVersionWithBox, the
+// numbers of normals, rings, runs and samples, these arrays, checksum.
 //
 // A state with sections has another magic, the version and the number of states. Each state
 // follows, the main one first: the number of its bytes, then its bytes. The checksum is last. The
@@ -33,7 +33,7 @@ namespace {
 constexpr std::uint32_t kMagic = 0x53504d45;             // "EMPS"
 constexpr std::uint32_t kSectionsMagic = 0x4d504d45;     // "EMPM"
 constexpr std::uint32_t kWithSurfaceMagic = 0x55504d45;  // "EMPU"
-constexpr std::uint32_t kVersion = 5;
+constexpr std::uint32_t kVersion = 5, kVersionWithBox = 6;
 
 // The arrays of a state in the order of the layout.
 constexpr std::array<ArrayKind, 4> kKinds = {
@@ -168,19 +168,21 @@ Counts CountsOf(const State& state) {
 }
 
 std::size_t OwnBytes(const State& state) {
-  return kHeaderBytes + BytesOf(kKinds, CountsOf(state)) + kChecksumBytes;
+  return kHeaderBytes + BoxBytes(state.history.box) + BytesOf(kKinds, CountsOf(state)) +
+         kChecksumBytes;
 }
 
 // Appends the state of one outline, without the states of its sections.
 void PutOwn(const State& state, std::string& bytes) {
   const std::size_t start = bytes.size();
   PutNumber(kMagic, bytes);
-  PutNumber(kVersion, bytes);
+  PutNumber(state.history.box ? kVersionWithBox : kVersion, bytes);
   PutNumber(state.cell_size.value_or(0), bytes);
   PutNumber(state.spacing.value_or(0), bytes);
   PutOptional(state.area_offset, bytes);
   PutOptional(state.history.time, bytes);
   PutNumber(state.history.identities_given, bytes);
+  PutBox(state.history.box, bytes);
   for (const std::uint64_t count : CountsOf(state)) PutNumber(count, bytes);
   PutArrays(
       ArraysOf(state), [](const auto& item) { return NumbersOf(item); }, bytes);
@@ -196,7 +198,8 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   if (TakeNumber<std::uint32_t>(rest) != kMagic) {
     return Corrupt("another kind of data", "must be a state");
   }
-  if (absl::Status status = TakeVersion(rest, kVersion); !status.ok()) return status;
+  const auto has_box = TakeVersion(rest, kVersion, kVersionWithBox);
+  if (!has_box.ok()) return has_box.status();
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   State state;
   if (const auto cell_size = TakeNumber<double>(rest); cell_size != 0) state.cell_size = cell_size;
@@ -204,6 +207,10 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   state.area_offset = TakeOptional(rest);
   state.history.time = TakeOptional(rest);
   state.history.identities_given = TakeNumber<std::uint64_t>(rest);
+  if (*has_box && bytes.size() < kHeaderBytes + kBoxBytes + kChecksumBytes) {
+    return Corrupt("a box cut off", kAsWritten);
+  }
+  if (absl::Status status = TakeBox(*has_box, rest, state.history.box); !status.ok()) return status;
   const auto counts = TakeCounts(kKinds, rest);
   if (!counts.ok()) return counts.status();
   const auto numbers_of = [](auto& item) { return NumbersOf(item); };

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "core/internal/byte_string.h"
+#include "partiemc/parameters.h"
 #include "partiemc/status.h"
 
 namespace partiemc {
@@ -53,6 +55,49 @@ inline std::optional<double> TakeOptional(std::string_view& rest) {
 
 inline void PutOptional(std::optional<double> value, std::string& bytes) {
   PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
+}
+
+/// Returns whether the version is `with_box`, of a layout that has a box after its header.
+inline absl::StatusOr<bool> TakeVersion(std::string_view& rest, std::uint32_t without_box,
+                                        std::uint32_t with_box) {
+  const auto version = TakeNumber<std::uint32_t>(rest);
+  if (version == without_box || version == with_box) return version == with_box;
+  return Corrupt(absl::StrCat("version ", version),
+                 absl::StrCat("must be version ", without_box, " or ", with_box));
+}
+
+/// The bytes of a box: origin and length of each axis, kAbsent for axes that are not periodic.
+inline constexpr std::size_t kBoxBytes = 6 * 8;
+
+inline std::size_t BoxBytes(const std::optional<PeriodicBox>& box) { return box ? kBoxBytes : 0; }
+
+inline void PutBox(const std::optional<PeriodicBox>& box, std::string& bytes) {
+  if (!box) return;
+  for (const std::optional<PeriodicAxis>& axis : box->axes) {
+    PutOptional(axis ? std::optional(axis->origin) : std::nullopt, bytes);
+    PutOptional(axis ? std::optional(axis->length) : std::nullopt, bytes);
+  }
+}
+
+/// Reads a box if `is_present`. Errors: INVALID_ARGUMENT (CORRUPT_STATE).
+inline absl::Status TakeBox(bool is_present, std::string_view& rest,
+                            std::optional<PeriodicBox>& box) {
+  if (!is_present) return absl::OkStatus();
+  if (rest.size() < kBoxBytes) return Corrupt("a box cut off", kAsWritten);
+  box.emplace();
+  bool any = false;
+  for (std::optional<PeriodicAxis>& axis : box->axes) {
+    const auto origin = TakeOptional(rest), length = TakeOptional(rest);
+    if (!origin && !length) continue;
+    any = true;
+    axis = PeriodicAxis{origin.value_or(0), length.value_or(0)};
+    if (!origin || !std::isfinite(axis->origin) || !std::isfinite(axis->length) ||
+        !(axis->length > 0)) {
+      return Corrupt("a box", "must have finite axes of positive length");
+    }
+  }
+  if (!any) return Corrupt("a box", "must have an axis");
+  return absl::OkStatus();
 }
 
 /// Reads a number. A bool is stored as a number of 4 bytes; returns false if this is not 0 or 1.

@@ -1,6 +1,6 @@
 // The bytes of the state of surfaces. Little-endian layout: magic, version, cell size and time
-// (kAbsent: none), largest identity, the numbers of shells, runs and samples, these arrays,
-// checksum.
+// (kAbsent: none), largest identity, the box if the version is kSurfaceVersionWithBox, the numbers
+// of shells, runs and samples, these arrays, checksum.
 #include "partiemc/surface_state.h"
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace partiemc {
 namespace {
 
 constexpr std::uint32_t kSurfaceMagic = 0x42504d45;  // "EMPB"
-constexpr std::uint32_t kSurfaceVersion = 1;
+constexpr std::uint32_t kSurfaceVersion = 1, kSurfaceVersionWithBox = 2;
 
 // The arrays of a state in the order of the layout.
 constexpr std::array<ArrayKind, 3> kSurfaceKinds = {
@@ -122,17 +122,19 @@ SurfaceCounts SurfaceCountsOf(const SurfaceState& state) {
 }  // namespace
 
 std::size_t SerializedBytes(const SurfaceState& state) {
-  return kSurfaceHeaderBytes + BytesOf(kSurfaceKinds, SurfaceCountsOf(state)) + kChecksumBytes;
+  return kSurfaceHeaderBytes + BoxBytes(state.history.box) +
+         BytesOf(kSurfaceKinds, SurfaceCountsOf(state)) + kChecksumBytes;
 }
 
 std::string Serialize(const SurfaceState& state) {
   std::string bytes;
   bytes.reserve(SerializedBytes(state));
   PutNumber(kSurfaceMagic, bytes);
-  PutNumber(kSurfaceVersion, bytes);
+  PutNumber(state.history.box ? kSurfaceVersionWithBox : kSurfaceVersion, bytes);
   PutOptional(state.cell_size, bytes);
   PutOptional(state.history.time, bytes);
   PutNumber(state.history.identities_given, bytes);
+  PutBox(state.history.box, bytes);
   for (const std::uint64_t count : SurfaceCountsOf(state)) PutNumber(count, bytes);
   PutArrays(
       ShellArraysOf(state), [](const auto& item) { return ShellNumbersOf(item); }, bytes);
@@ -149,12 +151,17 @@ absl::StatusOr<SurfaceState> ParseSurfaceState(std::string_view bytes) {
   if (TakeNumber<std::uint32_t>(rest) != kSurfaceMagic) {
     return Corrupt("another kind of data", "must be the state of a stream of surfaces");
   }
-  if (absl::Status status = TakeVersion(rest, kSurfaceVersion); !status.ok()) return status;
+  const auto has_box = TakeVersion(rest, kSurfaceVersion, kSurfaceVersionWithBox);
+  if (!has_box.ok()) return has_box.status();
   if (absl::Status status = CheckSum(bytes); !status.ok()) return status;
   SurfaceState state;
   state.cell_size = TakeOptional(rest);
   state.history.time = TakeOptional(rest);
   state.history.identities_given = TakeNumber<std::uint64_t>(rest);
+  if (*has_box && bytes.size() < kSurfaceHeaderBytes + kBoxBytes + kChecksumBytes) {
+    return Corrupt("a box cut off", kAsWritten);
+  }
+  if (absl::Status status = TakeBox(*has_box, rest, state.history.box); !status.ok()) return status;
   const auto counts = TakeCounts(kSurfaceKinds, rest);
   if (!counts.ok()) return counts.status();
   const auto numbers_of = [](auto& item) { return ShellNumbersOf(item); };

@@ -96,6 +96,12 @@ static void try_box(const char* address) {
     EXPECT(fabs(event.area - kCount) < 1e-3 && event.cut_bodies == 1);
     EXPECT(event.cut_count == (axes == 2 ? 4u : 2u) && event.cuts[1] < event.point_count);
     EXPECT(fabs(event.perimeter - (axes == 2 ? 0 : 2 * kSide)) < 1e-3);
+    /* A box of the frame: the body ends before its faces. */
+    const double wide[6] = {-.5 - kSide, 3 * kSide, -.5, axes == 2 ? kSide : 0, 0, 0};
+    partiemc_particles boxed = plain();
+    boxed.box = wide;
+    EXPECT(partiemc_reconstruct(stream, &boxed, 1, &event) == PARTIEMC_OK);
+    EXPECT(event.kind == PARTIEMC_RESULT && event.cut_bodies == (axes == 2 ? 1u : 0u));
     partiemc_close(stream);
   }
 }

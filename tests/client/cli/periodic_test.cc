@@ -80,6 +80,45 @@ TEST(PeriodicReplay, DiscAcrossCornerIsOneBody) {
             whole.digest);
 }
 
+// A disc across the corner of a box that grows by 1 % a frame, and a layer, as of LAMMPS `fix npt`.
+TEST(PeriodicReplay, FramesHaveTheirOwnBoxes) {
+  const support::TemporaryFolder folder;
+  const std::string dump = folder.Path("npt.lammpstrj");
+  std::ofstream file(dump);
+  for (int frame = 0; frame < 4; ++frame) {
+    const double length = 60 * std::pow(1.01, frame), low = -.5 * length;
+    std::string atoms;
+    int count = 0;
+    for (int i = -6; i <= 6; ++i) {
+      for (int j = -6; j <= 6; ++j) {
+        if (i * i + j * j > 36) continue;
+        const double x = i / 60. - std::floor(i / 60.), y = j / 60. - std::floor(j / 60.);
+        atoms += std::to_string(++count) + " " + std::to_string(x) + " " + std::to_string(y) + "\n";
+      }
+    }
+    for (int k = 0; k < 240; ++k) {
+      atoms += std::to_string(++count) + " " + std::to_string((k % 60 + .5) / 60) + " " +
+               std::to_string((k / 60 + 28) / 60.) + "\n";
+    }
+    file << "ITEM: TIMESTEP\n"
+         << frame << "\nITEM: NUMBER OF ATOMS\n"
+         << count << "\nITEM: BOX BOUNDS pp pp pp\n";
+    for (int axis = 0; axis < 2; ++axis) file << low << " " << low + length << "\n";
+    file << "-1 1\nITEM: ATOMS id xs ys\n" << atoms;
+  }
+  file.close();
+  std::vector<std::string> flags = {"--local", "--periodic", "x,y", "--check"};
+  const Columns local = Replayed(dump, flags);
+  EXPECT_THAT(local.rings, ElementsAre("2", "2", "2", "2"));
+  ServerProgram server;
+  EXPECT_EQ(Replayed(dump, {"--server", server.address(), "--periodic", "x,y"}).digest,
+            local.digest);
+  // One box for all frames cuts the disc and the layer elsewhere.
+  const Columns fixed = Replayed(dump, {"--local", "--periodic", "x,y", "--box", "-30,30,-30,30"});
+  EXPECT_EQ(fixed.digest[0], local.digest[0]);
+  EXPECT_NE(fixed.digest[3], local.digest[3]);
+}
+
 // A layer of 30 x 6 particles across the periodic faces.
 TEST(PeriodicReplay, LayerIsCutAtTheFaces) {
   const support::TemporaryFolder folder;

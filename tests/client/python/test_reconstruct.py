@@ -134,6 +134,20 @@ class Layouts(unittest.TestCase):
         with self.assertRaisesRegex(partiemc.Error, "wrap"):
             partiemc.reconstruct(both, spacing=1.0, wrap=True)
 
+    def test_a_frame_may_have_its_own_box(self):
+        x, y = numpy.meshgrid(numpy.arange(30) + 0.3, numpy.arange(6))
+        layer = numpy.column_stack([x.ravel(), y.ravel() + 10])
+        sequence = partiemc.Reconstructor(spacing=1.0, box={"x": (0, 30)})
+        first = sequence.reconstruct(layer)
+        wider = sequence.reconstruct(layer * [1.01, 1], box={"x": (0, 30.3)})
+        self.assertAlmostEqual(wider.rings.points[:, 0].max(), 30.3, places=6)
+        self.assertEqual(wider.rings.identities.tolist(), first.rings.identities.tolist())
+        for wrong in ({"y": (0, 30)}, {"x": (0, 30), "y": (0, 40)}, {"x": (0, 5)}, {"u": (0, 9)}, 3):
+            with self.assertRaisesRegex(partiemc.Error, "box"):
+                sequence.reconstruct(layer, box=wrong)
+        with self.assertRaises(partiemc.Error):
+            partiemc.Reconstructor(spacing=1.0).reconstruct(layer, box={"x": (0, 30)})
+
     def test_a_column_wets_the_walls_of_its_tank(self):
         x, y = numpy.meshgrid(numpy.arange(20) + 0.5, numpy.arange(15) + 0.5)
         column = numpy.column_stack([x.ravel(), y.ravel()])

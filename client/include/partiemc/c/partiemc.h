@@ -145,7 +145,7 @@ typedef struct partiemc_options {
   const double* box; /* Six numbers: lower end and length of a periodic box along x, y and z; length
                         0: the axis is not periodic. A body that crosses a face is one body; an
                         outline or surface that reaches its image is cut there. NULL: no box. */
-  int32_t wrap;      /* 1: every outline is cut at the faces of the box. */
+  int32_t wrap;      /* 1: every outline or surface is cut at the faces of the box. */
   const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume), for a surface
                         cbrt(volume). NULL: equal. */
   const char* boundary; /* "bulk", or "grains" with own sizes: particles are discs of the diameter
@@ -229,6 +229,8 @@ typedef struct partiemc_particles {
   /* Optional: only those named in the options are used. */
   const partiemc_attribute* attributes;
   size_t attribute_count;
+  const double* box; /* Optional: the periodic box of this frame, as in the options, with the same
+                        periodic axes. NULL: the box of the options. */
 } partiemc_particles;
 /* Sets no particles and no arrays. `size` is sizeof(partiemc_particles). */
 void partiemc_particles_init(partiemc_particles* particles, size_t size);

@@ -11,10 +11,13 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
 #include <variant>
+
+#include "partiemc/parameters.h"
 
 namespace partiemc::client {
 
@@ -75,6 +78,7 @@ struct ParticleArrays {
   Reals velocity_x, velocity_y, velocity_z;
   /// Rounded to float.
   std::span<const AttributeArrays> attributes = {};
+  std::optional<PeriodicBox> box = std::nullopt;  ///< As Frame::box.
 };
 
 }  // namespace partiemc::client

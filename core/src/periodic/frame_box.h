@@ -1,0 +1,73 @@
+// The periodic box of a frame, and the motion of positions with a box that changes between frames
+// (core/PERIODIC.md, "Boxes that change").
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "partiemc/frame.h"
+#include "partiemc/parameters.h"
+
+namespace partiemc {
+
+/// Sets Frame::box to the box that the stages use: the given one with `wraps` of the stream, or the
+/// box of the stream. Errors: INVALID_ARGUMENT (OUT_OF_RANGE) if the given box has other periodic
+/// axes than the box of the stream, if the stream has none, and for axes that Validate refuses.
+absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& frame);
+
+/// Checks the lengths of the box of a frame after ResolveBox. Errors: as Validate. They name
+/// `parameters.box` if it is the box of the stream, else `box`.
+absl::Status CheckBoxLengths(const std::optional<PeriodicBox>& of_stream, const PeriodicBox& box,
+                             double kernel_radius, double spacing);
+
+/// The box that a history stores: absent if it is the box of the stream. `box`: after ResolveBox.
+std::optional<PeriodicBox> BoxToStore(const std::optional<PeriodicBox>& of_stream,
+                                      const std::optional<PeriodicBox>& box);
+
+/// The affine motion of positions with the box, from the last frame to this one.
+struct BoxMotion {
+  struct Axis {
+    double before = 0, now = 0;  ///< Origin of the box.
+    double stretch = 1;          ///< Length of the box now, divided by its former length.
+  };
+  std::array<Axis, 3> axes;
+  bool any = false;  ///< The box has changed.
+
+  /// The position now of what was at `position`, along one axis.
+  double At(std::size_t axis, double position) const {
+    const auto& [before, now, stretch] = axes[axis];
+    return now + (position - before) * stretch;
+  }
+
+  /// The nearest node to the position now of a node, in cells. Clamped to the range of nodes.
+  std::int32_t NodeAt(std::size_t axis, double node) const {
+    constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+    const double at = std::floor(At(axis, node) + .5);
+    return static_cast<std::int32_t>(at > -kMost ? std::min(at, kMost) : -kMost);
+  }
+
+  /// Moves the run of nodes [first, last] with its middle node.
+  void MoveRun(std::size_t axis, std::int32_t& first, std::int32_t& last) const {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
+    const std::int64_t nodes = std::int64_t{last} - first;
+    const std::int64_t middle = first + nodes / 2;
+    const std::int64_t moved = NodeAt(axis, static_cast<double>(middle)) - nodes / 2;
+    first = static_cast<std::int32_t>(std::clamp(moved, -kMost, kMost));
+    last = static_cast<std::int32_t>(std::clamp(moved + nodes, -kMost, kMost));
+  }
+};
+
+/// The motion from the box of a history to the box of a frame. `before` is absent for the box of
+/// the stream; `now` is absent without a box. An axis that only one of them has does not move.
+/// Divides lengths by `unit`, so that positions are in this unit.
+BoxMotion MotionOf(const std::optional<PeriodicBox>& of_stream,
+                   const std::optional<PeriodicBox>& before, const std::optional<PeriodicBox>& now,
+                   double unit);
+
+}  // namespace partiemc
