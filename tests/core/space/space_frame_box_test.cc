@@ -347,12 +347,12 @@ TEST(SpaceFrameBox, RandomFramesKeepTheGuarantees) {
     ASSERT_TRUE(reconstructor.ok());
     SurfaceState state;
     Surface surface;
-    const double density = std::pow(10, random.Uniform(-2, 0));
+    const double density = std::pow(10, random.Uniform(-2, -.3));
     for (int frame = 0; frame < 2; ++frame) {
       PeriodicBox box;
       double volume = 1;
       for (auto& axis : box.axes) {
-        axis = PeriodicAxis{random.Uniform(-20, 20), random.Uniform(10, 20)};
+        axis = PeriodicAxis{random.Uniform(-20, 20), random.Uniform(10, 14)};
         volume *= axis->length;
       }
       SpaceParticles particles;
