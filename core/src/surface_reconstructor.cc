@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,7 +24,6 @@
 #include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame/scale.h"
-#include "frame/wall_rules.h"
 #include "frame_lengths.h"
 #include "partiemc/doubt.h"
 #include "partiemc/state.h"
@@ -42,7 +40,6 @@
 #include "space/mesh.h"
 #include "space/spacing_doubt.h"
 #include "space/surface_bytes.h"
-#include "space_cut/surface_cut.h"
 #include "space_identities/shell_identities.h"
 #include "space_images/body_images.h"
 #include "space_vertices/drops.h"
@@ -51,21 +48,10 @@
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
 #include "space_vertices/virtual_plane.h"
+#include "surface_planes.h"
 #include "walls/wall_images.h"
 
 namespace partiemc {
-
-namespace {
-
-/// Warm buffers of CutAtWalls and CutAtBox.
-struct PlaneCuts {
-  std::vector<space::AxisPlane> planes;
-  std::vector<std::uint8_t> is_cut;  // By shell.
-  space::SurfaceCutScratch cut;
-  space::SurfacePieces pieces;
-};
-
-}  // namespace
 
 struct SurfaceWorkspace::Buffers {
   DistinctIdsScratch distinct_ids;
@@ -120,41 +106,6 @@ ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
 // Cleaning fills cavities below this volume, in cubed spacings: they are dents of the level set,
 // not voids of the fluid (core/METHOD.md, "Cleaning").
 constexpr double kMinCavityParticles = 2;
-
-// Copies of particles reach this many kernel radii beyond the faces of a periodic box, at most one
-// length. kCopyEnd radii inside this margin, the level set and its windows do not depend on where
-// the copies end.
-constexpr double kCopyMargin = 6, kCopyEnd = 2;
-
-/// The periodic box along the axes along which bodies percolate; infinite along the others. World
-/// units.
-struct CopiedBox {
-  space::ClipBox faces;     ///< The faces of the box.
-  space::ClipBox complete;  ///< Bodies within these planes are complete.
-  bool any = false;         ///< There are copies.
-  std::array<bool, 3> has_copies{};
-};
-
-CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  CopiedBox box;
-  box.has_copies = lifted.percolates;
-  std::array<double, 3> low, high, least, most;
-  low.fill(-kInfinity), least.fill(-kInfinity);
-  high.fill(kInfinity), most.fill(kInfinity);
-  const double radius = parameters.kernel_radius * parameters.spacing;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (!lifted.percolates[k]) continue;
-    box.any = true;
-    const PeriodicAxis& axis = *lifted.frame.box->axes[k];
-    const double reach = std::min(kCopyMargin * radius, axis.length) - kCopyEnd * radius;
-    low[k] = axis.origin, high[k] = axis.origin + axis.length;
-    least[k] = low[k] - reach, most[k] = high[k] + reach;
-  }
-  box.faces = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
-  box.complete = {{least[0], least[1], least[2]}, {most[0], most[1], most[2]}};
-  return box;
-}
 
 /// Finds the bodies, and drops cavities and bodies as `parameters` require.
 SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& copied,
@@ -322,84 +273,6 @@ void MakeEmpty(Surface& surface) {
   surface.attributes.clear();
 }
 
-std::uint64_t CountWallAxes(const SurfaceParameters& parameters) {
-  std::array<bool, 3> has_wall{};
-  for (const WallPlane& plane : parameters.wall_planes) {
-    has_wall[static_cast<std::size_t>(plane.axis)] = true;
-  }
-  return static_cast<std::uint64_t>(std::ranges::count(has_wall, true));
-}
-
-/// Checks the walls, and that nothing excludes them.
-absl::Status CheckWallsOf(const SurfaceParameters& parameters) {
-  const std::vector<WallPlane>& planes = parameters.wall_planes;
-  if (planes.empty()) return absl::OkStatus();
-  const char* rule = nullptr;
-  if (parameters.box) rule = "must be absent with a periodic box";
-  if (parameters.sizes == Sizes::kOwn) rule = "must be absent unless sizes are equal";
-  if (rule != nullptr) {
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters.wall_planes",
-                           absl::StrCat(planes.size()), rule});
-  }
-  return CheckWallPlanes(planes, parameters.kernel_radius, parameters.spacing);
-}
-
-// Images of particles reach two kernel radii behind walls: F is exact for one of them, which
-// windows require. Particles up to half a spacing behind a wall are before it.
-// A particle on a wall would have no image, and half of a lone one would be cut off: such particles
-// move to kLeastHeight before the wall.
-constexpr double kImageRadii = 2, kWallTolerance = .5, kLeastHeight = .05;
-
-/// The space before the walls, in world units; absent without walls.
-std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters) {
-  if (parameters.wall_planes.empty()) return std::nullopt;
-  const FluidBox box = FluidBoxOf(parameters.wall_planes);
-  return space::ClipBox{{box.low[0], box.low[1], box.low[2]},
-                        {box.high[0], box.high[1], box.high[2]}};
-}
-
-/// Cuts the shells that reach a wall. Returns false if CutSurface does.
-bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface) {
-  // Above the largest move of a plane (CutSurface), so that no other shell reaches a moved plane.
-  constexpr double kReach = 1e-4;
-  scratch.planes.clear();
-  scratch.is_cut.assign(surface.ShellCount(), 0);
-  bool any = false;
-  for (const WallPlane& plane : parameters.wall_planes) {
-    scratch.planes.push_back({plane.axis, plane.position, plane.is_fluid_above});
-    const double sign = plane.is_fluid_above ? 1 : -1;
-    const double reach = kReach * parameters.spacing + 1e-5 * kReach * std::abs(plane.position);
-    for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
-      if (scratch.is_cut[shell] != 0) continue;
-      for (std::size_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1];
-           ++p) {
-        const double at = surface.points[3 * p + static_cast<std::size_t>(plane.axis)];
-        if (sign * (at - plane.position) > reach) continue;
-        scratch.is_cut[shell] = 1;
-        any = true;
-        break;
-      }
-    }
-  }
-  if (!any) return true;
-  // A body and its cavities are cut together.
-  for (int pass = 0; pass < 2; ++pass) {
-    for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
-      const std::uint32_t outer = surface.outer_of[shell];
-      if (outer == kNoShell) continue;
-      if (pass == 0 ? scratch.is_cut[shell] != 0 : scratch.is_cut[outer] != 0) {
-        scratch.is_cut[shell] = scratch.is_cut[outer] = 1;
-      }
-    }
-  }
-  return space::CutSurface({.planes = scratch.planes,
-                            .is_cut = scratch.is_cut,
-                            .spacing = parameters.spacing,
-                            .are_walls = true},
-                           scratch.cut, scratch.pieces, surface);
-}
-
 /// Sets the bodies of the shells that are ellipsoids, for FindCutShells.
 void NameDrops(SurfaceWorkspace::Buffers& b) {
   for (const space::Drops::Drop& drop : b.drops.drops) {
@@ -426,26 +299,6 @@ void CutLoneDrops(const LiftedFrame& lifted, SurfaceWorkspace::Buffers& b) {
       cut.outer_of[shell] = first;
     }
   }
-}
-
-/// Cuts the bodies that percolate at the faces of the box. Returns false if CutSurface does.
-bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
-              PlaneCuts& scratch, Surface& surface) {
-  if (!shells.any) return true;
-  const std::array<double, 3> low{box.faces.low.x, box.faces.low.y, box.faces.low.z};
-  const std::array<double, 3> high{box.faces.high.x, box.faces.high.y, box.faces.high.z};
-  scratch.planes.clear();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    if (!box.has_copies[k]) continue;
-    scratch.planes.push_back({axis, low[k], true});
-    scratch.planes.push_back({axis, high[k], false});
-  }
-  return space::CutSurface({.planes = scratch.planes,
-                            .is_cut = shells.is_cut,
-                            .body_of = shells.outer_of,
-                            .spacing = spacing},
-                           scratch.cut, scratch.pieces, surface);
 }
 
 /// The periods of the lattice; without a box, none.

@@ -190,7 +190,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
          "gauges",   "space",    "space_images", "space_vertices", "check",   "space_identities",
          "simplify", "space_cut"},
         {"frame_lengths", "frame_memory", "outline_stages", "prepared_frame", "reconstructor",
-         "surface_reconstructor", "workspace", "workspace_bytes"}},
+         "surface_planes", "surface_reconstructor", "workspace", "workspace_bytes"}},
        {"server/",
         "",
         {"base", "telemetry", "security", "connections", "compute", "watch", "stream", "relay",

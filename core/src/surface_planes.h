@@ -1,0 +1,65 @@
+// Surfaces that end at planes: walls, and the faces of a periodic box.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
+#include "periodic/lift.h"
+#include "space_cut/surface_cut.h"
+#include "space_images/body_images.h"
+#include "space_vertices/clipped_measures.h"
+
+namespace partiemc {
+
+/// Warm buffers of CutAtWalls and CutAtBox.
+struct PlaneCuts {
+  std::vector<space::AxisPlane> planes;
+  std::vector<std::uint8_t> is_cut;  // By shell.
+  space::SurfaceCutScratch cut;
+  space::SurfacePieces pieces;
+};
+
+/// Copies of particles reach this many kernel radii beyond the faces of a periodic box, at most one
+/// length. kCopyEnd radii inside this margin, the level set and its windows do not depend on where
+/// the copies end.
+inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
+
+/// The periodic box along the axes along which bodies percolate; infinite along the others. World
+/// units.
+struct CopiedBox {
+  space::ClipBox faces;     ///< The faces of the box.
+  space::ClipBox complete;  ///< Bodies within these planes are complete.
+  bool any = false;         ///< There are copies.
+  std::array<bool, 3> has_copies{};
+};
+
+CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted);
+
+/// Images of particles reach two kernel radii behind walls: F is exact for one of them, which
+/// windows require. Particles up to half a spacing behind a wall are before it.
+/// A particle on a wall would have no image, and half of a lone one would be cut off: such
+/// particles move to kLeastHeight before the wall.
+inline constexpr double kImageRadii = 2, kWallTolerance = .5, kLeastHeight = .05;
+
+/// The number of axes with walls.
+std::uint64_t CountWallAxes(const SurfaceParameters& parameters);
+
+/// Checks the walls, and that nothing excludes them. Errors: INVALID_ARGUMENT.
+absl::Status CheckWallsOf(const SurfaceParameters& parameters);
+
+/// The space before the walls, in world units; absent without walls.
+std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters);
+
+/// Cuts the shells that reach a wall. Returns false if CutSurface does.
+bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface);
+
+/// Cuts the bodies that percolate at the faces of the box. Returns false if CutSurface does.
+bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
+              PlaneCuts& scratch, Surface& surface);
+
+}  // namespace partiemc
