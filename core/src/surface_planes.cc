@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "frame/wall_rules.h"
 #include "partiemc/status.h"
+#include "walls/wall_images.h"
 
 namespace partiemc {
 

@@ -21,9 +21,11 @@ std::string_view Explanation(Doubt doubt) {
     case Doubt::kSpacingProvisional:
       return "particles do not agree on a spacing yet, lengths are estimates; give the spacing";
     case Doubt::kSpacingContradicted:
-      return "particles are about twice or half as far apart as the spacing says, or worse; give the right one";
+      return "particles are about twice or half as far apart as the spacing says; give the right "
+             "one";
     case Doubt::kVolumesContradictSpacing:
-      return "volumes are above twice or below half the squared spacing; check their unit";
+      return "volumes are above twice or below half the squared (in space cubed) spacing; check "
+             "the unit";
     case Doubt::kPositionsCoarse:
       return "float32 positions are coarse for the spacing; send float64, or relative to an origin";
   }

@@ -40,8 +40,7 @@ TEST(Usage, VersionIsOneLine) {
 
 TEST(Usage, UnknownFlagsAreNamedInTheirOrder) {
   const Ran other = RunPartiemc({"replay", kDamBreak, "--fil", "grid"});
-  EXPECT_EQ(other.error,
-            "partiemc: --fil grid: not expected; see `partiemc replay --help`\n");
+  EXPECT_EQ(other.error, "partiemc: --fil grid: not expected; see `partiemc replay --help`\n");
   const Ran of_splashsurf = RunPartiemc({"replay", kDamBreak, "--surface", "-r", "0.025"});
   EXPECT_EQ(of_splashsurf.error,
             "partiemc: -r 0.025: not expected; core/SURFACES.md has the counterparts of "
