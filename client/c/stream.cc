@@ -69,7 +69,6 @@ std::optional<SlicePlane> SliceOf(const double* numbers) {
   return slice;
 }
 
-// Reads six numbers; empty for a null pointer.
 std::vector<Wall> WallsOf(const partiemc_options& options) {
   std::vector<Wall> walls(options.wall_count);
   const double* point = options.walls;

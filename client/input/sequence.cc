@@ -129,7 +129,9 @@ class FileSequence final : public Sequence {
     if (frame.box->is_tilted) {
       return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
     }
-    return absl::OkStatus();
+    if (!periodic_axes_) periodic_axes_ = frame.box->is_periodic;
+    if (*periodic_axes_ == frame.box->is_periodic) return absl::OkStatus();
+    return refuse("its box is periodic along other axes than that of the first frame");
   }
 
   absl::Status SelectsNothing() const {
@@ -203,6 +205,7 @@ class FileSequence final : public Sequence {
   ParticleRows rows_;
   PlaneProjection projection_;
   bool requires_box_;
+  std::optional<std::array<bool, 3>> periodic_axes_;  // Of the first frame.
   absl::Status failure_;
   std::uint64_t selected_ = 0;    // Particles of all frames.
   std::uint64_t unselected_ = 0;  // Particles that --select left out.

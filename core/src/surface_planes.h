@@ -29,8 +29,8 @@ struct PlaneCuts {
 /// the copies end.
 inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
-/// The periodic box along the axes along which bodies percolate; infinite along the others. World
-/// units.
+/// The periodic box along the axes along which bodies percolate or wrap; infinite along the others.
+/// World units.
 struct CopiedBox {
   space::ClipBox faces;     ///< The faces of the box.
   space::ClipBox complete;  ///< Bodies within these planes are complete.
@@ -58,7 +58,7 @@ std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& paramete
 /// Cuts the shells that reach a wall. Returns false if CutSurface does.
 bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface);
 
-/// Cuts the bodies that percolate at the faces of the box. Returns false if CutSurface does.
+/// Cuts the bodies of `shells` at the faces of the box. Returns false if CutSurface does.
 bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
               PlaneCuts& scratch, Surface& surface);
 

@@ -33,13 +33,13 @@
 #include "simplify/simplify.h"
 #include "space/bins.h"
 #include "space/bodies.h"
-#include "space/certificate.h"
 #include "space/cleaning.h"
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
 #include "space/spacing_doubt.h"
 #include "space/surface_bytes.h"
+#include "space_certificate/certificate.h"
 #include "space_identities/shell_identities.h"
 #include "space_images/body_images.h"
 #include "space_vertices/drops.h"
@@ -61,8 +61,8 @@ struct SurfaceWorkspace::Buffers {
   space::Bodies bodies;
   space::CleaningScratch cleaning;
   LiftScratch lift;                     // Empty without a periodic box.
-  space::BodyImageScratch body_images;  // Empty unless bodies percolate.
-  space::CutShells cut_shells;          // Empty unless bodies percolate.
+  space::BodyImageScratch body_images;  // Empty unless bodies percolate or wrap.
+  space::CutShells cut_shells;          // Empty unless bodies percolate or wrap.
   WallImageScratch images;              // Empty without walls.
   PlaneCuts plane_cuts;                 // Empty unless walls or a box cut.
   std::vector<Vec3> anchors, positions, normals;

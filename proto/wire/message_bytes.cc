@@ -27,7 +27,8 @@ constexpr std::uint32_t LengthTag(int field) {
 }
 
 // Sizes of parsed fields, at most. Arrays of numbers grow by doubling.
-constexpr std::uint64_t kBytesOfMessage = 1024, kBytesOfField = 64, kBytesOfPackedByte = 16;
+constexpr std::uint64_t kBytesOfMessage = 1024, kBytesOfField = 96, kBytesOfPackedByte = 24,
+                        kBytesOfUnknownByte = 64;
 
 // Parsers read at most as many messages inside each other.
 constexpr int kMostNested = 100;
@@ -69,7 +70,12 @@ bool AddParsedBytes(CodedInputStream& input, const google::protobuf::Descriptor&
     bytes += kBytesOfField;
     const auto* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
     if (WireFormatLite::GetTagWireType(tag) != WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
+      const int before = input.CurrentPosition();
       if (!WireFormatLite::SkipField(&input, tag)) return false;
+      // A group is kept as unknown fields.
+      if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_START_GROUP) {
+        bytes += kBytesOfUnknownByte * static_cast<std::uint64_t>(input.CurrentPosition() - before);
+      }
       continue;
     }
     int length = 0;

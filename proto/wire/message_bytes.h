@@ -53,8 +53,8 @@ grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
 /// A view of the arrays of `frame`.
 FrameRows RowsOf(const Frame& frame);
 
-/// A ReconstructRequest with a frame. The same bytes as EncodeFrame and ToBytes, but copied
-/// directly from the caller's arrays. A box comes before the arrays.
+/// A ReconstructRequest with a frame. Without a box the same bytes as of EncodeFrame and ToBytes,
+/// but copied directly from the caller's arrays. A box comes before the arrays.
 class FrameRequest {
  public:
   /// A view of `frame`. Requires: frame.components is 2 or 3.

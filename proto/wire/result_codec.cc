@@ -353,7 +353,8 @@ absl::Status DecodeShape(const v1::ReconstructedFrame& message, Result& result) 
   result.surface.statistics = {.dropped_cavities = statistics.dropped_holes,
                                .dropped_components = statistics.dropped_components,
                                .dropped_spray = statistics.dropped_spray,
-                               .bricks = statistics.tiles};
+                               .bricks = statistics.tiles,
+                               .doubts = statistics.doubts};
   return status;
 }
 

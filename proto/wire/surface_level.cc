@@ -38,12 +38,19 @@ absl::Status CheckCounts(const v1::Surface& surface) {
 }
 
 std::uint64_t BytesOfLevel(const v1::Surface& surface) {
-  std::uint64_t values = 0;
+  // Three surfaces have the names of attributes and the parents.
+  constexpr std::uint64_t kCopies = 3, kBytesOfParent = 40;
+  std::uint64_t values = 0, names = 0, parents = 0;
   // More components are refused later.
   for (const v1::NamedAttribute& attribute : surface.attributes()) {
     values += std::min(attribute.components(), 3u);
+    names += attribute.name().size();
   }
-  return LevelBytes(LastOf(surface.point_offsets()), LastOf(surface.triangle_offsets()), values);
+  for (const v1::ShellMeasures& measures : surface.measures()) {
+    parents += static_cast<std::uint64_t>(measures.parent_identities_size());
+  }
+  return LevelBytes(LastOf(surface.point_offsets()), LastOf(surface.triangle_offsets()), values) +
+         kCopies * names + kBytesOfParent * parents;
 }
 
 }  // namespace
@@ -71,7 +78,7 @@ std::optional<SurfaceLevel> LevelOf(const v1::ReconstructedFrame& message) {
   return SurfaceLevel{.error = level.error(), .digest = level.digest()};
 }
 
-absl::Status ReplaceByLevel(const LevelOfDetail& level,
+absl::Status ReplaceByLevel(const LevelOfDetail& level, SurfaceOrigin origin,
                             absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve,
                             const std::atomic<bool>* cancelled, v1::ReconstructedFrame& message) {
   if (!message.has_surface()) return absl::OkStatus();
@@ -84,14 +91,15 @@ absl::Status ReplaceByLevel(const LevelOfDetail& level,
   const double spacing = message.statistics().spacing();
   double error = 0;
   if (decoded.ShellCount() > 0) {
-    const auto made = MakeLevel(level, spacing, cancelled, decoded);
+    const auto made = MakeLevel(level, spacing, origin, cancelled, decoded);
     if (!made.ok()) return made.status();
     error = *made;
   }
   // Measures and identities stay in the message.
   if (error > 0) status = ReplaceGeometry(decoded, spacing, message);
-  // A compact surface has another order of points and triangles in the message.
-  if (status.ok() && error > 0) status = DecodeSurface(message, decoded);
+  // The message has another order of points and triangles: a compact surface, or one of which no
+  // point was removed.
+  if (status.ok()) status = DecodeSurface(message, decoded);
   if (!status.ok()) return status;
   surface.mutable_level()->set_error(error);
   surface.mutable_level()->set_digest(DigestSurface(decoded));

@@ -28,7 +28,7 @@ std::optional<SurfaceLevel> LevelOf(const v1::ReconstructedFrame& message);
 /// Runs in the caller's Arena. Errors: DATA_LOSS for a malformed surface, and as MakeLevel;
 /// OUT_OF_RANGE (RESOLUTION) if a compact level does not fit its `step`. After an error `message`
 /// is unspecified. May throw std::bad_alloc.
-absl::Status ReplaceByLevel(const LevelOfDetail& level,
+absl::Status ReplaceByLevel(const LevelOfDetail& level, SurfaceOrigin origin,
                             absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve,
                             const std::atomic<bool>* cancelled, v1::ReconstructedFrame& message);
 

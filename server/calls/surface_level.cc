@@ -72,8 +72,12 @@ absl::StatusOr<LevelQueue::Frame> MakeOrThrow(const LevelQueue::Frame& exact,
     if (!frame.ParseFromString(bytes)) return Invalid(result, "a result that cannot be parsed");
   }
   if (!frame.has_surface()) return exact;
+  const SurfaceOrigin origin = result.origin == WatchedResult::Origin::kHere
+                                   ? SurfaceOrigin::kCore
+                                   : SurfaceOrigin::kUnknown;
   status = wire::ReplaceByLevel(
-      level, [&](std::uint64_t bytes) { return reservation.Take(bytes); }, &cancelled, frame);
+      level, origin, [&](std::uint64_t bytes) { return reservation.Take(bytes); }, &cancelled,
+      frame);
   if (absl::IsDataLoss(status) || absl::IsOutOfRange(status)) {
     return Invalid(result, status.message());
   }

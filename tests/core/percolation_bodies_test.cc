@@ -50,6 +50,26 @@ TEST(PercolationBodies, BodiesThatAreJoinedInOneImageOnlyAreKept) {
   }
 }
 
+// The image of a bar that nearly reaches its own image may contain particles and their copies.
+TEST(PercolationBodies, BarsThatNearlyReachTheirImageCountOnce) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(1000u); ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    PeriodicBox box = BoxOf(40, random.Uniform(13, 25));
+    box.axes[0].reset();
+    const double length = box.axes[1]->length - random.Uniform(2.3, 2.8);
+    const double from = random.Uniform(0, 25), across = random.Uniform(0, 1);
+    const int gaps = static_cast<int>(std::floor(length));
+    Particles scene;
+    for (int k = 0; k <= gaps; ++k) {
+      for (int j = 0; j < 2; ++j) scene.Add(across + j, from + k * length / gaps);
+    }
+    const Result result = ReconstructOnce(In(box), Wrapped(scene, box));
+    ExpectValid(result, Fill::kGreedy);
+    EXPECT_EQ(ParticlesOf(result.rings), scene.size());
+  }
+}
+
 // The given particle lies between the nodes of a coarse lattice, its copies lie on nodes.
 TEST(PercolationBodies, DropBesideNodesIsKeptOnce) {
   PeriodicBox box = BoxOf(19, 40);

@@ -494,7 +494,7 @@ TEST(LevelBytes, AreNoLessThanALevelTakesAndNotMuchMore) {
       const std::size_t before = live_bytes;
       peak_bytes = before;
       Surface surface = exact;
-      const auto made = MakeLevel(level, 1, nullptr, surface);
+      const auto made = MakeLevel(level, 1, SurfaceOrigin::kUnknown, nullptr, surface);
       ASSERT_TRUE(made.ok()) << made.status();
       most = std::max(most, peak_bytes - before);
     }

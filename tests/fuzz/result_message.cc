@@ -63,7 +63,8 @@ void RequireWhole(const Result& result) {
 void RequireLevel(const v1::ReconstructedFrame& message, const LevelOfDetail& level) {
   v1::ReconstructedFrame made = message;
   const auto grant = [](std::uint64_t) { return absl::OkStatus(); };
-  const absl::Status status = wire::ReplaceByLevel(level, grant, nullptr, made);
+  const absl::Status status =
+      wire::ReplaceByLevel(level, SurfaceOrigin::kUnknown, grant, nullptr, made);
   if (!status.ok()) {
     return Require(absl::IsDataLoss(status) || absl::IsOutOfRange(status),
                    "a level that cannot be made is DATA_LOSS, or too fine");

@@ -64,7 +64,7 @@ TEST_P(LevelMemory, IsReservedBeforeItIsTaken) {
         reserved = bytes;
         return absl::OkStatus();
       };
-      ASSERT_TRUE(ReplaceByLevel(level, reserve, nullptr, message).ok());
+      ASSERT_TRUE(ReplaceByLevel(level, SurfaceOrigin::kUnknown, reserve, nullptr, message).ok());
       const std::size_t taken = support::peak_bytes - before;
       std::printf("%.2f times\n", static_cast<double>(reserved) / static_cast<double>(taken));
       EXPECT_LE(taken, reserved);

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "partiemc/partiemc.h"
+#include "partiemc/surface_reconstructor.h"
 #include "support/shell_measures.h"
 #include "wire/codec.h"
 
@@ -105,6 +106,17 @@ std::set<std::vector<double>> PointsOf(const Surface& surface) {
   return points;
 }
 
+TEST_P(Levels, WithoutARemovedPointHaveTheDigestOfTheirMessage) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    v1::ReconstructedFrame message = MessageOf(Scene(seed));
+    ASSERT_TRUE(
+        ReplaceByLevel(MaxError(1e-9), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
+    const auto level = LevelOf(message);
+    ASSERT_TRUE(level.has_value());
+    EXPECT_EQ(level->digest, DigestSurface(Decoded(message))) << level->error;
+  }
+}
+
 TEST_P(Levels, HavePointsOfTheExactSurfaceAndFewerTriangles) {
   const Result result = Scene(1);
   const v1::ReconstructedFrame exact = MessageOf(result);
@@ -114,7 +126,8 @@ TEST_P(Levels, HavePointsOfTheExactSurfaceAndFewerTriangles) {
   for (const double error : {.02, .1, .3}) {
     SCOPED_TRACE(error);
     v1::ReconstructedFrame message = exact;
-    ASSERT_TRUE(ReplaceByLevel(MaxError(error), Grant, nullptr, message).ok());
+    ASSERT_TRUE(
+        ReplaceByLevel(MaxError(error), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
     EXPECT_EQ(message.coordinate_format(), exact.coordinate_format());
     EXPECT_EQ(message.surface().step(), exact.surface().step());
     EXPECT_EQ(message.surface_digest(), exact.surface_digest());
@@ -147,7 +160,10 @@ TEST_P(Levels, AreTheSameForAnyNumberOfThreads) {
   for (const unsigned threads : {1u, 2u}) {
     v1::ReconstructedFrame message = exact;
     Arena arena(threads);
-    arena.Execute([&] { ASSERT_TRUE(ReplaceByLevel(MaxError(.1), Grant, nullptr, message).ok()); });
+    arena.Execute([&] {
+      ASSERT_TRUE(
+          ReplaceByLevel(MaxError(.1), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
+    });
     EXPECT_TRUE(message.surface().normals().empty());
     const std::string bytes = message.SerializeAsString();
     if (first.empty()) first = bytes;
@@ -161,7 +177,8 @@ TEST_P(Levels, OfANumberOfTrianglesHaveTheSmallestErrorThatSuffices) {
   double former = 0;
   for (const std::uint64_t most : {all, all * 3 / 4, all / 2, all / 3}) {
     v1::ReconstructedFrame message = exact;
-    ASSERT_TRUE(ReplaceByLevel(MaxTriangles(most), Grant, nullptr, message).ok());
+    ASSERT_TRUE(
+        ReplaceByLevel(MaxTriangles(most), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
     const double error = LevelOf(message)->error;
     const std::uint64_t left = Decoded(message).TriangleCount();
     std::printf("at most %zu: %zu, error %g\n", static_cast<std::size_t>(most),
@@ -175,11 +192,13 @@ TEST_P(Levels, OfANumberOfTrianglesHaveTheSmallestErrorThatSuffices) {
     }
     EXPECT_GT(2 * left, most) << "a smaller error would suffice";
     v1::ReconstructedFrame by_error = exact;
-    ASSERT_TRUE(ReplaceByLevel(MaxError(error), Grant, nullptr, by_error).ok());
+    ASSERT_TRUE(
+        ReplaceByLevel(MaxError(error), SurfaceOrigin::kUnknown, Grant, nullptr, by_error).ok());
     EXPECT_EQ(by_error.SerializeAsString(), message.SerializeAsString());
   }
   v1::ReconstructedFrame message = exact;
-  ASSERT_TRUE(ReplaceByLevel(MaxTriangles(1), Grant, nullptr, message).ok());
+  ASSERT_TRUE(
+      ReplaceByLevel(MaxTriangles(1), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
   EXPECT_EQ(LevelOf(message)->error, .35);
   EXPECT_LT(3 * Decoded(message).TriangleCount(), all);
 }
@@ -187,7 +206,7 @@ TEST_P(Levels, OfANumberOfTrianglesHaveTheSmallestErrorThatSuffices) {
 TEST(Level, OfAMessageWithoutASurfaceIsThisMessage) {
   v1::ReconstructedFrame message;
   message.set_sequence(7);
-  ASSERT_TRUE(ReplaceByLevel(MaxError(.1), Grant, nullptr, message).ok());
+  ASSERT_TRUE(ReplaceByLevel(MaxError(.1), SurfaceOrigin::kUnknown, Grant, nullptr, message).ok());
   EXPECT_FALSE(message.has_surface());
   EXPECT_FALSE(LevelOf(message).has_value());
 }
@@ -219,17 +238,20 @@ TEST(Level, WithoutMemoryOrCancelledIsAnError) {
     return absl::ResourceExhaustedError("memory");
   };
   v1::ReconstructedFrame message = exact;
-  EXPECT_TRUE(absl::IsResourceExhausted(ReplaceByLevel(MaxError(.1), refuse, nullptr, message)));
+  EXPECT_TRUE(absl::IsResourceExhausted(
+      ReplaceByLevel(MaxError(.1), SurfaceOrigin::kUnknown, refuse, nullptr, message)));
   EXPECT_GT(asked, 2 * exact.ByteSizeLong());
   const std::atomic<bool> cancelled = true;
-  EXPECT_TRUE(absl::IsCancelled(ReplaceByLevel(MaxError(.1), Grant, &cancelled, message)));
+  EXPECT_TRUE(absl::IsCancelled(
+      ReplaceByLevel(MaxError(.1), SurfaceOrigin::kUnknown, Grant, &cancelled, message)));
 }
 
 TEST(Level, OfAMalformedSurfaceIsDataLoss) {
   v1::ReconstructedFrame message;
   ASSERT_TRUE(EncodeResult(Scene(4), {}, {}, message).ok());
   message.mutable_surface()->mutable_points()->resize(24);
-  EXPECT_TRUE(absl::IsDataLoss(ReplaceByLevel(MaxError(.1), Grant, nullptr, message)));
+  EXPECT_TRUE(absl::IsDataLoss(
+      ReplaceByLevel(MaxError(.1), SurfaceOrigin::kUnknown, Grant, nullptr, message)));
 }
 
 // A tetrahedron at `at`.
@@ -248,7 +270,8 @@ void EndShell(Surface& surface) {
 }
 // Why there is no level.
 std::string FaultOf(Surface surface, double spacing = 1) {
-  const absl::Status status = MakeLevel(MaxError(.1), spacing, nullptr, surface).status();
+  const absl::Status status =
+      MakeLevel(MaxError(.1), spacing, SurfaceOrigin::kUnknown, nullptr, surface).status();
   EXPECT_TRUE(status.ok() || absl::IsDataLoss(status)) << status;
   return std::string(status.message());
 }
@@ -329,6 +352,31 @@ TEST(Level, OfASurfaceThatTakesTooMuchWorkIsRefused) {
   EXPECT_EQ(FaultOf(large), "");
 }
 
+TEST(Level, OfShellsWhosePointsCoincideKeepsThem) {
+  Surface surface;
+  for (int k = 0; k < 2; ++k) {
+    AddTetrahedron(0, surface);
+    EndShell(surface);
+  }
+  std::fill(surface.points.begin(), surface.points.end(), 1.0);
+  EXPECT_EQ(FaultOf(surface), "");
+}
+
+// Fluid in a corner of two walls, whose cut faces have long triangles.
+TEST(Level, OfALongFilamentInACornerIsMade) {
+  std::vector<double> positions;
+  for (int x = 0; x < 2000; ++x) {
+    for (int k = 0; k < 9; ++k) positions.insert(positions.end(), {x + .5, k % 3 + .5, k / 3 + .5});
+  }
+  const auto reconstructor =
+      SurfaceReconstructor::Create({.wall_planes = {{.axis = 1}, {.axis = 2}}});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  const Frame frame{.positions = std::span<const double>(positions), .components = 3};
+  ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
+  EXPECT_EQ(FaultOf(surface), "");
+}
+
 // Self-intersections stay, because rounding can make them.
 TEST(Level, OfASurfaceThatIntersectsItselfKeepsItsTrianglesThere) {
   v1::ReconstructedFrame message;
@@ -338,12 +386,12 @@ TEST(Level, OfASurfaceThatIntersectsItselfKeepsItsTrianglesThere) {
   const std::uint32_t moved = surface.triangles[0], onto = surface.triangles[1];
   std::copy_n(surface.points.begin() + 3 * onto, 3, surface.points.begin() + 3 * moved);
   EXPECT_FALSE(Validate(surface).ok()) << "two triangles are degenerate";
-  const auto made = MakeLevel(MaxError(.1), .5, nullptr, surface);
+  const auto made = MakeLevel(MaxError(.1), .5, SurfaceOrigin::kUnknown, nullptr, surface);
   ASSERT_TRUE(made.ok()) << made.status();
   EXPECT_LT(2 * surface.TriangleCount(), all);
   surface.points[0] += 3;
   EXPECT_FALSE(Validate(surface).ok());
-  EXPECT_TRUE(MakeLevel(MaxError(.3), .5, nullptr, surface).ok());
+  EXPECT_TRUE(MakeLevel(MaxError(.3), .5, SurfaceOrigin::kUnknown, nullptr, surface).ok());
 }
 
 }  // namespace

@@ -38,6 +38,12 @@ struct SurfaceLevel {
   friend bool operator==(const SurfaceLevel&, const SurfaceLevel&) = default;
 };
 
+/// Who made a surface.
+enum class SurfaceOrigin : std::uint8_t {
+  kCore,     ///< This library. The surface has its guarantees.
+  kUnknown,  ///< Anybody. MakeLevel checks the surface, and limits its own work.
+};
+
 /// Estimate of the memory that MakeLevel allocates for a surface of this size, including the
 /// surface. `attribute_values`: values of all attributes for each point.
 std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
@@ -49,10 +55,11 @@ std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
 /// Requires: a valid level; indices, offsets and sizes of arrays as in a Surface; normals may be
 /// absent. Rounded coordinates may break S3; such triangles stay.
 /// Runs in the caller's Arena. Deterministic for any number of threads. Errors: CANCELLED after
-/// `cancelled` was set; DATA_LOSS for a surface that breaks S1 or S2, for coordinates that are not
-/// finite or too large, a `spacing` that is no length, and a surface so unlike a result that its
-/// simplification takes too much time. Then `surface` is unspecified. May throw std::bad_alloc.
-absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
+/// `cancelled` was set. With SurfaceOrigin::kUnknown also DATA_LOSS for a surface that breaks S1 or
+/// S2, for coordinates that are not finite or too large, a `spacing` that is no length, and a
+/// surface so unlike a result that its simplification takes too much time. After an error `surface`
+/// is unspecified. May throw std::bad_alloc.
+absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing, SurfaceOrigin origin,
                                  const std::atomic<bool>* cancelled, Surface& surface);
 
 }  // namespace partiemc

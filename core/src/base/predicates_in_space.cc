@@ -1,5 +1,7 @@
 #include "base/predicates_in_space.h"
 
+#include <cstdint>
+
 #include "base/expansion.h"
 
 namespace partiemc {
@@ -27,9 +29,14 @@ void AddDeterminant(double sign, const Vec3& a, const Vec3& b, const Vec3& c, Su
   sum.AddProduct(-sign * a.z, b.y, c.x);
 }
 
+thread_local std::uint64_t exact_predicates = 0;
+
 }  // namespace
 
+std::uint64_t ExactPredicates() { return exact_predicates; }
+
 int SideOfPlaneExact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  ++exact_predicates;
   const Difference p = DifferenceOf(b, a), q = DifferenceOf(c, a), r = DifferenceOf(d, a);
   if (p.is_exact && q.is_exact && r.is_exact) {
     Expansion<24> determinant;

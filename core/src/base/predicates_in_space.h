@@ -5,6 +5,8 @@
 // In the domain no product of three coordinates overflows or loses subnormal bits.
 #pragma once
 
+#include <cstdint>
+
 #include "base/vec3.h"
 
 namespace partiemc {
@@ -23,6 +25,10 @@ constexpr bool InSpaceDomain(double coordinate) {
 
 /// SideOfPlane without the filter, for the calls that the filter cannot decide.
 int SideOfPlaneExact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+
+/// Number of calls of SideOfPlaneExact by this thread, which take most of the time if triangles lie
+/// in nearly one plane.
+std::uint64_t ExactPredicates();
 
 /// The sign of (b - a) x (c - a) . (d - a): +1 if d is on the side of the plane from which a, b, c
 /// appear counter-clockwise, -1 on the other side, 0 on the plane or if a, b, c are collinear.

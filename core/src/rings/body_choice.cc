@@ -94,7 +94,8 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   for (std::uint32_t root = 0; root < components; ++root) {
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent) continue;
-    if (topology.particle_count[topology.outer_ring[best]] < c.total[root]) best = kNoComponent;
+    // An image with a particle and its copy has more.
+    if (topology.particle_count[topology.outer_ring[best]] != c.total[root]) best = kNoComponent;
   }
 }
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #define MESHOPTIMIZER_NO_WRAPPERS
 #include <meshoptimizer.h>
@@ -27,20 +29,37 @@ double ExtentOf(const Box& box) {
   return std::max({size.x, size.y, size.z});
 }
 
-/// Simplifies triangles of one block. Coordinates are relative to its box, so that a block far from
-/// the origin loses nothing. Their rounding influences the choice of points only.
+/// Whether meshoptimizer 0.18 would compare too many points with each other. Its hash table of
+/// positions is searched linearly, and a hostile result can have positions with the same hash.
+/// Surfaces have up to 9 pairs per point.
+bool HasManyCollisions(std::span<const float> positions) {
+  constexpr std::uint64_t kMostPairs = 256;
+  const std::size_t points = positions.size() / 3;
+  const std::size_t buckets = std::bit_ceil(points + points / 4);
+  std::vector<std::uint32_t> in_bucket(buckets, 0);
+  std::uint64_t pairs = 0;
+  for (std::size_t k = 0; k < points; ++k) {
+    const auto part = [&](std::size_t axis) {
+      const auto bits = std::bit_cast<std::uint32_t>(positions[3 * k + axis]);
+      return bits ^ bits >> 17;
+    };
+    const std::uint32_t hash = part(0) * 73856093 ^ part(1) * 19349663 ^ part(2) * 83492791;
+    pairs += 2 * std::uint64_t{in_bucket[hash & (buckets - 1)]++} + 1;
+  }
+  return pairs > kMostPairs * points;
+}
+
+/// Simplifies triangles of one block. Keeps them if all points coincide, or have the same hash.
+/// Coordinates are relative to its box, so that a block far from the origin loses nothing. Their
+/// rounding influences the choice of points only.
 void SimplifyBlock(std::span<const double> points, double error,
                    std::vector<std::uint32_t>& triangles) {
+  const Box box = BoxOf(points, triangles);
+  const double extent = ExtentOf(box);
+  if (extent == 0) return;  // Rounded coordinates.
   std::vector<std::uint32_t> used = triangles;
   std::sort(used.begin(), used.end());
   used.erase(std::unique(used.begin(), used.end()), used.end());
-  for (std::uint32_t& point : triangles) {
-    point = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), point) -
-                                       used.begin());
-  }
-  const Box box = BoxOf(points, used);
-  const double extent = ExtentOf(box);
-  if (extent == 0) return;  // Rounded coordinates.
   std::vector<float> positions;
   positions.reserve(3 * used.size());
   for (const std::uint32_t point : used) {
@@ -48,6 +67,11 @@ void SimplifyBlock(std::span<const double> points, double error,
     for (const double value : {within.x, within.y, within.z}) {
       positions.push_back(static_cast<float>(value));
     }
+  }
+  if (HasManyCollisions(positions)) return;
+  for (std::uint32_t& point : triangles) {
+    point = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), point) -
+                                       used.begin());
   }
   std::vector<std::uint32_t> output(triangles.size());
   output.resize(meshopt_simplify(output.data(), triangles.data(), triangles.size(),

@@ -36,9 +36,9 @@ absl::Status OutOfRange(std::string field, std::string value, std::string rule) 
       {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Limits for surfaces that no core has made, for each triangle. Triangles of results take WORK
-// units at most, and the squares of the numbers of triangles at their points are DEGREES.
-constexpr std::uint64_t kMostWork = 1 << 14, kMostDegrees = 1 << 8;
+// Limits for surfaces of unknown origin, for each triangle: the work of the simplification, and the
+// squares of the numbers of triangles at the points.
+constexpr std::uint64_t kMostWork = 1 << 16, kMostDegrees = 1 << 10;
 constexpr std::uint64_t kFewTriangles = 1 << 12;
 // Largest coordinate in spacings.
 constexpr double kFarthestCoordinate = 0x1p40;
@@ -87,22 +87,26 @@ absl::Status Check(const Surface& surface, double spacing) {
 }
 
 // Keeps the measures of the exact surface.
-void SimplifyBy(double error, double spacing, Surface& surface) {
+void SimplifyBy(double error, double spacing, SurfaceOrigin origin, Surface& surface) {
   std::vector<ShellMeasures> exact = surface.measures;
   WorkLimit work(kMostWork * AtLeastFew(surface));
-  simplify::Simplify({.error = error * spacing, .spacing = spacing, .work = &work}, surface);
+  simplify::Simplify({.error = error * spacing,
+                      .spacing = spacing,
+                      .work = origin == SurfaceOrigin::kUnknown ? &work : nullptr},
+                     surface);
   surface.measures = std::move(exact);
 }
 
 // Finds the smallest error of kErrors that suffices, by bisection. Returns the error.
-double SimplifyToCount(std::uint64_t max_triangles, double spacing, Surface& surface) {
+double SimplifyToCount(std::uint64_t max_triangles, double spacing, SurfaceOrigin origin,
+                       Surface& surface) {
   std::size_t first = 0, last = kErrors.size() - 1;
   Surface best = surface;
-  SimplifyBy(kErrors[last], spacing, best);
+  SimplifyBy(kErrors[last], spacing, origin, best);
   while (first < last && best.TriangleCount() <= max_triangles) {
     const std::size_t middle = first + (last - first) / 2;
     Surface level = surface;
-    SimplifyBy(kErrors[middle], spacing, level);
+    SimplifyBy(kErrors[middle], spacing, origin, level);
     if (level.TriangleCount() <= max_triangles) {
       best = std::move(level);
       last = middle;
@@ -139,18 +143,20 @@ std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
              points;
 }
 
-absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing,
+absl::StatusOr<double> MakeLevel(const LevelOfDetail& level, double spacing, SurfaceOrigin origin,
                                  const std::atomic<bool>* cancelled, Surface& surface) {
   const CancellationScope scope(cancelled);
   const std::size_t exact = surface.TriangleCount();
   double error = 0;
   try {
-    if (absl::Status status = Check(surface, spacing); !status.ok()) return status;
+    if (origin == SurfaceOrigin::kUnknown) {
+      if (absl::Status status = Check(surface, spacing); !status.ok()) return status;
+    }
     if (level.max_error) {
       error = *level.max_error;
-      SimplifyBy(error, spacing, surface);
+      SimplifyBy(error, spacing, origin, surface);
     } else if (exact > level.max_triangles.value_or(exact)) {
-      error = SimplifyToCount(*level.max_triangles, spacing, surface);
+      error = SimplifyToCount(*level.max_triangles, spacing, origin, surface);
     }
   } catch (const Cancelled&) {
     return absl::CancelledError("the level of detail was cancelled");

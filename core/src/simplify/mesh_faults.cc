@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "base/predicates_in_space.h"
 #include "check/triangle_contact.h"
 #include "check/triangle_grid.h"
 
@@ -11,7 +12,7 @@ namespace partiemc::simplify {
 namespace {
 
 // Units of WorkLimit. A contact also takes memory, so that its number must be far smaller.
-constexpr std::uint64_t kWorkOfPair = 32, kWorkOfContact = 1 << 12;
+constexpr std::uint64_t kWorkOfPair = 32, kWorkOfExact = 1 << 10, kWorkOfContact = 1 << 16;
 
 Triangle TriangleAt(std::span<const std::uint32_t> triangles, std::size_t triangle) {
   return {triangles[3 * triangle], triangles[3 * triangle + 1], triangles[3 * triangle + 2]};
@@ -137,7 +138,10 @@ void FindContacts(std::span<const double> points, std::span<const std::uint32_t>
     if (is_flat(a) || is_flat(b)) return true;
     work.Add(kWorkOfPair);
     const Triangle first = TriangleAt(triangles, a), second = TriangleAt(triangles, b);
-    if (TrianglesCollide(points, first, second)) {
+    const std::uint64_t exact = ExactPredicates();
+    const bool collide = TrianglesCollide(points, first, second);
+    work.Add(kWorkOfExact * (ExactPredicates() - exact));
+    if (collide) {
       work.Add(kWorkOfContact);
       contacts.push_back({a, b, Intersection(BoxOf(points, first), BoxOf(points, second))});
     }

@@ -18,7 +18,7 @@ struct SurfaceSize {
   bool has_state = false;              ///< Of a stream.
   bool is_simplified = false;
   std::uint64_t wall_axes = 0;  ///< Axes that have walls.
-  std::uint64_t box_axes = 0;   ///< Axes along which bodies percolate.
+  std::uint64_t box_axes = 0;   ///< Axes along which bodies are cut at a periodic box.
   std::uint64_t lift_bytes =
       0;  ///< Of a periodic box (periodic/lift.h), or of walls (walls/wall_images.h).
   std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
@@ -57,7 +57,8 @@ inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
 
 /// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and the
-/// cuts along each axis. Particles have copies far beyond the faces, so few points are cut.
+/// cuts along each axis. Bodies that percolate have copies far beyond the faces, so few points are
+/// cut. Wrapped spray has more (core_allocation_test).
 inline constexpr std::uint64_t kBytesPerBoxPoint = 450, kBytesPerBoxAxis = 50;
 
 /// For any frame.

@@ -128,7 +128,8 @@ void FindBest(const BodyImageInput& input, const Bodies& bodies, std::vector<Ima
   for (Image& set : images) {
     if (set.best == kNoIndex) continue;
     const Body& best = bodies.bodies[set.best];
-    if (best.particles + best.images < set.particles) set.best = kNoIndex;
+    // An image with a particle and its copy has more.
+    if (best.particles + best.images != set.particles) set.best = kNoIndex;
   }
 }
 

@@ -9,10 +9,10 @@
 
 #include "base/vec3.h"
 #include "space/bodies.h"
-#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/field.h"
 #include "space/mesh.h"
+#include "space_certificate/certificate.h"
 #include "space_vertices/clipped_measures.h"
 
 namespace partiemc::space {

@@ -18,7 +18,7 @@
 #include "space/bodies.h"
 #include "space/lattice.h"
 #include "space/mesh.h"
-#include "space/moved_nodes.h"
+#include "space_certificate/moved_nodes.h"
 
 namespace partiemc::space {
 

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "base/vec3.h"
-#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/lattice.h"
 #include "space/mesh.h"
+#include "space_certificate/certificate.h"
 
 namespace partiemc::space {
 

@@ -119,17 +119,20 @@ TEST(LammpsDump, BoxHasTheAxesOfThePositions) {
 }
 
 TEST(LammpsDump, PeriodicRequiresOrthogonalBoxes) {
-  const SequenceOptions one_box{.requires_box = true};
+  const SequenceOptions periodic{.requires_box = true};
   const std::string atoms = "x y\n1 2\n";
   const std::string wider = "ITEM: BOX BOUNDS pp pp pp\n0 10.5\n-5 15\n-0.5 0.5\n";
-  const ReadSequence read = Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, wider), one_box);
+  const ReadSequence read = Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, wider), periodic);
   ASSERT_EQ(read.frames.size(), 2u) << read.status;
   EXPECT_EQ(read.frames[0].box->high[0], 10);
   EXPECT_EQ(read.frames[1].box->high[0], 10.5);
   const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
-  ExpectRefused(Read(Frame("0", "1", atoms, tilted), one_box).status,
+  ExpectRefused(Read(Frame("0", "1", atoms, tilted), periodic).status,
                 absl::StatusCode::kFailedPrecondition, {"frame 0", "triclinic", "orthogonal"});
-  ExpectRefused(Read(Frame("0", "1", atoms, ""), one_box).status,
+  const std::string open = "ITEM: BOX BOUNDS ff pp pp\n0 10\n-5 15\n-0.5 0.5\n";
+  ExpectRefused(Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, open), periodic).status,
+                absl::StatusCode::kFailedPrecondition, {"frame 1", "other axes"});
+  ExpectRefused(Read(Frame("0", "1", atoms, ""), periodic).status,
                 absl::StatusCode::kFailedPrecondition, {"no box", "--box"});
 }
 

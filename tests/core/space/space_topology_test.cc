@@ -13,10 +13,10 @@
 #include "partiemc/surface_reconstructor.h"
 #include "space/bodies.h"
 #include "space/cell_loops.h"
-#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/mesh.h"
 #include "space/space_particles.h"
+#include "space_certificate/certificate.h"
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
 

@@ -1,4 +1,4 @@
-#include "space/certificate.h"
+#include "space_certificate/certificate.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "base/parallel.h"
 #include "space/brick_layers.h"
-#include "space/face_checker.h"
+#include "space_certificate/face_checker.h"
 
 namespace partiemc::space {
 namespace {

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "base/vec3.h"
-#include "space/certificate.h"
 #include "space/crossings.h"
 #include "space/lattice.h"
-#include "space/moved_nodes.h"
+#include "space_certificate/certificate.h"
+#include "space_certificate/moved_nodes.h"
 
 namespace partiemc::space {
 

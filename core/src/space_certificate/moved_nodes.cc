@@ -1,4 +1,4 @@
-#include "space/moved_nodes.h"
+#include "space_certificate/moved_nodes.h"
 
 #include "base/parallel.h"
 

@@ -1,4 +1,4 @@
-#include "space/face_checker.h"
+#include "space_certificate/face_checker.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -24,7 +24,7 @@
 #include "base/vec3.h"
 #include "space/crossings.h"
 #include "space/lattice.h"
-#include "space/moved_nodes.h"
+#include "space_certificate/moved_nodes.h"
 
 namespace partiemc::space {
 
