@@ -66,7 +66,7 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// What happens to the vertices and nodes of a body between two certifications.
+/// The step of a body between two certifications, for its vertices and nodes.
 enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
 
 /// Finds the body of each node that may move. Requires: Certify.

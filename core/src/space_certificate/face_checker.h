@@ -158,7 +158,7 @@ class FaceChecker {
   const MovedNodes& nodes_;
   const std::uint32_t brick_;
   const Vec3 centre_;
-  double bound_;  // Of the errors of determinants.
+  double bound_;  // Largest error of determinants.
   std::bitset<kNodesAlong * kNodesAlong * kNodesAlong> has_node_;
   std::bitset<kCellsAlong * kCellsAlong * kCellsAlong> has_cell_;
   std::array<Node, kNodesAlong * kNodesAlong * kNodesAlong> node_;
