@@ -123,9 +123,11 @@ class Probe {
     const std::uint32_t first = bins_.FirstOf(other), end = bins_.EndOf(other);
     if (first == end) return;
     const BrickCoordinate &from = bins_.bricks[at.brick], &to = bins_.bricks[other];
-    const Vec3 corner =
-        kBrickSize * Vec3{double{to.x} - from.x, double{to.y} - from.y, double{to.z} - from.z} -
-        at.place;
+    const auto along = [](std::int32_t low, std::int32_t high, double place) {
+      return kBrickSize * (static_cast<double>(high) - low) - place;
+    };
+    const Vec3 corner{along(from.x, to.x, at.place.x), along(from.y, to.y, at.place.y),
+                      along(from.z, to.z, at.place.z)};
     const auto across = [](double low) { return std::max({0.0, low, -low - kBrickSize}); };
     const Vec3 away{across(corner.x), across(corner.y), across(corner.z)};
     const double widest = WidestPair(at);
