@@ -13,12 +13,6 @@
 namespace partiemc {
 namespace {
 
-// Numbers of samples. If fewer than kCause of the first kAskedFirst samples contradict the spacing,
-// the check ends: there is no doubt.
-constexpr std::size_t kAsked = 64;
-constexpr std::size_t kAskedFirst = 16;
-constexpr std::size_t kCause = 3;
-
 // Limit of the particles that the check visits. In full tiles one sample visits two thousand.
 constexpr std::size_t kMaxLooks = std::size_t{1} << 20;
 
@@ -58,8 +52,11 @@ class Probe {
         largest_(scale.sizes.largest),
         most_in_tile_(kMaxDensity * kTileNodes / (scale.spacing * scale.spacing)) {}
 
-  // Whether the k-th sample of `tile` contradicts the spacing.
-  bool Contradicts(std::size_t tile, std::uint64_t k) {
+  // Whether the sample at this place of the particles contradicts the spacing.
+  bool Contradicts(std::size_t particle) {
+    const auto above = std::upper_bound(bins_.offsets.begin(), bins_.offsets.end(), particle);
+    const auto tile = static_cast<std::size_t>(above - bins_.offsets.begin()) - 1;
+    const std::uint64_t k = particle - bins_.offsets[tile];
     const auto particles = ParticlesOf(tile);
     if (SquaredSizesOf(tile) > most_in_tile_) return true;
     looks_ += particles.size();
@@ -147,21 +144,8 @@ class Probe {
 }  // namespace
 
 bool ContradictsSpacing(const ParticleBins& bins, const Scale& scale) {
-  const std::size_t count = bins.particles.size();
-  const std::size_t most = std::min(kAsked, count);
   Probe probe(bins, scale);
-  std::size_t asked = 0, contradicting = 0;
-  for (; asked < most && !probe.IsExhausted(); ++asked) {
-    if (asked == kAskedFirst && contradicting < kCause) return false;
-    // The samples are multiples of an odd step modulo a power of 2. The first few samples are
-    // therefore spread over all particles, too.
-    const std::size_t place = asked * 37 % kAsked;
-    const std::size_t particle = count <= kAsked ? asked : count * place / kAsked;
-    const auto above = std::upper_bound(bins.offsets.begin(), bins.offsets.end(), particle);
-    const auto tile = static_cast<std::size_t>(above - bins.offsets.begin()) - 1;
-    if (probe.Contradicts(tile, particle - bins.offsets[tile])) ++contradicting;
-  }
-  return AreEnough(contradicting, asked);
+  return SamplesContradict(bins.particles.size(), probe);
 }
 
 }  // namespace partiemc

@@ -78,4 +78,24 @@ constexpr bool AreEnough(std::size_t surrounded, std::size_t asked) {
   return surrounded >= 12 && 10 * surrounded >= 3 * asked;
 }
 
+/// Number of samples of SamplesContradict, and of those that it examines first. It ends if fewer
+/// than kCauseToAsk of these contradict the spacing.
+inline constexpr std::size_t kAsked = 64, kAskedFirst = 16, kCauseToAsk = 3;
+
+/// Whether enough of the sampled particles contradict the spacing. `probe` has
+/// Contradicts(particle) and IsExhausted, after which no further sample is examined.
+template <typename Probe>
+bool SamplesContradict(std::size_t count, Probe& probe) {
+  const std::size_t most = count < kAsked ? count : kAsked;
+  std::size_t asked = 0, contradicting = 0;
+  for (; asked < most && !probe.IsExhausted(); ++asked) {
+    if (asked == kAskedFirst && contradicting < kCauseToAsk) return false;
+    // Multiples of an odd number modulo a power of 2, so that the first samples are spread over all
+    // particles, too.
+    const std::size_t place = asked * 37 % kAsked;
+    if (probe.Contradicts(count <= kAsked ? asked : count * place / kAsked)) ++contradicting;
+  }
+  return AreEnough(contradicting, asked);
+}
+
 }  // namespace partiemc

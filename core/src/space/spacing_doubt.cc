@@ -13,11 +13,6 @@
 namespace partiemc::space {
 namespace {
 
-// Numbers of samples. If fewer than kCause of the first kAskedFirst samples contradict the spacing,
-// there is no doubt, and the check ends.
-constexpr std::size_t kAsked = 64;
-constexpr std::size_t kAskedFirst = 16;
-constexpr std::size_t kCause = 3;
 // Limit of the particles and bricks that the check visits.
 constexpr std::size_t kMostLooks = std::size_t{1} << 20;
 
@@ -81,7 +76,9 @@ class Probe {
       : bins_(bins), spacing_(scale.spacing), largest_(scale.sizes.largest) {}
 
   // Whether the distances around a particle contradict the spacing.
-  bool Contradicts(std::uint32_t brick, std::uint32_t particle) {
+  bool Contradicts(std::size_t sampled) {
+    const auto particle = static_cast<std::uint32_t>(sampled);
+    const std::uint32_t brick = BrickOf(particle);
     const Sample at{
         brick, {bins_.x[particle], bins_.y[particle], bins_.z[particle]}, SizeOf(particle)};
     NearShell near;
@@ -112,6 +109,14 @@ class Probe {
     double size;
   };
 
+  std::uint32_t BrickOf(std::uint32_t particle) const {
+    std::uint32_t low = 0, high = static_cast<std::uint32_t>(bins_.bricks.size());
+    while (high - low > 1) {
+      const std::uint32_t middle = low + (high - low) / 2;
+      (bins_.FirstOf(middle) <= particle ? low : high) = middle;
+    }
+    return low;
+  }
   double SizeOf(std::uint32_t particle) const {
     return bins_.size.empty() ? 1.0 : double{bins_.size[particle]};
   }
@@ -147,25 +152,8 @@ class Probe {
 }  // namespace
 
 bool ContradictsSpacing(const SpaceBins& bins, const Scale& scale) {
-  const std::size_t count = bins.source.size();
-  const std::size_t most = std::min(kAsked, count);
   Probe probe(bins, scale);
-  std::size_t asked = 0, contradicting = 0;
-  for (; asked < most && !probe.IsExhausted(); ++asked) {
-    if (asked == kAskedFirst && contradicting < kCause) return false;
-    // Multiples of an odd number modulo a power of 2, so that the first samples are spread over all
-    // particles, too.
-    const std::size_t place = asked * 37 % kAsked;
-    const auto particle =
-        static_cast<std::uint32_t>(count <= kAsked ? asked : count * place / kAsked);
-    std::uint32_t low = 0, high = static_cast<std::uint32_t>(bins.bricks.size());
-    while (high - low > 1) {
-      const std::uint32_t middle = low + (high - low) / 2;
-      (bins.FirstOf(middle) <= particle ? low : high) = middle;
-    }
-    if (probe.Contradicts(low, particle)) ++contradicting;
-  }
-  return AreEnough(contradicting, asked);
+  return SamplesContradict(bins.source.size(), probe);
 }
 
 }  // namespace partiemc::space
