@@ -30,7 +30,7 @@ constexpr std::uint32_t LengthTag(int field) {
 constexpr std::uint64_t kBytesOfMessage = 1024, kBytesOfField = 96, kBytesOfPackedByte = 24,
                         kBytesOfUnknownByte = 64;
 
-// Parsers read at most as many messages inside each other.
+// Parsers refuse messages that are nested deeper.
 constexpr int kMostNested = 100;
 
 std::uint64_t LengthFieldBytes(int field, std::uint64_t bytes) {

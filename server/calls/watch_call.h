@@ -56,7 +56,7 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   v1::WatchStreamResponse opened_;  // Once open.
   WatchTerms terms_;
   LevelQueue::Seat level_;                              // Without a level: exact frames.
-  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Of the frame that waits for its level.
+  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Numbers of the frame that waits.
   std::string stream_name_;
   std::string end_reason_;
   std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
