@@ -78,25 +78,29 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 }
 
 // The limits that IntakeGuard enforces for the memory of the process. The process may hold its
-// memory at the start, the workers, and the budget, which includes the histories. In addition it
-// may hold frames beyond the budget, and results that watchers have not received yet or levels of
-// detail of them, up to a sixteenth of the budget.
+// memory at the start, the workers, the states of streams, and the budget, which includes the
+// histories. In addition it may hold frames beyond the budget, and results that watchers have not
+// received yet or levels of detail of them, up to a sixteenth of the budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
-                                    const WatchRegistry& watchers, const LevelQueue& levels) {
-  const std::uint64_t outside =
-      ResidentBytes() + options.threads * kWorkerBytes + options.limits.AllHistoryBytes();
+                                    const StateMemory& states, const WatchRegistry& watchers,
+                                    const LevelQueue& levels) {
+  const std::uint64_t own_states = options.limits.max_streams * options.limits.OwnStateBytes();
+  const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes +
+                                options.limits.AllHistoryBytes() + own_states;
   const std::uint64_t room = budget.bytes(), more = room / kPartsOfBudgetBeyond;
   const std::uint64_t most =
       room + options.limits.ReadBytesBeyond() + options.limits.WorkerBytesBeyond();
   return {.resident_bytes = ResidentBytes,
-          .most_bytes = [outside, room, most,
-                         &budget] { return outside + std::clamp(budget.planned(), room, most); },
+          .most_bytes =
+              [outside, room, most, &budget, &states] {
+                return outside + states.held() + std::clamp(budget.planned(), room, most);
+              },
           .more_bytes =
               [more, &watchers, &levels] {
                 return std::min(watchers.held_bytes() + levels.kept_bytes(), more);
               },
           .give_back_freed = GiveBackFreedMemory,
-          .limit_bytes = outside + most,
+          .limit_bytes = outside + options.limits.SharedStateBytes() + most,
           .received_bytes = ReceivedBytesOfConnections};
 }
 
@@ -159,6 +163,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                                                       options.advertised_address)),
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
+      states_(options.limits.SharedStateBytes(), options.limits.OwnStateBytes()),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       levels_(std::make_shared<LevelQueue>(
           dispatcher_,
@@ -168,7 +173,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
           },
           LevelQueue::Limits{.kept_bytes = options.limits.LevelBytes()})),
       idle_timer_(registry_, watchers_, calls_, options.limits),
-      intake_guard_(opening_, WatchedProcess(options, budget_, watchers_, *levels_),
+      intake_guard_(opening_, WatchedProcess(options, budget_, states_, watchers_, *levels_),
                     &budget_.reads()),
       context_{.limits = options_.limits,
                .authentication = authentication_,
@@ -181,6 +186,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                .dispatcher = dispatcher_,
                .levels = *levels_,
                .budget = budget_,
+               .states = states_,
                .pool = pool_,
                .relay = relay_.get()},
       methods_(std::make_unique<Methods>(context_, *metrics_)),
@@ -268,6 +274,8 @@ void Server::AddGauges() {
       [this] { return budget_.held(); });
   add("partiemc_memory_budget_bytes", "What they may hold together.",
       [this] { return budget_.bytes(); });
+  add("partiemc_state_bytes", "States of streams between their frames, above 64 KiB of each.",
+      [this] { return states_.held(); });
   add("partiemc_watched_bytes",
       "Results that watchers have not taken yet, counted for each although they share them; "
       "outside of the budget.",

@@ -13,6 +13,7 @@
 #include "server/calls/server_context.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/compute/state_memory.h"
 #include "server/connections/acceptor.h"
 #include "server/connections/connection_table.h"
 #include "server/connections/connection_watch.h"
@@ -162,6 +163,7 @@ class Server {
   std::unique_ptr<Relay> relay_;
   UnaryRegistry calls_;
   MemoryBudget budget_;
+  StateMemory states_;
   ComputePool pool_;
   std::shared_ptr<LevelQueue> levels_;
   IdleTimer idle_timer_;

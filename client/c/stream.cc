@@ -80,22 +80,31 @@ std::vector<Wall> WallsOf(const partiemc_options& options) {
   return walls;
 }
 
-// Checks the arrays of walls.
-absl::Status CheckWalls(const partiemc_options& options) {
-  const bool has_walls = options.wall_count == 0 || (options.walls && options.wall_sizes);
-  const bool has_phases = options.wall_phase_count == 0 || options.wall_phases;
-  if (options.wall_plane_count != 0 && options.wall_planes == nullptr) {
+// Checks that an array with a count above zero is given.
+absl::Status CheckArrays(const partiemc_options& options) {
+  struct Array {
+    const char* name;
+    const char* count_name;
+    std::size_t count;
+    const void* entries;
+  };
+  const Array arrays[] = {
+      {"sections", "section_count", options.section_count, options.sections},
+      {"phases", "phase_count", options.phase_count, options.phases},
+      {"walls", "wall_count", options.wall_count, options.walls},
+      {"wall_sizes", "wall_count", options.wall_count, options.wall_sizes},
+      {"wall_phases", "wall_phase_count", options.wall_phase_count, options.wall_phases},
+      {"wall_planes", "wall_plane_count", options.wall_plane_count, options.wall_planes}};
+  for (const auto& [name, count_name, count, entries] : arrays) {
+    if (count == 0 || entries != nullptr) continue;
     return absl::InvalidArgumentError(
-        "wall_planes: NULL; must be an array of wall_plane_count walls");
+        absl::StrCat(name, ": NULL; must be an array of ", count_name, " entries"));
   }
-  if (has_walls && has_phases) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      has_walls ? "wall_phases: NULL; must be an array of wall_phase_count phases"
-                : "walls, wall_sizes: NULL; must be arrays of wall_count walls");
+  return absl::OkStatus();
 }
 
 absl::StatusOr<ReconstructionParameters> ParametersOf(const partiemc_options& options) {
-  if (absl::Status status = CheckWalls(options); !status.ok()) return status;
+  if (absl::Status status = CheckArrays(options); !status.ok()) return status;
   ReconstructionParameters parameters;
   if (options.spacing != 0) parameters.spacing = options.spacing;
   if (options.kernel_radius != 0) parameters.kernel_radius = options.kernel_radius;

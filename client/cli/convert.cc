@@ -81,7 +81,8 @@ CLI::App* AddConvert(CLI::App& app, ConvertFlags& flags) {
       "  partiemc convert drum.lammpstrj.gz drum.pemc --select type=1 --frames 0:100\n"
       "  partiemc convert 'tank_*.vtu' tank.pemc --in-space --spacing 0.02\n"
       "A recording holds time, position, id, volume, velocity and --attributes of the particles,\n"
-      "compressed. A truncated recording loses only its last frames.");
+      "and orthogonal periodic boxes. It is compressed. If it is truncated, only its last frames\n"
+      "are lost.");
   verb->parse_complete_callback([&flags] {
     if (!std::string_view(flags.output).ends_with(".pemc")) {
       throw CLI::ValidationError(

@@ -48,7 +48,7 @@ std::optional<RecordedBox> BoxOf(std::string_view text) {
   RecordedBox box;
   for (std::size_t k = 0; 2 * k < bounds.size(); ++k) {
     box.low[k] = bounds[2 * k];
-    box.high[k] = bounds[2 * k + 1];
+    box.length[k] = bounds[2 * k + 1] - bounds[2 * k];
     box.is_periodic[k] = true;
   }
   return box;
@@ -77,7 +77,7 @@ absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& 
                        Concat("axes of the box with periodic boundaries (pp); ", name,
                               " is none. --box gives other bounds"));
     }
-    box.axes[axis] = PeriodicAxis{bounds->low[axis], bounds->high[axis] - bounds->low[axis]};
+    box.axes[axis] = PeriodicAxis{bounds->low[axis], bounds->length[axis]};
   }
   box.wraps = flags.wrap;
   if (bounds) parameters.box = box;

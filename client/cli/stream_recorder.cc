@@ -1,6 +1,7 @@
 #include "client/cli/stream_recorder.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <type_traits>
@@ -28,7 +29,8 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
 // A word for a shell, which may come from a stranger.
 std::string Quoted(std::string_view text) {
   const bool is_plain = std::ranges::all_of(text, [](char c) {
-    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '.';
+    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '.' ||
+           c == '/';
   });
   if (is_plain && !text.empty()) return std::string(text);
   std::string quoted = "'";
@@ -51,6 +53,19 @@ std::string PhasesOf(const std::string& attribute, const std::vector<std::int32_
 // The value of --slice.
 std::string TextOf(const SlicePlane& slice) {
   return Concat(NumberList(slice.origin), ",", NumberList(slice.normal));
+}
+
+std::optional<RecordedBox> RecordedBoxOf(const std::optional<PeriodicBox>& box) {
+  if (!box) return std::nullopt;
+  RecordedBox recorded;
+  for (std::size_t k = 0; k < box->axes.size(); ++k) {
+    const auto& axis = box->axes[k];
+    if (!axis) continue;
+    recorded.low[k] = axis->origin;
+    recorded.length[k] = axis->length;
+    recorded.is_periodic[k] = true;
+  }
+  return recorded;
 }
 
 }  // namespace
@@ -93,17 +108,13 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   AddFlag(flags, "--min-particles", parameters.min_component_particles,
           defaults.min_component_particles);
   if (parameters.box) {
-    std::string axes, bounds;
+    // The recording holds the box of each frame.
+    std::string axes;
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto& axis = parameters.box->axes[k];
-      if (axis) AppendAll(axes, axes.empty() ? "" : ",", std::string(1, "xyz"[k]));
-      if (k == 2 && !axis) break;
-      const auto [origin, length] = axis.value_or(PeriodicAxis{});
-      AppendAll(bounds, bounds.empty() ? "" : ",", ShortestNumber(origin), ",",
-                ShortestNumber(origin + length));
+      if (parameters.box->axes[k])
+        AppendAll(axes, axes.empty() ? "" : ",", std::string(1, "xyz"[k]));
     }
-    AppendAll(flags, " --periodic ", axes, " --box ", bounds,
-              parameters.box->wraps ? " --wrap" : "");
+    AppendAll(flags, " --periodic ", axes, parameters.box->wraps ? " --wrap" : "");
   }
   if (parameters.noise_filter) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
@@ -133,15 +144,23 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   return flags;
 }
 
+StreamRecorder::StreamRecorder(std::string path, const ReconstructionParameters& parameters,
+                               std::unique_ptr<RecordingWriter> writer)
+    : path_(std::move(path)),
+      flags_(ReplayFlagsOf(parameters)),
+      box_(parameters.box),
+      has_isovalue_(parameters.isovalue.has_value()),
+      writer_(std::move(writer)) {
+  if (parameters.output == Output::kSurface) frame_.components = 3;
+}
+
 absl::StatusOr<StreamRecorder> StreamRecorder::Create(const std::string& path,
                                                       const std::string& stream_name,
                                                       const WatchedStream& stream) {
   auto writer = RecordingWriter::Create(
       path, {.spacing = stream.parameters.spacing, .title = stream_name}, {.float64 = true});
   if (!writer.ok()) return writer.status();
-  StreamRecorder recorder(path, ReplayFlagsOf(stream.parameters), *std::move(writer));
-  if (stream.parameters.output == Output::kSurface) recorder.frame_.components = 3;
-  return recorder;
+  return StreamRecorder(path, stream.parameters, *std::move(writer));
 }
 
 absl::Status StreamRecorder::Add(WatchedFrame& frame) {
@@ -152,7 +171,14 @@ absl::Status StreamRecorder::Add(WatchedFrame& frame) {
         "`partiemc.connect(..., echo_particles=True)`, in C `options.echo_particles = 1`, in C++ "
         "`StreamOptions::outputs.echo_particles`");
   }
-  if (writer_->frame_count() == 0) first_sequence_ = frame.sequence;
+  if (writer_->frame_count() == 0) {
+    first_sequence_ = frame.sequence;
+    const Result& result = frame.frame.result;
+    const auto& attributes = frame_.components == 3 ? result.surface.attributes : result.attributes;
+    for (const AttributeValues& one : attributes) {
+      AppendAll(attributes_, attributes_.empty() ? " --attributes " : ",", Quoted(one.name));
+    }
+  }
   missed_ += frame.dropped + frame.gap;
   frame_.index = writer_->frame_count();
   frame_.time = frame.time;
@@ -161,6 +187,7 @@ absl::Status StreamRecorder::Add(WatchedFrame& frame) {
   frame_.ids.swap(frame.particle_ids);
   frame_.volumes.swap(frame.particle_volumes);
   frame_.velocities.swap(frame.particle_velocities);
+  frame_.box = RecordedBoxOf(frame.particle_box ? frame.particle_box : box_);
   frame_.attributes.resize(frame.particle_attributes.size());
   for (std::size_t k = 0; k < frame_.attributes.size(); ++k) {
     const auto& [name, components, values] = frame.particle_attributes[k];
@@ -180,8 +207,13 @@ absl::Status StreamRecorder::Finish() {
 
 std::string StreamRecorder::Summary() const {
   if (writer_->frame_count() == 0) return "recorded: no frame, so there is no file\n";
-  std::string text = Concat("recorded: ", Plural(writer_->frame_count(), "frame"),
-                            "; partiemc replay ", path_, " --local", flags_, "\n");
+  std::string text =
+      Concat("recorded: ", Plural(writer_->frame_count(), "frame"), "; partiemc replay ",
+             Quoted(path_), " --local", flags_, attributes_, "\n");
+  if (has_isovalue_) {
+    AppendAll(text,
+              "the stream has an isovalue, for which replay has no option: a replay differs\n");
+  }
   if (first_sequence_ > 1) {
     AppendAll(text, "begins with frame ", first_sequence_,
               ": a replay lacks the state of the stream before it\n");

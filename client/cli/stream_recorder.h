@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -36,11 +37,14 @@ class StreamRecorder {
   std::string Summary() const;
 
  private:
-  StreamRecorder(std::string path, std::string flags, std::unique_ptr<RecordingWriter> writer)
-      : path_(std::move(path)), flags_(std::move(flags)), writer_(std::move(writer)) {}
+  StreamRecorder(std::string path, const ReconstructionParameters& parameters,
+                 std::unique_ptr<RecordingWriter> writer);
 
   std::string path_;
-  std::string flags_;  // For `partiemc replay`.
+  std::string flags_;               // For `partiemc replay`.
+  std::string attributes_;          // The flag with the attributes of the results, or empty.
+  std::optional<PeriodicBox> box_;  // Of the stream.
+  bool has_isovalue_;
   std::unique_ptr<RecordingWriter> writer_;
   RecordedFrame frame_;
   std::uint64_t first_sequence_ = 0, missed_ = 0;

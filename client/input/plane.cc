@@ -112,7 +112,7 @@ absl::Status PlaneProjection::Project(const ParticleRows& rows, RecordedFrame& f
     frame.box.emplace(RecordedBox{.is_tilted = rows.box->is_tilted});
     for (std::size_t c = 0; c < components; ++c) {
       frame.box->low[c] = rows.box->low[(*axes)[c]];
-      frame.box->high[c] = rows.box->high[(*axes)[c]];
+      frame.box->length[c] = rows.box->length[(*axes)[c]];
       frame.box->is_periodic[c] = rows.box->is_periodic[(*axes)[c]];
     }
   }

@@ -40,9 +40,7 @@ struct Recording {
 class FileSequence final : public Sequence {
  public:
   FileSequence(Recording recording, const SequenceOptions& options)
-      : recording_(std::move(recording)),
-        projection_(options.in_space),
-        requires_box_(options.requires_box) {}
+      : recording_(std::move(recording)), projection_(options.in_space) {}
 
   // Opens the first file, so that its errors are reported at once. Required before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
@@ -108,7 +106,6 @@ class FileSequence final : public Sequence {
           !status.ok()) {
         return status;
       }
-      if (absl::Status status = CheckBox(frame); !status.ok()) return status;
       selected_ += rows_.count;
       unselected_ += rows_.unselected;
       if (absl::Status status = TakeTime(frame); !status.ok()) return status;
@@ -118,20 +115,6 @@ class FileSequence final : public Sequence {
       return true;
     }
     return false;
-  }
-
-  absl::Status CheckBox(const RecordedFrame& frame) {
-    if (!requires_box_) return absl::OkStatus();
-    const auto refuse = [&](std::string_view fault) {
-      return absl::FailedPreconditionError(Concat(frame.source, ": ", fault));
-    };
-    if (!frame.box) return refuse("has no box for --periodic; give --box");
-    if (frame.box->is_tilted) {
-      return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
-    }
-    if (!periodic_axes_) periodic_axes_ = frame.box->is_periodic;
-    if (*periodic_axes_ == frame.box->is_periodic) return absl::OkStatus();
-    return refuse("its box is periodic along other axes than that of the first frame");
   }
 
   absl::Status SelectsNothing() const {
@@ -204,8 +187,6 @@ class FileSequence final : public Sequence {
   std::size_t index_ = 0;  // Index of the next frame.
   ParticleRows rows_;
   PlaneProjection projection_;
-  bool requires_box_;
-  std::optional<std::array<bool, 3>> periodic_axes_;  // Of the first frame.
   absl::Status failure_;
   std::uint64_t selected_ = 0;    // Particles of all frames.
   std::uint64_t unselected_ = 0;  // Particles that --select left out.

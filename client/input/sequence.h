@@ -26,7 +26,7 @@ struct RecordedFrame {
   /// cannot be used.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
-  /// The box of the simulation, along the axes of `positions`; of LAMMPS dumps.
+  /// The box of the simulation, along the axes of `positions`; of LAMMPS dumps and recordings.
   std::optional<RecordedBox> box;
   int components = 2;  ///< 3 with SequenceOptions::in_space.
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
@@ -76,9 +76,6 @@ struct SequenceOptions {
 
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
   bool in_space = false;
-
-  /// Refuse a frame whose box is absent or tilted.
-  bool requires_box = false;
 
   /// CSV file of frame times: columns `frame` (0-based index in the input) and `t` or `time`, or a
   /// single column of times, one line per frame. Empty: `times.csv` beside the files, if present. A

@@ -57,7 +57,18 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
       .frames_in_flight = std::clamp<std::size_t>(opened.frames_in_flight(), 1, kMaxFramesInFlight),
       .limits = {.max_particles_per_frame = opened.limits().max_particles_per_frame(),
                  .max_frame_bytes = opened.limits().max_frame_bytes(),
-                 .max_tiles_per_frame = opened.limits().max_tiles_per_frame()}};
+                 .max_tiles_per_frame = opened.limits().max_tiles_per_frame()},
+      .frame_boxes = opened.frame_boxes()};
+}
+
+// The error for a frame with a box of its own, which the server ignores.
+absl::Status BoxesNotSupported() {
+  return ViolationError(absl::StatusCode::kUnimplemented,
+                        {.reason = "UNSUPPORTED",
+                         .field = "frame.box",
+                         .value = "set",
+                         .rule = "requires a server with the capability frame-boxes: use a newer "
+                                 "one"});
 }
 
 constexpr auto kNever = Clock::TimePoint::max();
@@ -173,9 +184,11 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendArrays(const ParticleArrays& p
 absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& frame,
                                                        std::size_t particles) {
   if (auto fits = CheckParticleCount(particles, info_.limits); !fits.ok()) return fits;
+  const bool has_box = frame.scalars.box.has_value();
   const auto start = monitor_.Now();
   const MutexLock lock(monitor_.mutex);
   AssertShared();
+  if (has_box && !info_.frame_boxes) return BoxesNotSupported();
   if (auto ready = WaitToSend(start, 0); !ready.ok()) return ready;
   const std::uint64_t sequence = resend_.end();
   absl::StatusOr<grpc::ByteBuffer> request;
@@ -186,6 +199,7 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   if (!request.ok()) return request.status();
   if (auto ready = WaitToSend(start, request->Length()); !ready.ok()) return ready;
   if (all_answered()) due_since_ = monitor_.Now();
+  sends_boxes_ = sends_boxes_ || has_box;
   resend_.Add(*request);
   if (call_ != nullptr) call_->Queue(*std::move(request));
   return sequence;
@@ -440,6 +454,7 @@ absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
     return absl::FailedPreconditionError(
         absl::StrCat("the server at ", address, " resolves the stream's parameters otherwise"));
   }
+  if (sends_boxes_ && !info.frame_boxes) return BoxesNotSupported();
   const StreamLimits& limits = info.limits;
   if (AllowsAsMuch(limits.max_particles_per_frame, info_.limits.max_particles_per_frame) &&
       AllowsAsMuch(limits.max_frame_bytes, info_.limits.max_frame_bytes) &&

@@ -119,8 +119,9 @@ class ResumingStream final : public Stream {
   // Starts of deadlines.
   TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);
   TimePoint adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
-  bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // FinishSending was called.
-  absl::Status failure_ ABSL_GUARDED_BY(monitor_.mutex);   // Status that ended the stream.
+  bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;     // FinishSending was called.
+  bool sends_boxes_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // A frame had a box of its own.
+  absl::Status failure_ ABSL_GUARDED_BY(monitor_.mutex);      // Status that ended the stream.
 };
 
 }  // namespace partiemc::client

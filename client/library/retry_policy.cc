@@ -11,12 +11,12 @@ namespace partiemc::client {
 namespace {
 
 // Reasons of refusals (proto/PROTOCOL.md) after which another attempt may succeed. The stream's
-// former call may still hold a name or a slot. Another server may have a version or keys that
-// accept the checkpoint.
+// former call may still hold a name, a slot or the memory of its state. Another server may have a
+// version or keys that accept the checkpoint.
 constexpr std::string_view kDraining = "DRAINING";
-constexpr std::array<std::string_view, 7> kRetryableWhileResuming = {
-    "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",    "CALLER_STREAMS",
-    "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE"};
+constexpr std::array<std::string_view, 8> kRetryableWhileResuming = {
+    "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",     "CALLER_STREAMS",
+    "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE", "MEMORY_BUDGET"};
 
 constexpr std::array<std::string_view, 4> kRetryableWhileJoining = {
     "NO_SUCH_STREAM", "LEADER_GONE", "TOO_MANY_OPENING", "CALLER_CALLS"};

@@ -58,6 +58,7 @@ void TakeParticles(const Frame& echoed, const ReconstructionParameters& paramete
   Project(echoed.velocities, components, axes, frame.particle_velocities);
   frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
   frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
+  frame.particle_box = echoed.box;
 }
 
 // Takes the scalars that have values, of several with one name the first. Returns false if one has
@@ -225,12 +226,15 @@ absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& f
   frame.particle_volumes.clear();
   frame.particle_velocities.clear();
   frame.particle_attributes.clear();
+  frame.particle_box.reset();
   if (result.particles().empty()) return absl::OkStatus();
   particles_.set_position_format(result.particle_format());
   particles_.mutable_positions()->swap(*result.mutable_particles());
   particles_.mutable_ids()->swap(*result.mutable_particle_ids());
   particles_.mutable_volumes()->swap(*result.mutable_particle_volumes());
   particles_.mutable_velocities()->swap(*result.mutable_particle_velocities());
+  particles_.clear_box();
+  if (result.has_particle_box()) particles_.mutable_box()->Swap(result.mutable_particle_box());
   const auto particles = wire::DecodeFrame(particles_);
   if (!particles.ok() || !TakeScalars(result, particles->ParticleCount(), frame)) {
     return Broken("sent particles that cannot be read");

@@ -13,6 +13,7 @@
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "wire/bytes.h"
+#include "wire/codec.h"
 
 namespace partiemc::client {
 namespace {
@@ -69,6 +70,25 @@ absl::Status CopyAttributes(const v1::ParticleFrame& message, RecordedFrame& fra
   return absl::OkStatus();
 }
 
+absl::Status CopyBox(const v1::ParticleFrame& message, RecordedFrame& frame) {
+  frame.box.reset();
+  if (!message.has_box()) return absl::OkStatus();
+  const PeriodicBox box = wire::FromWire(message.box());
+  RecordedBox recorded;
+  for (std::size_t k = 0; k < box.axes.size(); ++k) {
+    if (!box.axes[k]) continue;
+    const auto [origin, length] = *box.axes[k];
+    if (!std::isfinite(origin) || !(length > 0) || !std::isfinite(origin + length)) {
+      return absl::DataLossError("a length of the box is not positive and finite");
+    }
+    recorded.is_periodic[k] = true;
+    recorded.low[k] = origin;
+    recorded.length[k] = length;
+  }
+  frame.box = recorded;
+  return absl::OkStatus();
+}
+
 absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   absl::Status status = CopyPositions(message, frame);
   const std::size_t count = frame.ParticleCount();
@@ -80,6 +100,7 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   }
   if (!status.ok()) return status;
   if (absl::Status copied = CopyAttributes(message, frame); !copied.ok()) return copied;
+  if (absl::Status copied = CopyBox(message, frame); !copied.ok()) return copied;
   frame.time = message.time();
   wire::CopyBytes(message.ids(), frame.ids);
   wire::CopyBytes(message.volumes(), frame.volumes);

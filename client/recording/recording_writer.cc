@@ -15,6 +15,7 @@
 #include "partiemc/status.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "wire/bytes.h"
+#include "wire/codec.h"
 
 namespace partiemc::client {
 namespace {
@@ -85,6 +86,7 @@ class RecordingWriter::Impl {
     wire::AssignBytes(
         frame.time ? std::span<const float>(frame.velocities) : std::span<const float>(),
         *message_.mutable_velocities());
+    SetBox(frame.box);
     message_.clear_scalars();
     for (const ParticleAttribute& attribute : frame.attributes) {
       v1::NamedScalar& scalar = *message_.add_scalars();
@@ -109,6 +111,16 @@ class RecordingWriter::Impl {
   std::uint64_t frame_count() const { return frame_count_; }
 
  private:
+  void SetBox(const std::optional<RecordedBox>& box) {
+    message_.clear_box();
+    if (!box || box->is_tilted) return;
+    PeriodicBox periodic;
+    for (std::size_t k = 0; k < periodic.axes.size(); ++k) {
+      if (box->is_periodic[k]) periodic.axes[k] = PeriodicAxis{box->low[k], box->length[k]};
+    }
+    *message_.mutable_box() = wire::ToWire(periodic);
+  }
+
   absl::Status SetPositions(const RecordedFrame& frame) {
     const bool in_space = frame.components == 3;
     if (float64_) {

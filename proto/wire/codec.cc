@@ -286,6 +286,28 @@ absl::Status CheckNames(const v1::Outputs& message) {
                  absl::StrCat(message.attributes_size(), " names"), "must all be different");
 }
 
+SurfaceOptions FromWire(const v1::SurfaceOptions& message) {
+  SurfaceOptions options;
+  if (message.has_thinning_distance()) options.thinning_distance = message.thinning_distance();
+  if (message.has_max_drop_particles()) options.max_drop_particles = message.max_drop_particles();
+  if (message.has_simplify()) options.simplify = message.simplify();
+  if (message.has_min_component_volume()) {
+    options.min_component_volume = message.min_component_volume();
+  }
+  return options;
+}
+
+v1::SurfaceOptions ToWire(const SurfaceOptions& options) {
+  v1::SurfaceOptions message;
+  message.set_thinning_distance(options.thinning_distance);
+  message.set_max_drop_particles(options.max_drop_particles);
+  message.set_simplify(options.simplify);
+  message.set_min_component_volume(options.min_component_volume);
+  return message;
+}
+
+}  // namespace
+
 PeriodicBox FromWire(const v1::PeriodicBox& message) {
   PeriodicBox box;
   const auto axis = [](const v1::PeriodicAxis& from) {
@@ -310,28 +332,6 @@ v1::PeriodicBox ToWire(const PeriodicBox& box) {
   message.set_wraps(box.wraps);
   return message;
 }
-
-SurfaceOptions FromWire(const v1::SurfaceOptions& message) {
-  SurfaceOptions options;
-  if (message.has_thinning_distance()) options.thinning_distance = message.thinning_distance();
-  if (message.has_max_drop_particles()) options.max_drop_particles = message.max_drop_particles();
-  if (message.has_simplify()) options.simplify = message.simplify();
-  if (message.has_min_component_volume()) {
-    options.min_component_volume = message.min_component_volume();
-  }
-  return options;
-}
-
-v1::SurfaceOptions ToWire(const SurfaceOptions& options) {
-  v1::SurfaceOptions message;
-  message.set_thinning_distance(options.thinning_distance);
-  message.set_max_drop_particles(options.max_drop_particles);
-  message.set_simplify(options.simplify);
-  message.set_min_component_volume(options.min_component_volume);
-  return message;
-}
-
-}  // namespace
 
 v1::Output ToWire(Output output) {
   return output == Output::kSurface ? v1::OUTPUT_SURFACE : v1::OUTPUT_OUTLINE;

@@ -64,6 +64,8 @@ v1::CoordinateFormat ToWire(Coordinates coordinates);
 v1::Placement ToWire(Placement placement);
 v1::Fill ToWire(Fill fill);
 v1::Doubt ToWire(Doubt doubt);
+v1::PeriodicBox ToWire(const PeriodicBox& box);
+PeriodicBox FromWire(const v1::PeriodicBox& message);
 
 /// Decodes parameters and fills in defaults. The core's Validate checks the values.
 /// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value, or for more points of walls

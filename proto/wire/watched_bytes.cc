@@ -94,19 +94,20 @@ void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFr
   if (frame.positions().empty()) return;  // A frame without particles.
   using From = v1::ParticleFrame;
   using To = v1::ReconstructedFrame;
-  static constexpr int kArrays[][2] = {
+  static constexpr int kFields[][2] = {
       {From::kPositionsFieldNumber, To::kParticlesFieldNumber},
       {From::kIdsFieldNumber, To::kParticleIdsFieldNumber},
       {From::kVolumesFieldNumber, To::kParticleVolumesFieldNumber},
       {From::kVelocitiesFieldNumber, To::kParticleVelocitiesFieldNumber},
       {From::kScalarsFieldNumber, To::kParticleScalarsFieldNumber},
+      {From::kBoxFieldNumber, To::kParticleBoxFieldNumber},
   };
   const std::vector<grpc::Slice> slices = SlicesOf(request);
   AppendOwn(Written([&](CodedOutputStream& out) {
     out.WriteTag(VarintTag(To::kParticleFormatFieldNumber));
     out.WriteVarint32(static_cast<std::uint32_t>(frame.position_format()));
   }));
-  for (const auto& [from, to] : kArrays) {
+  for (const auto& [from, to] : kFields) {
     const int path[] = {v1::ReconstructRequest::kFrameFieldNumber, from};
     for (const Span& array : Find(request, path)) {
       if (array.length == 0) continue;

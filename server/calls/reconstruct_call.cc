@@ -146,7 +146,8 @@ absl::Status ReconstructCall::OpenStream(const v1::OpenStream& open) {
                           {std::string(wire::kReasonUnsupported), "outputs.echo_particles", "true",
                            "must be false with a slice, whose particles are not in its plane"});
   }
-  auto session = Session::Open(*parameters, context().limits.frame);
+  auto session =
+      Session::Open(*parameters, context().limits.frame, {context().states, caller().account()});
   if (!session.ok()) return session.status();
   const std::string token = open.has_resume() ? open.resume().stream_token() : NewStreamToken();
   StreamTerms terms = TermsOf(open, *outputs, token);
@@ -216,6 +217,7 @@ absl::Status ReconstructCall::JoinStream(const v1::OpenStream& open) {
 void ReconstructCall::PrepareOpened(v1::StreamOpened opened) {
   opened.set_frames_in_flight(context().limits.frames_in_flight);
   EncodeLimits(context().limits, *opened.mutable_limits());
+  opened.set_frame_boxes(true);
   v1::ReconstructResponse response;
   *response.mutable_opened() = std::move(opened);
   opened_ = wire::ToBytes(response);

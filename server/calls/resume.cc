@@ -57,8 +57,7 @@ absl::Status Resume(const v1::ResumeStream& resume, const ServerContext& context
                                     context.checkpoint_keys.Get().get());
   if (!checkpoint.ok()) return checkpoint.status();
   terms.name = checkpoint->name;
-  session.GoOnFrom(*std::move(checkpoint));
-  return absl::OkStatus();
+  return session.GoOnFrom(*std::move(checkpoint));
 }
 
 std::string CheckpointAfter(std::uint64_t sequence, const Session& session,

@@ -11,6 +11,7 @@ class LevelQueue;
 class MemoryBudget;
 class OpeningCalls;
 class Relay;
+class StateMemory;
 class StreamRegistry;
 class UnaryRegistry;
 class WatchDispatcher;
@@ -30,6 +31,7 @@ struct ServerContext {
   WatchDispatcher& dispatcher;
   LevelQueue& levels;
   MemoryBudget& budget;
+  StateMemory& states;
   ComputePool& pool;
   Relay* relay = nullptr;  ///< Null: only the streams of this server.
 };

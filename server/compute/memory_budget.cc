@@ -13,12 +13,12 @@ namespace {
 
 using Fit = FairShare::Fit;
 
-std::uint64_t MostOf(const CallerAccount* caller) {
+}  // namespace
+
+std::uint64_t QuotaOf(const CallerAccount* caller) {
   return caller == nullptr ? FairShare::kNoLimit
                            : caller->quota().bytes.value_or(FairShare::kNoLimit);
 }
-
-}  // namespace
 
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget) {
   return ViolationError(
@@ -47,7 +47,7 @@ Fit MemoryBudget::FitsNow(const Claim& claim) const {
 }
 
 Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
-  const std::uint64_t most = MostOf(caller);
+  const std::uint64_t most = QuotaOf(caller);
   const MutexLock lock(mutex_);
   const Fit fit = FitsNow({{}, bytes, caller, most});
   if (fit == Fit::kYes) {
@@ -60,7 +60,7 @@ Fit MemoryBudget::TryTake(std::uint64_t bytes, const CallerAccount* caller) {
 
 bool MemoryBudget::TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                               const CallerAccount* caller) {
-  Claim claim{waiter, bytes, caller, MostOf(caller)};
+  Claim claim{waiter, bytes, caller, QuotaOf(caller)};
   const MutexLock lock(mutex_);
   const Fit fit = FitsNow(claim);
   const bool fits = fit == Fit::kYes;
@@ -196,7 +196,7 @@ void MemoryBudget::Plan(std::uint64_t bytes, const CallerAccount* caller) {
 }
 
 bool MemoryBudget::TryPlan(std::uint64_t bytes, const CallerAccount* caller) {
-  const std::uint64_t most = MostOf(caller);
+  const std::uint64_t most = QuotaOf(caller);
   const MutexLock lock(mutex_);
   const Fit fit = share_.Fits(caller, bytes, most);
   if (fit == Fit::kYes) share_.Take(caller, bytes);
@@ -210,7 +210,7 @@ void MemoryBudget::Unplan(std::uint64_t bytes, const CallerAccount* caller) {
 }
 
 absl::Status MemoryBudget::CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const {
-  const std::uint64_t most = MostOf(caller);
+  const std::uint64_t most = QuotaOf(caller);
   const MutexLock lock(mutex_);
   if (caller != nullptr && share_.held_by(caller) > most) return TooManyBytesOfCaller(bytes);
   if (share_.Fits(nullptr, 0) == Fit::kYes) return absl::OkStatus();
@@ -224,7 +224,7 @@ void MemoryBudget::ChangeBeyond(std::uint64_t before, std::uint64_t after) {
 }
 
 bool MemoryBudget::FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const {
-  const std::uint64_t most = MostOf(caller);
+  const std::uint64_t most = QuotaOf(caller);
   const MutexLock lock(mutex_);
   return share_.FitsWithout(beyond, caller, most);
 }

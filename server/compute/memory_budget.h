@@ -24,6 +24,9 @@ inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 /// RESOURCE_EXHAUSTED (MEMORY_BUDGET): `bytes` do not fit into the budget.
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget);
 
+/// The caller's quota of bytes; FairShare::kNoLimit if it has none.
+std::uint64_t QuotaOf(const CallerAccount* caller);
+
 /// Limits of the memory that streams and one worker may hold beyond the budget, so that large
 /// frames can be computed.
 struct BeyondBudget {

@@ -12,11 +12,11 @@
 
 namespace partiemc::server {
 
-/// The sum of these terms bounds the server's memory (MemoryPlan computes it), except for the
-/// states of streams between their frames:
+/// The sum of these terms bounds the server's memory (MemoryPlan computes it):
 /// - `memory_budget` for requests, responses, workers and histories;
 /// - frames beyond the budget (ReadBytesBeyond);
 /// - the worker that computes a frame beyond the budget (WorkerBytesBeyond);
+/// - the states of streams between their frames (StateBytes);
 /// - 16 MiB of buffers for each compute thread, which do not count in the budget.
 struct ServerLimits {
   /// Limits of one frame. Larger simulations need higher limits; memory grows with them.
@@ -89,6 +89,16 @@ struct ServerLimits {
   }
   /// The budget without the histories.
   std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
+
+  /// Maximum size of the states of all streams between their frames, outside of the budget: a
+  /// quarter of it.
+  std::uint64_t StateBytes() const { return memory_budget / 4; }
+  /// The part of StateBytes that each stream has for itself. Ordinary states are smaller.
+  std::uint64_t OwnStateBytes() const {
+    return std::min<std::uint64_t>(64 << 10, StateBytes() / 2 / std::max(1u, max_streams));
+  }
+  /// The part of StateBytes that larger states share.
+  std::uint64_t SharedStateBytes() const { return StateBytes() - max_streams * OwnStateBytes(); }
 
   /// An idle stream costs little memory except for its state, but it occupies a name and a slot.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};

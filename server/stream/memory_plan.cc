@@ -25,6 +25,7 @@ MemoryPlan::MemoryPlan(const ServerLimits& limits, unsigned threads)
                            limits.streams_beyond_budget)},
           {limits.WorkerBytesBeyond(),
            "computing one frame beyond that (--max-particles, --max-frame-bytes)"},
+          {limits.StateBytes(), "states of streams between their frames (--memory-budget)"},
           {limits.FrameBudget() / kPartsOfBudgetBeyond, "results that watchers have not taken"},
           {kOnTheirWayBytes, "messages on their way"},
           {(std::uint64_t{limits.max_streams} + limits.max_parts) * kUnreadBytes,

@@ -14,13 +14,18 @@ namespace {
 // the worker.
 class FrameMemory final : public MemoryGuard {
  public:
-  FrameMemory(WorkerMemory& account, std::size_t particles)
-      : account_(account), particles_(particles) {}
-  bool Reserve(std::uint64_t bytes) override { return account_.Reserve(bytes, particles_); }
+  /// `state_bytes`: size of the stream's state.
+  FrameMemory(WorkerMemory& account, std::size_t particles, std::uint64_t state_bytes)
+      : account_(account), particles_(particles), state_bytes_(state_bytes) {}
+  bool Reserve(std::uint64_t bytes) override {
+    // Worker::next_state, and the copy of it that becomes the stream's state.
+    return account_.Reserve(bytes + 2 * state_bytes_, particles_);
+  }
 
  private:
   WorkerMemory& account_;
   const std::size_t particles_;
+  const std::uint64_t state_bytes_;
 };
 
 }  // namespace
@@ -33,15 +38,19 @@ absl::Status OutOfMemory(std::string value) {
 }
 
 absl::StatusOr<Session> Session::Open(const ReconstructionParameters& parameters,
-                                      const FrameLimits& limits) {
+                                      const FrameLimits& limits, StateMemory::Account memory) {
   auto reconstructor = Reconstructor::Create(parameters, limits);
   if (!reconstructor.ok()) return reconstructor.status();
-  return Session(*std::move(reconstructor));
+  return Session(*std::move(reconstructor), std::move(memory));
 }
 
-void Session::GoOnFrom(Checkpoint checkpoint) {
+absl::Status Session::GoOnFrom(Checkpoint checkpoint) {
+  if (auto status = state_memory_.Grow(SerializedBytes(checkpoint.state)); !status.ok()) {
+    return status;
+  }
   next_sequence_ = checkpoint.next_sequence;
   state_ = std::move(checkpoint.state);
+  return absl::OkStatus();
 }
 
 std::string Session::MakeCheckpoint(const StreamTerms& terms, const CheckpointKeys* keys,
@@ -98,17 +107,24 @@ absl::Status Session::Reconstruct(const Frame& frame, Worker& worker, Deliver de
   // receives, but `deliver` may still refuse the frame.
   worker.next_state = state_;
   StageClock clock;
-  FrameMemory memory(worker.memory, frame.ParticleCount());
+  const std::uint64_t state_bytes = SerializedBytes(state_);
+  FrameMemory memory(worker.memory, frame.ParticleCount(), state_bytes);
   absl::Status status =
       reconstructor_.Reconstruct(frame, worker.next_state, worker.workspace, worker.result,
                                  {.observer = &clock, .memory = &memory, .cancelled = cancelled});
+  const std::uint64_t next_bytes = status.ok() ? SerializedBytes(worker.next_state) : 0;
+  if (status.ok()) status = state_memory_.Grow(next_bytes);
   if (status.ok()) status = deliver(worker.result, clock);
-  if (!status.ok()) return status;
+  if (!status.ok()) {
+    state_memory_.Shrink(state_bytes);
+    return status;
+  }
   // Copies the new state instead of moving it. The worker's buffers have the capacity of the
   // largest stream that the worker has computed; a move would give this capacity to the stream. If
   // the allocation fails, the stream's state is unchanged.
   State next = worker.next_state;
   state_ = std::move(next);
+  state_memory_.Shrink(next_bytes);
   if (worker.observer != nullptr) {
     worker.observer->FrameReconstructed(frame.ParticleCount(), clock);
   }

@@ -17,6 +17,7 @@
 #include "partiemc/result.h"
 #include "partiemc/stage.h"
 #include "partiemc/state.h"
+#include "server/compute/state_memory.h"
 #include "server/compute/worker.h"
 #include "server/stream/checkpoint.h"
 
@@ -36,13 +37,13 @@ class Session {
   /// Function that writes a result into the response. If it returns an error, the frame is refused.
   using Deliver = absl::FunctionRef<absl::Status(const Result&, const StageClock&)>;
 
-  /// Errors: as Reconstructor::Create.
+  /// `memory` counts the state between frames. Errors: as Reconstructor::Create.
   static absl::StatusOr<Session> Open(const ReconstructionParameters& parameters,
-                                      const FrameLimits& limits);
+                                      const FrameLimits& limits, StateMemory::Account memory = {});
 
   /// Continues the stream of the checkpoint. The results are bit-identical to the results of an
-  /// uninterrupted stream.
-  void GoOnFrom(Checkpoint checkpoint);
+  /// uninterrupted stream. Errors: as StateMemory::Account::Grow.
+  absl::Status GoOnFrom(Checkpoint checkpoint);
 
   /// Serialises the state after the last frame (see Serialize in checkpoint.h). Returns no bytes if
   /// the checkpoint might exceed `max_bytes`. Cost and size are proportional to the state.
@@ -55,8 +56,8 @@ class Session {
   /// An error leaves the state unchanged. Every error except CANCELLED has a Violation:
   /// - SEQUENCE_GAP, SEQUENCE_DUPLICATE: `sequence` is not next_sequence(). The expected number
   ///   stays the same.
-  /// - OUT_OF_MEMORY, and errors of `frame`, of the core or of `deliver`: the frame uses up its
-  ///   number, so next_sequence() increases.
+  /// - OUT_OF_MEMORY, MEMORY_BUDGET (the state is too large), and errors of `frame`, of the core or
+  ///   of `deliver`: the frame uses up its number, so next_sequence() increases.
   /// - CANCELLED: `cancelled` was set (FrameControl). next_sequence() stays the same, so that the
   ///   client may send the frame again.
   absl::Status Answer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
@@ -72,7 +73,8 @@ class Session {
   const ReconstructionParameters& parameters() const { return reconstructor_.parameters(); }
 
  private:
-  explicit Session(Reconstructor reconstructor) : reconstructor_(std::move(reconstructor)) {}
+  Session(Reconstructor reconstructor, StateMemory::Account memory)
+      : reconstructor_(std::move(reconstructor)), state_memory_(std::move(memory)) {}
 
   absl::Status TryAnswer(std::uint64_t sequence, const absl::StatusOr<Frame>& frame, Worker& worker,
                          Deliver deliver, const std::atomic<bool>* cancelled);
@@ -80,6 +82,7 @@ class Session {
                            const std::atomic<bool>* cancelled);
 
   Reconstructor reconstructor_;
+  StateMemory::Account state_memory_;
   State state_;
   std::uint64_t next_sequence_ = 1;
 };

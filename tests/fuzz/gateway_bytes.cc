@@ -21,6 +21,7 @@
 #include "server/calls/surface_level.h"
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
+#include "server/compute/state_memory.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/stream/opening_calls.h"
@@ -71,6 +72,7 @@ class Served {
   server::WatchRegistry watchers_{4};
   server::WatchDispatcher dispatcher_;
   server::MemoryBudget budget_{std::uint64_t{64} << 20};
+  server::StateMemory states_{std::uint64_t{16} << 20, std::uint64_t{64} << 10};
   server::ComputePool pool_{1};
   const std::shared_ptr<server::LevelQueue> levels_ = std::make_shared<server::LevelQueue>(
       dispatcher_,
@@ -90,6 +92,7 @@ class Served {
                                        .dispatcher = dispatcher_,
                                        .levels = *levels_,
                                        .budget = budget_,
+                                       .states = states_,
                                        .pool = pool_};
   const server::Methods methods_{context_, metrics_};
   const std::unique_ptr<server::WebGateway> gateway_;

@@ -61,6 +61,7 @@ class NoChannel final : public server::CallChannel {
 struct Shared {
   server::ComputePool pool{1};
   server::MemoryBudget budget{1 << 30};
+  server::StateMemory states{std::uint64_t{16} << 20, std::uint64_t{64} << 10};
   server::WatchDispatcher dispatcher;
   const std::shared_ptr<server::LevelQueue> levels = std::make_shared<server::LevelQueue>(
       dispatcher,
@@ -144,6 +145,7 @@ class Stream {
                                        .dispatcher = shared_.dispatcher,
                                        .levels = *shared_.levels,
                                        .budget = shared_.budget,
+                                       .states = shared_.states,
                                        .pool = shared_.pool};
   NoChannel channel_;
   server::ReconstructCall call_{{channel_, nullptr, server::AdmittedCall{}}, context_};

@@ -73,6 +73,7 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   request.mutable_frame()->set_ids(std::string(1'500'000, 'i'));
   request.mutable_frame()->set_volumes("volumes");
   request.mutable_frame()->set_velocities(std::string(10, 'v'));
+  request.mutable_frame()->mutable_box()->mutable_x()->set_length(30);
   for (const char* name : {"type", "heat"}) {
     v1::NamedScalar& scalar = *request.mutable_frame()->add_scalars();
     scalar.set_name(name);
@@ -87,6 +88,7 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   EXPECT_TRUE(seen.particle_ids() == request.frame().ids());
   EXPECT_EQ(seen.particle_volumes(), "volumes");
   EXPECT_EQ(seen.particle_velocities(), std::string(10, 'v'));
+  EXPECT_EQ(seen.particle_box().x().length(), 30);
   ASSERT_EQ(seen.particle_scalars_size(), 2);
   for (int k = 0; k < 2; ++k) {
     EXPECT_TRUE(seen.particle_scalars(k).SerializeAsString() ==
@@ -100,6 +102,7 @@ TEST(WatchedBytes, ParticlesAreAddedToAFrameWithFieldsBehindThem) {
   seen.clear_particle_volumes();
   seen.clear_particle_velocities();
   seen.clear_particle_scalars();
+  seen.clear_particle_box();
   EXPECT_TRUE(seen.SerializeAsString() == frame.SerializeAsString());
 }
 

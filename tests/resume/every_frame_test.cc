@@ -68,7 +68,7 @@ class EveryFrame : public testing::TestWithParam<Workload (*)()> {
     auto checkpoint = Parse(undisturbed_[after - 1].checkpoint);
     EXPECT_TRUE(checkpoint.ok()) << checkpoint.status();
     auto session = Session::Open(workload_.parameters, kLimits);
-    session->GoOnFrom(*std::move(checkpoint));
+    EXPECT_TRUE(session->GoOnFrom(*std::move(checkpoint)).ok());
     return *std::move(session);
   }
 

@@ -76,7 +76,7 @@ absl::StatusOr<Session> Resume(const std::string& bytes) {
   auto checkpoint = Parse(bytes);
   if (!checkpoint.ok()) return checkpoint.status();
   auto session = Session::Open(BlobParameters(), kLimits);
-  session->GoOnFrom(*std::move(checkpoint));
+  EXPECT_TRUE(session->GoOnFrom(*std::move(checkpoint)).ok());
   return session;
 }
 
@@ -85,6 +85,16 @@ std::string CheckpointAfter(std::uint64_t frames, const CheckpointKeys* keys = n
   Worker worker;
   while (session.next_sequence() <= frames) Answer(session, worker);
   return CheckpointOf(session, keys);
+}
+
+TEST(Checkpoint, OfAStateThatDoesNotFitIsRefused) {
+  auto checkpoint = Parse(CheckpointAfter(3));
+  ASSERT_TRUE(checkpoint.ok()) << checkpoint.status();
+  StateMemory memory(100, 0);
+  auto session = Session::Open(BlobParameters(), kLimits, {memory, nullptr});
+  const absl::Status status = session->GoOnFrom(*std::move(checkpoint));
+  EXPECT_EQ(FindViolation(status)->reason, "MEMORY_BUDGET") << status;
+  EXPECT_EQ(session->next_sequence(), 1u);
 }
 
 class ResumedSession : public testing::TestWithParam<bool> {};

@@ -61,8 +61,9 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   EXPECT_THAT(early->text, HasSubstr("    1016 MiB  requests and answers"));
   EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond that"));
   EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond that"));
-  // 24 + 48 + 8 + 1016 + 640 + 305 + 63.5 + 64 + 66
-  EXPECT_THAT(early->text, HasSubstr("    2235 MiB  in all"));
+  EXPECT_THAT(early->text, HasSubstr("     256 MiB  states of streams"));
+  // 24 + 48 + 8 + 1016 + 640 + 305 + 256 + 63.5 + 64 + 66
+  EXPECT_THAT(early->text, HasSubstr("    2491 MiB  in all"));
 }
 
 TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {

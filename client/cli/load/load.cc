@@ -136,6 +136,7 @@ class LoadedStream {
         std::this_thread::sleep_until(due);
       }
       due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
+      answered_at_[(k + 1) % kRemembered] = 0;  // That of an earlier frame.
       const std::vector<float>& frame = shared_.frames[k % shared_.frames.size()];
       const auto sent = stream_->Send({.positions = std::span<const float>(frame),
                                        .components = shared_.flags.surface ? 3 : 2,

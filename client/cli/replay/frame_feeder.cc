@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "client/cli/console.h"
+#include "client/output/text.h"
 #include "partiemc/status.h"
 
 namespace partiemc::client {
@@ -18,13 +19,28 @@ std::optional<PeriodicBox> BoxOf(const RecordedFrame& recorded,
   if (!of_stream || !recorded.box) return std::nullopt;
   PeriodicBox box = *of_stream;
   for (std::size_t k = 0; k < box.axes.size(); ++k) {
-    const double low = recorded.box->low[k], high = recorded.box->high[k];
-    if (box.axes[k]) box.axes[k] = PeriodicAxis{low, high - low};
+    if (box.axes[k]) box.axes[k] = PeriodicAxis{recorded.box->low[k], recorded.box->length[k]};
   }
   return box == *of_stream ? std::nullopt : std::optional(box);
 }
 
 }  // namespace
+
+absl::Status CheckBox(const RecordedFrame& frame, const std::optional<PeriodicBox>& of_stream) {
+  const auto refuse = [&](std::string_view fault) {
+    return absl::FailedPreconditionError(Concat(frame.source, ": ", fault));
+  };
+  if (!frame.box) return refuse("has no box for --periodic; give --box");
+  if (frame.box->is_tilted) {
+    return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
+  }
+  for (std::size_t k = 0; of_stream && k < of_stream->axes.size(); ++k) {
+    if (of_stream->axes[k] && !frame.box->is_periodic[k]) {
+      return refuse("its box is periodic along other axes than that of the first frame");
+    }
+  }
+  return absl::OkStatus();
+}
 
 FrameFeeder::FrameFeeder(Sequence& input, FrameStream& stream,
                          std::optional<double> frames_per_second, SendPolicy policy,
@@ -97,8 +113,9 @@ void FrameFeeder::Read() {
     }
     if (frame == nullptr) frame = std::make_unique<RecordedFrame>();
     const auto more = input_.Next(*frame);
-    if (!more.ok()) input_status_ = more.status();
-    if (!more.ok() || !*more || !read_ahead_.Push(std::move(frame))) break;
+    input_status_ = more.status();
+    if (more.ok() && *more && box_) input_status_ = CheckBox(*frame, box_);
+    if (!input_status_.ok() || !*more || !read_ahead_.Push(std::move(frame))) break;
   }
   read_ahead_.Close();
 }

@@ -31,6 +31,11 @@ enum class SendPolicy {
   kLatest,  ///< Send the newest frame, skip and count the others.
 };
 
+/// Checks that the periodic axes of `of_stream` have bounds in the box of `frame`; without
+/// `of_stream`, only that the frame has an orthogonal box. Errors: FAILED_PRECONDITION.
+absl::Status CheckBox(const RecordedFrame& frame,
+                      const std::optional<PeriodicBox>& of_stream = std::nullopt);
+
 class FrameFeeder {
  public:
   /// A frame that the library refused to send. It has no response.

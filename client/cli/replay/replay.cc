@@ -262,10 +262,8 @@ absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) 
   RecordedFrame first;
   const auto found = input->frames->Next(first);
   if (!found.ok()) return found.status();
-  if (!*found || !first.box) {
-    return absl::FailedPreconditionError(
-        Concat(flags.input, ": has no box for --periodic; give --box"));
-  }
+  if (!*found) return absl::FailedPreconditionError(Concat(flags.input, ": has no frame"));
+  if (auto status = CheckBox(first); !status.ok()) return status;
   return first.box;
 }
 
@@ -273,7 +271,6 @@ absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) 
 
 int Replay(const ReplayFlags& given) {
   ReplayFlags flags = given;
-  flags.sequence.requires_box = !flags.periodic.empty() && flags.box.empty();
   // The reader keeps this attribute, too.
   std::vector<std::string>& attributes = flags.sequence.attributes;
   const std::string phases = PhaseAttributeOf(flags);
@@ -329,8 +326,7 @@ int Replay(const ReplayFlags& given) {
   const Clock::time_point start = Clock::now();
   FrameFeeder feeder(*input->frames, **stream, *rate,
                      flags.policy == "latest" ? SendPolicy::kLatest : SendPolicy::kBlock,
-                     flags.sequence.attributes,
-                     flags.sequence.requires_box ? parameters->box : std::nullopt);
+                     flags.sequence.attributes, *box ? parameters->box : std::nullopt);
   Receiver receiver(flags, **stream, feeder, *outputs, progress);
   const ReplayEnd ended = receiver.Run();
   if (ended.code != kGood) feeder.Stop();

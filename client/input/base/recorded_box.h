@@ -6,9 +6,9 @@
 namespace partiemc::client {
 
 struct RecordedBox {
-  std::array<double, 3> low{}, high{};  ///< Bounds by axis, world units.
-  std::array<bool, 3> is_periodic{};    ///< By axis, as the input marks it.
-  bool is_tilted = false;               ///< Triclinic: the bounds are not its faces.
+  std::array<double, 3> low{}, length{};  ///< Lower bound and length of each axis, world units.
+  std::array<bool, 3> is_periodic{};      ///< By axis, as the input marks it.
+  bool is_tilted = false;  ///< Triclinic: `low` and `length` do not describe its faces.
 
   friend bool operator==(const RecordedBox&, const RecordedBox&) = default;
 };

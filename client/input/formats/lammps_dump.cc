@@ -31,7 +31,7 @@ RecordedBox AsRecorded(const Box& box) {
   RecordedBox recorded{.is_periodic = box.is_periodic, .is_tilted = box.IsTilted()};
   for (std::size_t k = 0; k < 3; ++k) {
     recorded.low[k] = box.origin[k];
-    recorded.high[k] = box.origin[k] + box.edges[k][k];
+    recorded.length[k] = box.edges[k][k];
   }
   return recorded;
 }

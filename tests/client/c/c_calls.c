@@ -216,6 +216,13 @@ static void try_refusals(const char* address) {
   partiemc_cancel(stream);
   EXPECT(partiemc_receive(stream, -1, &event) == PARTIEMC_CANCELLED);
   partiemc_close(stream);
+
+  partiemc_options options;
+  partiemc_options_init(&options, sizeof options);
+  options.section_count = 1;
+  stream = NULL;
+  EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT && stream == NULL);
+  EXPECT(strstr(partiemc_last_error()->message, "sections: NULL; must be an array") != NULL);
 }
 
 /* Every frame that is offered is sent, skipped or refused, and those that are sent are answered. */

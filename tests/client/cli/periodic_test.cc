@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/cli/program.h"
@@ -12,6 +13,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -162,6 +164,28 @@ TEST(PeriodicReplay, WrongBoxesAreRefused) {
   EXPECT_THAT(refusal(plain, {"--periodic", "x", "--box", "0,9,0,9"}, 2),
               HasSubstr("four kernel radii"));
   EXPECT_THAT(refusal(plain, {"--box", "0,30,0,30"}, 2), HasSubstr("--periodic"));
+}
+
+TEST(PeriodicReplay, LaterBoxesWithoutThePeriodicAxisAreRefused) {
+  const support::TemporaryFolder folder;
+  const std::string dump = folder.Path("opened.lammpstrj"), csv = folder.Path("no_box.csv");
+  std::ofstream file(dump);
+  for (const std::string_view y : {"pp", "pp", "ff"}) {
+    file << "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS pp " << y
+         << " pp\n0 30\n0 30\n-1 1\nITEM: ATOMS id x y\n1 2 3\n2 3 3\n";
+  }
+  file.close();
+  std::ofstream(csv) << "x,y\n1,2\n2,2\n";
+  const auto run = [&](const std::string& input, const std::string& axes) {
+    return RunPartiemc({"replay", input, "--local", "--spacing", "1", "--periodic", axes});
+  };
+  EXPECT_EQ(run(dump, "x").exit_code, 0) << "x is periodic in all frames";
+  const Ran opened = run(dump, "x,y");
+  EXPECT_EQ(opened.exit_code, 3);
+  EXPECT_THAT(opened.error, AllOf(HasSubstr("frame 2"), HasSubstr("other axes")));
+  const Ran no_box = run(csv, "x");
+  EXPECT_EQ(no_box.exit_code, 3);
+  EXPECT_THAT(no_box.error, HasSubstr("no box for --periodic; give --box"));
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
@@ -24,9 +25,15 @@ using ::testing::SizeIs;
 constexpr int kFrames = 40;
 
 // A turning block of particles with all quantities of a recording.
-RecordedFrame BlockFrame(int index) {
+RecordedFrame BlockFrame(int index, bool has_box = false) {
   RecordedFrame frame;
   frame.time = 0.1 * index;
+  if (has_box) {  // The block crosses its corner. The length cannot be computed from its bounds.
+    const double length = 40 + 0.1 * index;
+    frame.box = RecordedBox{.low = {-5, -7 / 3., 0},
+                            .length = {length, length / 3 + 20, 0},
+                            .is_periodic = {true, true}};
+  }
   const double angle = 0.02 * index;
   for (int k = 0; k < 400; ++k) {
     const double x = k % 20 - 9.5, y = static_cast<double>(k / 20) - 9.5;
@@ -43,10 +50,10 @@ RecordedFrame BlockFrame(int index) {
   return frame;
 }
 
-void WriteRecording(const std::string& path) {
+void WriteRecording(const std::string& path, bool has_boxes = false) {
   auto writer = RecordingWriter::Create(path, {.spacing = 1}, {.float64 = true});
   ASSERT_TRUE(writer.ok()) << writer.status();
-  for (int k = 0; k < kFrames; ++k) ASSERT_TRUE((*writer)->Add(BlockFrame(k)).ok());
+  for (int k = 0; k < kFrames; ++k) ASSERT_TRUE((*writer)->Add(BlockFrame(k, has_boxes)).ok());
   ASSERT_TRUE((*writer)->Finish().ok());
 }
 
@@ -117,6 +124,22 @@ TEST_F(Record, ReplaysToTheSameBitsByTheFlagsThatItTells) {
   EXPECT_EQ(Digests(Content(Path("again.csv"))), digests);
 }
 
+TEST_F(Record, TellsTheAttributesThatShapeTheMesh) {
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles", "--attributes",
+                                               "type,velocity", "--attribute-tolerance", "0.001"}));
+  const Ran ran = Watch({"--record", Path("seen file.pemc")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_THAT(ran.out, HasSubstr("seen file.pemc' --local"));
+  EXPECT_THAT(ran.out, HasSubstr(" --attributes type,velocity\n"));
+  std::filesystem::rename(Path("seen file.pemc"), Path("seen.pemc"));
+  const Ran again =
+      RunPartiemc({"replay", Path("seen.pemc"), "--local", "--stats", Path("again.csv"),
+                   "--attributes", "type,velocity", "--attribute-tolerance", "0.001"});
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+  EXPECT_EQ(Digests(Content(Path("again.csv"))), Digests(Content(Path("made.csv"))));
+}
+
 TEST_F(Record, TellsTheWallsOfTheStream) {
   const std::string tank = "-30,-40,30.5,-40,30.5,40,-30,40";
   Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "20", "--echo-particles", "--wall", tank,
@@ -130,6 +153,27 @@ TEST_F(Record, TellsTheWallsOfTheStream) {
   EXPECT_EQ(again.exit_code, 0) << again.error;
   EXPECT_EQ(Column(Content(Path("again.csv")), "rings_digest"),
             Column(Content(Path("made.csv")), "rings_digest"));
+}
+
+TEST_F(Record, HoldsTheBoxOfEachFrame) {
+  WriteRecording(Path("made.pemc"), /*has_boxes=*/true);
+  Program producer(PARTIEMC_PROGRAM,
+                   Producer({"--rate", "20", "--echo-particles", "--periodic", "x,y"}));
+  const Ran ran = Watch({"--record", Path("seen.pemc")});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  const std::string made = Content(Path("made.csv"));
+  EXPECT_THAT(Column(made, "polylines"), Each("1")) << "the block is whole";
+  const Ran again = RunPartiemc(ToldCommand(ran.out, {"--stats", Path("again.csv")}));
+  EXPECT_EQ(again.exit_code, 0) << again.error;
+  EXPECT_EQ(Column(Content(Path("again.csv")), "rings_digest"), Column(made, "rings_digest"));
+  const auto reader = RecordingReader::Open(Path("seen.pemc"), "");
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  RecordedFrame seen;
+  for (int k = 0; k < kFrames; ++k) {
+    ASSERT_TRUE((*reader)->Next(seen).value());
+    EXPECT_TRUE(seen.box == BlockFrame(k, true).box) << "frame " << k;
+  }
 }
 
 TEST_F(Record, HoldsThePhasesOfTheStream) {

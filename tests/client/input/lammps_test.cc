@@ -103,7 +103,7 @@ TEST(LammpsDump, BoxHasBoundsAndBoundaries) {
   ASSERT_EQ(read.frames.size(), 3u) << read.status;
   ASSERT_TRUE(read.frames[0].box.has_value());
   EXPECT_THAT(read.frames[0].box->low, ElementsAre(0, -5, 0));
-  EXPECT_THAT(read.frames[0].box->high, ElementsAre(10, 15, 0));
+  EXPECT_THAT(read.frames[0].box->length, ElementsAre(10, 20, 0));
   EXPECT_THAT(read.frames[0].box->is_periodic, ElementsAre(true, false, false));
   EXPECT_THAT(read.frames[1].box->is_periodic, ElementsAre(true, true, false));
   EXPECT_THAT(read.frames[2].box->is_periodic, ElementsAre(false, false, false));
@@ -115,25 +115,20 @@ TEST(LammpsDump, BoxHasTheAxesOfThePositions) {
   const ReadSequence read = Read(Frame("0", "2", "x y z\n1 2 0.1\n3 2 0.2\n"));
   ASSERT_EQ(read.frames.size(), 1u) << read.status;
   EXPECT_THAT(read.frames[0].box->low, ElementsAre(0, -.5, 0));
-  EXPECT_THAT(read.frames[0].box->high, ElementsAre(10, .5, 0));
+  EXPECT_THAT(read.frames[0].box->length, ElementsAre(10, 1, 0));
 }
 
-TEST(LammpsDump, PeriodicRequiresOrthogonalBoxes) {
-  const SequenceOptions periodic{.requires_box = true};
+TEST(LammpsDump, BoxesMayChangeAndBeTriclinic) {
   const std::string atoms = "x y\n1 2\n";
   const std::string wider = "ITEM: BOX BOUNDS pp pp pp\n0 10.5\n-5 15\n-0.5 0.5\n";
-  const ReadSequence read = Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, wider), periodic);
-  ASSERT_EQ(read.frames.size(), 2u) << read.status;
-  EXPECT_EQ(read.frames[0].box->high[0], 10);
-  EXPECT_EQ(read.frames[1].box->high[0], 10.5);
   const std::string tilted = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n0 14 4\n0 20 0\n-0.5 0.5 0\n";
-  ExpectRefused(Read(Frame("0", "1", atoms, tilted), periodic).status,
-                absl::StatusCode::kFailedPrecondition, {"frame 0", "triclinic", "orthogonal"});
-  const std::string open = "ITEM: BOX BOUNDS ff pp pp\n0 10\n-5 15\n-0.5 0.5\n";
-  ExpectRefused(Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, open), periodic).status,
-                absl::StatusCode::kFailedPrecondition, {"frame 1", "other axes"});
-  ExpectRefused(Read(Frame("0", "1", atoms, ""), periodic).status,
-                absl::StatusCode::kFailedPrecondition, {"no box", "--box"});
+  const ReadSequence read = Read(Frame("0", "1", atoms) + Frame("1", "1", atoms, wider) +
+                                 Frame("2", "1", atoms, tilted) + Frame("3", "1", atoms, ""));
+  ASSERT_EQ(read.frames.size(), 4u) << read.status;
+  EXPECT_EQ(read.frames[0].box->length[0], 10);
+  EXPECT_EQ(read.frames[1].box->length[0], 10.5);
+  EXPECT_TRUE(read.frames[2].box->is_tilted);
+  EXPECT_FALSE(read.frames[3].box.has_value());
 }
 
 TEST(LammpsDump, ASelectionThatHoldsForNoParticleIsRefused) {

@@ -37,6 +37,7 @@ v1::OpenStream AcceptResumable(
   opened.set_frames_in_flight(2);
   opened.mutable_limits()->set_max_frame_bytes(1 << 20);
   opened.set_next_sequence(next_sequence);
+  opened.set_frame_boxes(true);
   change(opened);
   rpc.Write(response);
   return request.open();
@@ -62,11 +63,11 @@ StreamOptions Options(const FakeServer* other = nullptr) {
 }
 
 // Sends frames, each after the previous answer; returns the numbers of the answers.
-std::vector<std::uint64_t> Exchange(FrameStream& stream, int count) {
+std::vector<std::uint64_t> Exchange(FrameStream& stream, int count, const Frame& frame = kFrame) {
   std::vector<std::uint64_t> answered;
   Event event;
   for (int k = 0; k < count; ++k) {
-    if (!stream.Send(kFrame, k).ok() || !stream.Receive(event).ok()) break;
+    if (!stream.Send(frame, k).ok() || !stream.Receive(event).ok()) break;
     answered.push_back(event.sequence);
   }
   return answered;
@@ -153,7 +154,7 @@ class MayPassElsewhere : public testing::TestWithParam<const char*> {};
 
 INSTANTIATE_TEST_SUITE_P(Reason, MayPassElsewhere,
                          testing::Values("NAME_IN_USE", "TOO_MANY_STREAMS", "CHECKPOINT_MISMATCH",
-                                         "CHECKPOINT_SIGNATURE"));
+                                         "CHECKPOINT_SIGNATURE", "MEMORY_BUDGET"));
 
 TEST_P(MayPassElsewhere, IsNoVerdictWhileAStreamResumes) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
@@ -257,7 +258,8 @@ TEST(Resume, AReconnectionIsToldToACallerWhoWantsToKnow) {
 
 // Expects that a replica with these differences is skipped.
 void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise,
-                      const ReconstructionParameters& parameters = {}) {
+                      const ReconstructionParameters& parameters = {},
+                      const Frame& frame = kFrame) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1);
     return Lost(grpc::StatusCode::UNAVAILABLE);
@@ -278,7 +280,7 @@ void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise,
   options.parameters = parameters;
   const auto stream = Stream::Open(first.address(), options);
   ASSERT_TRUE(stream.ok()) << stream.status();
-  EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
+  EXPECT_THAT(Exchange(**stream, 2, frame), ElementsAre(1, 2));
 }
 
 TEST(Resume, AReplicaWithSmallerLimitsIsPassedOver) {
@@ -294,6 +296,12 @@ TEST(Resume, AReplicaThatResolvesTheParametersOtherwiseIsPassedOver) {
 TEST(Resume, AReplicaWithoutSurfacesIsPassedOver) {
   ExpectPassedOver([](v1::StreamOpened& opened) { opened.mutable_parameters()->clear_output(); },
                    {.output = Output::kSurface, .spacing = 1});
+}
+
+TEST(Resume, AReplicaThatIgnoresBoxesOfFramesIsPassedOver) {
+  Frame frame = kFrame;
+  frame.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+  ExpectPassedOver([](v1::StreamOpened& opened) { opened.clear_frame_boxes(); }, {}, frame);
 }
 
 TEST(Resume, GivesUpInTimeWithTheLastError) {

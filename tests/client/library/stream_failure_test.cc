@@ -16,6 +16,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 using ::testing::Not;
@@ -296,6 +297,22 @@ TEST(StreamFailure, ServersThatIgnoreAParameterAreRefused) {
       {.walls = walls}, [](Message& m) { m.clear_walls(); }, "walls");
   ExpectRefused(
       {.walls = walls}, [](Message& m) { m.mutable_walls(0)->set_points(1, 2); }, "walls");
+}
+
+TEST(StreamFailure, AServerWithoutFrameBoxesGetsNone) {
+  FakeServer server(AnswerAll);
+  const PeriodicBox box{.axes = {PeriodicAxis{0, 100}}};
+  const auto stream = Stream::Open(server.address(), {});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_FALSE((*stream)->info().frame_boxes);
+  const std::vector<double> positions = {0, 0, 1, 0};
+  const auto refused = (*stream)->Send({.positions = std::span(positions), .box = box}, 0);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(refused.status().message()),
+              AllOf(HasSubstr("frame.box"), HasSubstr("newer one"), HasSubstr("frame-boxes")));
+  ExpectOneLine(refused.status());
+  const auto sent = (*stream)->Send({.positions = std::span(positions)}, 0);
+  EXPECT_EQ(sent.value(), 1u) << "the stream continues";
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -378,6 +379,36 @@ TEST_F(Recording, AnAttributeOfAnotherLengthIsDamage) {
   const auto read = (*reader)->Next(frame);
   EXPECT_EQ(read.status().code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(std::string(read.status().message()), HasSubstr("a scalar has 4 bytes where"));
+}
+
+TEST_F(Recording, HoldsOrthogonalPeriodicBoxes) {
+  std::vector<RecordedFrame> frames = RandomFrames(5);
+  frames[0].box = RecordedBox{.low = {-1 / 3., 2}, .length = {1e5 / 3, 7}, .is_periodic = {true}};
+  frames[1].box =
+      RecordedBox{.low = {0, 0, 5}, .length = {1, 2, 3}, .is_periodic = {false, true, true}};
+  frames[2].box = RecordedBox{.length = {9, 9}, .is_periodic = {true, true}, .is_tilted = true};
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path());
+  ASSERT_THAT(read.frames, SizeIs(5)) << read.status;
+  ASSERT_TRUE(read.frames[0].box && read.frames[1].box);
+  EXPECT_THAT(read.frames[0].box->low, ElementsAre(-1 / 3., 0, 0));
+  EXPECT_THAT(read.frames[0].box->length, ElementsAre(1e5 / 3, 0, 0)) << "of periodic axes only";
+  EXPECT_THAT(read.frames[1].box->low, ElementsAre(0, 0, 5));
+  EXPECT_THAT(read.frames[1].box->is_periodic, ElementsAre(false, true, true));
+  EXPECT_FALSE(read.frames[2].box.has_value()) << "triclinic boxes are not stored";
+  EXPECT_FALSE(read.frames[3].box.has_value());
+}
+
+TEST_F(Recording, BoxesWithoutALengthAreDamage) {
+  for (const double length : {0., -1., std::nan(""), HUGE_VAL}) {
+    std::vector<RecordedFrame> frames = RandomFrames(2);
+    frames[1].box = RecordedBox{.length = {length}, .is_periodic = {true}};
+    Write(Path(), frames);
+    const WhatWasRead read = Read(Path());
+    EXPECT_EQ(read.status.code(), absl::StatusCode::kDataLoss) << length;
+    EXPECT_THAT(std::string(read.status.message()), HasSubstr("length of the box"));
+    EXPECT_THAT(read.frames, SizeIs(1));
+  }
 }
 
 }  // namespace

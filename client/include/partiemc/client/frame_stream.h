@@ -73,6 +73,7 @@ struct StreamInfo {
   ReconstructionParameters parameters;  ///< Resolved; `spacing` is absent if it is estimated.
   std::size_t frames_in_flight = 1;  ///< Capacity of the window: frames sent and not yet received.
   StreamLimits limits;
+  bool frame_boxes = true;  ///< The server uses Frame::box; Send refuses a box otherwise.
 };
 
 /// Progress of reconnecting after a loss.
