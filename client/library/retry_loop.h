@@ -48,7 +48,7 @@ class RetryLoop {
   /// The address in use, or the next one to try.
   const std::string& address() const { return addresses_[address_]; }
   /// Replaces the addresses that were learned before. The addresses passed to the constructor and
-  /// the address in use stay. Only the first few addresses of a long list are used.
+  /// the address in use stay. At most 16 learned addresses are kept.
   void Learn(const std::vector<std::string>& addresses);
   void UseNextAddress() { address_ = (address_ + 1) % addresses_.size(); }
 

@@ -13,7 +13,7 @@
 namespace partiemc::client {
 namespace {
 
-// For a new stream: time limit for connecting to each of several addresses; pause between attempts.
+// For a new stream: time limit to connect to one of several addresses; pause between attempts.
 constexpr std::chrono::milliseconds kShortConnect(250);
 constexpr std::chrono::milliseconds kRest(20);
 

@@ -18,7 +18,7 @@ struct StreamSummary {
   std::string stream_id;
   std::string name;
   std::map<std::string, std::string> labels;
-  ReconstructionParameters parameters;  ///< Resolved.
+  ReconstructionParameters parameters;  ///< Resolved; defaults if this client cannot read them.
   std::uint64_t last_sequence = 0;      ///< Number of the stream's newest frame.
   std::uint64_t frames = 0;             ///< Frames answered by a result.
   std::uint64_t frame_errors = 0;
