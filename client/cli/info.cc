@@ -45,7 +45,6 @@ std::string SecurityText(const Credentials& credentials) {
                 SendsToken(credentials) ? ", token" : "");
 }
 
-// To a tenth of a mebibyte.
 std::string Mebibytes(std::uint64_t bytes) {
   return absl::StrFormat("%.1f MiB", static_cast<double>(bytes) / (1 << 20));
 }

@@ -1,5 +1,5 @@
-// `partiemc watch --record`: records the frames that a producer sends. A replay of the recording
-// has the same results, bit for bit.
+// `partiemc watch --record`: records the particles that a producer sends. If the recording has all
+// frames of the stream, its replay has the same results, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class StreamRecorder {
                                                const std::string& stream_name,
                                                const WatchedStream& stream);
 
-  /// Writes the particles of `frame`, which is the same after the call as before.
+  /// Writes the particles of `frame`. Takes its buffers during the call and returns them unchanged.
   /// Errors: FAILED_PRECONDITION if the producer does not echo its particles; the errors of
   /// RecordingWriter.
   absl::Status Add(WatchedFrame& frame);

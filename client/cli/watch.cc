@@ -73,7 +73,7 @@ struct Ended {
   ExitCode code = kGood;
   std::uint64_t dropped = 0;
   std::uint64_t gaps = 0, in_gaps = 0;  // Reconnections; upper bound of the frames missed.
-  std::string word;                     // Why it ended; empty for a regular end.
+  std::string word;                     // Why the watch ended early; empty for a regular end.
 
   Ended With(ExitCode end_code, std::string end_word) const {
     Ended ended = *this;
@@ -318,7 +318,7 @@ int Watch(const WatchFlags& flags) {
                               .color_by = flags.color_by,
                               .compress_glb = flags.compress_glb,
                               .gauges = flags.gauges};
-  // Before the stream is known, which may take long.
+  // Checks the flags now, because waiting for the stream may take long.
   if (const absl::Status right = FrameOutputs::Check(places); !right.ok()) {
     return Complain(kUsage, right);
   }

@@ -159,6 +159,7 @@ void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
       attributes_.push_back({one.name, one.components, one.values});
       break;  // A recording may hold a name twice.
     }
+    // The core takes this attribute from Frame::velocities, which View leaves out without times.
     if (name == kVelocityAttribute && !recorded.time && !recorded.velocities.empty()) {
       attributes_.push_back({kVelocityAttribute, recorded.components, recorded.velocities});
     }
@@ -192,8 +193,8 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   return sender.Offer(frame, time).ok();
 }
 
-// The sender sends or skips frames in the order of Offer, so the first two hooks concern the front
-// of `offered_`.
+// LatestSender sends or skips frames in the order of Offer, so the first two hooks concern the
+// front of `offered_`.
 OfferHooks FrameFeeder::Hooks() {
   return {.sending =
               [this](std::uint64_t) {
