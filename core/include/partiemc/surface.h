@@ -27,7 +27,7 @@ struct ShellMeasures {
 
 struct SurfaceStatistics {
   std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
-  std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
+  std::uint64_t dropped_components = 0;  ///< Removed bodies without a particle.
   std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
   std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
   Doubts doubts;                         ///< Reasons to distrust the surface.
@@ -59,8 +59,8 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the periodic
-  /// box, where a body was cut. They close the surface; areas do not count them.
+  /// Triangles, ascending, on walls (ReconstructionParameters::wall_planes) or on faces of the
+  /// periodic box, where a body was cut. They close the surface; areas do not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.
@@ -75,13 +75,13 @@ struct Surface {
     return std::span(parents).subspan(parent_offsets[shell],
                                       parent_offsets[shell + 1] - parent_offsets[shell]);
   }
-  /// Empties everything. The elements of `attributes` remain, without contents.
+  /// Empties everything, except that `attributes` keep their names and components.
   void Clear();
   friend bool operator==(const Surface&, const Surface&) = default;
 };
 
-/// Checks S1 to S5 with exact arithmetic, independent of the construction. Measures are compared
-/// to 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
+/// Checks S1 to S5, independently of the construction: S1 to S4 with exact arithmetic, measures to
+/// 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
 /// values. Cost: n log n in the triangles if they are of similar size.
 absl::Status Validate(const Surface& surface);
 
