@@ -17,7 +17,7 @@ namespace partiemc {
 /// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). By default, all steps
 /// are on.
 struct VirtualPlaneSteps {
-  bool edge_vertices = true;  ///< Vertices on crossed lattice edges, besides those of cells.
+  bool edge_vertices = true;  ///< Vertices on crossed lattice edges, not only in cells.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
   bool curvature = true;      ///< Undo the kernel's rounding of curved boundaries.
   bool support = true;        ///< Shift planes to the particles that support them.

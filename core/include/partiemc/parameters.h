@@ -14,7 +14,7 @@
 
 namespace partiemc {
 
-/// What a frame of particles becomes.
+/// The kind of a frame's result.
 enum class Output : std::uint8_t {
   kOutline,  ///< Rings and their mesh in a plane (core/METHOD.md).
   kSurface,  ///< Closed surfaces in space (core/SURFACES.md).
@@ -54,7 +54,7 @@ enum class Sizes : std::uint8_t {
   kOwn,    ///< h_i = sqrt(v_i), of a surface cbrt(v_i), with the volume v_i (core/SIZES.md).
 };
 
-/// What the outline runs around.
+/// The shape that the outline surrounds.
 enum class Boundary : std::uint8_t {
   kBulk,    ///< The body that the particles fill: the outline smooths over single particles.
   kGrains,  ///< Particles are discs of the diameter h_i, and the outline follows their surfaces
@@ -79,8 +79,8 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// A further outline of the same particles. All other parameters are those of the stream. At most
-/// one member is present, except that a slice and an isovalue may be combined.
+/// A further outline of the same particles, with the other parameters of the stream. At most one
+/// member is present, except that a slice and an isovalue may be combined.
 struct Section {
   /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
   /// present only if the stream has a slice.
@@ -163,8 +163,8 @@ struct SurfaceOptions {
 
 /// The parameters of a stream. Output::kSurface requires `spacing`; it excludes `slice`, `isovalue`
 /// and Placement::kFarthestParticle. Surfaces ignore `fill`, `attribute_tolerance`,
-/// `normal_memory`, `min_component_area` and `plane`. The sections of such a stream are slices of
-/// the same particles; they use these parameters, except `plane`.
+/// `normal_memory`, `min_component_area` and `plane`. The sections of a stream with a surface are
+/// slices of the same particles; they use these parameters, except `plane`.
 struct ReconstructionParameters {
   Output output = Output::kOutline;
   Placement placement = Placement::kVirtualPlane;

@@ -42,9 +42,9 @@ class MemoryGuard {
   virtual ~MemoryGuard() = default;
 
   /// Returns whether workspace and result may grow to `bytes` in total; if not, Reconstruct returns
-  /// RESOURCE_EXHAUSTED. Reconstruct calls this on its caller's thread, about twice per outline:
-  /// when particles are sorted, with a lower bound from the number of tiles, then when the length
-  /// of the outline is known. The memory for tiles and outline is allocated afterwards.
+  /// RESOURCE_EXHAUSTED. Reconstruct calls this on its caller's thread, about twice per outline.
+  /// The first call follows the sorting of particles, with a lower bound from the number of tiles;
+  /// memory for tiles is allocated afterwards. The second call includes the length of the outline.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
@@ -95,7 +95,7 @@ class Reconstructor {
                                   Result& result, const FrameControl& control) const;
 
   ReconstructionParameters parameters_;
-  std::vector<ReconstructionParameters> sections_;  // Of each section, resolved.
+  std::vector<ReconstructionParameters> sections_;  // By section, resolved.
   FrameLimits limits_;
   std::shared_ptr<const VirtualPlaneVariant> variant_;
   std::shared_ptr<const SurfaceReconstructor> surface_;  // Null for Output::kOutline.

@@ -50,7 +50,7 @@ struct Rings {
   std::vector<std::uint32_t> cuts;
   /// Points, ascending, whose segment to the next point of the ring lies on a wall
   /// (ReconstructionParameters::walls, wall_phases). Where rings crossed, their repair may have
-  /// moved an end of such a segment off the wall.
+  /// moved an end of this segment off the wall.
   std::vector<std::uint32_t> wetted;
   /// Points, ascending, where the outline of a body meets a wall, or where a phase meets two other
   /// phases, or one and the outside (core/PHASES.md). `contact_angles` has one angle per contact,

@@ -27,7 +27,7 @@ struct CellNormal {
 struct KnownRing {
   std::uint64_t identity = 0;
   bool is_hole = false;
-  std::uint32_t outer = kNoRing;  ///< Of a hole: the index of its outer ring, if known.
+  std::uint32_t outer = kNoRing;  ///< For a hole: the index of its outer ring, if known.
   /// Mean velocity of its particles, world units per time; 0: unknown.
   double velocity_x = 0, velocity_y = 0;
 
@@ -66,7 +66,7 @@ struct RingHistory {
   std::optional<PeriodicBox> box;
   std::vector<KnownRing> rings;  ///< Sorted by identity.
   std::vector<NodeRun> runs;     ///< Disjoint, by row, then column. Each ring has at least one run.
-  /// Sorted by hash. Of each outer ring, the up to kMaxSamples particles with the lowest hashes.
+  /// The up to kMaxSamples particles of each outer ring with the lowest hashes; sorted by hash.
   std::vector<ParticleSample> samples;
 
   friend bool operator==(const RingHistory&, const RingHistory&) = default;

@@ -43,9 +43,9 @@ struct SurfaceStatistics {
 ///   S4 triangles are counter-clockwise seen from outside the body; shells alternate: the next
 ///      shell around an outer shell, if any, is a cavity, and the next shell around a cavity is the
 ///      outer shell that `outer_of` gives;
-///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
-///      centroids are those of the triangles. Each triangle of `cuts` has one coordinate that is
-///      the same at its three corners.
+///   S5 offsets, normals and measures fit the triangles: normals have length 1; areas, volumes and
+///      centroids are computed from the triangles. Each triangle of `cuts` has one coordinate that
+///      is the same at its three corners.
 struct Surface {
   std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.

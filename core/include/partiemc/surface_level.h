@@ -49,8 +49,8 @@ std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
                          std::uint64_t attribute_values);
 
 /// Simplifies `surface` to a level, and returns SurfaceLevel::error. `spacing` is in world units.
-/// The remaining points keep their bits, normals and attributes; measures stay those of the exact
-/// surface. S1 and S2 hold, S4 as in the exact surface, and S3 between all triangles that the
+/// The remaining points keep their bits, normals and attributes; shells keep the measures of the
+/// exact surface. S1 and S2 hold, S4 as in the exact surface, and S3 between all triangles that the
 /// simplification has changed.
 /// Requires: a valid level; indices, offsets and sizes of arrays as in a Surface; normals may be
 /// absent. Coordinates may be rounded: triangles that break S3 stay.

@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::ma
 struct KnownShell {
   std::uint64_t identity = 0;
   bool is_cavity = false;
-  std::uint32_t outer = kNoShell;  ///< Of a cavity: the index of its outer shell, if known.
+  std::uint32_t outer = kNoShell;  ///< For a cavity: the index of its outer shell, if known.
   /// Mean velocity of its particles, world units per time; 0: unknown.
   double velocity_x = 0, velocity_y = 0, velocity_z = 0;
 
@@ -56,7 +56,7 @@ struct ShellHistory {
   std::optional<PeriodicBox> box;      ///< As RingHistory::box.
   std::vector<KnownShell> shells;      ///< Sorted by identity.
   std::vector<ShellRun> runs;  ///< Disjoint; sorted by layer, row, node. At least one per shell.
-  /// Sorted by hash. Of each outer shell, the up to kMaxSamples particles with the lowest hashes.
+  /// The up to kMaxSamples particles of each outer shell with the lowest hashes; sorted by hash.
   std::vector<ShellSample> samples;
 
   friend bool operator==(const ShellHistory&, const ShellHistory&) = default;
