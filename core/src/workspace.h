@@ -41,10 +41,10 @@ struct NextState {
   State state;
 };
 
-// The outline that was reconstructed last.
+// The last outline of ReconstructOutline, for ReconstructPhase.
 struct LastOutline {
   Frame frame;                     // Its particles.
-  std::optional<Lengths> lengths;  // Empty if it has no rings.
+  std::optional<Lengths> lengths;  // Empty: the spacing is unknown, so no rings.
   Scale scale;
   Doubts doubts;
 };
@@ -61,7 +61,7 @@ struct Workspace::Buffers {
   LevelSet level_set;
   WallField walls;               // Empty without walls.
   WallParticles wall_particles;  // Empty unless particles of some phases are walls.
-  NextState wall_state;          // The same. Nothing is kept.
+  NextState wall_state;          // The same. It is never committed.
   Result wall_result;
   WallCornerScratch wall_corners;
   Crossings crossings;
@@ -82,7 +82,7 @@ struct Workspace::Buffers {
   std::vector<NextState> next_states;            // By outline: the main one, then the sections.
   LastOutline last;
   Phases phases;                      // Empty unless sections have phases.
-  std::vector<Attribute> attributes;  // Without that of the phases.
+  std::vector<Attribute> attributes;  // Without the attribute of the phases.
   PlacedVertices placed_phase;
   SurfaceWorkspace surface;
 };

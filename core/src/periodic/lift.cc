@@ -371,7 +371,7 @@ std::uint64_t BytesOfCopy(const Frame& frame) {
   return bytes;
 }
 
-// Appends copies of the particles of percolating clusters. `bytes`: what has been reserved.
+// Appends copies of the particles of percolating clusters. `bytes`: reserved so far.
 absl::Status AddCopies(const LiftInput& input, const Grid& grid, std::uint64_t bytes,
                        LiftScratch& s, LiftedFrame& lifted) {
   const Frame& given = input.frame;
