@@ -22,7 +22,7 @@
 
 namespace partiemc {
 
-/// Reused buffers of ContinueRings. The kept rings of the frame have numbers from 0, in the order
+/// Scratch of ContinueRings. The kept rings of the frame have numbers from 0, in the order
 /// of their first runs (NodeRun): by row, then column. Cut bodies without nodes in the box come
 /// last.
 struct IdentityScratch {

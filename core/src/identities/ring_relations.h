@@ -23,7 +23,7 @@ struct RingsNow {
   LatticePeriods periods = {};
 };
 
-/// Warm buffers of RelateRings.
+/// Scratch of RelateRings.
 struct RelationScratch {
   std::vector<CellShift> shift_before, shift_now;
   std::vector<std::int64_t> displacements;

@@ -21,7 +21,7 @@ struct FoundSample {
   CellShift displacement;             ///< From the last frame to this one.
 };
 
-/// Samples of a frame, and reused buffers.
+/// Samples of a frame, and scratch of SampleRings.
 struct RingSamples {
   std::vector<ParticleSample> samples;  ///< By ring, then in any order; `ring` is a number.
   std::vector<FoundSample> found;       ///< Sorted by `before`, then `now`.

@@ -14,8 +14,7 @@
 
 namespace partiemc {
 
-/// A set of nodes, stored as bits by tile. The number of a node is the number of bits before its
-/// bit. Keeps its memory warm from frame to frame.
+/// A set of nodes, stored as bits by tile. After Number, their numbers are consecutive.
 class NodeVertices {
  public:
   /// Removes all nodes.

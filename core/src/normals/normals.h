@@ -44,7 +44,7 @@ inline constexpr std::size_t kSegmentsAtOnce = 64;
 /// A gradient of F or phi with a smaller squared length is weak: its direction is unreliable.
 inline constexpr double kWeakGradientSquare = 1e-3;
 
-/// Warm buffers of EstimateNormals.
+/// Scratch of EstimateNormals.
 struct NormalScratch {
   CellsByRow cells_by_row;
   std::vector<std::uint32_t> previous;       ///< By active cell: index of its previous normal.

@@ -16,7 +16,7 @@ using GridCell = std::array<std::int32_t, 3>;
 /// Bytes of CellGroups, at most: for each item, and for each occupied cell.
 inline constexpr std::uint64_t kBytesPerGroupedItem = 24, kBytesPerCellGroup = 24;
 
-/// The items of each occupied cell. Keeps its buffers from frame to frame.
+/// The items of each occupied cell. Reuses its memory.
 class CellGroups {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();

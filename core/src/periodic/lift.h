@@ -28,7 +28,7 @@ struct LiftCell {
   std::uint8_t percolates = 0;
 };
 
-/// Warm buffers of Lift.
+/// Scratch of Lift.
 struct LiftScratch {
   std::vector<GridCell> cell_of;  // By particle.
   CellGroups groups;              // The particles of each cell.

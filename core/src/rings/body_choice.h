@@ -13,8 +13,8 @@
 
 namespace partiemc {
 
-/// The result of ChooseBodies, and reused buffers. A set has the images of one body; its root is
-/// its first component.
+/// The result of ChooseBodies, and its scratch. A set has the images of one body; its root is its
+/// first component.
 struct BodyChoice {
   std::vector<Fate> fates;  ///< By component.
   /// By component: if the body is cut, its first component, else the component itself.

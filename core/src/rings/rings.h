@@ -33,7 +33,7 @@ struct RingTopology {
   std::size_t RingCount() const { return outer_of.size(); }
 };
 
-/// Reused buffers of TraceRings.
+/// Scratch of TraceRings.
 struct RingScratch {
   std::vector<std::uint64_t> particle_count;
   std::vector<double> particle_weight;

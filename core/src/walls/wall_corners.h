@@ -9,7 +9,7 @@
 
 namespace partiemc {
 
-/// Warm buffers of SharpenCorners.
+/// Scratch of SharpenCorners.
 struct WallCornerScratch {
   struct Corner {
     std::uint32_t point;  // Of the ring, in the middle of the rounded part.

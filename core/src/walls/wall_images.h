@@ -18,7 +18,7 @@
 
 namespace partiemc {
 
-/// Warm buffers of AddWallImages.
+/// Scratch of AddWallImages.
 struct WallImageScratch {
   std::vector<double> positions;
   std::vector<std::uint32_t> originals;  // The given particle of each particle.
