@@ -34,7 +34,8 @@ inline void ThrowIfCancelled(const std::atomic<bool>* flag) {
   }
 }
 
-/// Checks the flag of the calling thread. For sequential loops with up to a million steps.
+/// Checks the flag of the calling thread. Sequential code calls it about once per million steps;
+/// parallel.h checks the flag by itself.
 inline void ThrowIfCancelled() { ThrowIfCancelled(CancellationScope::Current()); }
 
 }  // namespace partiemc

@@ -46,7 +46,7 @@ class TileDirectory {
   /// further tiles unsorted.
   void Sort();
 
-  /// Sorts the tiles and links neighbours.
+  /// Sorts the tiles and sets `neighbours`. A later Insert or Sort makes `neighbours` invalid.
   void Seal();
 
   std::size_t size() const { return tiles_.size(); }
