@@ -55,7 +55,7 @@ std::uint64_t AttributeValuesOf(const Frame& frame) {
   return values;
 }
 
-// Adds the sizes of a mesh over these interior cells.
+// Adds the sizes of a mesh over these interior cells to `size`.
 void AddMesh(const ReconstructionParameters& parameters, const std::vector<BitRows>& interior,
              FrameSize& size) {
   if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(interior);

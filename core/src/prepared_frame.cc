@@ -89,7 +89,8 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
                        Prepared& prepared) {
   const ReconstructionParameters& parameters = input.parameters;
   const double radius = parameters.kernel_radius * spacing;
-  // Rings that may cross themselves cannot be cut, so with them bodies that percolate are refused.
+  // Rings that may cross themselves cannot be cut. Without a margin, Lift refuses bodies that
+  // percolate.
   const double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
   absl::Status status =
       Lift({.frame = frame,

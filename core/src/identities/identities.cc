@@ -168,7 +168,6 @@ void AssignIdentities(const RingHistory& previous, IdentityScratch& s, RingHisto
   }
 }
 
-// Writes identities and parents to the result.
 void WriteResult(const RingHistory& previous, std::span<const std::uint32_t> kept_as,
                  IdentityScratch& s, Rings& rings) {
   for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {

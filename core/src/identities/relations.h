@@ -38,8 +38,8 @@ struct Evidence {
 /// Merges the relations of each pair into one, with the maximum of each count.
 void Unite(std::vector<Relation>& relations);
 
-/// Adds the pairs of `found` to `relations`, each with its number of samples. Requires: `found` is
-/// sorted by `before`, then `now`.
+/// Adds the pairs of `found` to `relations`, each with its number of samples, and unites them.
+/// Requires: `found` is sorted by `before`, then `now`.
 template <typename Found>
 void AddFoundSamples(std::span<const Found> found, std::vector<Relation>& relations) {
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {

@@ -44,7 +44,7 @@ struct SampleInput {
   const Crossings& crossings;
   const Components& components;
   std::span<const std::uint32_t> ring_of_component;  ///< By component: number of its outer ring.
-  std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
+  std::span<const std::uint64_t> particle_count;     ///< By number: particles that count.
   const Percolation* percolation = nullptr;          ///< Null: the frame has no copies.
   ParticleSubset subset = {};
 

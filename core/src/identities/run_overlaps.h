@@ -22,7 +22,7 @@ inline std::int32_t RowOf(const NodeRun& run) { return run.row; }
 inline std::uint32_t PieceOf(const NodeRun& run) { return run.ring; }
 
 /// Writes `runs`, moved by the shifts of their rings, to `moved`, sorted by row, then column. Moved
-/// runs may overlap. Drops runs that leave the coordinates of 32 bits.
+/// runs may overlap. Drops runs whose coordinates exceed 32 bits.
 void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of_ring,
               std::vector<NodeRun>& moved);
 

@@ -1,6 +1,6 @@
 // Sweeps over the runs of two frames and sums the nodes that their pieces share.
 //
-// Runs of lattice nodes are of the plane or of space. RowOf(run) is the row of a run, PieceOf(run)
+// For runs of lattice nodes in the plane and in space. RowOf(run) is the row of a run, PieceOf(run)
 // its ring or shell, and `first` and `last` are its end nodes.
 #pragma once
 

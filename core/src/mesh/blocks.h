@@ -35,7 +35,7 @@ struct Blocks {
   using Levels = std::array<BitRows, kBlockLevels>;
   std::vector<Levels> at_least;  ///< By tile and level: the cells in blocks of this level or more.
   // Scratch:
-  std::vector<Levels> linear;            ///< By tile, level: cells of linear blocks.
+  std::vector<Levels> linear;            ///< By tile, level: cells in blocks that meet rule 1.
   std::vector<std::uint32_t> window_of;  ///< By tile: its first window, if it has windows.
   std::vector<double> windows;           ///< Sums over the particles of each window.
   std::vector<double> tolerances;        ///< By part of an attribute.

@@ -10,7 +10,6 @@
 
 namespace partiemc {
 
-/// Coordinates of a cell.
 using GridCell = std::array<std::int32_t, 3>;
 
 /// Bytes of CellGroups, at most: for each item, and for each occupied cell.

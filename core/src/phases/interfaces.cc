@@ -110,7 +110,7 @@ class ArcCollector {
     const auto first =
         std::ranges::find_if(points, [&](std::uint32_t point) { return IsEnd(point); });
     if (first == points.end()) {
-      // The whole ring is one arc, if any.
+      // The whole ring is one arc, which the phase with the smaller label adds.
       const PhaseLabel other = *std::ranges::max_element(across);
       if (other < label) return;
       Begin(label, other, rings.topology.component_of_ring[ring]);

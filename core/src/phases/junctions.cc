@@ -16,14 +16,14 @@ namespace {
 constexpr std::size_t kMostArcs = 4, kMostCurves = 6;
 // Steps of the search for the point nearest to curves.
 constexpr int kSteps = 3;
-// Weight of a junction's place against lines that hardly determine it.
+// Weight of a junction's present place, for lines that hardly determine a new one.
 constexpr double kOwnWeight = 1e-3;
 // A junction moves by at most this number of spacings.
 constexpr double kLongestMove = 1.5;
 // A vertex of the body moves at most by this share of the segment to its neighbour: kShare if the
 // neighbour stays, kSharedShare if it may move, too.
 constexpr double kShare = .9, kSharedShare = .45;
-// Lines that meet at a smaller angle, by its sine, do not determine a point.
+// A line that meets the ring at a smaller angle, given by its sine, does not determine a place.
 constexpr double kSmallestSine = .3;
 
 Point Between(const Point& from, const Point& to) { return Minus(to, from); }

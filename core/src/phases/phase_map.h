@@ -49,7 +49,7 @@ struct PhaseMap {
   PhaseLabel At(const TilePlace& node) const {
     return node.tile == kNoTile ? kNoPhase : labels[node.tile][node.j * kTileSize + node.i];
   }
-  /// Index of an edge in `edges`. Requires: it exists.
+  /// Index in `edges` of the edge up or to the right from a node. Requires: it exists.
   std::uint32_t EdgeAt(const TilePlace& node, bool is_up) const;
   /// Index of a cell in `cells`, or kNoIndex.
   std::uint32_t CellAt(const TilePlace& cell) const;

@@ -37,7 +37,7 @@ class BodyVertices {
   std::uint32_t Leaving(const TilePlace& cell, int edge) const;
   /// The edge through which a segment leaves its cell.
   int ExitOf(std::uint32_t at) const;
-  /// The only segment of a cell.
+  /// The segment of a cell that has only one in the topology.
   std::uint32_t In(const TilePlace& cell) const;
 
   /// Index in Rings::points of a segment's vertex in its cell, and of its vertex on its entry edge:

@@ -68,7 +68,7 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
 /// Labels the nodes of the body by phase. Requires: TakePhases.
 void MapPhases(const PhaseInput& input, Phases& phases);
 
-/// Points of all interfaces.
+/// Number of points of all interfaces.
 inline std::uint64_t InterfacePointsOf(const Phases& phases) {
   return phases.map.edges.size() + phases.map.cells.size();
 }

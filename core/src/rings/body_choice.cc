@@ -39,7 +39,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
     c.has_copies[of_copy] = 1;
     std::uint32_t& of_given = c.component_of[input.lifted.originals[copy]];
     if (of_given == kNoComponent) {
-      of_given = of_copy;  // Further copies join this one.
+      of_given = of_copy;  // Further copies join this component.
       ++c.total[of_copy];
     }
     const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
@@ -94,7 +94,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   for (std::uint32_t root = 0; root < components; ++root) {
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent) continue;
-    // An image with a particle and its copy has more.
+    // An image that has both a particle and its copy has more particles.
     if (topology.particle_count[topology.outer_ring[best]] != c.total[root]) best = kNoComponent;
   }
 }

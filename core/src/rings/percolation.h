@@ -27,7 +27,7 @@ struct Window {
 /// A frame with copies of particles (periodic/lift.h).
 struct Percolation {
   Window window;
-  std::uint32_t particles;                ///< Given particles; copies follow.
+  std::uint32_t particles;                ///< Number of given particles; copies follow them.
   std::span<const Fate> fates;            ///< By component.
   std::span<const std::uint32_t> bodies;  ///< By component: BodyChoice::bodies.
 

@@ -18,9 +18,9 @@ namespace partiemc {
 /// the value F of the fluid. Lengths are in cells.
 ///
 /// Kernels see no particles beyond a wall, so F near a wall does not tell whether the fluid touches
-/// it. An outside node lower than `kReach` spacings therefore has the F of the point
-/// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
-/// lattice: its zeros are the outline of the fluid, cut at the walls.
+/// it. An outside node lower than `kReach` spacings therefore has the F of the point straight above
+/// it at this height, if that point is inside. Then max(F, -w) replaces F on the lattice: its zeros
+/// are the outline of the fluid, cut at the walls.
 ///
 /// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
@@ -54,8 +54,8 @@ class WallField {
   /// F of the fluid at a node, extended to the walls but not cut by them.
   float FluidAt(const LevelSet& level_set, const TilePlace& node) const;
 
-  /// The wall nearest to a point near a tile, in cells from the origin of the world. Its height is
-  /// infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
+  /// The wall nearest to a point near the tile, given in cells from the origin of the world. The
+  /// height is infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
   NearestWall Nearest(std::uint32_t tile, const Point& point) const;
   /// The lines near a tile.
   std::span<const std::uint32_t> EdgesNear(std::uint32_t tile) const;
