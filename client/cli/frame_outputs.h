@@ -20,7 +20,6 @@ class Option;
 
 namespace partiemc::client {
 
-/// Adds --compress-glb.
 CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb);
 
 /// Adds --gauge, whose help lists the kinds.
@@ -44,7 +43,7 @@ class FrameOutputs {
   static absl::Status Check(const Places& places);
 
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: those of Check and of AtomicFile.
+  /// Errors: as Check and AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether a file shows the normals of ring vertices.

@@ -38,7 +38,6 @@ bool SendsToken(const Credentials& credentials) {
   return !credentials.token.empty() || !credentials.token_file.empty();
 }
 
-// The security of this client's connection.
 std::string SecurityText(const Credentials& credentials) {
   return Concat(credentials.tls ? "TLS" : "in the clear",
                 credentials.cert_file.empty() ? "" : ", own certificate",

@@ -122,7 +122,6 @@ bool ParsePhases(std::string_view text, std::string& attribute, std::vector<std:
   return true;
 }
 
-// Parses --phases and adds a section for each phase.
 absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   if (flags.phases.empty()) return absl::OkStatus();
   std::vector<std::int32_t> phases;

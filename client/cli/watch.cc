@@ -68,7 +68,6 @@ std::optional<LevelOfDetail> LevelOf(const WatchFlags& flags) {
   return LevelOfDetail{.max_error = flags.max_error, .max_triangles = flags.max_triangles};
 }
 
-// Exit code and counts of a watch.
 struct Ended {
   ExitCode code = kGood;
   std::uint64_t dropped = 0;
@@ -172,7 +171,7 @@ Progress::Options ProgressOptions(const WatchFlags& flags) {
 
 // Opens the watch. With --wait it retries until the stream exists, even if the server becomes
 // unreachable in between, for example to restart. Shows `progress` from the first retry on. Errors:
-// those of Watcher::Open; CANCELLED after Ctrl-C.
+// as Watcher::Open; CANCELLED after Ctrl-C.
 absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
                                                     std::optional<Progress>& progress) {
   for (bool waited = false;; waited = true) {

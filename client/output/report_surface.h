@@ -25,7 +25,7 @@ struct ReportSurface {
 };
 
 /// Encodes surface, sections and particles of a frame. Points are rounded to about 1/1024 of the
-/// spacing, particles to 1/32. Counts and differences are those of ReportBytes:
+/// spacing, particles to 1/32. ReportBytes encodes counts and differences:
 ///
 ///   message     count of bytes; a partiemc.v1.ReconstructedFrame with a compact surface without
 ///               normals, the rings of the sections, and the statistics

@@ -30,11 +30,11 @@ enum class StatisticsOf : std::uint8_t {
 /// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (names separated by
 /// blanks), section.
 ///
-/// Section 0 is the frame's own outline; a row for each section follows. The last columns are those
-/// of the gauges (partiemc/gauges.h): NAME for a gauge with one value, otherwise NAME_VALUE. A
-/// gauge is "nan" if the outline has no such point. Digests have 16 hexadecimal digits.
-/// Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts rings,
-/// `vertices` their vertices.
+/// Section 0 is the frame's own outline; a row for each section follows. The gauges
+/// (partiemc/gauges.h) have the last columns: NAME for a gauge with one value, otherwise
+/// NAME_VALUE. A gauge is "nan" if the outline has no such point. Digests have 16 hexadecimal
+/// digits. Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts
+/// rings, `vertices` their vertices.
 ///
 /// Outlines at walls have these columns between `section` and the gauges: wetted_length, the length
 /// of the outline that lies on walls; contacts, the number of points where the outline meets a

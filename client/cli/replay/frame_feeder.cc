@@ -186,7 +186,6 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   const Frame frame = View(recorded);
   const double time = TimeOf(recorded);
   {
-    // The frame is queued before Offer, because its response may arrive before Offer returns.
     const MutexLock lock(mutex_);
     offered_.push_back(std::move(owned));
   }

@@ -25,7 +25,7 @@
 
 namespace partiemc::client {
 
-/// What to do with frames that are due while the stream is busy.
+/// Policy for frames that are due while the stream is busy.
 enum class SendPolicy {
   kBlock,   ///< Wait; no frame is lost.
   kLatest,  ///< Send the newest frame, skip and count the others.

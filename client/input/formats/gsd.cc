@@ -1,5 +1,5 @@
-// GSD, the format of HOOMD-blue: chunks of numbers with a name and a frame. A chunk that a frame
-// lacks is taken from frame 0. https://gsd.readthedocs.io/en/stable/file-layer.html
+// GSD, the format of HOOMD-blue: chunks of numbers with a name and a frame. If a frame lacks a
+// chunk, the chunk of frame 0 is used. https://gsd.readthedocs.io/en/stable/file-layer.html
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -172,7 +172,7 @@ class GsdReader final : public FrameReader {
     return chunk != nullptr ? chunk : Find(0, name);
   }
 
-  // A chunk with one whole number.
+  // Reads a chunk with one whole number. Empty without such a chunk, or for a negative number.
   absl::StatusOr<std::optional<std::uint64_t>> Number(std::uint64_t frame,
                                                       std::string_view name) const {
     const GsdChunk* const chunk = FindOrInitial(frame, name);
@@ -209,10 +209,9 @@ class GsdReader final : public FrameReader {
                        [this, &chunk](std::vector<char>& bytes) { return Load(chunk, bytes); }};
   }
 
-  // Returns the arrays with one row per particle.
   std::vector<StoredArray> Arrays(std::uint64_t frame, std::uint64_t particles) const {
     std::vector<StoredArray> arrays;
-    // Frame 0 does not replace a broken chunk.
+    // A chunk with another number of rows is broken. The chunk of frame 0 does not replace it.
     std::set<std::string_view> seen;
     for (const std::uint64_t from : {frame, std::uint64_t{0}}) {
       const auto chunks = content_.frames.find(from);
@@ -225,7 +224,7 @@ class GsdReader final : public FrameReader {
     return arrays;
   }
 
-  // Returns the arrays of a frame without particles: those of all frames, without rows.
+  // Returns the arrays of a frame without particles: the arrays of all frames, with no rows.
   const std::vector<StoredArray>& EmptyArrays() {
     if (!empty_.empty()) return empty_;
     std::set<std::string_view> seen;

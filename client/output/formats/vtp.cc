@@ -120,7 +120,6 @@ void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
   data->GetPointData()->AddArray(angles);
 }
 
-// Adds the cell data of a surface.
 void AddShells(const Surface& surface, vtkPolyData* data) {
   vtkNew<vtkIntArray> shell_of, body_of;
   shell_of->SetName("shell");
