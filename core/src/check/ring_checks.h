@@ -19,12 +19,12 @@ absl::Status Broken(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-/// Checks that all coordinates are finite and in the domain of predicates.h. `guarantee` names the
-/// guarantee in the error.
+/// Checks that all coordinates are in the domain of predicates.h, so also finite. `guarantee`: its
+/// name in the error, such as "R1".
 absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> points);
 
-/// Checks guarantees R1-R4.
-/// Cost: n log n in the points.
+/// Checks guarantees R1-R4, and Rings::contacts with their angles. Errors: INTERNAL. Cost: n log n
+/// in the points.
 absl::Status CheckRings(const Rings& rings);
 
 }  // namespace partiemc
