@@ -3,7 +3,7 @@
 /** The beginning of a file: its bytes as Latin-1 text, and its extension in lower case. */
 export interface FileHead { text: string; extension: string }
 
-/** What the page reads, for errors. */
+/** Formats that the page reads, for errors. */
 export const READABLE = 'CSV, LAMMPS text dumps, NPY, NPZ, VTK (.vtk, .vtp, .vtu, .pvd, .series), extended XYZ and recordings (.pemc)';
 
 const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?: string }[] = [

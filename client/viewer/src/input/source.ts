@@ -10,7 +10,7 @@ export interface FrameSource {
   readonly spacing: number | null;
   /** Whether 3D particles are reconstructed as surfaces. The planes are sections then. */
   readonly isSurface: boolean;
-  /** Planes that cut 3D particles: the picture, then more. Empty without surfaces: the particles are 2D. */
+  /** Planes that cut 3D particles. The first is the picture, unless `isSurface`. Empty for 2D particles. */
   readonly slices: readonly SectionPlane[];
   /** Names of scalars that every frame has. */
   readonly scalars: string[];

@@ -27,7 +27,7 @@ export interface SpaceFrame { frame: Frame; surface: Surface; channels: Channels
 export interface PickedShell { shell: number; point: Vector }
 
 const MAP_COLOURS = 256;
-/** The camera never shows what is nearer than this share of its distance. */
+/** Smallest depth that a perspective camera shows, as a share of its distance from the target. */
 const NEAREST = 1e-3;
 
 /** A frame with a surface, ready to draw. Throws an Error with a sentence if its sections contradict themselves. */
@@ -201,7 +201,7 @@ export class SpaceScene {
     this.drawing?.setSections(lines);
   }
 
-  /** Writes the colour of each shell to its points. A cavity has the colour of its body, which is beside it in a cut. */
+  /** Writes the colour of each shell to its points. A cavity has the colour of its body, because a cut shows both. */
   private tint(): void {
     if (!this.shown || !this.drawing) return;
     const { pointOffsets, identities, outerOf, positions } = this.shown.surface;

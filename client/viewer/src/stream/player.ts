@@ -57,7 +57,7 @@ export class Player {
     this.mode = 'playing';
   }
 
-  /** Follows the newest frame. */
+  /** Follows the newest frame of a live stream; plays files. */
   follow(): void {
     this.mode = this.live ? 'live' : 'playing';
   }

@@ -5,7 +5,7 @@ import type { Settings } from '../stream/settings';
 import { button, byId, input, make } from './dom';
 import { FileForm } from './file_form';
 
-/** Closed files that are offered. Their bytes stay in memory only if they are recordings. */
+/** Limit of closed files that are offered. Only recordings stay in memory. */
 const MOST_CLOSED = 6;
 
 /** A file that was opened, with its options. */
@@ -23,7 +23,7 @@ export interface FilesEvents {
   asks(): void;
   /** `isGone`: whether the cause of an error has gone. */
   report(text: string, isError: boolean, isGone?: () => boolean): void;
-  /** Options of a file at first. */
+  /** Options of a file when it is first opened. */
   optionsOf(title: string): FileOptions;
 }
 

@@ -24,7 +24,7 @@ export class GaugesPanel {
     });
   }
 
-  /** Gauges measure outlines, which surfaces lack. */
+  /** Disables the form for surfaces: gauges measure outlines. */
   offer(hasSurfaces: boolean): void {
     if (hasSurfaces === this.isBlocked) return;
     this.isBlocked = hasSurfaces;

@@ -19,7 +19,7 @@ const TITLES: Record<keyof typeof SWITCHES, string> = {
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
   normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
-/** Beside a picture of surfaces. */
+/** Tooltips for a picture of surfaces, if they differ. */
 const SPACE_TITLES: Partial<Record<keyof typeof SWITCHES, string>> = {
   fill: 'Draws the surface.', particles: 'Draws the particles as dots, which an opaque surface hides.',
   sections: 'Draws the sections as lines in their planes.', axes: 'Shows coordinates along the box of the surface.',

@@ -88,7 +88,7 @@ export class Pane {
 
   /**
    * `variants`: computes other settings; null if they are not offered. `pictureOfSpace`: makes the
-   * picture of surfaces; null where there are none.
+   * picture of surfaces; null if the pane cannot show surfaces.
    */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
               private readonly variants: Variants | null,
@@ -191,7 +191,7 @@ export class Pane {
     else if (!this.isSpace) this.setView(other.scene.view);
   }
 
-  /** What lies over a picture of surfaces, for exports; null for another picture. */
+  /** Marks of a picture of surfaces, for exports; null for another picture. */
   spaceMarks(dark: boolean): Mark[] | null {
     return this.space && this.isSpace ? this.space.marks(this.caption, dark) : null;
   }

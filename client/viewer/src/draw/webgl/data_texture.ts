@@ -22,7 +22,7 @@ export const TEXELS = {
 
 /**
  * An array that shaders read by index (`texelFetch(name, at(index), 0)`). Arrays of a message are
- * uploaded without rearrangement on the main thread. It grows and never shrinks.
+ * uploaded as they are. The texture grows and never shrinks.
  */
 export class DataTexture {
   private texture: WebGLTexture | null = null;
