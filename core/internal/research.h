@@ -70,13 +70,11 @@ struct VirtualPlaneVariant {
   friend bool operator==(const VirtualPlaneVariant&, const VirtualPlaneVariant&) = default;
 };
 
-/// A step by its name.
 struct NamedStep {
   std::string_view name;  ///< "edge-vertices", ...
   bool VirtualPlaneSteps::*value;
 };
 
-/// A constant by its name.
 struct NamedConstant {
   std::string_view name;  ///< "normal-reach", ...
   double VirtualPlaneConstants::*value;

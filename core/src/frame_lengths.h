@@ -18,8 +18,7 @@ namespace partiemc {
 /// Spacing and cell size of a frame, in world units.
 struct Lengths {
   double spacing, cell_size;
-  bool is_provisional = false;  ///< Estimates of this frame only: no spacing is given, and no
-                                ///< frame so far agreed on one.
+  bool is_provisional = false;  ///< No spacing is given, and no frame so far agreed on one.
 };
 
 /// Returns the lengths of a checked frame. The cell size comes from the state, if it has one. The

@@ -23,8 +23,7 @@ class FrameMemory final : public MemoryGuard {
     return guard_ == nullptr || guard_->Reserve(done_ + last_);
   }
 
-  /// Returns RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier
-  /// ones.
+  /// Returns RESOURCE_EXHAUSTED if the guard refuses the memory of the outlines so far.
   absl::Status ReserveOutline(const FrameSize& size) {
     const std::uint64_t bytes = done_ + WorkspaceBytes(size);
     if (Reserve(WorkspaceBytes(size))) return absl::OkStatus();

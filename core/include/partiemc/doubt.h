@@ -35,7 +35,6 @@ std::string_view Name(Doubt doubt);
 /// One line for the user: what the doubt means, and how to resolve it.
 std::string_view Explanation(Doubt doubt);
 
-/// A set of doubts.
 class Doubts {
  public:
   void Add(Doubt doubt) { bits_ |= BitOf(doubt); }

@@ -143,7 +143,6 @@ std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
 std::uint64_t DigestSurface(const Surface& surface);
 
-/// The digests of one outline.
 struct OutlineDigests {
   std::uint64_t rings = 0, mesh = 0;
 

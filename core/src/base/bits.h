@@ -1,4 +1,4 @@
-// Small functions of numbers that are inlined, and the invalid index.
+// Small functions of numbers that are inlined, and the invalid index kNoIndex.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,6 @@
 
 namespace partiemc {
 
-/// The invalid index.
 inline constexpr std::uint32_t kNoIndex = 0xffffffff;
 
 /// Counts the set bits. Without a processor instruction for it, std::popcount is a library call

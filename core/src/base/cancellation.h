@@ -1,5 +1,4 @@
-// Cancels a frame: its tasks check the caller's flag and throw Cancelled, which Reconstruct
-// catches.
+// Cancels a frame: its tasks check the caller's flag and throw Cancelled. Reconstruct catches it.
 #pragma once
 
 #include <atomic>

@@ -17,8 +17,7 @@ namespace partiemc {
 absl::Status CheckResolution(const Frame& frame, Plane plane, const TileDirectory& tiles,
                              double cell_size, double spacing, Doubts& doubts);
 
-/// Whether positions in space are float32 and a step is above 1/16 of the spacing. Cost: linear in
-/// particles.
+/// Whether positions in space are float32 and their largest step is above 1/16 of the spacing.
 bool AreCoarse(const Frame& frame, double spacing);
 
 /// As CheckResolution, without the shortcut by tiles. Cost: linear in particles.

@@ -27,9 +27,8 @@ class SideBalance {
   struct Finding {
     /// A point where the sides are not balanced, if there is one.
     std::optional<Point> imbalance;
-    /// Number of points where sides end inside another side; 0 if the sides are not balanced. If
-    /// balanced sides have none, each belongs to two triangles, or to one triangle and the
-    /// boundary.
+    /// Number of points where a side ends inside another side, if the sides are balanced. If it is
+    /// 0, each side belongs to two triangles, or to one triangle and the boundary.
     std::size_t t_junctions = 0;
     Point t_junction;  ///< One of these points.
 

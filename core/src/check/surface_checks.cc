@@ -86,7 +86,6 @@ absl::Status CheckIndices(const Surface& surface) {
 
 // --- S1, S2 -------------------------------------------------------------------------------------
 
-/// A side of a triangle.
 struct Side {
   std::uint32_t from, to;
   std::uint32_t triangle;

@@ -45,7 +45,6 @@ struct TileBits {
   std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below.
 };
 
-/// Numbers of cells and segments.
 struct CrossingCounts {
   std::uint32_t cells = 0, segments = 0;
 };

@@ -19,7 +19,6 @@ struct AxisLine {
   bool keeps_above = true;  ///< Whether the kept points have larger coordinates than the line.
 };
 
-/// A point of a loop.
 struct LoopPoint {
   Point at;
   Point root;  ///< Its root (PlacedVertices::roots), or `at`.

@@ -198,7 +198,6 @@ class Assembly {
   Rings& to_;
 };
 
-// The number of bodies with pieces.
 std::uint64_t CountCutBodies(const RingCutInput& input, const RingCutScratch& s,
                              std::vector<std::uint8_t>& seen) {
   seen.assign(input.topology.components.size(), 0);

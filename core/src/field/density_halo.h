@@ -11,8 +11,7 @@
 
 namespace partiemc {
 
-/// The margins of the sums of all tiles with particles (NodeSums), kept until the neighbours add
-/// them.
+/// The margins of the NodeSums of all tiles with particles, kept until the neighbours add them.
 ///
 ///   uuuuuuuuuuuuuu
 ///   llll      rrrr     u: rows within reach of the kernel; l and r: kSumMargin columns

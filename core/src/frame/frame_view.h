@@ -79,7 +79,6 @@ auto VisitPositions(const Frame& frame, Plane plane, Visit visit) {
       frame.positions);
 }
 
-/// Position of one particle.
 Point PositionOf(const Frame& frame, Plane plane, std::size_t particle);
 
 /// A velocity in the plane. Requires: the frame has velocities.

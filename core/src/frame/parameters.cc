@@ -22,7 +22,6 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
-// Limit of the names of attributes.
 constexpr std::size_t kMostNameBytes = 64;
 // Limits of slice planes: squares and products stay finite.
 constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
