@@ -10,9 +10,9 @@
 
 namespace partiemc::client {
 
-/// Shows the progress of a run. On a terminal it is one line, redrawn at most ten times per second,
-/// that never wraps. Elsewhere it is plain lines, at most one every two seconds. If `quiet` is set,
-/// only notes are shown. Not thread-safe.
+/// Shows the progress of a run. A terminal shows one line, which never wraps and is redrawn at most
+/// ten times per second. Other outputs get plain lines, at most one every two seconds. If `quiet`
+/// is set, only notes are shown. Not thread-safe.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;
@@ -21,7 +21,7 @@ class Progress {
     bool quiet = false;
     bool terminal = false;               ///< Redraw one line; otherwise plain lines.
     std::optional<std::uint64_t> total;  ///< Frames of the whole run; absent: unknown.
-    std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< Width.
+    std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< Terminal's width.
     std::function<Clock::time_point()> now = Clock::now;
     std::function<void(std::string_view)> write;  ///< Prints text unchanged.
   };

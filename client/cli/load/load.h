@@ -31,7 +31,6 @@ struct LoadFlags {
 /// Adds the verb to `app`. Requires: `flags` outlives the parsing.
 CLI::App* AddLoad(CLI::App& app, LoadFlags& flags);
 
-/// Returns the exit code.
 int Load(const LoadFlags& flags);
 
 }  // namespace partiemc::client

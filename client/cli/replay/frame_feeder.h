@@ -52,6 +52,7 @@ class FrameFeeder {
   /// or refusal, in order.
   std::unique_ptr<RecordedFrame> TakeAnswered() ABSL_LOCKS_EXCLUDED(mutex_);
   void Recycle(std::unique_ptr<RecordedFrame> frame) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// The frames refused since the last call.
   std::vector<Refused> TakeRefused() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Number of frames that newer ones replaced before they were sent.
   std::uint64_t skipped_count() const ABSL_LOCKS_EXCLUDED(mutex_);

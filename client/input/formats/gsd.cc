@@ -77,8 +77,7 @@ class GsdIndex {
   }
 
  private:
-  // Multiplies two numbers. On overflow the result is larger than any file, so that later checks
-  // against the file's size fail.
+  // Returns a * b, or on overflow 2^62, which fails the checks against the size of the file.
   static std::uint64_t Product(std::uint64_t a, std::uint64_t b) {
     constexpr std::uint64_t kBeyond = std::uint64_t{1} << 62;
     return b != 0 && a > kBeyond / b ? kBeyond : a * b;
