@@ -87,8 +87,7 @@ class ResumingStream final : public Stream {
   bool sends_other_part() const { return options_.parts.part > 0; }
   std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // Declares to Clang's thread-safety analysis that the connector and the call use the same
-  // monitor. Does nothing at run time.
+  // For Clang's thread-safety analysis: connector and call use the same monitor. Does nothing.
   void AssertShared() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.mutex(), call_->mutex()) {}
 

@@ -69,8 +69,7 @@ class StreamConnector {
   absl::StatusOr<Opened> OpenNewAt(TimePoint give_up_at, bool& retryable)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   void Start(std::shared_ptr<grpc::Channel> channel) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // Declares to Clang's thread-safety analysis that the attempt uses the same monitor. Does nothing
-  // at run time.
+  // For Clang's thread-safety analysis: the attempt uses the same monitor. Does nothing.
   void AssertAttemptLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(attempt_->mutex()) {}
   const std::string& address() const { return retry_.address(); }

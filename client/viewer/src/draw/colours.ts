@@ -81,7 +81,6 @@ export function unpacked(colour: number): Rgb {
   return [(colour & 255) / 255, ((colour >> 8) & 255) / 255, ((colour >> 16) & 255) / 255];
 }
 
-/** Linear interpolation between two colours. */
 export function mix(from: Rgb, to: Rgb, share: number): Rgb {
   return [
     from[0] + (to[0] - from[0]) * share,

@@ -22,7 +22,6 @@ const MAPS = {
 export type MapName = keyof typeof MAPS;
 export const MAP_NAMES = Object.keys(MAPS) as MapName[];
 
-/** A colour map in one theme. */
 export interface Ramp { dark: boolean; map: MapName }
 
 /** The colour of a number from 0 to 1. */

@@ -159,7 +159,6 @@ function colourAt(extent: Range, value: number, look: Look): string {
   return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look));
 }
 
-/** Groups rings by colour. */
 function grouped(rings: Rings, colourOf: (ring: number) => number): Map<number, number[]> {
   const groups = new Map<number, number[]>();
   for (let ring = 0; ring < rings.outerOf.length; ++ring) {

@@ -17,7 +17,6 @@ export interface Geometry {
 /** Name of the attribute, and the range of each of its channels. */
 export interface Colors { name: string; ranges: readonly (readonly [number, number])[] }
 
-/** Decodes the geometry of a frame. */
 export function decodeGeometry(base64: string, colors: Colors | null): Geometry {
   const reader = new Reader(bytesOfBase64(base64));
   const origin = reader.origin();

@@ -10,7 +10,6 @@ export interface SectionLines { positions: Float32Array; colour: Rgb; isBorder: 
 /** Alpha of a point's tint: the sum of `shell` if its shell is selected, and `body` if its body is (for cut faces). */
 export const SELECTED = { shell: 170, body: 85 } as const;
 
-/** Colours of one picture. */
 export interface SpaceTheme {
   background: Rgb;
   edge: Rgb;

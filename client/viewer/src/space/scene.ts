@@ -87,13 +87,11 @@ export class SpaceScene {
   get isDrawing(): boolean { return this.drawing !== null; }
   get selectedShells(): readonly number[] { return this.selected; }
 
-  /** Begins to draw by `drawing`. */
   attach(drawing: SpaceDrawing): void {
     this.drawing = drawing;
     this.upload();
   }
 
-  /** Shows a frame, or null for none. */
   show(shown: SpaceFrame | null, outlines: readonly Outline[]): void {
     const begin = performance.now();
     this.shown = shown;

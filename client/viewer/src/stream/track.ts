@@ -49,7 +49,6 @@ export interface Track extends Playable {
   labelOf(sequence: number): string;
   /** The inverse of `labelOf`; for a label between two frames, the next one. */
   sequenceOf(label: number): number;
-  /** Explanation of a doubt. */
   doubtText(doubt: number): string;
   /** Why a frame is refused; empty if it is not. */
   refusalOf?(sequence: number): string;

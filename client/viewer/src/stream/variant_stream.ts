@@ -93,7 +93,6 @@ export class VariantStream implements CurveSource {
     return this.problem || (this.refusals.get(this.frameAt(position)) ?? '');
   }
 
-  /** Counts a frame as drawn. */
   drawn(entry: Entry, now: number): void {
     if (!Number.isNaN(entry.summary.latency)) return;
     entry.summary.latency = now - entry.receivedAt;

@@ -172,7 +172,6 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  /** The frames that the curves show. */
   get shownEntries(): readonly (Entry | null)[] { return this.entries; }
 
   /**

@@ -53,7 +53,6 @@ export class FilesPanel {
     this.form.show(file?.input ?? null, file?.options ?? NO_OPTIONS);
   }
 
-  /** Offers a closed file. */
   addClosed(file: OpenFile): void {
     this.forget(file.input);
     this.closed.unshift(file);

@@ -263,7 +263,6 @@ export class Pane {
     return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
   }
 
-  /** The outlines of the frame. */
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
   /** The outline that the pane shows: the first one if the frame lacks the chosen one. */

@@ -58,7 +58,6 @@ export class DataTexture {
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
   }
 
-  /** Binds the texture to a unit. */
   bind(unit: number): void {
     this.gl.activeTexture(this.gl.TEXTURE0 + unit);
     if (!this.texture) this.reserve(1);
