@@ -1,6 +1,6 @@
 // The placement `farthest-particle`: the paper's rule to the letter (sections 3.3 and 3.5).
 // Everything that only this placement does is here, in MoveVertices of mesh.cc and in AppendRing of
-// vertices.cc. What it requires of the other stages is in its row of placement_traits.h.
+// vertices.cc. placement_traits.h has its requirements of the other stages.
 #pragma once
 
 #include "normals/normals.h"

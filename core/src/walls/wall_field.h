@@ -17,7 +17,7 @@ namespace partiemc {
 /// The fluid near walls. A node has the height w above the nearest wall, negative in the solid, and
 /// the value F of the fluid. Lengths are in cells.
 ///
-/// Kernels see no particles beyond a wall, so F near a wall does not tell whether the fluid touches
+/// Kernels see no particles beyond a wall, so F near a wall does not show whether the fluid touches
 /// it. An outside node lower than `kReach` spacings therefore has the F of the point straight above
 /// it at this height, if that point is inside. Then max(F, -w) replaces F on the lattice: its zeros
 /// are the outline of the fluid, cut at the walls.
