@@ -228,7 +228,7 @@ class BrickCells {
 };
 
 /// Sorts the particles of a brick, [first, last) of `sorted`, and finds the first particle of each
-/// cell: counts the particles of each cell, moves them there, and sorts each cell.
+/// cell. Counts the particles of each cell, moves them there, and sorts each cell.
 void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBins& bins,
                std::uint32_t brick) {
   const auto before = [&](const SpaceBins::Keyed& a, const SpaceBins::Keyed& b) {

@@ -30,7 +30,7 @@ struct Body {
   double volume = 0;            ///< Volume of `particles`, world units cubed.
   BodyFate fate = BodyFate::kWhole;
   bool is_complete = false;  ///< A cut body that lacks no part. Only in a box that wraps.
-  /// Of a cut or dropped image: the smallest index among all images of the body. Else its own
+  /// For a cut or dropped image: the smallest index among all images of the body. Else its own
   /// index. ChooseImages gives all images the particles and the volume of the whole body.
   std::uint32_t first_image = kNoIndex;
 };

@@ -1,5 +1,5 @@
 // Kernel sums at nodes and points, in vectors. Every instruction set gives the same bits, because
-// the order of each sum is fixed. Symbols are those of Sums and Slopes (level_set.h).
+// the order of each sum is fixed. Symbols are as in Sums and Slopes (level_set.h).
 #pragma once
 
 #include <array>

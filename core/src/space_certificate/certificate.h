@@ -66,8 +66,8 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// What happens to a body before CertifyAgain: nothing; its positions are saved as the best; it
-/// returns to the saved positions.
+/// The change of a body before CertifyAgain: none; its positions are saved as the best; it returns
+/// to the saved positions.
 enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
 
 /// Finds the body of each node that may move. Requires: Certify.

@@ -19,7 +19,7 @@ namespace partiemc::space {
 
 /// Measures of a body, in the units of the measured positions.
 struct BodyMeasure {
-  double area = 0;    ///< Of all its shells. With own sizes, each part times the local size.
+  double area = 0;    ///< Area of all its shells. With own sizes, each part times the local size.
   double volume = 0;  ///< Without its cavities.
 };
 

@@ -11,7 +11,7 @@ struct ClipBox {
 };
 
 struct ClippedMeasure {
-  double area = 0;    ///< Of the triangle in the box.
+  double area = 0;    ///< Area of the part of the triangle in the box.
   double volume = 0;  ///< Summed over a closed surface: the volume that it encloses in the box.
 };
 

@@ -234,7 +234,7 @@ bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit)
   return true;
 }
 
-/// Lists the taken drops by brick. Those that reach too many bricks are no longer taken.
+/// Lists the taken drops by brick. Drops that reach too many bricks are no longer taken.
 void ListDrops(double cell_size, Drops& drops) {
   drops.bricks.Clear();
   drops.reaches.clear();

@@ -47,7 +47,7 @@ struct Drops {
     std::uint32_t body = kNoIndex;      ///< kNoIndex: a particle without a body.
     std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
-    double volume = 0;   ///< Of its particles, images included. In cells cubed, as the moments.
+    double volume = 0;   ///< Volume of its particles, images included. The unit is a cell.
     Vec3 origin, first;  ///< A place in the drop; the first moment relative to it.
     /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls.
     std::array<double, 6> second{};
@@ -55,8 +55,8 @@ struct Drops {
     /// particle without a body. World units.
     Box box;
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
-    std::uint32_t first_point = 0;   ///< Of the ellipsoid in `points`.
-    std::uint32_t first_vertex = 0;  ///< Of the ellipsoid in the positions, if it is taken.
+    std::uint32_t first_point = 0;   ///< First index in `points`.
+    std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
   std::vector<Drop> drops;
 

@@ -1,5 +1,5 @@
 // Weighted sums over windows of loops, in vectors. Every instruction set gives the same bits,
-// because the order of each sum is fixed. Symbols are those of loop_filters.h.
+// because the order of each sum is fixed. Symbols are as in loop_filters.h.
 #pragma once
 
 #include <array>
