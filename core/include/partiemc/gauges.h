@@ -44,8 +44,8 @@ enum class GaugeKind {
   kPacking,
 };
 
-/// A measurement to make. Lengths are in world units. x and y are the coordinates of results; for a
-/// slice, they run along the axes of its plane.
+/// A measurement to make. Lengths are in world units. x and y are the coordinates of results, for a
+/// slice along the axes of its plane. Heights are measured along y.
 struct Gauge {
   std::string name;  ///< 1 to 40 ASCII letters, digits and "_".
   GaugeKind kind = GaugeKind::kHeight;

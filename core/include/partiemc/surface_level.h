@@ -19,8 +19,8 @@ struct LevelOfDetail {
   /// Limit of the root mean square distance of the level to the exact surface, in spacings, in
   /// (0, 1]. No removed point is farther than twice this from the level.
   std::optional<double> max_error;
-  /// Limit of triangles; at least 1. The level has the smallest error, of a fixed list up to 0.35,
-  /// that meets the limit. If none does, the level has error 0.35 and more triangles.
+  /// Limit of triangles; at least 1. The level has the smallest error that meets the limit, of 0
+  /// and a fixed list up to 0.35. If none does, the level has error 0.35 and more triangles.
   std::optional<std::uint64_t> max_triangles;
 
   friend auto operator<=>(const LevelOfDetail&, const LevelOfDetail&) = default;

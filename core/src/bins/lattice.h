@@ -38,8 +38,8 @@ class TileDirectory {
   /// Removes all tiles; keeps the memory.
   void Clear();
 
-  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant on
-  /// average.
+  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant unless
+  /// coordinates are chosen so that their hashes collide.
   std::uint32_t Insert(TileCoordinate tile);
 
   /// Sorts the tiles. The index of a tile is then its position in the sorted order. Insert appends
