@@ -28,7 +28,7 @@ using partiemc::kReasonResolution;
 /// v1::CoordinateFormat.
 enum class Coordinates : std::uint8_t { kFloat64, kRelativeFloat32, kCompact };
 
-/// The requested outputs (v1::Outputs). The defaults are those of an absent message.
+/// The requested outputs (v1::Outputs). Defaults as for an absent message.
 struct Outputs {
   bool rings = true;
   bool mesh = true;
