@@ -64,8 +64,8 @@ class RetryLoop {
   /// From Lose to Recovered.
   bool lost() const { return backoff_.has_value(); }
 
-  /// Makes attempts until one has opened a call, but no longer than `until`. Requires lost().
-  /// Errors: from `attempts`.
+  /// Makes attempts until one has opened a call. Returns kNotYet at `until`, kGaveUp when
+  /// ReconnectPolicy::give_up_after has passed. Requires lost(). Errors: from `attempts`.
   absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<TimePoint> until);
 
   /// Requires lost().

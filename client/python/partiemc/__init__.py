@@ -68,8 +68,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
     simplify: for output "surface": fewer triangles, within this error in spacings, in [0, 1]; .05
         leaves a third of the triangles of large bodies. 0 by default.
-    thinning_distance: for output "surface": drops points on lattice edges that are at most this many
-        spacings from the triangles without them. 0.03 by default, 0 keeps all.
+    thinning_distance: for output "surface": drops a point on a lattice edge if the triangles without it
+        pass within this many spacings of it. 0.03 by default, 0 keeps all.
     max_drop_particles: for output "surface": bodies of up to this many particles become ellipsoids. 30
         by default, 0: none.
     min_component_volume: for output "surface": drops bodies with less particle volume, in cubed

@@ -129,11 +129,11 @@ typedef struct partiemc_options {
   const char* output; /* "outline" or "surface"; NULL: outline. Surfaces require `spacing`, and
                          particles that have x, y and z and fill space. Each section then needs a
                          slice. */
-  /* Surfaces only: drops points on lattice edges that are at most this many spacings from the
-   * triangles without them. 0: the default, .03; negative: none. */
+  /* Surfaces only: drops a point on a lattice edge if the triangles without it pass within this
+   * many spacings of it. 0: the default, .03; negative: drops none. */
   double thinning_distance;
   int64_t max_drop_particles; /* Surfaces only: bodies of up to this many particles become
-                                 ellipsoids. 0: the default, 30; negative: none. */
+                                 ellipsoids. 0: the default, 30; negative: no body. */
   double simplify; /* Surfaces only: removes points while the error stays below this many spacings,
                       in [0, 1]; .05 leaves a third of the triangles of large bodies. */
   double min_component_volume; /* Surfaces only: drops bodies with less particle volume, in cubed
@@ -355,7 +355,7 @@ typedef struct partiemc_event {
   const uint8_t* triangle_classes; /* 0: in the band along the outline, 1: inside. */
 
   uint64_t particle_count;
-  double area, perimeter;             /* Sums over rings; `area` also over shells. */
+  double area, perimeter;             /* Sums over rings; with a surface `area` is its area. */
   double spacing, cell_size;          /* As used in this frame, world units. */
   double milliseconds;                /* Computation time. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
@@ -363,7 +363,7 @@ typedef struct partiemc_event {
   size_t attribute_count; /* Attributes of the options, in that order; not the phases. */
   const partiemc_values* attributes;
 
-  size_t section_count; /* Results: sections and phases of the options. */
+  size_t section_count; /* Results: number of sections and phases (partiemc_event_section). */
 
   /* Results of streams with the output "surface"; otherwise NULL and 0. Such results have no rings
    * and no mesh. */

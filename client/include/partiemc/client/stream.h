@@ -96,7 +96,7 @@ struct StreamOptions {
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Labels, shown in lists of streams. At most 16; each at most 128 bytes without control
+  /// Shown in lists of streams. At most 16; keys and values have at most 128 bytes and no control
   /// characters.
   std::map<std::string, std::string> labels = {};
   /// TLS, certificates and token. Loopback and Unix sockets need none unless the server requires
