@@ -54,7 +54,7 @@ struct Workspace::Buffers {
   SpacingScratch spacing;
   LiftScratch lift;  // Empty without a periodic box.
   BodyChoice choice;
-  RingCutScratch ring_cut;   // Empty unless bodies percolate.
+  RingCutScratch ring_cut;   // Empty unless bodies are cut.
   NoiseFilterScratch noise;  // Empty without a noise filter.
   Slab slab;
   ParticleBins bins;
@@ -78,7 +78,7 @@ struct Workspace::Buffers {
   RingHistory next_history;
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
-  std::vector<AttributeValues> node_attributes;  // At the nodes around interior cells.
+  std::vector<AttributeValues> node_attributes;  // At the nodes where blocks are tested.
   std::vector<NextState> next_states;            // By outline: the main one, then the sections.
   LastOutline last;
   Phases phases;                      // Empty unless sections have phases.

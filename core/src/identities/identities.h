@@ -50,7 +50,7 @@ struct IdentityInput {
   const Crossings& crossings;
   const RingTopology& topology;
   const PlacedVertices& placed;
-  double cell_size;
+  double cell_size;  ///< World units.
   LatticePeriods periods = {};
   const Percolation* percolation = nullptr;  ///< Null: the frame has no copies.
   ParticleSubset subset = {};                ///< Other particles are ignored.

@@ -53,7 +53,7 @@ struct BodyChoiceInput {
 /// - If the chosen image lacks particles of the body, all images are cut, too. Bodies less than a
 ///   cell apart may be one component in one image and two in another.
 /// In `topology`, the images of cut bodies keep only their given particles, and spray is counted.
-/// Requires: TraceRings has kept the spray.
+/// Requires: TraceRings has kept the spray. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);
 
 }  // namespace partiemc

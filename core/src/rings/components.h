@@ -51,8 +51,8 @@ class Components {
                          Visit visit) const;
 
   /// Adds the number of particles of each component to `counts`, and the sum of their weights to
-  /// `weights`, unless weights are uniform. Both have size() elements. Parallel over tiles. Only
-  /// tiles with several components examine their particles one by one.
+  /// `weights`, unless weights are uniform. Both have size() elements. Parallel over tiles.
+  /// Components of single particles are searched only in tiles with several components.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
                       std::span<std::uint64_t> counts, std::span<double> weights);
 

@@ -39,12 +39,12 @@ class WallField {
   std::size_t PairCount() const { return pair_count_; }
   std::size_t TileCount() const { return near_count_; }
 
-  /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles;
-  /// endless lines times tiles.
+  /// Finds the tiles near walls and the tiles in solids. Cost: near-linear in pairs, lines and
+  /// tiles, and in the product of tiles and long lines.
   void FindTiles(const TileDirectory& directory);
 
-  /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the nodes
-  /// near walls times the lines near their tiles.
+  /// Replaces F at the nodes of the tiles near walls and in solids. Parallel over tiles. Cost:
+  /// linear in these nodes, near walls times the lines near their tiles.
   void Apply(const TileDirectory& directory, double spacing, LevelSet& level_set);
 
   const WallLines& lines() const { return lines_; }
