@@ -1,7 +1,7 @@
 // Wraps runs of lattice nodes into a periodic box.
 //
-// A period need not be a whole number of cells, so a node moves by the nearest whole number. Bodies
-// are farther apart than a cell, so this never moves a node into another body.
+// A period need not be a whole number of cells, so a node moves by the nearest whole number. The
+// error of half a cell hardly changes the number of nodes that two rings share.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,8 @@ inline std::int64_t WrapOf(double period, std::int64_t at) {
   return static_cast<std::int64_t>(std::floor(image * period + 0.5));
 }
 
-/// Splits the run [first, last] at the faces of boxes, and calls visit(first, last) for each part,
-/// wrapped.
+/// Splits the run [first, last] at the faces of boxes. Calls visit(first, last) for each wrapped
+/// part.
 template <typename Visit>
 void ForEachWrapped(double period, std::int64_t first, std::int64_t last, const Visit& visit) {
   if (period == 0) {
