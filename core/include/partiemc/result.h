@@ -45,16 +45,16 @@ struct Rings {
   /// merge has several. After a split, several rings have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< Like `offsets`; {0} without identities.
-  /// Points, ascending, whose segment to the next point of the ring lies on a face of the periodic
-  /// box, where a body was cut (ReconstructionParameters::box).
+  /// Indices of points, ascending, whose segment to the next point of the ring lies on a face of
+  /// the periodic box, where a body was cut (ReconstructionParameters::box).
   std::vector<std::uint32_t> cuts;
-  /// Points, ascending, whose segment to the next point of the ring lies on a wall
+  /// Indices of points, ascending, whose segment to the next point of the ring lies on a wall
   /// (ReconstructionParameters::walls, wall_phases). Where rings crossed, their repair may have
   /// moved an end of this segment off the wall.
   std::vector<std::uint32_t> wetted;
-  /// Points, ascending, where the outline of a body meets a wall, or where a phase meets two other
-  /// phases, or one and the outside (core/PHASES.md). `contact_angles` has one angle per contact,
-  /// of the fluid or of the phase, in radians, in [0, 2 pi].
+  /// Indices of points, ascending, where the outline of a body meets a wall, or where a phase meets
+  /// two other phases, or one and the outside (core/PHASES.md). `contact_angles` has one angle per
+  /// contact, of the fluid or of the phase, in radians, in [0, 2 pi].
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

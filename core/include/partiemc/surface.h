@@ -16,7 +16,7 @@ namespace partiemc {
 struct ShellMeasures {
   double area = 0;    ///< World units squared, without the triangles of Surface::cuts.
   double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
-  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the enclosed volume.
+  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the volume, world units.
   std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
   /// The shell that continues this shell in the next frame has the same identity. Distinct within a
   /// frame, never reused in a stream (core/SURFACES.md, "Identities").
@@ -59,7 +59,7 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, on walls (ReconstructionParameters::wall_planes) or on faces of the
+  /// Indices of triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the
   /// periodic box, where a body was cut. They close the surface; areas do not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`

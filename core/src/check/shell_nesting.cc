@@ -239,7 +239,7 @@ std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit
   }
   work.Finish();
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
-    // The innermost of the shells around `shell` lies in all others, so most shells contain it.
+    // The innermost of these shells lies in all others, so more shells contain it than any other.
     for (const std::uint32_t other : containing[shell]) {
       if (around[shell] == kNoShell ||
           containing[other].size() > containing[around[shell]].size()) {

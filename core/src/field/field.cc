@@ -64,7 +64,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     values.fill(0);
     return;
   }
-  // Fetches the memory that is written at the end: the sums take longer than this fetch.
+  // Prefetches the values that are written at the end: the sums take longer than this fetch.
   PrefetchLines(std::span<const float>(values));
   alignas(64) NodeSums sums;
   sums.fill(0);
@@ -85,8 +85,8 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
   }
 }
 
-// First part of the second pass: completes the density at every node and sets the sides that the
-// density decides.
+// First part of the second pass: adds the density from neighbouring tiles, and sets the sides that
+// the density decides.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();

@@ -210,7 +210,7 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
     return Refused("boundary", std::string(Name(p.boundary)), "must be bulk for a surface");
   }
   if (p.sizes == Sizes::kOwn && !is_isoline) {
-    // An absent spacing is the smallest diameter.
+    // Without a spacing, the smallest grain is the spacing, 2 / cell_size cells wide.
     if (p.spacing || p.cell_size * p.kSmallestGrain <= 2) return absl::OkStatus();
     return OutOfRange("cell_size", p.cell_size,
                       "must be at most 1.408 half spacings for grains without a spacing");
@@ -236,7 +236,7 @@ absl::Status CheckSurface(const ReconstructionParameters& p) {
       !status.ok()) {
     return status;
   }
-  // A larger error removes what the particles show.
+  // A larger error would remove details as large as particles.
   if (!Within(p.surface.simplify, 0, 1)) {
     return OutOfRange("surface.simplify", p.surface.simplify, "must be in [0, 1] spacings");
   }
