@@ -41,7 +41,7 @@ struct OfferHooks {
 /// the simulator must soon receive an error, set ReconnectPolicy::give_up_after to kShortPatience.
 ///
 /// Two frames wait in addition to the window: one that is being sent and the newest one. Their
-/// memory is reused. Another thread receives events from the stream as usual. `time` or the order
+/// memory is reused. Any one thread receives events from the stream as usual. `time` or the order
 /// of `OfferHooks::sending` identifies the frame of a result.
 class LatestSender {
  public:

@@ -142,7 +142,7 @@ void main() {
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
-/** Nothing but its depth is drawn. */
+/** The colour does not matter: the cut face writes its depth only. */
 export const CUT_FACE_FRAGMENT = `
 void main() {
   gl_FragColor = vec4(0.0);

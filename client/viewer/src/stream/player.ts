@@ -1,4 +1,4 @@
-/** Sequences of the available frames. */
+/** Sequences of the first and the last available frame. */
 export interface Range { first: number; last: number }
 
 /** `live` follows the newest frame at a fixed latency; `playing` continues from any position. */

@@ -231,7 +231,7 @@ export class App {
     if (!pane) return;
     this.status.report('', false);
     // If the pane shows dropped files, only the first pane of these files reopens their stream with
-    // the new settings. The other panes request single frames from the server.
+    // the new settings. Each other pane has a temporary stream for its settings (VariantStream).
     const isFirst = this.stage.panes.find(({ track }) => track === pane.track) === pane;
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);

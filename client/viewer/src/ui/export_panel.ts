@@ -46,7 +46,7 @@ export class ExportPanel {
       downloadCurves(curves, track.title, gauges, hasSurfaces);
     });
     button('export-clip').addEventListener('click', () => {
-      // The picture that is recorded may be closed by now.
+      // Works without a chosen picture, because the recorded one may be closed by now.
       if (this.recording) this.run(this.stopClip(this.recording));
       else this.withPicture(async (shown) => this.startClip(shown));
     });

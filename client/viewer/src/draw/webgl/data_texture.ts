@@ -1,4 +1,4 @@
-/** Texels per row, which every WebGL2 supports. `at` in the shaders uses its logarithm. */
+/** Texels per row, which every WebGL2 supports. `at` in the shaders (program.ts) contains its logarithm. */
 const WIDTH = 2048;
 
 /** Factor of spare rows, so that a growing stream rarely reallocates. */
