@@ -14,8 +14,7 @@ namespace partiemc {
 /// not moved.
 inline constexpr double kMaxShift = 1u << 31;
 
-/// The lower median: a few stray particles hardly change it. Reorders `values`. Requires: not
-/// empty.
+/// The lower median, which stray particles hardly change. Reorders `values`. Requires: not empty.
 std::int64_t MedianOf(std::vector<std::int64_t>& values);
 
 /// A piece of the last frame, and a piece of this frame that may continue it. Both are outer rings

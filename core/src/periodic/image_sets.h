@@ -50,9 +50,8 @@ class ImageSets {
     return {node, image};
   }
 
-  /// Joins the sets of two found nodes, so that the node of `b` lies `offset` beyond the node of
-  /// `a`. Requires: different roots. The smaller root remains, so the roots depend only on the
-  /// sets.
+  /// Joins the sets of two nodes, so that node `b` lies `offset` beyond node `a`. Requires:
+  /// different roots. The smaller root remains, so the roots depend only on the sets.
   void Join(const Found& a, const Found& b, const Image& offset) {
     const Image of_root = a.image + offset - b.image;  // Of b's root, seen from a's root.
     if (a.root < b.root) {

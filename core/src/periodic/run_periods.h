@@ -29,8 +29,7 @@ inline std::int64_t WrapOf(double period, std::int64_t at) {
   return static_cast<std::int64_t>(std::floor(image * period + 0.5));
 }
 
-/// Splits the run [first, last] at the faces of boxes. Calls visit(first, last) for each wrapped
-/// part.
+/// Splits the run [first, last] at faces of boxes. Calls visit(first, last) for each wrapped part.
 template <typename Visit>
 void ForEachWrapped(double period, std::int64_t first, std::int64_t last, const Visit& visit) {
   if (period == 0) {
