@@ -19,7 +19,7 @@ namespace partiemc::python {
 class PythonParticles {
  public:
   /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes`: N.
-  /// `ids`: N integers of 32 or 64 bits, never converted. `velocities`: like positions.
+  /// `ids`: N integers of 32 or 64 bits; others are refused. `velocities`: like positions.
   /// `attributes`: a dict from names to (N,), (N, 2), (N, 3), or tuples. `box`: see BoxOf. None:
   /// absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,

@@ -109,8 +109,8 @@ struct StreamOptions {
   std::chrono::milliseconds deadline{30000};
   /// Maximum time that Send waits for a slot in the window, even while the connection is lost. A
   /// frame that gets no slot is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream
-  /// continues. If absent, or if longer than the following time: Send waits for `deadline`, after a
-  /// loss `reconnect.give_up_after` longer; then the stream ends.
+  /// continues. Set or not, Send waits at most `deadline`, while the connection is lost
+  /// `reconnect.give_up_after` longer; then the stream ends.
   std::optional<std::chrono::milliseconds> send_timeout = {};
   /// Servers to fail over to, in addition to the address of Open. Their version must be the same,
   /// their limits at least as large. Behind a proxy one address is enough.
