@@ -47,7 +47,7 @@ struct Bodies {
     std::uint32_t brick;
     std::uint32_t body;  // Index of the body; in JoinParts: the parent part.
   };
-  std::vector<Part> parts;             ///< By brick.
+  std::vector<Part> parts;             ///< Sorted by brick.
   std::vector<std::uint32_t> first;    ///< By brick: its first part; then the number of parts.
   std::vector<std::int64_t> lowest_z;  ///< Scratch: by body.
 

@@ -48,7 +48,7 @@ struct LoopTriangles {
   std::array<std::array<std::uint8_t, 3>, kMostCrossings - 2> corners{};
 };
 
-/// The triangles of marching cubes for a loop of up to six crossings.
+/// The triangles of marching cubes for a loop of up to six crossings of a case.
 const LoopTriangles& TrianglesOf(unsigned corners, int loop);
 
 /// The axis of an edge and its lower corner; EdgeAt returns the edge that has both.

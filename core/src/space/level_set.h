@@ -117,9 +117,8 @@ inline LevelSetAt LevelSetOf(const Sums& sums, const Scale& scale) {
   return at;
 }
 
-/// The gradient of phi = |m| - r_0 with m = (sum k D) / (sum k); 0 if m is 0. Leaves out the factor
-/// of the local size. With n = m / |m|: (sum (D . n) grad k - |m| sum grad k) / (sum k) - per_size
-/// n.
+/// The gradient of phi = |m| - r_0, m = (sum k D) / (sum k), without the factor of the local size;
+/// 0 if m is 0. With n = m / |m|: (sum (D . n) grad k - |m| sum grad k) / (sum k) - per_size n.
 inline Vec3 GradientOfPhi(const Sums& sums, const Slopes& slopes, const Scale& scale) {
   const double length = Length(sums.first);
   if (length == 0) return {};

@@ -80,8 +80,7 @@ void FindBodyOfNodes(const BrickDirectory& bricks, const SpaceCrossings& crossin
 void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
                           std::span<const BodyStep> steps, Certificate& certificate);
 
-/// The number of faces without a valid mode or with another mode than in `certificate.modes`: 0
-/// after Certify. For tests.
+/// The number of faces without a valid mode or with another mode than in `modes`; 0 after Certify.
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate);

@@ -88,8 +88,8 @@ bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
 void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
 /// MatchVolumes as a step of a search. A body whose error has grown returns to its best positions
-/// and stays there. Errors grow if the certificate sets vertices back, which happens to most sheets
-/// of one layer. With `step.limit` 0, bodies only return. Returns whether a body has moved.
+/// and stays there. Errors can grow because the certificate sets vertices back, in sheets of one
+/// layer after most steps. With `step.limit` 0, bodies only return. Returns whether a body moved.
 /// Requires: BeginSearch before the first step, MeasureTriangles before each.
 bool SearchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                    BodyVolumes& volumes, std::vector<Vec3>& positions);

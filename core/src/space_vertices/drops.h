@@ -47,7 +47,7 @@ struct Drops {
     std::uint32_t body = kNoIndex;      ///< kNoIndex: a particle without a body.
     std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
-    double volume = 0;   ///< Volume of its particles, images included. The unit is a cell.
+    double volume = 0;   ///< Cells cubed; of its particles, images included.
     Vec3 origin, first;  ///< A place in the drop; the first moment relative to it.
     /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls.
     std::array<double, 6> second{};

@@ -18,8 +18,8 @@ struct TangentPlane {
   Vec3 point, normal;  ///< The normal has length 1.
 };
 
-/// The point x that minimises the sum over the planes of (n . (x - e))^2, plus .05 |x - mean|^2. A
-/// plane passes through e and has the normal n.
+/// The point x that minimises sum (n . (x - e))^2 + .05 |x - mean|^2 over planes through points e
+/// with normals n.
 Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean);
 
 /// Sets the normals of vertices on edges to the direction of the gradient. Moves each vertex in a

@@ -41,8 +41,7 @@ enum class NormalWeights {
   kSphere,
 };
 
-/// Sets each normal to the normalised weighted sum of the normals of its triangles; (0, 0, 1) if
-/// the sum is 0.
+/// Sets each normal to the normalised weighted sum over its triangles; (0, 0, 1) if the sum is 0.
 void NormalsFromTriangles(NormalWeights weights, const std::vector<Vec3>& positions,
                           const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals);
 
