@@ -31,8 +31,7 @@ std::int64_t Quantised(double cells) {
   return whole - static_cast<std::int64_t>(static_cast<double>(whole) > value);
 }
 
-/// A position in its brick as a number: first the cell, then the fractions, so that keys sort by
-/// cell.
+/// A position in its brick as a number that sorts by cell: first the cell, then the fractions.
 std::uint64_t KeyOf(const std::array<std::int64_t, 3>& at) {
   std::uint64_t key = 0;
   for (int axis = 2; axis >= 0; --axis) {
@@ -154,7 +153,7 @@ void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   }
 }
 
-/// Adds the bricks within `reach` of the box around the particles of each brick; with own sizes,
+/// Adds the bricks within `reach` of the box around the particles of each brick. With own sizes,
 /// particles reach farther by (size - 1) kernel radii. Returns false if there are more than `most`.
 bool AddReachedBricks(double reach, float kernel_radius, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();

@@ -23,8 +23,7 @@ constexpr std::array<std::array<int, 3>, 9> kBefore = {{{-1, 0, 0},
                                                         {0, -1, -1},
                                                         {0, 1, -1}}};
 
-/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has at least one
-/// such node.
+/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has one at least.
 void FindFirstNodes(const BrickDirectory& bricks, const SpaceField& field,
                     std::vector<BrickBits>& first_nodes) {
   first_nodes.resize(bricks.size());

@@ -114,7 +114,7 @@ void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<
     if (any == 0) return;
     EvaluateBrick(bins, scale, brick, rows, missing, field);
     // The density of SampleBrick decided whether a node is inside. At f_0 and f_1, rounding may
-    // give F another sign here, so F is then set to the nearest value with the right sign.
+    // give F another sign here. F is then set to 0 outside, and to just below 0 inside.
     for (int layer = 0; layer < kBrickSize; ++layer) {
       for (std::uint64_t bits = missing[layer]; bits != 0; bits &= bits - 1) {
         const int bit = std::countr_zero(bits);

@@ -19,8 +19,7 @@ void ForEachCurve(const SpaceCrossings& crossings, const ActiveCell& cell, int l
   }
 }
 
-/// The origin of the sums of a body, in cells. It is near, so that the sums lose no digits far from
-/// the origin of the world.
+/// The origin of the sums of a body, in cells. It is near the body, so that sums lose no digits.
 Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
   const BrickPlace& at = body.lowest;
   return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};

@@ -164,7 +164,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       drop.particle = p;
       AddParticle(at, volume, drop);
       drop.particles = 1;
-      // This node is outside and has not moved, so no surface encloses it.
+      // This node is outside and has not moved, so it is still outside of all bodies.
       const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
       drop.box = {corner, corner};
     }

@@ -167,8 +167,8 @@ class ChunkSearch {
   void GrowWindows() {
     std::fill_n(found_.begin(), count_, std::uint64_t{0});
     for (std::size_t k = 0; k < ends_.count; ++k) found_[k] = std::uint64_t{1} << k;
-    // Near loops are in the order of their number of links from the chunk. With alternating
-    // directions, few passes reach all of them.
+    // Near loops are in the order of their links from the chunk, so that few passes in alternating
+    // directions reach all of them.
     for (bool is_up = true, has_grown = true; has_grown; is_up = !is_up) {
       has_grown = false;
       for (std::size_t n = 0; n < count_; ++n) {
