@@ -1,4 +1,4 @@
-// What streams and watches share: waiting for events, and addresses.
+// Helpers of streams and watches: waiting for events, and addresses.
 #pragma once
 
 #include <pybind11/pybind11.h>

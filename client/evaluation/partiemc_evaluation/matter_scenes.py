@@ -174,7 +174,7 @@ def _half_plane(x: float, y: float, angle: float) -> Any:
 
 
 def _phase_regions(kind: str, center: Points, rng: Rng) -> list[Any]:
-    """A region around `center` for each phase but the first one, which has the rest of the body."""
+    """A region around `center` for each phase except the first. The first phase fills the rest of the body."""
     (x, y), angle = center, rng.uniform(0, 2 * np.pi)
     half = _half_plane(x, y, angle)
     if kind == "straight":

@@ -66,7 +66,7 @@ def _frame(fields: dict[int, Any]) -> Frame:
 
 
 def read_recording(path: pathlib.Path, notes: list[str], frames: slice = slice(None)) -> Sequence:
-    """Reads a .pemc file, and NAME.truth beside NAME.pemc if there is one.
+    """Reads NAME.pemc, and NAME.truth in the same folder if it exists.
 
     A spacing that the file lacks is estimated from the first frame, and `notes` says so. Raises ValueError with the
     file's name.

@@ -50,8 +50,8 @@ class Method:
 
 
 def all_methods(steps: bool = False, sensitivity: bool = False) -> list[Method]:
-    """The baseline first, then the other placements and two variants; on request the default without each of its
-    steps, and with each of its constants times 0.7 and 1.4."""
+    """The baseline first, then the other placements and two variants. steps: also the default without each of its
+    steps. sensitivity: also the default with each of its constants times 0.7 and 1.4."""
     def changed(name: str, remark: str, kind: str, value: dict[str, Any], is_step: bool = True) -> Method:
         return Method(f"{DEFAULT}-{name}", {"placement": DEFAULT, "_research": {kind: value}}, remark, is_step,
                       value == {"area": False})
@@ -204,7 +204,7 @@ def _summary(frames: list[dict[str, float]]) -> dict[str, float]:
 
 @dataclass
 class Study:
-    """All rows, by sequence, then method, then what was given; recordings last."""
+    """All rows, ordered by sequence, then method, then `given`; recordings last."""
     methods: list[Method]
     given: list[str]
     rows: list[Row]

@@ -164,8 +164,8 @@ typedef struct partiemc_options {
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
-  /* The phases (`phase_attribute`) of the particles of walls. Their outline is a further wall. At
-   * most 16. Excludes what `walls` exclude. */
+  /* Phases (`phase_attribute`) whose particles are walls. The outline of these particles is a
+   * further wall. At most 16. Excludes the same options as `walls`. */
   const int32_t* wall_phases;
   size_t wall_phase_count;
   /* Walls at which a surface is cut, at most one for each side of each axis. Excludes outlines,
@@ -227,7 +227,7 @@ typedef struct partiemc_particles {
   partiemc_array ids;     /* Optional: the same number for a particle in every frame. */
   /* Optional: world units per unit of time, in the components of the coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
-  /* Optional: only those named in the options are used. */
+  /* Optional: only attributes named in the options are used. */
   const partiemc_attribute* attributes;
   size_t attribute_count;
   const double* box; /* Optional: the periodic box of this frame, as in the options, with the same

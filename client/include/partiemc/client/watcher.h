@@ -27,7 +27,7 @@
 namespace partiemc::client {
 
 enum class WatchMode : std::uint8_t {
-  kLatest,  ///< The newest frame when a credit is free; the others are dropped and counted.
+  kLatest,  ///< The newest frame when a credit is free; older ones are dropped and counted.
   kEvery,   ///< Every frame; a slow watcher is disconnected.
 };
 
@@ -82,8 +82,8 @@ struct WatchedFrame {
   std::uint64_t sequence = 0;  ///< Number of the producer's frame.
   double time = 0;
   FrameResult frame;
-  /// Set if the surface is a level of detail. Statistics, digests, measures and identities are
-  /// those of the exact surface.
+  /// Set if the surface is a level of detail. Statistics, digests, measures and identities describe
+  /// the exact surface.
   std::optional<SurfaceLevel> level;
   /// x0, y0, x1, y1, ... in the stream's plane, or x0, y0, z0, ... if the stream has surfaces;
   /// empty unless the producer echoes its particles.

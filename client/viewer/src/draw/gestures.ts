@@ -1,4 +1,4 @@
-/** What the gestures on a canvas change. All lengths are in CSS pixels. */
+/** The effects of gestures on a canvas. All lengths are in CSS pixels. */
 export interface Gestures {
   /** A pointer is pressed. False ignores it. */
   press(event: PointerEvent): boolean;

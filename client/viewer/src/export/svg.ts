@@ -133,7 +133,7 @@ function outline(
     stroke(path, colour, look.lineWidth, 1));
 }
 
-/** The particles, in one colour or in those of an attribute. */
+/** The particles, in one colour or in the colours of an attribute. */
 function dots(
   { particleAttributes }: Frame, particles: Float32Array, look: Look, range: Range | null,
   diameter: number, at: Projection,

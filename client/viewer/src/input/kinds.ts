@@ -30,7 +30,7 @@ const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?:
   },
 ];
 
-/** Why a file is refused, and what to do. */
+/** The reason why a file is refused, and a remedy, as sentences. */
 export function refusalOf(name: string, head: FileHead): string {
   const kind = KINDS.find(({ matches }) => matches(head));
   if (!kind) return `${name} is of an unknown kind. The page reads ${READABLE}.`;

@@ -14,7 +14,7 @@ export interface FrameSource {
   readonly slices: readonly SectionPlane[];
   /** Names of scalars that every frame has. */
   readonly scalars: string[];
-  /** What the user must know about the files, such as their truncation; empty without it. */
+  /** A warning about the files for the user, such as their truncation; empty without one. */
   readonly notice: string;
   /** Reads frame `index`, starting at 0. Throws InputError. */
   frame(index: number): Promise<Particles>;

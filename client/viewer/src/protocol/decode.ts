@@ -156,7 +156,7 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
   };
 }
 
-/** Decodes a section. Its message has neither sequence nor time, so both are those of the frame. */
+/** Decodes a section. Its message has neither sequence nor time, so it gets both from the frame. */
 function decodeSection(section: ReconstructedFrame, { sequence, time }: ReconstructedFrame): Frame {
   return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }

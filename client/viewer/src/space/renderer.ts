@@ -131,8 +131,8 @@ class Drawing implements SpaceDrawing {
   private readonly inside: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
   /**
-   * The depth of the clip plane where it cuts a body, so that the cut face hides what is in the body. The surface
-   * draws its colour: `inside` sets the stencil, and `outside` clears it, so it remains where the inside is in front.
+   * Writes the depth of the clip plane where it cuts a body, so that the cut face hides the content of the body. The
+   * surface draws its colour. `inside` sets the stencil, `outside` clears it: it stays set where the inside is in front.
    */
   private readonly cutFace = new Mesh(new PlaneGeometry(2, 2), new ShaderMaterial({
     vertexShader: CUT_FACE_VERTEX, fragmentShader: CUT_FACE_FRAGMENT, side: DoubleSide, colorWrite: false,

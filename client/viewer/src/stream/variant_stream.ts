@@ -41,7 +41,7 @@ export function nextOf(history: Pick<History, 'after'>, last: number, target: nu
  * The frames of a track with other settings: a temporary stream on the server, with its own state,
  * identities, curves and times. Sends the particles of the track in order, from WARM_UP frames before
  * the one shown, and skips frames if it is MOST_BEHIND behind. Starts again if the player stays at a
- * frame before the first one.
+ * frame before the first frame sent.
  */
 export class VariantStream implements CurveSource {
   readonly history = new History(HISTORY_BYTES);

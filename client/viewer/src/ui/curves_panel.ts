@@ -219,7 +219,7 @@ export class CurvesPanel {
     this.showCaptions();
   }
 
-  /** The values at the pointer, or else those under the picture, in the colours of the lines. */
+  /** Writes the values at the pointer, or else of the frame shown, in the colours of the lines. */
   private showCaptions(): void {
     const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     for (const { curve: { title, lines, isWide, total }, caption } of this.items) {

@@ -55,7 +55,7 @@ export class ExportPanel {
     });
   }
 
-  /** Offers only what the browser can export. */
+  /** Enables the exports that the browser and the kind of picture allow. */
   offer(hasWebgl: boolean, isSpace: boolean): void {
     for (const id of ['export-svg', 'export-geojson']) block(button(id), isSpace ? OF_OUTLINES : '');
     const png = button('export-png');

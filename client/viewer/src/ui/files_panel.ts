@@ -31,7 +31,7 @@ export interface FilesEvents {
 export class FilesPanel {
   private readonly form: FileForm;
   private readonly closed: OpenFile[] = [];
-  /** The file that the form asks about. */
+  /** The file for which the form shows an error; null for none. */
   private asked: FileInput | null = null;
 
   constructor(private readonly events: FilesEvents) {
@@ -104,7 +104,7 @@ export class FilesPanel {
     }
   }
 
-  /** Opens a file. Asks for an option that is missing or wrong. */
+  /** Opens a file. If an option is missing or wrong, shows the form with the error. */
   private async open(file: OpenFile): Promise<void> {
     try {
       const source = await file.input.open(file.options);

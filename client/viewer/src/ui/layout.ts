@@ -4,7 +4,7 @@ const KEY = 'partiemc-side';
 /** Widest screen of the layout for phones, as in page.css. */
 const PHONE = '(max-width: 600px)';
 
-/** Whether an address asks for the picture and its time alone. */
+/** Whether an address requests only the picture and its time. */
 export function isEmbedded(search: string): boolean {
   return new URLSearchParams(search).has('embed');
 }

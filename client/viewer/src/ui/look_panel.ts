@@ -228,7 +228,7 @@ export function rangeOf(from: number | null, to: number | null): Pick<Look, 'fro
   return from !== null && to !== null && from >= to ? { from: null, to: null } : { from, to };
 }
 
-/** The channels to offer: those of the frame, of earlier frames, and the chosen one. */
+/** The channels to offer: `known` (of this frame and earlier frames of the track), and the chosen one. */
 export function offeredChannels(known: Iterable<string>, chosen: string): string[] {
   const names = [...known];
   return ['plain', 'identity', ...names].includes(chosen) ? names : [...names, chosen];

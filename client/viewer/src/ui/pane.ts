@@ -265,7 +265,7 @@ export class Pane {
 
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
-  /** The outline that the pane shows: the first one if the frame lacks the chosen one. */
+  /** Index of the outline that the pane shows: 0 if the frame lacks the chosen one. */
   private get outlineShown(): number {
     const chosen = this.look?.outlineShown ?? 0;
     return chosen < this.outlines.length ? chosen : 0;
@@ -356,7 +356,7 @@ export class Pane {
     return !this.hasSurfaces && isOther && !isAsStreamed(this.settings);
   }
 
-  /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
+  /** Shows the frame of the variant's stream. While this frame is computed, the picture stays as it is. */
   private updateVariant(stream: VariantStream, sequence: number, now: number): void {
     stream.refresh(sequence, now);
     this.refusal = stream.refusalOf(sequence);
@@ -499,7 +499,7 @@ export class Pane {
     this.dirty = true;
   }
 
-  /** Selects the ring or the body at a world position, or none. A picture of the other kind selects nothing. */
+  /** Selects the ring or the body at a world position, or none. A position of the other kind of picture selects none. */
   selectAt(point: Point | Vector | null): void {
     if (this.isSpace || point?.length === 3) {
       this.space?.selectAt(point?.length === 3 ? point : null);
