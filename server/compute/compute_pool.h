@@ -22,8 +22,7 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// If no frame needed a worker's large buffers for this time, they are oversized (WarmSize), and
-/// the worker is dropped.
+/// A worker is dropped if no frame has needed its large buffers for this time (WarmSize).
 inline constexpr std::chrono::seconds kWarmTime(10);
 
 /// A caller competes for the threads for this time after it submitted or finished a job.
@@ -43,13 +42,13 @@ inline constexpr std::chrono::seconds kBetweenShortages(1);
 /// kSharingTime and the pool has at least two threads. A caller without competitors uses all
 /// threads, and its jobs share one arena. A caller with competitors runs at most `threads - 1` jobs
 /// at once. So one thread stays free, and starts another caller's job as soon as it wakes. Each job
-/// of such a caller has its own arena of `threads - 1` slots, so that it never waits for a part of
-/// another job. A job may still wait for one job if other callers use all threads already.
+/// of a caller with competitors has a separate arena of `threads - 1` slots, so that it never waits
+/// for a part of another job. A job may still wait for one job if other callers use all threads.
 ///
 /// Memory: a job gets the worker that was used last, so a single stream always uses the same
-/// worker. An idle worker is dropped if its buffers are oversized (WarmSize, BusyStreams). It is
-/// kept if at least as many streams as there are workers recently sent frames that need such
-/// buffers, because all workers may be needed at any time. If the budget lacks memory, idle workers
+/// worker. An idle worker is dropped if its buffers are oversized (WarmSize). Exception: all
+/// workers may be needed at any time, because the streams that recently sent frames of this size
+/// are at least as numerous as the workers (BusyStreams). If the budget lacks memory, idle workers
 /// with bytes in the budget are dropped at once.
 class ComputePool {
  public:

@@ -24,8 +24,7 @@ class FairShare {
   enum class Fit {
     kYes,
     kNoRoom,         ///< Not enough room is free, although the caller holds nothing.
-    kMoreThanShare,  ///< The caller would exceed its quota, or holds something and the rule
-                     ///< forbids.
+    kMoreThanShare,  ///< The caller would exceed its quota or, if it holds some, its share.
   };
 
   explicit FairShare(std::uint64_t room) : room_(room) {}

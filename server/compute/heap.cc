@@ -18,9 +18,9 @@ extern "C" {
 // - A stream allocates and frees the bytes of its frames all the time, so freed pages stay for two
 //   seconds. Then a thread of jemalloc returns them. With glibc, returning the memory of a large
 //   frame stopped all threads for up to 15 ms.
-// - Small blocks may use any free extent, and large blocks have no arena of their own. With
-//   jemalloc's defaults, frames of a million particles caused six times the page faults, which took
-//   6 % of the processor time.
+// - Small blocks may use any free extent, and large blocks have no separate arena. With jemalloc's
+//   defaults, frames of a million particles caused six times the page faults, 6 % of the processor
+//   time.
 // - Each thread caches only free blocks of up to 4 KiB, which bounds the memory of gRPC's threads
 //   in a flood of calls.
 [[gnu::visibility("default")]] extern const char* malloc_conf;

@@ -25,8 +25,8 @@ inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 /// becomes the field of the Violation.
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget);
 
-/// Limits of the memory that streams and one worker may hold beyond the budget. Without it, a frame
-/// larger than the free budget could wait forever.
+/// Limits of the memory that streams and one worker may hold beyond the budget. Without this
+/// memory, a large frame could wait forever.
 struct BeyondBudget {
   ReadTerms reads;
   /// Maximum bytes of the one worker that may compute beyond the budget.
@@ -62,7 +62,6 @@ class MemoryBudget {
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
-  /// Decides which streams may read.
   ReadPermits& reads() { return reads_; }
 
   /// Counts bytes that `caller` holds already, even if they do not fit.
@@ -91,7 +90,6 @@ class MemoryBudget {
   /// Takes bytes for a worker beyond the budget. Returns false if another worker computes beyond
   /// the budget, or if this worker would exceed BeyondBudget::worker_bytes.
   bool TryTakeBeyond(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Whether `worker` holds bytes beyond the budget.
   bool IsBeyond(const void* worker) const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Gives back all `bytes` that a worker holds, both within the budget and beyond it.
   void GiveBackOfWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
@@ -142,9 +140,7 @@ class MemoryBudget {
 
   mutable Mutex mutex_;
   CondVar may_compute_;
-  // The worker that computes beyond the budget.
   const void* worker_beyond_ ABSL_GUARDED_BY(mutex_) = nullptr;
-  // Its bytes beyond the budget.
   std::uint64_t bytes_of_worker_beyond_ ABSL_GUARDED_BY(mutex_) = 0;
   FairShare share_ ABSL_GUARDED_BY(mutex_);  // Held and planned bytes; may exceed the budget.
   std::uint64_t held_ ABSL_GUARDED_BY(mutex_) = 0;

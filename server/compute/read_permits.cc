@@ -172,7 +172,7 @@ std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   for (const auto& [reader, permit] : permits_) {
     if (permit.has_slot) ++slots_of[permit.read.caller];
   }
-  // Computes the ranks before the sort: other threads may change a caller's bytes meanwhile.
+  // Computes the ranks before the sort: other threads may change a caller's bytes during the sort.
   using Rank = std::tuple<bool, std::size_t, std::uint64_t, std::uint64_t>;
   std::vector<std::pair<Rank, Permits::value_type*>> waiting;
   for (auto& item : permits_) {

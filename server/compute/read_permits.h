@@ -41,9 +41,8 @@ struct ReadTerms {
 ///    the budget. Bytes in a slot take no memory of the budget from other streams.
 /// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
 ///    other, each connection once, until they have received the size of the largest message.
-/// 4. Waiting reads get permits in this order: reads of streams that have a slot, then reads of the
-///    caller with the fewest slots, then of the caller with the fewest bytes, then the read that
-///    has waited longest. A read that does not fit is skipped.
+/// 4. Waiting reads get permits in this order: streams that have a slot, callers with the fewest
+///    slots, callers with the fewest bytes, longest wait. A read that does not fit is skipped.
 /// 5. While other reads wait, the permit of an idle connection lapses: its read continues, but its
 ///    bytes are no longer planned and its slot is free. So an idle stream does not block others. A
 ///    lapsed read may receive bytes after all, and any read may receive more bytes than planned.
@@ -67,10 +66,10 @@ class ReadPermits {
   };
 
   struct Read {
-    const void* stream = nullptr;      ///< The same for all connections of one stream.
-    std::uint64_t expected_bytes = 0;  ///< 0: unknown.
-    const CallerAccount* caller = nullptr;
-    std::string peer;  ///< As CallChannel::peer.
+    const void* stream = nullptr;           ///< The same for all connections of one stream.
+    std::uint64_t expected_bytes = 0;       ///< 0: unknown.
+    const CallerAccount* caller = nullptr;  ///< Lives until End.
+    std::string peer;                       ///< As CallChannel::peer.
   };
 
   /// Returns the bytes that the connection of a peer has received so far, or nothing if the number
@@ -88,9 +87,8 @@ class ReadPermits {
   /// Like Begin, but always permits the read. Requires: MemoryBudget has just granted the bytes.
   void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Records that the read is complete: its bytes are no longer planned. Requires: the received
-  /// `bytes` were taken from the budget (MemoryBudget::Take). Errors, each with a Violation:
-  /// RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed and the bytes do not
-  /// fit.
+  /// `bytes` were taken from the budget (MemoryBudget::Take). Errors: RESOURCE_EXHAUSTED
+  /// (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed and the bytes do not fit.
   absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes the reader and its permit. Called when it stops waiting, or when it has ended.
   /// Idempotent.
@@ -102,11 +100,11 @@ class ReadPermits {
 
   // For the thread that watches the memory of the process (IntakeGuard):
 
-  /// Whether Look is needed. True if reads wait, if permits have lapsed, or if the reads in
-  /// progress could exceed the memory: held bytes, planned bytes and one largest message for each
-  /// read in progress are more than the budget and one largest message for each slot.
+  /// Whether Look is needed. True if reads wait, if permits have lapsed, or if sum A exceeds sum B.
+  /// A: held bytes, planned bytes and one largest message for each read in progress. B: the budget
+  /// and one largest message for each slot.
   bool NeedsLook() const;
-  /// Whether Look may let permits lapse, or whether some have lapsed.
+  /// Whether Look needs the received bytes: reads wait, so permits may lapse, or some have lapsed.
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }
   /// Sets the function that Begin calls if the read must wait or if NeedsLook is true. The calling
   /// thread may hold a reader's lock. Empty: no call.

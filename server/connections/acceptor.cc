@@ -15,7 +15,7 @@
 namespace partiemc::server {
 namespace {
 
-// Pause after AcceptAll has returned false. Meanwhile new connections wait in the kernel.
+// Pause after AcceptAll has returned false. New connections then wait in the kernel.
 constexpr std::chrono::milliseconds kPause(100);
 
 }  // namespace

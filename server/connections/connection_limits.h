@@ -14,7 +14,8 @@ namespace partiemc::server {
 struct ConnectionLimits {
   std::uint32_t connections = 2'048;  ///< Connections of all addresses.
   std::uint32_t of_address = 1'024;   ///< Connections of one address.
-  /// New connections of one address per second; twice as many at once. 0 also disables OnFlood.
+  /// New connections of one address per second; bursts may have twice this number. 0 also disables
+  /// OnFlood.
   std::uint32_t new_of_address = 500;
 };
 
@@ -42,16 +43,14 @@ class ConnectionCounts {
 
   /// Called when a connection of `address`, admitted as `admission`, was cut because of a flood.
   /// For ten seconds, new connections of this address may only make health checks. If the cut
-  /// connection itself was only for health checks, new connections of the address are refused for
-  /// one second: over TLS the server must complete an expensive handshake before it can detect a
-  /// flood. Open connections of the address continue.
+  /// connection was kHealthOnly, new ones are refused for one second, because over TLS a flood is
+  /// detected only after an expensive handshake. Open connections of the address continue.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
-  /// Number of connections of all addresses that were admitted as kKept.
+  /// Numbers of connections that were admitted as kKept: of all addresses, of `address`.
   std::size_t count() const { return kept_; }
-  /// Number of connections of `address` that were admitted as kKept.
   std::size_t CountOf(const std::string& address) const;
-  /// Whether the limit of all addresses is reached: no connection can be admitted as kKept.
+  /// Whether the limit of all addresses is reached, so no connection can be admitted as kKept.
   bool IsFull() const { return limits_.connections > 0 && kept_ >= limits_.connections; }
 
   /// Removes addresses that have no connection, ten seconds after the last one was opened and after

@@ -54,7 +54,7 @@ class ConnectionTable {
  public:
   /// Adds a connection. Returns false, and adds nothing, if the peer (address and port) has a
   /// connection already: a client may use one port for connections to two addresses of the server.
-  /// The calls of such connections could not be distinguished.
+  /// The calls of these connections could not be distinguished.
   bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Remove(const std::string& peer) ABSL_LOCKS_EXCLUDED(mutex_);

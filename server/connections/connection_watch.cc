@@ -207,9 +207,9 @@ bool ConnectionWatch::EvictIdleLocked() {
   return true;
 }
 
-// Makes room for a new connection that may only make health checks. If `address` has reached its
-// limit of such connections, ends the oldest one of this address. Otherwise, if all addresses
-// together have reached their limit, ends the oldest one.
+// Makes room for a new health-only connection of `address`. If the address has reached its limit,
+// ends its oldest health-only connection. Otherwise, if all addresses together have reached their
+// limit, ends the oldest health-only connection.
 void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   const auto is_health_only = [](const Connection& connection) {
     return connection.tracked->admission == Admission::kHealthOnly;

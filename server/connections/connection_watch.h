@@ -42,7 +42,7 @@ class ConnectionWatch {
   /// must not block and not call the watch.
   using HandOver = std::function<void(Descriptor)>;
 
-  /// Numbers of connections since the start.
+  /// Numbers of connections since the start; `accepted` includes `health_only`.
   struct Counters {
     std::atomic<std::uint64_t> accepted = 0, health_only = 0, evicted = 0;
     std::array<std::atomic<std::uint64_t>, 3> floods{};  ///< By Flood.

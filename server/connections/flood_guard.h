@@ -24,7 +24,7 @@ struct ExaminedConnection {
 
 /// A connection to cut, and the reason.
 struct Excess {
-  std::size_t index = 0;
+  std::size_t index = 0;  ///< In the `connections` of LargestExcess.
   Flood flood = Flood::kUnaccountedBytes;
 };
 /// Returns the connection to cut if all connections together exceed a limit. It belongs to the
@@ -32,9 +32,9 @@ struct Excess {
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules);
 
-/// Returns the index of the connection to evict for a new one. Of the kept connections without a
-/// call, it is the oldest one of the address with the most connections. Returns nothing if there is
-/// none. Requires: `connections` are in the order of arrival.
+/// Returns the index of the connection to evict for a new one: a kept connection without a call. If
+/// there are several, it is the oldest one of the address with the most connections. Returns
+/// nothing if there is none. Requires: `connections` are in the order of arrival.
 std::optional<std::size_t> IdleOfLargestAddress(const std::vector<ExaminedConnection>& connections,
                                                 const ConnectionCounts& counts);
 

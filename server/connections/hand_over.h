@@ -12,8 +12,8 @@
 namespace partiemc::server {
 
 /// Threads that pass connections to gRPC. The thread that passes a connection may have to read it
-/// for gRPC as long as bytes arrive without a pause. Meanwhile the next connection needs another
-/// thread. Threads are started on demand, up to kMostThreads; if all are busy, connections wait.
+/// for gRPC while bytes arrive without a pause. The next connection then needs another thread.
+/// Threads are started on demand, up to kMostThreads; if all are busy, connections wait.
 class HandOverThreads {
  public:
   explicit HandOverThreads(std::function<void(int descriptor)> hand_over)

@@ -205,7 +205,7 @@ void Relay::LookAtLocalStreams() {
 }
 
 // Handles producers that have resumed their stream at another replica. The replica of the former
-// stream may not have detected yet that its producer is gone. Ends the watches of the former
+// stream may not have detected yet that its producer has left. Ends the watches of the former
 // stream, so that the watchers find the new one.
 void Relay::EndTakenOver() {
   const WatchEnd taken_over{

@@ -82,7 +82,7 @@ class Relay final : private RelayPort {
   /// Announces that this replica accepts no further streams. The caller calls Drain later.
   void WillDrain();
   /// Ends pending searches with an error, sends the last results and the ends of streams, and
-  /// leaves the other replicas. Blocks for at most two seconds.
+  /// announces that this replica leaves. Blocks for at most two seconds.
   void Drain();
 
   bool connected() const { return connected_; }
