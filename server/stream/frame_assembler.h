@@ -39,7 +39,8 @@ class AssemblyMember {
   virtual ~AssemblyMember() = default;
   /// A frame of part 0, or a part, may be ready for its response: the call should check again.
   virtual void LookAgain() = 0;
-  /// The assembler has removed this call. `status` is OK if all its frames were answered.
+  /// The assembler has removed this call. `status` is OK if the call of part 0 has ended with OK;
+  /// frames that it did not answer are then refused (OutcomeOf).
   virtual void LeftOut(const absl::Status& status) = 0;
 };
 
@@ -118,7 +119,8 @@ class FrameAssembler {
   /// failed. If part 0 has not arrived within the timeout after the first part, this function
   /// closes the frame. It drops the parts, and part 0 will be refused.
   bool IsOver(std::uint64_t sequence, Clock::time_point now);
-  /// The outcome of a frame for the sender of a part; OK if the frame was answered.
+  /// The outcome of a frame for the sender of a part. OK: the frame was answered, perhaps by an
+  /// error.
   /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) if part 0 arrived too late, PART_LATE if the call of
   /// part 0 ended before this frame.
   absl::Status OutcomeOf(std::uint64_t sequence) const;

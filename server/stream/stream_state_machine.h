@@ -46,8 +46,8 @@ class StreamStateMachine;
 
 /// Carries the messages of a stream. There are `window` slots; each holds a request and its
 /// response. The transport shares the slots with the handler. StreamStateMachine has at most one
-/// read, one write and one computation in progress, each on another slot. It calls the transport
-/// without holding a lock.
+/// read, one write and one computation in progress, each on a different slot. It holds no lock when
+/// it calls the transport, except for `peer`.
 class StreamTransport {
  public:
   virtual ~StreamTransport() = default;
@@ -99,7 +99,7 @@ class StreamHandler {
 
 /// Time for which a client may keep a stream waiting; 0: no limit.
 struct IdleLimits {
-  std::chrono::milliseconds opening{0};    ///< From the call to its `open`.
+  std::chrono::milliseconds opening{0};    ///< From the call's start to its `open`.
   std::chrono::milliseconds streaming{0};  ///< Between frames, and from a write's start to its end.
 };
 
@@ -161,16 +161,15 @@ class StreamStateMachine final : public SerializedCall,
   /// The client has resumed this stream in another call, so the connection of this call may be
   /// dead. Abandons the stream with ABORTED.
   void TakenOver();
-  /// Ends this stream with this error if it has not received its `open`. Has no effect on other
-  /// streams.
+  /// Ends this stream with this error if it has not received its `open`. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
   /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read, and
   /// ends the stream with UNAVAILABLE.
   void Drain();
   /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`. The
   /// client has either not sent a request, or not received a response; in the second case the call
-  /// is cut. The time in which the stream waits for a worker or for memory does not count. Returns
-  /// the time of the next check.
+  /// is cut. A frame's wait for parts or a worker does not count. The stream's wait for a permit to
+  /// read does. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 
