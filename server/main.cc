@@ -43,7 +43,6 @@ void TakeAllDescriptors() {
 }
 
 // Writes the address to a temporary file and renames it, so that no reader sees half of the file.
-// `flag` is for the error.
 absl::Status WritePortFile(const std::string& flag, const std::string& path,
                            const Address& address) {
   const std::string temporary = path + ".part";
@@ -77,8 +76,7 @@ int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
 // thread of CutDrainShort.
 std::atomic<bool> leaving = false;
 
-// Waits for a second signal, or until kTimeToEnd after `grace`. Then ends the process, unless the
-// drain has finished.
+// After a second signal, or after `grace` and kTimeToEnd, ends the process unless it has drained.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
   const int signal = WaitForSignal(signals, grace + kTimeToEnd);
   if (leaving.exchange(true)) return;

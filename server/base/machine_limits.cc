@@ -11,16 +11,14 @@ namespace {
 
 constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 
-// Reads the number at the beginning of a file. Returns kUnlimited for the text "max" and for
-// errors.
+// Returns the number at the beginning of a file; kUnlimited for the text "max" and for errors.
 std::uint64_t NumberIn(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
   return file >> number ? number : kUnlimited;
 }
 
-// Calls visit(folder) for the folder of a control group and the folders of its parents, up to
-// `top`.
+// Calls visit(folder) for the folders of a control group and of its parents, up to `top`.
 template <typename Visit>
 void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   for (;;) {

@@ -23,8 +23,7 @@ struct AdmittedCall {
   CallerAccount::Place place;
 };
 
-/// A function that checks a permission of the caller, such as Caller::CheckMayProduce. Null: no
-/// check.
+/// Checks a permission of a caller, such as Caller::CheckMayProduce. Null: no check.
 using Permission = absl::Status (Caller::*)() const;
 
 /// Authenticates the caller of a new call and checks its permission and its quota, before the

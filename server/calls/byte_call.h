@@ -57,8 +57,7 @@ class ByteCall {
   CallChannel& channel() { return channel_; }
   const CallChannel& channel() const { return channel_; }
   const ServerContext& context() const { return context_; }
-  /// Ends the call. A second call of End is a bug of the state machine: it is logged and has no
-  /// effect.
+  /// Ends the call. A second End, a bug of the state machine, is logged and has no effect.
   void End(const absl::Status& status);
 
   /// OK, or the error with which the caller was refused.

@@ -82,8 +82,7 @@ class FrameArrival {
 /// The steps for the call of part 0, which owns the session of the stream.
 class PartZero final : public FrameArrival {
  public:
-  /// Requires: CheckParts was OK, and `open` has parts > 0. `next_sequence`: the sequence number of
-  /// the first frame.
+  /// `next_sequence`: number of the first frame. Requires: CheckParts was OK; `open` has parts > 0.
   PartZero(const v1::OpenStream& open, const ServerLimits& limits, std::uint64_t next_sequence);
 
   void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;

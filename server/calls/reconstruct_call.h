@@ -38,8 +38,7 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
   void OnCancel() override { machine_->Cancelled(); }
   void OnDone() override;
 
-  // The steps of a frame. Public for the fuzz target, which replaces the channel and the state
-  // machine.
+  // The steps of a frame. Public for the fuzz target, which replaces channel and state machine.
 
   grpc::ByteBuffer& Request(std::size_t slot) { return requests_[slot]; }
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);

@@ -12,8 +12,7 @@ extern "C" {
 [[gnu::weak]] int mallctl(const char* name, void* old_value, std::size_t* old_size, void* new_value,
                           std::size_t new_size);
 
-// jemalloc reads its options from this variable. The environment variable MALLOC_CONF overrides
-// them.
+// jemalloc's options. The environment variable MALLOC_CONF overrides them.
 // - Two arenas only, so that threads reuse memory that other threads have freed.
 // - A stream allocates and frees the bytes of its frames all the time, so freed pages stay for two
 //   seconds. Then a thread of jemalloc returns them. With glibc, returning the memory of a large

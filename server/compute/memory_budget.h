@@ -49,8 +49,7 @@ class MemoryBudget {
   class Waiter {
    public:
     virtual ~Waiter() = default;
-    /// The waiter's claim was granted: it now holds `bytes`. Called without a lock, by the thread
-    /// that gave back memory.
+    /// The claim was granted: the waiter now holds `bytes`. Called without holding a lock.
     virtual void Granted(std::uint64_t bytes) = 0;
   };
 

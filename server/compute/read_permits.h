@@ -22,8 +22,7 @@ class CallerAccount;
 class MemoryBudget;
 
 struct ReadTerms {
-  /// Maximum number of streams that may hold a frame beyond the budget at the same time, at least
-  /// 1.
+  /// Maximum number of streams with a frame beyond the budget at the same time, at least 1.
   std::uint32_t streams_beyond = 2;
   /// Size of the largest message, at least 1.
   std::uint64_t message_bytes = 1;
@@ -78,8 +77,7 @@ class ReadPermits {
 
   ReadPermits(MemoryBudget& budget, const ReadTerms& terms);
 
-  // For readers. A reader may hold its own lock during these calls. After each call it releases its
-  // lock and calls Serve.
+  // For readers. A reader may hold its own lock. It calls Serve after it has released this lock.
 
   /// Requests a permit for a reader that has no frame in flight. Returns false if the read must
   /// wait; ReadPermitted is called later.
@@ -90,8 +88,7 @@ class ReadPermits {
   /// `bytes` were taken from the budget (MemoryBudget::Take). Errors: RESOURCE_EXHAUSTED
   /// (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed and the bytes do not fit.
   absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the reader and its permit. Called when it stops waiting, or when it has ended.
-  /// Idempotent.
+  /// Removes the reader and its permit, when it stops waiting or has ended. Idempotent.
   void End(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Grants claims and permits waiting reads that fit now. Requires: the calling thread holds no

@@ -48,8 +48,7 @@ class WorkerMemory {
 
   /// Whether the budget counts bytes of this worker.
   bool counts() const { return counted_ > 0; }
-  /// Whether the worker holds memory beyond the budget. Then its buffers must be freed after the
-  /// frame.
+  /// Whether the worker holds memory beyond the budget, which it must give back after the frame.
   bool is_beyond() const { return is_beyond_; }
 
  private:

@@ -38,8 +38,7 @@ class Acceptor {
 
   void Start(HandOver hand_over);
 
-  /// Closes the listening sockets, so further connections are refused. Deletes the file of a Unix
-  /// socket.
+  /// Closes the listening sockets and deletes a Unix socket's file. New connections are refused.
   void StopListening();
 
  private:

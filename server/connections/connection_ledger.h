@@ -13,8 +13,7 @@ namespace partiemc::server {
 /// Limits of one connection. The defaults are the limits of a server without options.
 struct ConnectionRules {
   /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 uses up to
-  /// 40 bytes of memory for each such byte (if headers have four bytes). 0: no limit, and header
-  /// blocks are not examined.
+  /// 40 bytes of memory for each (if headers have four bytes). 0: no limit, and no Flood::kHeaders.
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
@@ -58,8 +57,7 @@ std::string_view FloodName(Flood flood);
 /// such a stream, and no stream begins and no message ends, the ledger counts every byte that gRPC
 /// reads as part of the header block. These bytes get no credit and no allowance.
 ///
-/// The methods `On...` and Take, and the counts of calls, are thread-safe. One thread uses the
-/// rest.
+/// The methods `On...`, Take and the counts of calls are thread-safe. One thread uses the rest.
 class ConnectionLedger {
  public:
   using Clock = std::chrono::steady_clock;

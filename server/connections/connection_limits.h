@@ -14,8 +14,7 @@ namespace partiemc::server {
 struct ConnectionLimits {
   std::uint32_t connections = 2'048;  ///< Connections of all addresses.
   std::uint32_t of_address = 1'024;   ///< Connections of one address.
-  /// New connections of one address per second; bursts may have twice this number. 0 also disables
-  /// OnFlood.
+  /// New connections of one address per second; a burst may be double. 0 also disables OnFlood.
   std::uint32_t new_of_address = 500;
 };
 

@@ -66,8 +66,7 @@ class ConnectionWatch {
   /// Ends a connection that has no call, to free its descriptors. Returns false if there is none.
   /// Does not end connections that may only make health checks.
   bool EvictIdle() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Sets the time from which all connections are ended, so that a silent peer does not delay the
-  /// drain.
+  /// Sets the time from which all connections end, so that a silent peer does not delay the drain.
   void EndAllAt(Clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Counters& counters() const { return counters_; }

@@ -39,8 +39,7 @@ class StreamDirectory {
   void Left(const std::string& replica) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes and returns the replicas that have sent no announcement since `before`.
   std::vector<std::string> Expire(TimePoint before) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// For Expire, treats all replicas as if they had sent an announcement at `now`. Called while the
-  /// bus is disconnected.
+  /// For Expire, treats all replicas as if they had sent an announcement at `now`.
   void Refresh(TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Returns at most `count` distinct addresses of replicas. Omits draining replicas.

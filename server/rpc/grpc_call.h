@@ -48,8 +48,7 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
   grpc::CallbackServerContext& context_;
   CallTally tally_;
   grpc::ByteBuffer* message_ = nullptr;  // The read in progress.
-  // Created at the end of the constructor; gRPC calls no method before the constructor has
-  // returned.
+  // Created last in the constructor; gRPC calls no method before the constructor has returned.
   std::unique_ptr<ByteCall> call_;
 };
 
