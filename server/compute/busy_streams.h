@@ -9,8 +9,8 @@
 
 namespace partiemc::server {
 
-/// Counts the streams for which a frame of at least a given size was computed recently. It does not
-/// matter which frames happened to be computed at the same time. Not thread-safe.
+/// Counts the streams for which a frame of at least a given size was computed recently. The count
+/// does not depend on which frames were computed at the same time. Not thread-safe.
 class BusyStreams {
  public:
   using Clock = std::chrono::steady_clock;
@@ -23,7 +23,7 @@ class BusyStreams {
     std::size_t size_class_ = 0;
   };
 
-  /// `late`: length of a period, and the time after which a frame no longer counts. Positive.
+  /// `late`: length of a period; after this time without a frame, Count returns 0. Positive.
   explicit BusyStreams(Clock::duration late) : late_(late) {}
 
   /// Records that a frame of `size` (in any unit) was computed for `stream`. `now` never decreases.

@@ -69,8 +69,8 @@ class MemoryBudget {
   /// kYes, or the reason why they were not taken.
   FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes the bytes like TryTake and returns true. If it cannot, queues a claim and returns false;
-  /// `Granted` is called when the bytes were taken, unless `waiter` no longer exists. The waiter
+  /// Takes the bytes and returns true if TryTake would. Otherwise queues a claim and returns false;
+  /// `Granted` is called when the claim is granted, unless `waiter` no longer exists. The waiter
   /// keeps the caller's account alive.
   bool TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                   const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);

@@ -87,8 +87,8 @@ class ConnectionLedger {
 
   /// The debt in excess of the allowance, in bytes, at the last call of Examine.
   std::uint64_t excess() const { return excess_; }
-  /// Number of open streams, or of streams that have not become calls if there are more of them, at
-  /// the last reading with `has_streams`.
+  /// The larger of two numbers at the last reading with `has_streams`: open streams, and streams
+  /// that have not become calls.
   std::uint64_t streams() const { return streams_; }
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }

@@ -33,8 +33,8 @@ class StreamCounter {
 };
 
 /// Watches connections and cuts floods. Holds a duplicate of each connection's descriptor, to read
-/// its byte counts and to end it; does not read its bytes. One thread examines the connections: all
-/// new and suspicious ones every 5 or 20 ms, and the others in turn.
+/// its byte counts and to end it; does not read its bytes. One thread examines the connections. New
+/// ones, and ones with an excess or pending headers, come every 5 or 20 ms, the others in turn.
 class ConnectionWatch {
  public:
   using Clock = std::chrono::steady_clock;

@@ -53,8 +53,8 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
 
  private:
   struct Answering {
-    std::uint64_t fetch = 0;  // In whose response a result is sent; 0: a new result, not fetched.
-    bool first = false;       // Whether it is the first result of the response.
+    std::uint64_t fetch = 0;  // Number of the fetch that a result answers; 0: none, a new result.
+    bool first = false;       // Whether the result is the first one of this response.
   };
 
   void StartRead() override;

@@ -42,7 +42,7 @@ class Relay final : private RelayPort {
 
   struct Limits {
     ResultBroadcaster::Limits broadcaster;              ///< For streams of other replicas.
-    std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Waiting results of an export or import.
+    std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Maximum of waiting results per stream.
     HistoryRoom* history = nullptr;  ///< Null: no history for streams of other replicas.
     std::size_t watches = 64;        ///< Maximum number of concurrent searches (Find).
   };
