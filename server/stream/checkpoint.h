@@ -1,5 +1,5 @@
-// Checkpoints: the bytes with which a client resumes a stream on any server. The client does not
-// interpret them; the server treats them as untrusted input.
+// Checkpoints: the bytes with which a client resumes a stream, on this or another server. The
+// client does not interpret them; the server treats them as untrusted input.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ struct StreamTerms {
 
 std::uint64_t FingerprintOf(const std::map<std::string, std::string>& labels);
 
-/// A stream between two frames.
+/// The contents of a checkpoint: a stream between two frames.
 struct Checkpoint {
   std::uint64_t next_sequence = 1;
   std::string name = {};  ///< Name of the stream.

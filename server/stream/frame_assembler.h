@@ -55,9 +55,9 @@ class FrameAssembler {
 
   struct Terms {
     std::uint32_t parts = 1;
-    std::size_t window = 1;                ///< Number of frames, from the next to be answered.
+    std::size_t window = 1;                ///< Frames assembled at once, from the next answer on.
     std::uint64_t max_frame_bytes = 0;     ///< Limit for a frame without its part 0.
-    std::chrono::milliseconds timeout{0};  ///< From the first part of a frame, of any rank.
+    std::chrono::milliseconds timeout{0};  ///< Time for all parts of a frame, from the first on.
     bool has_checkpoints = false;          ///< Responses may have checkpoints.
     std::uint64_t next_sequence = 1;       ///< Number of the first frame.
   };
@@ -139,7 +139,7 @@ class FrameAssembler {
     std::vector<std::uint64_t> bytes;                     // Sizes of `parts`.
     std::uint64_t all_bytes = 0;
     std::uint32_t count = 0;
-    Clock::time_point since;  // The first part came.
+    Clock::time_point since;  // Arrival of the first part.
     bool is_over = false;     // Part 0 came too late; the parts were dropped.
   };
   struct Member {

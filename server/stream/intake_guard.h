@@ -33,7 +33,7 @@ class IntakeGuard {
     /// expensive, so it is only called if the memory exceeds `most_bytes`.
     std::function<std::uint64_t()> most_bytes, more_bytes;
     std::function<void()> give_back_freed;
-    /// Upper limit of the resident memory, constant.
+    /// The largest value that `most_bytes` can return.
     std::uint64_t limit_bytes = 0;
     /// Bytes that each connection has received, by peer address (ReceivedBytesOfConnections).
     std::function<std::map<std::string, std::uint64_t>()> received_bytes = {};

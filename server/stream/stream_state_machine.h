@@ -112,20 +112,19 @@ struct StreamCounts {
 
 /// The state machine of one stream (phases: server/base/call_state.h):
 ///
-///   opening --open--> serving --half-close, broken protocol, drain--> ending or closing -->
-///   finished
-///      |                 |                                                |                    ^
-///      |                 +----------- cancelled, write failed ------------+--> abandoned ------+
+///   opening --open--> serving --half-close, bad request, drain--> ending or closing --> finished
+///      |                 |                                            |                     ^
+///      |                 +----------- cancelled, write failed --------+--> abandoned -------+
 ///      +-- no open, or refused: ending, with nothing to answer
 ///
 /// While serving, frame n uses slot n % window from the start of its read to the end of its
 /// response's write. So if a client does not read its responses, the server stops reading from it.
 /// In the phase `ending` the stream still answers all frames that it has read. In the phase
-/// `abandoned` it sends nothing more. Thread-safe.
+/// `closing` it does so too, except for frames with missing parts. In the phase `abandoned` it
+/// sends nothing more. Thread-safe.
 ///
-/// A frame that arrives in parts is computed when MayAnswer permits it for each of the calls. If
-/// the server, or the stream that the parts belong to, closes this stream, frames with missing
-/// parts get no response.
+/// A frame that arrives in parts is computed when MayAnswer permits it for each of the calls. A
+/// drain, or an error that ends the call of part 0, leads to the phase `closing`.
 ///
 /// Memory: the budget of all streams counts requests that were read and responses that are not
 /// written yet. While a stream has frames in flight, it reads another frame only if the budget has
