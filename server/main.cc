@@ -27,15 +27,14 @@ constexpr std::chrono::seconds kHealthCheckTimeout{3};
 
 // Time that cancelled work gets to end, after the grace time has passed.
 constexpr std::chrono::milliseconds kTimeToEnd{500};
-constexpr int kCutOff = 1;  // Exit code if it has not ended.
+constexpr int kCutOff = 1;  // Exit code if the work has not ended by then.
 
 int Fail(const absl::Status& status) {
   std::fprintf(stderr, "partiemc-server: %s\n", std::string(status.message()).c_str());
   return 1;
 }
 
-// gRPC stops listening forever if a connection arrives while the process has no free descriptor
-// (CVE-2023-4785). Therefore the process raises its limit of descriptors to the maximum.
+// Raises the process's limit of descriptors to the maximum, because each connection uses two.
 void TakeAllDescriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -43,8 +42,7 @@ void TakeAllDescriptors() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// Writes the address to a temporary file and renames it, so that a reader never sees half of the
-// file.
+// Writes the address to a temporary file and renames it, so that no reader sees half of the file.
 absl::Status WritePortFile(const std::string& flag, const std::string& path,
                            const Address& address) {
   const std::string temporary = path + ".part";
@@ -74,12 +72,11 @@ int WaitForSignal(const sigset_t& signals, std::chrono::milliseconds time) {
   }
 }
 
-// The thread that sets this flag first ends the process: either the main thread after the drain, or
-// the thread of CutDrainShort.
+// The first thread that sets this flag ends the process: the main thread after the drain, or the
+// thread of CutDrainShort.
 std::atomic<bool> leaving = false;
 
-// Waits for a second signal or for the end of the grace time, then ends the process, whatever its
-// state, unless the drain has finished.
+// After a second signal, or after `grace` and kTimeToEnd, ends the process unless it has drained.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
   const int signal = WaitForSignal(signals, grace + kTimeToEnd);
   if (leaving.exchange(true)) return;
@@ -94,8 +91,8 @@ int Serve(const CommandLine& line) {
   // Disables abseil's deadlock detection. Linux distributions build abseil with it, and it slows
   // down every lock of gRPC.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // Blocks these signals before gRPC starts threads. The threads inherit the mask, so only sigwait
-  // receives the signals.
+  // Blocks these signals before gRPC starts threads, which inherit the mask. So only sigwait and
+  // sigtimedwait receive the signals.
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
@@ -135,8 +132,7 @@ int Serve(const CommandLine& line) {
   if (line.drain_delay.count() > 0) (*server)->SendAway(line.drain_delay);
   (*server)->Drain(line.grace);
   server->reset();
-  // If CutDrainShort has set the flag first, it is about to end the process; this thread waits for
-  // that.
+  // If CutDrainShort has set the flag first, it ends the process; this thread waits for that.
   while (leaving.exchange(true)) std::this_thread::sleep_for(kTimeToEnd);
   LogEvent(spdlog::level::info, "stopped", {});
   FlushLog();

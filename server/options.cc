@@ -64,9 +64,9 @@ struct Raw {
 // times this value and must fit into an int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
 
-// By default a frame may have at most 1/kFramesInBudget of the memory budget, or kLeastFrameBytes
-// if that is more. The reason: a frame is in memory before it is counted. If the budget is very
-// small, streams still progress, one frame at a time.
+// By default a frame may have at most 1/kFramesInBudget of the memory budget, because it is in
+// memory before it is counted. With a very small budget it may have kLeastFrameBytes; then streams
+// progress one frame at a time.
 constexpr std::uint64_t kFramesInBudget = 8;
 constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
@@ -405,7 +405,7 @@ EarlyExit Wrong(const std::string& message) {
   return {2, "partiemc-server: " + line + "; see --help\n"};
 }
 
-// Rounds up, so that a short positive time does not become 0.
+// Rounds up: a short positive time must not become 0, which means no limit.
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
 }

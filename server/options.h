@@ -14,12 +14,12 @@ namespace partiemc::server {
 
 struct CommandLine {
   ServerOptions server;
-  /// Time after SIGTERM in which the server delivers finished frames and ends its streams.
+  /// Time limit of the drain (Server::Drain), which begins with SIGTERM or after `drain_delay`.
   std::chrono::milliseconds grace{4000};
-  /// Time after SIGTERM in which the server still serves but its health checks report that it does
-  /// not (Server::SendAway). The grace time follows.
+  /// Time after SIGTERM in which the server still serves, while its health checks report that it
+  /// does not (Server::SendAway).
   std::chrono::milliseconds drain_delay{0};
-  /// File to which the server writes its bound address as soon as it serves.
+  /// File to which the server writes its bound address when it serves.
   std::optional<std::string> port_file;
   /// File to which the server writes the bound address of the gateway.
   std::optional<std::string> web_port_file;
@@ -32,7 +32,7 @@ struct CommandLine {
 
 /// Returned if the process must print `text` and exit with `code`.
 struct EarlyExit {
-  int code = 0;      ///< 0 for --help and --version, 2 for a wrong command line.
+  int code = 0;      ///< 2 for a wrong command line; 0 for --help, --version, --print-memory-plan.
   std::string text;  ///< For standard output if `code` is 0, otherwise one line for standard error.
 };
 

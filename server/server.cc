@@ -32,7 +32,7 @@
 namespace partiemc::server {
 namespace {
 
-// Size of one read from a connection.
+// Maximum size of one read from a connection.
 constexpr int kReadBytes = 32 << 10;
 
 // Time limit for the handshakes of HTTP/2 and TLS on a new connection.
@@ -63,7 +63,6 @@ absl::Status CheckSecurity(const ServerOptions& options, const Address& address)
       "--insecure if the network is trusted"));
 }
 
-// Parses the file of `flag` by `parse`.
 template <typename Parse>
 auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
     -> decltype(parse(std::string())) {
@@ -110,7 +109,7 @@ BeyondBudget BeyondOf(const ServerLimits& limits) {
           .worker_bytes = limits.WorkerBytesBeyond()};
 }
 
-// Each connection uses two descriptors.
+// Limits the connections by the free descriptors; each connection uses two.
 ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   ConnectionLimits limits = options.connections;
   rlimit descriptors{};
@@ -122,7 +121,7 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
-// Callers within their limits have fewer streams.
+// max_streams exceeds the calls of one caller, so only a flood reaches it.
 ConnectionRules RulesOfConnections(const ServerOptions& options) {
   return {.unaccounted_bytes = options.unaccounted_bytes,
           .max_message_bytes = options.limits.MaxMessageBytes(),
@@ -141,8 +140,7 @@ Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
           .watches = limits.max_watchers};
 }
 
-// Time for watchers to receive the notice of the drain. After it, watchers that do not read are
-// cut.
+// Time for watchers to read the end of their watch when the server drains.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
 }  // namespace

@@ -104,8 +104,8 @@ class Server {
  public:
   /// Starts the server; it listens and serves when this returns. Errors: INVALID_ARGUMENT for an
   /// address that other machines can reach if neither `tls` nor `insecure` is set, and for invalid
-  /// files of TLS, tokens or keys; UNAVAILABLE if it cannot listen. Each message is one line:
-  /// problem, place, remedy.
+  /// files of TLS, tokens or keys; UNAVAILABLE if it cannot listen; the errors of ConnectToNats.
+  /// Each message is one line: problem, place, remedy.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
 
   /// Unless Drain has already stopped the server: stops it without a grace time and cancels its

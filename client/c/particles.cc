@@ -18,7 +18,7 @@ absl::Status Invalid(std::string_view reason, std::string field, std::string val
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// True if `array` is present and readable.
+// False if `array` is absent. Errors: reason COUNT if it has no address.
 absl::StatusOr<bool> IsThere(const partiemc_array& array, std::size_t count,
                              const std::string& field) {
   if (array.type == PARTIEMC_NONE) return false;

@@ -11,14 +11,14 @@
 
 namespace partiemc::c {
 
-/// Returns a view of `particles`. The view refers to `attributes`, which this function fills.
-/// Errors: INVALID_ARGUMENT with a Violation. Reason UNSUPPORTED: an array has an element type that
-/// is not allowed for it. Reason COUNT: an array has no address.
+/// Returns a view of the program's arrays. The view also refers to `attributes`, which this
+/// function fills. Errors: INVALID_ARGUMENT with a Violation. Reason UNSUPPORTED: an array has an
+/// element type that is not allowed for it. Reason COUNT: an array has no address.
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes);
 
-/// Converts the lower end and the length of each axis; a length of 0 is no periodic axis. Null: no
-/// box.
+/// `numbers`: lower end and length of the axes x, y and z; an axis of length 0 is not periodic.
+/// Null: no box.
 std::optional<PeriodicBox> BoxOf(const double* numbers);
 
 }  // namespace partiemc::c

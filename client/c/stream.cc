@@ -37,7 +37,7 @@ struct partiemc_stream {
   Event event;
   std::vector<partiemc_values> values;                             // Attributes of the last event.
   partiemc_surface surface{};                                      // Surface of the last event.
-  std::vector<std::vector<partiemc_values>> section_values;        // Attributes of its sections.
+  std::vector<std::vector<partiemc_values>> section_values;        // Attributes of each section.
   std::vector<partiemc::client::AttributeArrays> sent_attributes;  // Sender's thread only.
 };
 
@@ -46,15 +46,15 @@ namespace {
 
 std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
-// Converts `seconds`; `otherwise` for 0.
+// Converts `seconds`; `otherwise` for 0 and NaN. Negative times become 0.
 std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds otherwise) {
-  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
+  constexpr double kLongest = 1e9;  // About thirty years, to prevent overflow of time points.
   if (seconds == 0 || seconds != seconds) return otherwise;
   return std::chrono::milliseconds(
       static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
 }
 
-// A negative option switches off what 0 leaves at the default.
+// For options where 0 means the default: a negative number stands for the value 0.
 template <typename T>
 T ZeroIfNegative(T number) {
   return number < 0 ? T{0} : number;
@@ -372,7 +372,7 @@ absl::Status ViewSection(partiemc_stream& stream, std::size_t index, partiemc_ev
     return absl::InvalidArgumentError(
         absl::StrCat("section: ", index, "; must be below the ", count, " of the last event"));
   }
-  // Events returned for other sections point into `section_values`, so it never shrinks.
+  // Events of other sections point to arrays in `section_values`, so it never shrinks.
   if (stream.section_values.size() < count) stream.section_values.resize(count);
   partiemc_event view = Empty(PARTIEMC_RESULT);
   view.sequence = stream.event.sequence;

@@ -8,15 +8,16 @@
 
 namespace partiemc::c {
 
-/// Copies the first `size` bytes of the library's struct `ours` to the program's struct `theirs`.
+/// Copies the library's struct `ours`, with its member `size` set, to the program's struct
+/// `theirs`. Writes at most `size` bytes.
 template <typename T>
 void Give(T ours, std::size_t size, T* theirs) {
   ours.size = size;
   std::memcpy(static_cast<void*>(theirs), &ours, std::min(size, sizeof ours));
 }
 
-/// Returns a copy of the program's struct `theirs`. Members beyond its size have the values of
-/// `defaults`.
+/// Returns a copy of the program's struct `theirs`. Members beyond its size, or all if it is null,
+/// have the values of `defaults`.
 template <typename T>
 T Take(const T* theirs, T defaults) {
   if (theirs != nullptr) {

@@ -1,6 +1,6 @@
 /* usage: surface BODIES.obj [ADDRESS]. A falling ball and a drop in space; without an address their
- * surfaces are computed in this process. The last one is written to a file. Built like example.c.
- */
+ * surfaces are computed in this process. The file gets the surfaces of the last frame. Built like
+ * example.c. */
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -24,7 +24,7 @@ static int write_obj(const partiemc_surface* surface, const char* path) {
   return fclose(file);
 }
 
-/* Adds the particles of a ball behind the first `count` and returns their new number. */
+/* Adds the particles of a ball to `at`, which has `count` of them, and returns the new count. */
 static size_t add_ball(double (*at)[3], size_t count, int radius, double centre, double height) {
   for (int x = -radius; x <= radius; ++x)
     for (int y = -radius; y <= radius; ++y)

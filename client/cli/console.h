@@ -16,19 +16,20 @@ enum ExitCode : int {
   kUsage = 2,         ///< A flag is wrong.
   kInput = 3,         ///< The input cannot be read, or a frame was refused.
   kServer = 4,        ///< No server, or it ended the stream.
-  kInterrupted = 130  ///< Ctrl-C, as shells number it.
+  kInterrupted = 130  ///< SIGINT or SIGTERM; shells use this number for SIGINT.
 };
 
 /// Prints "partiemc: MESSAGE" as one line on standard error and returns `code`.
 int Complain(ExitCode code, std::string_view message);
 int Complain(ExitCode code, const absl::Status& status);
 
-/// Makes text of any origin safe to print on one line of a terminal: line breaks become \n, other
-/// control characters and invalid UTF-8 become escapes (Printable).
+/// Makes untrusted text safe to print on one line of a terminal. Line feeds become "\n"; carriage
+/// returns and tabs become blanks; other control characters and invalid UTF-8 become escapes
+/// (Printable).
 std::string OneLine(std::string_view text);
 std::string OneLine(const absl::Status& status);
 
-/// Replaces the field at the start of a message by its flag, "address" by "--server":
+/// Replaces the field at the start of a message by its flag: "address: ..." -> "--server: ...",
 /// "parameters.kernel_radius: 99; ..." -> "--kernel-radius: 99; ...",
 /// "parameters.walls[1].points: ..." -> "--wall number 2: ...".
 std::string AsFlag(const absl::Status& status);
@@ -41,7 +42,8 @@ int ComplainOfServer(const absl::Status& status);
 /// 12 of 300 s".
 std::string WaitingText(const Reconnecting& reconnecting);
 
-/// After this call the first SIGINT or SIGTERM sets a flag and the second ends the program.
+/// After this call SIGINT and SIGTERM set a flag, which Interrupted returns. The second signal of
+/// the same kind ends the program.
 void CatchInterrupts();
 bool Interrupted();
 

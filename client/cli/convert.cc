@@ -16,7 +16,6 @@
 namespace partiemc::client {
 namespace {
 
-// How the copying ended.
 struct CopyEnd {
   ExitCode code = kGood;
   std::string error;  // Empty for kGood.

@@ -20,7 +20,6 @@ class Option;
 
 namespace partiemc::client {
 
-/// Adds --compress-glb.
 CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb);
 
 /// Adds --gauge, whose help lists the kinds.
@@ -28,7 +27,7 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges);
 
 class FrameOutputs {
  public:
-  /// The values of the flags with the same names. An empty value disables the output.
+  /// Values of the flags with the same names. Empty: this output is not written.
   struct Places {
     std::string output_dir;
     std::string format;  ///< Empty: geojson, or ply for surfaces.
@@ -44,18 +43,18 @@ class FrameOutputs {
   static absl::Status Check(const Places& places);
 
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: those of Check and of AtomicFile.
+  /// Errors: as Check and AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
-  /// Whether the files show the normals of the vertices.
+  /// Whether a file shows the normals of ring vertices.
   bool ShowNormals() const { return show_normals_; }
 
   absl::Status Write(const FrameRecord& frame);
   void AddRefused() { summary_.AddRefused(); }
   void EndEarly(std::string why) { summary_.EndEarly(std::move(why)); }
 
-  /// Writes the statistics file, and the collection files that list the frames. These files do not
-  /// exist before this call.
+  /// Completes the statistics, and writes the collection files that list the frames. Until then
+  /// none of these files is created or replaced.
   absl::Status Finish();
 
   const Summary& summary() const { return summary_; }

@@ -38,14 +38,12 @@ bool SendsToken(const Credentials& credentials) {
   return !credentials.token.empty() || !credentials.token_file.empty();
 }
 
-// The security of this client's connection.
 std::string SecurityText(const Credentials& credentials) {
   return Concat(credentials.tls ? "TLS" : "in the clear",
                 credentials.cert_file.empty() ? "" : ", own certificate",
                 SendsToken(credentials) ? ", token" : "");
 }
 
-// To a tenth of a mebibyte.
 std::string Mebibytes(std::uint64_t bytes) {
   return absl::StrFormat("%.1f MiB", static_cast<double>(bytes) / (1 << 20));
 }

@@ -20,7 +20,6 @@ int Info(const QueryFlags& flags);
 /// Returns aligned lines for a person to read; every line ends in '\n'.
 std::string InfoText(const ServerInfo& info, const ServerFlags& server);
 
-/// One JSON object on one line.
 std::string InfoJson(const ServerInfo& info, const ServerFlags& server);
 
 }  // namespace partiemc::client

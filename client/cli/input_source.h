@@ -18,14 +18,15 @@ namespace partiemc::client {
 
 struct InputSource {
   std::unique_ptr<Sequence> frames;
-  std::optional<double> spacing = {};  ///< World units, if the recording holds it.
+  std::optional<double> spacing = {};  ///< Stored in the recording, world units.
 };
 
-/// Errors: as Sequence::Open.
+/// Errors: as Sequence::Open and RecordingReader::Open; INVALID_ARGUMENT for a recording with
+/// options of columns or times.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
 
-/// The spacing that the first frame with two different particles shows, to four digits.
-/// Errors: as Sequence::Open and Next; INVALID_ARGUMENT if no frame shows one.
+/// Estimates the spacing, to four digits, from the first frame with two different particles.
+/// Errors: as OpenInput and Sequence::Next; INVALID_ARGUMENT if there is no such frame.
 absl::StatusOr<double> EstimatedSpacing(const std::string& input, const SequenceOptions& options);
 
 /// Adds --attributes, a list of names.
@@ -34,7 +35,7 @@ CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const st
 /// Adds --times and --time-step.
 std::vector<CLI::Option*> AddTimeFlags(CLI::App& app, SequenceOptions& options);
 
-/// Adds --max-expansion, a bound for packed input.
+/// Adds --max-expansion, the limit on the expansion of compressed input.
 CLI::Option* AddExpansionFlag(CLI::App& app, SequenceOptions& options);
 
 /// The last part of a path: "dam_break.pemc" of "client/recordings/dam_break.pemc".

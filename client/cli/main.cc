@@ -29,7 +29,7 @@ bool IsFlagOfSplashsurf(std::string_view flag) {
          std::ranges::any_of(kLong, [&](std::string_view name) { return flag.starts_with(name); });
 }
 
-// The arguments that no verb and no flag takes, in their order.
+// Returns a message that lists the arguments that no verb and no flag takes.
 std::string Unexpected(const CLI::App& app) {
   std::string text;
   bool is_of_splashsurf = false;

@@ -26,7 +26,7 @@ struct ReplayFlags {
   std::uint32_t checkpoint_interval = 4;
   int threads = 0;  ///< 0: one for each processor.
   double deadline_seconds = 30;
-  std::optional<double> give_up_after_seconds;  ///< Absent: kPatience, kShortPatience for latest.
+  std::optional<double> give_up_after_seconds;  ///< Absent: kPatience; for latest kShortPatience.
   std::string name;                             ///< Stream name; empty: chosen by the server.
   bool echo_particles = false;
 
@@ -35,16 +35,16 @@ struct ReplayFlags {
   SurfaceOptions surface_options = {};
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
-  /// "z=0.5" or six numbers. The first is the outline, unless the stream has a surface.
+  /// "z=0.5" or six numbers. The first slice has the frame's outline, unless `surface` is set.
   std::vector<std::string> slices;
   std::string phases;            ///< "NAME=PHASE,...": the attribute and the phases.
-  std::vector<double> isolines;  ///< Isovalues of the density, drawn on each slice.
+  std::vector<double> isolines;  ///< Isovalues of the density.
   std::string periodic;          ///< Axes: "x,y"; empty: none.
   std::string box;               ///< "X0,X1,Y0,Y1[,Z0,Z1]"; empty: the box of the input.
   bool wrap = false;             ///< Results are wrapped into the periodic box.
   std::optional<double> noise_filter;
   std::vector<std::string> wall_planes;  ///< "x=0", "x=9,below": the walls of a surface.
-  std::vector<std::string> walls;  ///< "X0,Y0,X1,Y1,...": the points of each wall; or "NAME=1,2".
+  std::vector<std::string> walls;        ///< "X0,Y0,X1,Y1,...": points; "NAME=1,2": particles.
   std::string spacing;  ///< A number, "first-frame" or "every-frame"; empty: from the input.
   std::string sizes = "equal";
   std::string boundary = "bulk";

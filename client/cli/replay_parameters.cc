@@ -54,7 +54,7 @@ std::optional<RecordedBox> BoxOf(std::string_view text) {
   return box;
 }
 
-// Sets the periodic box. Without --box and a box of the input, checks --periodic only.
+// Sets the periodic box. If --box and `recorded` are absent, only checks --periodic.
 absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& recorded,
                     ReconstructionParameters& parameters) {
   if (flags.periodic.empty()) return absl::OkStatus();
@@ -110,7 +110,7 @@ std::string AttributeOf(std::string_view text) {
   return std::string(text.substr(0, end == std::string_view::npos ? 0 : end));
 }
 
-// Parses "NAME=1,2", an attribute and phases. Returns false if the text is no such thing.
+// Parses "NAME=1,2", an attribute and phases. Returns false for any other text.
 bool ParsePhases(std::string_view text, std::string& attribute, std::vector<std::int32_t>& phases) {
   attribute = AttributeOf(text);
   if (attribute.empty()) return false;
@@ -122,7 +122,6 @@ bool ParsePhases(std::string_view text, std::string& attribute, std::vector<std:
   return true;
 }
 
-// Parses --phases and adds a section for each phase.
 absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   if (flags.phases.empty()) return absl::OkStatus();
   std::vector<std::int32_t> phases;
@@ -133,7 +132,7 @@ absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& param
   return absl::OkStatus();
 }
 
-// Parses each --wall-plane. The core's Validate checks how they fit.
+// Parses each --wall-plane. The core's Validate checks them against each other.
 absl::Status AddWallPlanes(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   constexpr std::string_view kAxes = "xyz", kBelow = ",below", kAbove = ",above";
   for (const std::string& text : flags.wall_planes) {
@@ -154,7 +153,7 @@ absl::Status AddWallPlanes(const ReplayFlags& flags, ReconstructionParameters& p
   return absl::OkStatus();
 }
 
-// Parses each --wall. The core's Validate checks what the points form.
+// Parses each --wall. The core's Validate checks the shape of the walls.
 absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   for (const std::string& text : flags.walls) {
     if (text.find('=') != std::string::npos) {
@@ -175,8 +174,8 @@ absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parame
 }
 
 // Makes the first slice the stream's slice, unless the stream has a surface. Adds a section for the
-// outline of each other slice.
-// Adds sections for the isolines of every slice; without slices, for the isolines of the stream.
+// outline of each other slice. Adds a section for each isoline on each slice; without slices, for
+// each isoline in the plane of the stream.
 absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   const auto add_isolines = [&](const std::optional<SlicePlane>& slice) {
     for (const double isovalue : flags.isolines) {
@@ -251,7 +250,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(const ReplayFlags& flags,
   }
 
   if (flags.spacing == "first-frame" || flags.spacing == "every-frame") {
-    // In space, the spacing of the first frame is given.
+    // In space, first-frame uses the estimate in `spacing`.
     if (!IsEstimatedInSpace(flags, std::nullopt)) parameters.spacing.reset();
     parameters.spacing_rule =
         flags.spacing == "first-frame" ? SpacingRule::kFirstFrame : SpacingRule::kEveryFrame;

@@ -12,14 +12,15 @@
 
 namespace partiemc::client {
 
-/// The attribute that --phases names; empty without a name.
+/// The attribute that --phases names, or a --wall of particles. Empty without such a flag.
 std::string PhaseAttributeOf(const ReplayFlags& flags);
 
-/// Whether the spacing is estimated before the stream opens: surfaces and slices require one.
+/// Whether the caller must estimate the spacing before the stream opens. Surfaces and slices
+/// require a given spacing.
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing);
 
-/// Uses `spacing` if the flags give none: that of the recording, or the estimate. Uses
-/// `recorded_box` for --periodic without --box. If both boxes are absent, the parameters have none.
+/// `spacing`: of the recording, or an estimate; unused if --spacing has a number.
+/// `recorded_box`: for --periodic without --box. Without any box the parameters have none.
 /// Errors: INVALID_ARGUMENT, one line that names the flag.
 absl::StatusOr<ReconstructionParameters> ParametersOf(
     const ReplayFlags& flags, std::optional<double> spacing,
@@ -28,7 +29,7 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(
 /// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
 absl::StatusOr<std::optional<double>> RateOf(std::string_view text);
 
-/// A positive, finite number and nothing else.
+/// Absent unless the whole text is a positive, finite number.
 std::optional<double> PositiveNumber(std::string_view text);
 
 }  // namespace partiemc::client

@@ -18,7 +18,6 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
                "Use TLS and require a certificate for the host of the address")
       ->envname("PARTIEMC_TLS")
       ->group(group);
-  // Setting a certificate enables TLS.
   const auto add_file = [&](const char* name, std::string& file, const char* what,
                             const char* variable) {
     return app

@@ -26,7 +26,7 @@ void AddFlag(std::string& flags, std::string_view flag, const Value& value,
   }
 }
 
-// A word for a shell, which may come from a stranger.
+// Quotes untrusted text as one word for a shell.
 std::string Quoted(std::string_view text) {
   const bool is_plain = std::ranges::all_of(text, [](char c) {
     return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '.' ||

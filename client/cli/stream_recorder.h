@@ -1,5 +1,6 @@
-// `partiemc watch --record`: records the frames that a producer sends. A replay of the recording
-// has the same results, bit for bit.
+// `partiemc watch --record`: records the particles that a producer sends. If the recording has all
+// frames of the stream, its replay has the same rings, bit for bit, except for streams with an
+// isovalue or with boxes of frames.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +25,7 @@ class StreamRecorder {
                                                const std::string& stream_name,
                                                const WatchedStream& stream);
 
-  /// Writes the particles of `frame`, which is the same after the call as before.
+  /// Writes the particles of `frame`. Takes its buffers during the call and returns them unchanged.
   /// Errors: FAILED_PRECONDITION if the producer does not echo its particles; the errors of
   /// RecordingWriter.
   absl::Status Add(WatchedFrame& frame);
@@ -32,8 +33,8 @@ class StreamRecorder {
   /// Completes the file. Does nothing if no frame was added.
   absl::Status Finish();
 
-  /// Returns lines for a user: the path and the command that replays the recording. If a replay may
-  /// have other bits, another line states the reason.
+  /// Returns lines for a user: the number of frames and the command that replays the recording. If
+  /// frames are missing, further lines state that a replay may have other bits.
   std::string Summary() const;
 
  private:
@@ -51,7 +52,8 @@ class StreamRecorder {
 };
 
 /// Returns the flags of `partiemc replay` for parameters that differ from the defaults, each after
-/// a space. Leaves out a given spacing, because the recording holds it.
+/// a space. Leaves out a given spacing, which the recording holds, and an isovalue, which has no
+/// flag.
 std::string ReplayFlagsOf(const ReconstructionParameters& parameters);
 
 }  // namespace partiemc::client

@@ -21,7 +21,6 @@ int Streams(const QueryFlags& flags);
 /// Returns an aligned table for a person to read; every line ends in '\n'.
 std::string StreamsText(std::span<const StreamSummary> streams);
 
-/// One JSON object on one line.
 std::string StreamsJson(std::span<const StreamSummary> streams, const std::string& address);
 
 }  // namespace partiemc::client

@@ -68,12 +68,11 @@ std::optional<LevelOfDetail> LevelOf(const WatchFlags& flags) {
   return LevelOfDetail{.max_error = flags.max_error, .max_triangles = flags.max_triangles};
 }
 
-// Exit code and counts of a watch.
 struct Ended {
   ExitCode code = kGood;
   std::uint64_t dropped = 0;
   std::uint64_t gaps = 0, in_gaps = 0;  // Reconnections; upper bound of the frames missed.
-  std::string word;                     // Why it ended; empty for a regular end.
+  std::string word;                     // Why the watch ended early; empty for a regular end.
 
   Ended With(ExitCode end_code, std::string end_word) const {
     Ended ended = *this;
@@ -172,7 +171,7 @@ Progress::Options ProgressOptions(const WatchFlags& flags) {
 
 // Opens the watch. With --wait it retries until the stream exists, even if the server becomes
 // unreachable in between, for example to restart. Shows `progress` from the first retry on. Errors:
-// those of Watcher::Open; CANCELLED after Ctrl-C.
+// as Watcher::Open; CANCELLED after Ctrl-C.
 absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
                                                     std::optional<Progress>& progress) {
   for (bool waited = false;; waited = true) {
@@ -318,7 +317,7 @@ int Watch(const WatchFlags& flags) {
                               .color_by = flags.color_by,
                               .compress_glb = flags.compress_glb,
                               .gauges = flags.gauges};
-  // Before the stream is known, which may take long.
+  // Checks the flags now, because waiting for the stream may take long.
   if (const absl::Status right = FrameOutputs::Check(places); !right.ok()) {
     return Complain(kUsage, right);
   }

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws the pictures of this folder: runs each simulation, watches its stream, keeps a few frames.
+"""Draws the SVG files in `pictures`: runs each simulation, watches its stream, keeps a few frames.
 
     client/couplings/draw.py NAME...        NAME: pysph_dam_break, lammps_column, numpy_drops
 

@@ -24,8 +24,8 @@ struct Live {
   absl::Status status = absl::OkStatus();
 };
 
-// Callback of `fix external`: `positions` points to the coordinates of `count` particles, x, y, z,
-// x, y, z, ... The stream copies each number once.
+// Callback of `fix external`: `positions[0]` points to the coordinates of `count` particles, x, y,
+// z, x, y, z, ... The stream copies each number once.
 void Send(void* context, std::int64_t step, int count, int* ids, double** positions, double**) {
   Live& live = *static_cast<Live*>(context);
   if (!live.status.ok()) return;

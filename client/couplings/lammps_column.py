@@ -22,7 +22,7 @@ SCRIPT_IN_SPACE = SCRIPT.with_name("lammps_column_3d.in")
 
 
 class Sender:
-    """Callback of `fix external`. LAMMPS ignores exceptions, so it stores one in `error`."""
+    """Callback of `fix external`. LAMMPS ignores exceptions, so `error` keeps the first one."""
 
     def __init__(self, simulation, stream, dimensions):
         self.simulation, self.stream, self.dimensions = simulation, stream, dimensions

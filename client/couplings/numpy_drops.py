@@ -30,13 +30,13 @@ def drop(centre, radius):
 
 
 def neighbours(positions):
-    """Pairs that may interact within the next steps: two arrays of indices."""
+    """Pairs that may interact within the next ten steps: two arrays of indices."""
     squared = sum((along[:, None] - along) ** 2 for along in positions.T)
     return numpy.nonzero(numpy.triu(squared < (2.5 * LENGTH) ** 2, 1))
 
 
 def accelerations(positions, velocities, first, second):
-    """Pressure and viscosity of the pairs (first, second)."""
+    """Accelerations by pressure and viscosity of the pairs (first, second): (N, dimensions)."""
     count = len(positions)
     apart = positions[first] - positions[second]
     squared = (apart ** 2).sum(axis=1)
@@ -57,7 +57,8 @@ def accelerations(positions, velocities, first, second):
 
 
 def simulate(steps, dimensions=2):
-    """Yields time, positions and velocities, (N, dimensions) each, after every step."""
+    """Yields step, time, positions and velocities after every step. The two arrays of shape
+    (N, dimensions) are overwritten by the next step."""
     radius = 0.5 if dimensions == 2 else 0.25
     apart = numpy.array([1.2 * radius, -0.3 * radius, 0][:dimensions])
     drops = [drop(-apart, radius), drop(apart, radius)]

@@ -15,9 +15,10 @@ struct Collection {
   FrameTimes times;                ///< By index in `files`.
 };
 
-/// Reads ParaView's collections: NAME.pvd and NAME.EXTENSION.series. Returns nothing if the file
-/// has another name. Paths in a collection are relative to its folder. Errors: kDataLoss for
-/// damage, a file without a time or several files at one time; kNotFound.
+/// Reads ParaView's collections: NAME.pvd and NAME.EXTENSION.series. Returns nothing if the path
+/// has another name or is no regular file. Paths in a collection are relative to its folder.
+/// Errors: kDataLoss for damage, a file without a time or several files at one time;
+/// kPermissionDenied; kResourceExhausted above 64 MiB.
 absl::StatusOr<std::optional<Collection>> ReadCollection(const std::string& path);
 
 /// Whether a file has the name of a collection.

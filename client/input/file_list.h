@@ -10,7 +10,7 @@
 
 namespace partiemc::client::input {
 
-/// Files whose names differ only in a number: frames of one recording, in natural order.
+/// Files whose names differ only in numbers: frames of one recording, in natural order.
 struct FileSeries {
   std::string pattern;  ///< "WaterBlock_*.vtp", or the name of the only file.
   std::vector<std::string> files;
@@ -30,7 +30,7 @@ struct InputFiles {
 /// differ in several numbers. Errors: kNotFound without a file.
 absl::StatusOr<InputFiles> ListInput(const std::string& input);
 
-/// The error for an input with several series. Lists them and suggests the largest.
+/// The error for an input with several series. Lists them and suggests the one with most bytes.
 absl::Status SeveralSeries(const std::string& input, const InputFiles& files);
 
 }  // namespace partiemc::client::input

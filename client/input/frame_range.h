@@ -25,7 +25,7 @@ struct FrameRange {
   }
 };
 
-/// Parses SequenceOptions::frames. Errors: kInvalidArgument.
+/// Parses SequenceOptions::frames; empty text selects all. Errors: kInvalidArgument.
 absl::StatusOr<FrameRange> ParseFrameRange(std::string_view text);
 
 }  // namespace partiemc::client::input

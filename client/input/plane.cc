@@ -13,7 +13,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// An axis is constant if its extent is below this share of the largest extent. The share is above
+// An axis is constant if its extent is at most this share of the largest extent. The share is above
 // the rounding error of text with six digits, and far below a real third dimension.
 constexpr double kFlatRelativeTolerance = 1e-6;
 
@@ -41,7 +41,7 @@ bool HasThreeAxes(const ParticleRows& rows) {
 
 constexpr std::array<std::size_t, 3> kAllAxes = {0, 1, 2};
 
-// The two other axes.
+// The two axes that remain, in ascending order.
 std::span<const std::size_t> AxesWithout(std::size_t dropped) {
   static constexpr std::array<std::array<std::size_t, 2>, 3> kOthers = {{{1, 2}, {0, 2}, {0, 1}}};
   return kOthers[dropped];

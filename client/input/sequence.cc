@@ -20,8 +20,8 @@ namespace {
 
 using namespace input;
 
-// Largest total size of files that are scanned to count their frames. The scan takes a fraction of
-// a second.
+// Largest total size of files that are scanned to count their frames. The scan takes less than a
+// second.
 constexpr std::size_t kMaxScannedBytes = std::size_t{64} << 20;
 
 // The files of the input and their format.
@@ -131,7 +131,7 @@ class FileSequence final : public Sequence {
     const std::string& path = recording_.files[file_++];
     const auto format = RecogniseFormat(path);
     if (!format.ok()) return format.status();
-    // The indices and times of the frames count the files.
+    // Frames have the indices and times of their files, so each file must hold one frame.
     if (recording_.format->one_frame_per_file && !(*format)->one_frame_per_file) {
       return absl::FailedPreconditionError(Concat(path, ": is a ", (*format)->name,
                                                   " file, which can hold several frames; ",
@@ -152,7 +152,8 @@ class FileSequence final : public Sequence {
       frame.time = *frame.step * *recording_.time_step;
     }
     if (!recording_.times) return absl::OkStatus();
-    // A time of another source, such as the number of the step, can have another unit.
+    // A frame without a time in the file is refused: a time of another source, such as the number
+    // of the step, can have another unit.
     const auto found = recording_.times->find(frame.index);
     if (found == recording_.times->end()) {
       return absl::FailedPreconditionError(
@@ -238,7 +239,7 @@ absl::StatusOr<FileSeries> ChooseSeries(const std::string& input, InputFiles fil
   return std::move(readable.series.front());
 }
 
-// Takes the files and the times of a collection. Returns false for another input.
+// Sets files and times if `input` is a collection. Returns false for any other input.
 absl::StatusOr<bool> TakeCollection(const std::string& input, Recording& recording) {
   auto collection = ReadCollection(input);
   if (!collection.ok()) return collection.status();

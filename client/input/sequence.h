@@ -20,10 +20,11 @@ namespace partiemc::client {
 /// input.
 struct RecordedFrame {
   std::size_t index = 0;  ///< Index in the input, counted from 0, before any selection.
-  std::optional<double>
-      time;  ///< From the times file, else `step` times SequenceOptions::time_step, else the frame.
-  /// Number of the time step. If `time` is absent, the step orders the frames, but velocities
-  /// cannot be used.
+  /// From the times file or the collection, else `step` times SequenceOptions::time_step, else as
+  /// the file states it. Absent if the input has no times.
+  std::optional<double> time;
+  /// Number of the time step. Can replace an absent `time`, but not for velocities, which require
+  /// the interval between frames.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
   /// The box of the simulation, along the axes of `positions`; of LAMMPS dumps and recordings.
@@ -32,8 +33,8 @@ struct RecordedFrame {
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
   std::vector<double> positions;
   bool float32 = false;  ///< The recording holds float32: a conversion to float32 is lossless.
-  std::vector<float>
-      volumes;  ///< Area (in 3D volume) per particle, positive and finite; empty if absent.
+  /// Area (in space, volume) per particle, positive and finite; empty if absent.
+  std::vector<float> volumes;
   std::vector<std::uint64_t> ids;  ///< Unique within the frame; empty if absent.
   std::vector<float> velocities;   ///< Interleaved like `positions`, finite; empty if absent.
   /// The requested attributes; for a .pemc recording all of its attributes.
@@ -113,7 +114,7 @@ struct SequenceOptions {
 /// Errors are one line with the problem, the place (file, line, frame) and the remedy.
 /// kInvalidArgument: a wrong option. kNotFound, kPermissionDenied: the file. kUnimplemented: an
 /// unsupported format. kFailedPrecondition: the input is ambiguous (several series, columns without
-/// names, 3D), or `select` holds for no particle of all frames. kDataLoss: damaged or truncated
+/// names, 3D), or `select` holds for no particle of any frame. kDataLoss: damaged or truncated
 /// input. kResourceExhausted: the input unpacks to too many bytes. Files are not trusted: memory
 /// grows with the bytes read, never with a declared count.
 class Sequence {
@@ -128,8 +129,8 @@ class Sequence {
   /// every call returns this error.
   virtual absl::StatusOr<bool> Next(RecordedFrame& frame) = 0;
 
-  /// The total number of frames, if it is cheap to determine: one frame per file, or files below
-  /// 64 MiB together, which are scanned once in a fraction of a second.
+  /// The number of frames that Next returns in all, if it is cheap to determine: one frame per
+  /// file, a count in the file, or files below 64 MiB together, which are scanned once.
   virtual std::optional<std::size_t> FrameCount() = 0;
 
   /// A short description of the input: "75 CSV files, frame_0000.csv to frame_0074.csv".

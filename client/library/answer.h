@@ -17,9 +17,9 @@ bool IsAnswer(const v1::ReconstructResponse& response);
 /// The number of the frame that `response` answers; 0 if it answers none.
 std::uint64_t AnsweredSequence(const v1::ReconstructResponse& response);
 
-/// Fills `event` from `response`, which is not StreamOpened. Reuses the buffers of `event`;
-/// `scratch` is private to this function. Errors: DATA_LOSS with the server's address for a
-/// malformed response.
+/// Fills `event` from `response`, which is not StreamOpened. Reuses the buffers of `event`. The
+/// caller keeps `scratch` from call to call, for this function's buffers. Errors: DATA_LOSS with
+/// the server's address for a malformed response.
 absl::Status DecodeAnswer(const v1::ReconstructResponse& response, const std::string& address,
                           wire::ReconstructedFrame& scratch, Event& event);
 

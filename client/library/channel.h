@@ -20,16 +20,16 @@ namespace partiemc::client {
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials);
 
-/// Makes the checks of MakeChannel on the address and on sending the token to it.
+/// Checks the address and whether the token may be sent to it, as MakeChannel does.
 absl::Status CheckAddress(const std::string& address, const Credentials& credentials);
 
 /// Waits until `channel` is connected. Retries refused connections until `timeout`. Errors:
-/// UNAVAILABLE, "no server at ADDRESS (WHY): ...".
+/// UNAVAILABLE, with the address, the cause and a remedy.
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
-/// Calls MakeChannel and Connect for one call that ends at `deadline`. Connect waits long enough
-/// for a server that is just starting.
+/// Calls MakeChannel and Connect for calls that must end within `deadline`. Connect waits at most
+/// 2 s, enough for a server that is starting.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::string& address,
                                                                 const Credentials& credentials,
                                                                 std::chrono::milliseconds deadline);
@@ -43,7 +43,7 @@ absl::Status NotAccepted(const std::string& address, const char* call,
                          std::chrono::milliseconds time);
 
 /// The cause at the end of gRPC's message: "Connection refused" for "...: Failed to connect to
-/// remote host: Connection refused".
+/// remote host: Connection refused". "no answer" for an empty message.
 std::string Reason(const grpc::Status& status);
 
 /// Converts the status of a call to one line that names the server. OK stays OK.

@@ -71,7 +71,7 @@ class TokenSender final : public experimental::Interceptor {
   std::string header_;
 };
 
-// Adds the token with an interceptor, because gRPC allows call credentials with TLS only.
+// Adds the token to calls by an interceptor, because gRPC's call credentials require TLS.
 class TokenSenderFactory final : public experimental::ClientInterceptorFactoryInterface {
  public:
   explicit TokenSenderFactory(Credentials credentials) : credentials_(std::move(credentials)) {}

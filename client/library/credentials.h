@@ -14,9 +14,9 @@
 
 namespace partiemc::client {
 
-/// Returns gRPC's credentials for the connection; without `tls` it is clear text. Errors:
-/// INVALID_ARGUMENT, which names the field of Credentials, for a file that cannot be read or is not
-/// PEM.
+/// Returns gRPC's credentials for the connection; without `tls` the connection is not encrypted.
+/// Errors: INVALID_ARGUMENT, which names the field of Credentials, for a file that cannot be read
+/// or is not PEM, for a file without `tls`, and for a certificate without a key or the reverse.
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
     const Credentials& credentials);
 

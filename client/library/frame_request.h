@@ -23,7 +23,8 @@ absl::StatusOr<grpc::ByteBuffer> EncodeFrameRequest(const wire::FrameRows& frame
                                                     std::uint64_t sequence,
                                                     const StreamLimits& limits);
 
-/// The error for a frame that got no slot in the window: DEADLINE_EXCEEDED with a Violation.
+/// The error for a frame that got no slot in the window within `timeout`: DEADLINE_EXCEEDED with a
+/// Violation.
 absl::Status SendTimeout(std::chrono::milliseconds timeout);
 
 }  // namespace partiemc::client

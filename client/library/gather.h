@@ -10,8 +10,8 @@ namespace partiemc::client {
 
 /// Returns a view of `particles` in the layout of a frame's message: rows of two or three
 /// coordinates; volumes, velocities and attributes as float; ids as 64 bits. Numbers are copied
-/// only when rows are written. Errors: INVALID_ARGUMENT with a Violation (reason COUNT) if one
-/// component of coordinates or velocities is missing.
+/// only when rows are written, so the arrays must outlive the view. Errors: INVALID_ARGUMENT with a
+/// Violation, if a component is missing (reason COUNT) or `time` is not finite (NOT_FINITE).
 absl::StatusOr<wire::FrameRows> RowsOf(const ParticleArrays& particles, double time);
 
 }  // namespace partiemc::client

@@ -20,7 +20,7 @@ class OwnedFrame {
   OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep the addresses of their elements.
   OwnedFrame& operator=(OwnedFrame&&) = default;
 
-  /// Copies `frame`, with `time` instead of its time.
+  /// Copies `frame`, with `time` instead of its time. `number` is the caller's number of the frame.
   void Assign(const Frame& frame, double time, std::uint64_t number) {
     frame_ = frame;
     frame_.time = time;
@@ -41,8 +41,8 @@ class OwnedFrame {
     Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
   }
 
-  /// Copies only the arrays whose layout differs from a frame's. The other arrays must outlive this
-  /// object.
+  /// Copies only the arrays whose layout differs from a frame's. frame() refers to the other
+  /// arrays, so they must outlive its use.
   void Adopt(const wire::FrameRows& rows) {
     Take(rows, rows.scalars.time, 0, [](const std::byte* place, std::size_t alignment) {
       return place != nullptr && reinterpret_cast<std::uintptr_t>(place) % alignment == 0;

@@ -1,4 +1,4 @@
-// Adds the attribute with the phases of particles to the attributes that a stream asks for.
+// Adds the attribute with the phases of particles to the attributes that a stream requests.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace partiemc::client {
 
-/// The attributes that frames of a stream must have: those to interpolate, and the phases if a
-/// section has one or walls have.
+/// Returns `attributes`, and the phase attribute if a section or a wall is given by a phase. Frames
+/// of the stream must have these attributes.
 inline std::vector<std::string> WithPhases(const ReconstructionParameters& parameters,
                                            std::vector<std::string> attributes) {
   const bool has_phases = !parameters.wall_phases.empty() ||

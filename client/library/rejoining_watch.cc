@@ -82,7 +82,7 @@ RejoiningWatch::RejoiningWatch(std::vector<std::string> addresses, std::string_v
       retry_(std::move(addresses), "watcher", options.rejoin, options.connect_timeout,
              surroundings) {}
 
-// Tries all addresses. If all fail, returns the refusal of a server rather than the error of an
+// Tries each address once. If all fail, returns the refusal of a server rather than the error of an
 // address without a server, because the refusal is more informative.
 absl::Status RejoiningWatch::Connect() {
   const std::size_t count = retry_.addresses().size();
@@ -185,8 +185,8 @@ bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   if (!retry_.lost()) lost_ = received;
   retry_.Lose(absl::StrCat("lost the stream at ", address(), " (", call_->why(), ")"));
   SetCall(nullptr);
-  // If the producer was lost but the server was not, the same address is tried again: the producer
-  // may return to it.
+  // If the producer was lost but not the server, the next attempt uses the same address: the
+  // producer may return to it.
   if (!end_.reason.empty() && received.ok()) {
     retry_.TryAgain(received.status());
   } else {

@@ -47,7 +47,7 @@ class RejoiningWatch final : public Watcher {
   absl::Status ConnectAt(std::chrono::milliseconds connect_timeout);
   absl::StatusOr<Received> ReceiveOrLose(WatchedFrame& frame,
                                          std::optional<std::chrono::milliseconds> wait);
-  // The sequence number to request; absent: the newest.
+  // The first sequence number to request from a server; absent: the newest frame.
   std::optional<std::uint64_t> From() const;
   bool Lose(const absl::StatusOr<Received>& received);
   // Continues to rejoin. Returns kEvent if the watch has rejoined, kNothingYet if it has not
@@ -71,7 +71,7 @@ class RejoiningWatch final : public Watcher {
       lost_;  // Status of the lost call; returned if the watch gives up.
   std::optional<absl::StatusOr<Received>> over_;  // Set when the watch has ended.
   std::uint64_t last_ = 0;                        // Number of the last delivered frame; 0: none.
-  std::uint64_t unreported_drops_ = 0;  // Drops counted by ended calls and not yet reported.
+  std::uint64_t unreported_drops_ = 0;  // Dropped frames of ended calls, not yet reported.
 
   Mutex mutex_;
   CondVar cancel_came_;

@@ -9,11 +9,11 @@
 
 namespace partiemc::client {
 
-/// Requests in the order of their sequence numbers, without gaps. Shares their bytes with gRPC. Not
-/// thread-safe.
+/// Serialised frames in the order of their sequence numbers, without gaps. Shares their bytes with
+/// gRPC. Not thread-safe.
 class ResendBuffer {
  public:
-  /// `first` is the number of the first frame.
+  /// `first` is the sequence number of the frame that is added first.
   explicit ResendBuffer(std::uint64_t first) : first_(first) {}
 
   /// Adds frame end().

@@ -21,22 +21,19 @@ absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
                                       const ReconstructionParameters& requested) {
   auto parameters = wire::DecodeParameters(opened.parameters());
   if (!parameters.ok()) return parameters.status();
-  // Servers of before there were surfaces ignore the output.
+  // An older server ignores parameters that it does not know, and returns other values.
   if (requested.output == Output::kSurface && parameters->output != requested.output) {
     return absl::UnimplementedError("the server does not support surfaces: use a newer one");
   }
-  // Servers of before there were periodic boxes ignore the box.
   if (parameters->box != requested.box) {
     return absl::UnimplementedError("the server does not support periodic boxes: use a newer one");
   }
   if (parameters->noise_filter != requested.noise_filter) {
     return absl::UnimplementedError("the server does not support noise filters: use a newer one");
   }
-  // Servers of before there were own sizes ignore them.
   if (parameters->sizes != requested.sizes) {
     return absl::UnimplementedError("the server does not support own sizes: use a newer one");
   }
-  // Servers of before there were phases give outlines of the body instead.
   if (!std::ranges::equal(parameters->sections, requested.sections, {}, &Section::phase,
                           &Section::phase)) {
     return absl::UnimplementedError("the server does not support phases: use a newer one");
@@ -73,8 +70,8 @@ absl::Status BoxesNotSupported() {
 
 constexpr auto kNever = Clock::TimePoint::max();
 
-// Returns the purpose with which the end of an opened call is classified. It is not kResume: only a
-// part 0 that is resuming may wait until its former call releases a name or a slot.
+// Returns the purpose that classifies the end of a call that was open. It is never kResume: its
+// refusals, such as a name in use, can only end a call that has not opened.
 CallPurpose LossPurpose(const StreamOptions& options) {
   return options.parts.part > 0 ? CallPurpose::kJoin : CallPurpose::kOpen;
 }

@@ -1,9 +1,9 @@
 // Implements Stream over successive calls.
 //
 // The stream holds every frame from Send until a checkpoint covers it. After a loss the stream
-// opens a new call with the last checkpoint and resends all later frames in order. It drops results
-// that the caller has already received, so each result is delivered once. Results depend only on
-// checkpoint and frames, so their bits do not change.
+// opens a new call with the last checkpoint and resends all later frames in order. It drops
+// repeated results, so the caller receives each result once. Results depend only on checkpoint and
+// frames, so their bits do not change.
 //
 //   streaming (call_) --lost--> StreamConnector --opened--> streaming
 //       |                           +-- refused, or give_up_after passed: failed (failure_)
@@ -87,15 +87,14 @@ class ResumingStream final : public Stream {
   bool sends_other_part() const { return options_.parts.part > 0; }
   std::uint64_t FirstToSend(const StreamConnector::Opened& opened) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // Declares to Clang's thread-safety analysis that the connector and the call use the same
-  // monitor. Does nothing at run time.
+  // For Clang's thread-safety analysis: connector and call use the same monitor. Does nothing.
   void AssertShared() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.mutex(), call_->mutex()) {}
 
   const StreamOptions options_;
   // Constant after opening:
   StreamInfo info_;
-  bool survives_ = false;  // Reconnects after a loss.
+  bool survives_ = false;  // True if the stream reconnects after a loss.
 
   mutable Monitor monitor_;
   StreamConnector connector_;
@@ -109,14 +108,14 @@ class ResumingStream final : public Stream {
   std::string checkpoint_ ABSL_GUARDED_BY(monitor_.mutex);
   // The first frame after the checkpoint.
   std::uint64_t checkpoint_next_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
-  // The next frame whose response the caller has not received, and the next frame that call_
-  // answers. After a reconnection call_ repeats some responses, which are dropped.
+  // The next frame whose response the caller receives, and the next frame that call_ answers. After
+  // a reconnection the second is smaller: call_ repeats some responses, which are dropped.
   std::uint64_t next_answer_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   std::uint64_t next_of_call_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
-  // call_ does not answer this part's frames below this number, because the server has already
-  // completed them.
+  // Parts other than 0 only: call_ does not answer frames below this number, because the server has
+  // already completed them.
   std::uint64_t over_below_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
-  // Starts of deadlines.
+  // When the oldest unanswered frame was sent, and when call_ was opened: deadlines start then.
   TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);
   TimePoint adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
   bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;     // FinishSending was called.

@@ -48,7 +48,7 @@ class RetryLoop {
   /// The address in use, or the next one to try.
   const std::string& address() const { return addresses_[address_]; }
   /// Replaces the addresses that were learned before. The addresses passed to the constructor and
-  /// the address in use stay. Only the first few addresses of a long list are used.
+  /// the address in use stay. At most 16 learned addresses are kept.
   void Learn(const std::vector<std::string>& addresses);
   void UseNextAddress() { address_ = (address_ + 1) % addresses_.size(); }
 
@@ -64,8 +64,8 @@ class RetryLoop {
   /// From Lose to Recovered.
   bool lost() const { return backoff_.has_value(); }
 
-  /// Makes attempts until one has opened a call, but no longer than `until`. Requires lost().
-  /// Errors: from `attempts`.
+  /// Makes attempts until one has opened a call. Returns kNotYet at `until`, kGaveUp when
+  /// ReconnectPolicy::give_up_after has passed. Requires lost(). Errors: from `attempts`.
   absl::StatusOr<Outcome> Run(Attempts& attempts, std::optional<TimePoint> until);
 
   /// Requires lost().

@@ -10,9 +10,9 @@
 namespace partiemc::client {
 namespace {
 
-// Reasons of refusals (proto/PROTOCOL.md) after which another attempt may succeed. The stream's
-// former call may still hold a name, a slot or the memory of its state. Another server may have a
-// version or keys that accept the checkpoint.
+// Reasons of refusals (proto/PROTOCOL.md) after which another attempt may succeed: the stream's
+// former call may release its name, its slot or the memory of its state, and another server's
+// version or keys may accept the checkpoint.
 constexpr std::string_view kDraining = "DRAINING";
 constexpr std::array<std::string_view, 8> kRetryableWhileResuming = {
     "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",     "CALLER_STREAMS",

@@ -58,8 +58,7 @@ class StreamCall final
   ~StreamCall() override;
 
   Mutex& mutex() const ABSL_LOCK_RETURNED(monitor_.mutex) { return monitor_.mutex; }
-  /// Declares to Clang's thread-safety analysis that this thread holds the monitor's mutex. Does
-  /// nothing at run time.
+  /// For Clang's thread-safety analysis: this thread holds the monitor's mutex. Does nothing.
   void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(monitor_.mutex) {}
 
   /// Sends `open`. Call first and once.

@@ -13,7 +13,7 @@
 namespace partiemc::client {
 namespace {
 
-// For a new stream: time limit for connecting to each of several addresses; pause between attempts.
+// For a new stream: time limit to connect to one of several addresses; pause between attempts.
 constexpr std::chrono::milliseconds kShortConnect(250);
 constexpr std::chrono::milliseconds kRest(20);
 
@@ -65,8 +65,7 @@ class StreamConnector::Calls final : public Attempts {
  public:
   explicit Calls(StreamConnector& connector) : connector_(connector) {}
 
-  // Declares to Clang's thread-safety analysis that this thread holds the connector's mutex. Does
-  // nothing at run time.
+  // For Clang's thread-safety analysis: this thread holds the connector's mutex. Does nothing.
   void AssertLocked() const ABSL_ASSERT_EXCLUSIVE_LOCK(connector_.monitor_.mutex) {}
 
   bool Cancelled() override ABSL_EXCLUSIVE_LOCKS_REQUIRED(connector_.monitor_.mutex) {

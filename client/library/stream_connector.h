@@ -1,4 +1,4 @@
-// Finds a server for a stream: address, time and time limit of each attempt.
+// Opens the calls of a stream: the first one, and a new one after each loss.
 #pragma once
 
 #include <chrono>
@@ -37,7 +37,8 @@ class StreamConnector {
   /// Opens a new stream at the first address that accepts it. Errors: see Stream::Open.
   absl::StatusOr<Opened> OpenNew() ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
 
-  /// Adds addresses from a server's notice for failover, if the credentials suit them.
+  /// Replaces the addresses learned from earlier notices by those of `notice`, for failover. Leaves
+  /// out Unix sockets, and addresses to which the token may not be sent.
   void Learn(const v1::StreamNotice& notice);
   /// Records that the stream lost its call; OpenAgain then resumes the stream with `resume`. Until
   /// Recovered, further losses count as part of this one.
@@ -68,8 +69,7 @@ class StreamConnector {
   absl::StatusOr<Opened> OpenNewAt(TimePoint give_up_at, bool& retryable)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   void Start(std::shared_ptr<grpc::Channel> channel) ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  // Declares to Clang's thread-safety analysis that the attempt uses the same monitor. Does nothing
-  // at run time.
+  // For Clang's thread-safety analysis: the attempt uses the same monitor. Does nothing.
   void AssertAttemptLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex)
       ABSL_ASSERT_EXCLUSIVE_LOCK(attempt_->mutex()) {}
   const std::string& address() const { return retry_.address(); }

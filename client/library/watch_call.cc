@@ -20,7 +20,7 @@ v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
 
-// Sets `values` to the coordinates `axes` of each vector of `components` values.
+// Sets `values` to the components `axes` of each vector; a vector has `components` components.
 template <typename From, typename To>
 void Project(std::span<const From> vectors, std::size_t components,
              std::span<const std::size_t> axes, std::vector<To>& values) {
@@ -33,7 +33,7 @@ void Project(std::span<const From> vectors, std::size_t components,
   }
 }
 
-// The coordinates of particles with `components` that a watcher receives.
+// Indices of the coordinates that a watcher receives, of particles with `components` coordinates.
 std::vector<std::size_t> AxesOf(const ReconstructionParameters& parameters,
                                 std::size_t components) {
   if (components == 2) return {0, 1};
@@ -61,8 +61,8 @@ void TakeParticles(const Frame& echoed, const ReconstructionParameters& paramete
   frame.particle_box = echoed.box;
 }
 
-// Takes the scalars that have values, of several with one name the first. Returns false if one has
-// not as many values as there are particles.
+// Copies the attributes of particles that have values; of several with the same name the first.
+// Returns false if the number of values does not fit the number of particles.
 bool TakeScalars(const v1::ReconstructedFrame& result, std::size_t particles, WatchedFrame& frame) {
   std::set<std::string_view> names;
   for (const v1::NamedScalar& from : result.particle_scalars()) {

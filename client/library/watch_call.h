@@ -1,5 +1,5 @@
-// One WatchStream call. Its thread opens the call and reads messages into `ready_`; the credits
-// bound their number. The receiver's thread decodes them and returns the credits.
+// One WatchStream call. Its own thread opens the call and reads messages into `ready_`; the credits
+// limit their number. The receiver's thread decodes messages and returns credits.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -34,7 +34,7 @@ class WatchCall {
       : address_(std::move(address)),
         clock_(clock),
         stub_(v1::ReconstructionService::NewStub(channel)) {}
-  /// Cancels.
+  /// Cancels the call and waits for its thread.
   ~WatchCall();
 
   /// Starts to open the call without waiting. `from_sequence` replaces options.from_sequence.
@@ -53,10 +53,11 @@ class WatchCall {
   const std::string& address() const { return address_; }
   // Valid when open:
   const WatchedStream& stream() const { return stream_; }
+  /// Identifies the stream across resumes and servers. Empty: not supported by the server.
   const std::string& lineage() const { return lineage_; }
   // Valid when ended:
   const WatchEnd& end() const { return end_; }
-  /// Reason in the status; empty if there is none.
+  /// Reason in the call's status (proto/PROTOCOL.md); empty if there is none.
   std::string reason() ABSL_LOCKS_EXCLUDED(mutex_);
   /// True if the connection, the server or the producer was lost. False if another call would be
   /// refused too.

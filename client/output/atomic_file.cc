@@ -56,7 +56,8 @@ absl::Status WriteError(int error, const std::filesystem::path& path) {
                                    std::generic_category().message(error), "; ", Advice(error)));
 }
 
-// The target of `path` after its symbolic links, so that Commit does not replace a link.
+// The target of `path` after its symbolic links, so that Commit does not replace a link. A link to
+// a missing file is not followed.
 std::filesystem::path FollowLinks(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_symlink(path, error)) return path;

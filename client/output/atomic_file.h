@@ -13,7 +13,8 @@ namespace partiemc::client {
 /// A file that is written under a hidden temporary name in its directory. Commit renames it. Until
 /// then an older file of the same name is unchanged, even if the process is killed. Protection from
 /// a power loss depends on the file system. Without Commit the destructor removes the temporary
-/// file. A device or a pipe (/dev/stdout) is written directly. A symbolic link is followed.
+/// file. A device or a pipe (/dev/stdout) is written directly. A symbolic link is followed if its
+/// target exists.
 ///
 /// Errors of all calls: one line "FILE: cannot be written: CAUSE; REMEDY". The code is NOT_FOUND
 /// (no such directory), PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full) or the code for another

@@ -11,13 +11,13 @@
 
 namespace partiemc::client {
 
-/// Number of colours in a picture.
+/// Number of different colours in a picture.
 inline constexpr std::size_t kColorBands = 32;
 
 /// Returns the colour "#rrggbb" at a position in the map. `share` is clamped to 0 to 1.
 std::string ColorOf(double share);
 
-/// The attribute of this name, or null.
+/// The attribute of this name. Null if there is none or `name` is empty.
 const AttributeValues* FindAttribute(const Result& result, const std::string& name);
 
 /// One number per point: the value of a scalar, the length of a vector.
@@ -30,15 +30,15 @@ std::size_t ChannelCount(const AttributeValues& attribute);
 /// Requires: channel < ChannelCount(attribute).
 std::vector<double> ChannelOf(const AttributeValues& attribute, std::size_t channel);
 
-/// Range of the colours.
+/// The values that have the first and the last colour of the map.
 struct ValueRange {
   double low = 0, high = 0;
 
-  /// Position of a value in the range, 0 to 1; .5 if the range is empty.
+  /// Position of a value in the range, not clamped: 0 at `low`, 1 at `high`; .5 if they are equal.
   double ShareOf(double value) const { return high > low ? (value - low) / (high - low) : .5; }
 };
 
-/// Range of finite values; 0 to 0 without values.
+/// The least and the largest value; 0 and 0 without values. Requires: all values are finite.
 ValueRange RangeOf(std::span<const double> values);
 
 }  // namespace partiemc::client

@@ -18,30 +18,29 @@
 
 namespace partiemc::client {
 
-/// A frame of a replay. It owns nothing: all views must stay valid during the call that receives
-/// it.
+/// Owns nothing. All views must stay valid during the call that receives the record.
 struct FrameRecord {
   std::uint64_t index = 0;  ///< Index in the input, from 0; part of file names.
   double time = 0;          ///< Simulation time, in the simulation's own unit.
   const Result& result;
-  /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and of
-  /// `result` only the particle count, the doubts and the sections are used.
+  /// Null: the frame is the outline `result`. Otherwise the frame is this surface in space, and
+  /// writers use only the statistics and the sections of `result`.
   const Surface* surface = nullptr;
-  std::span<const double> particles = {};           ///< x0, y0, x1, y1, ... or empty.
-  std::span<const double> particles_in_space = {};  ///< Of a surface: x0, y0, z0, ... or empty.
-  std::span<const float> particle_areas = {};       ///< Of each of them; empty: not known.
+  std::span<const double> particles = {};           ///< x0, y0, x1, y1, ...; or empty.
+  std::span<const double> particles_in_space = {};  ///< Of a surface: x0, y0, z0, ...; or empty.
+  std::span<const float> particle_areas = {};       ///< One for each of `particles`, or empty.
   std::array<double, kStageCount> stages_ms = {};   ///< Wall time by stage.
   double total_ms = 0;                              ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::uint64_t surface_digest = 0;
-  std::span<const OutlineDigests> section_digests = {};  ///< Of result.sections; or empty.
+  std::span<const OutlineDigests> section_digests = {};  ///< For each of result.sections, or empty.
   /// Indices of the sections that the picture of the frame shows as thin lines.
   std::span<const std::size_t> sections_in_plane = {};
   /// The attribute that colours the particles in a report, with its values at the particles. Null
   /// if there is none.
   const AttributeValues* particle_color = nullptr;
-  std::size_t section = 0;  ///< 1 for the first of a frame's sections; 0: its own outline.
+  std::size_t section = 0;  ///< Number of the section, from 1; 0: the frame itself.
 };
 
 /// Numbers of a surface, over all of its shells.
@@ -58,8 +57,8 @@ inline SurfaceTotals TotalsOf(const Surface& surface) {
     ++(surface.outer_of[shell] == kNoShell ? totals.bodies : totals.cavities);
     totals.area += surface.measures[shell].area;
     totals.volume += surface.measures[shell].volume;
-    // Each triangle has three sides, which it shares with one other triangle each, so the Euler
-    // characteristic is points - triangles / 2.
+    // Two triangles share each edge, so there are 3/2 edges per triangle. The Euler characteristic
+    // is points - edges + triangles = points - triangles / 2.
     const std::int64_t points =
         std::int64_t{surface.point_offsets[shell + 1]} - surface.point_offsets[shell];
     const std::int64_t triangles =
@@ -83,7 +82,8 @@ inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
           .section = k + 1};
 }
 
-/// The areas of particles with these volumes. The volume of a grain is its squared diameter.
+/// The areas of particles with these volumes. In a plane a volume is an area, except for grains:
+/// theirs is the squared diameter.
 inline std::vector<float> AreasOf(std::span<const float> volumes, Boundary boundary) {
   std::vector<float> areas(volumes.begin(), volumes.end());
   if (boundary == Boundary::kGrains) {
@@ -92,8 +92,7 @@ inline std::vector<float> AreasOf(std::span<const float> volumes, Boundary bound
   return areas;
 }
 
-/// Indices of the sections that lie in the plane of the stream's own outline. These sections are
-/// isolines.
+/// Indices of the sections that lie in the plane of the stream's own outline: isolines and phases.
 inline std::vector<std::size_t> SectionsInPlane(const ReconstructionParameters& parameters) {
   std::vector<std::size_t> sections;
   for (std::size_t k = 0; k < parameters.sections.size(); ++k) {
@@ -132,7 +131,7 @@ struct Box {
     max_x = std::max(max_x, x);
     max_y = std::max(max_y, y);
   }
-  /// Includes interleaved coordinates.
+  /// Includes points: x0, y0, x1, y1, ...
   void Include(std::span<const double> points) {
     for (std::size_t k = 0; k + 1 < points.size(); k += 2) Include(points[k], points[k + 1]);
   }

@@ -26,8 +26,9 @@ enum class FrameFormat : std::uint8_t {
   /// vector NAME:0_mean and so on). A ring of `farthest-particle` that crosses itself is written
   /// unchanged.
   kGeoJson,
-  /// A picture of mesh edges, outline and particles. The y axis points up. The longer side has 1000
-  /// units; coordinates are rounded to 0.001. Dots mark the points where the outline meets a wall.
+  /// A picture of mesh edges, outline, isolines and particles. The y axis points up. The longer
+  /// side has 1000 units, without the legend; coordinates are rounded to 0.001 units. Dots mark the
+  /// points where the outline meets a wall.
   kSvg,
   /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
   /// polylines). Indices begin at 1.
@@ -82,7 +83,7 @@ absl::Status CheckHoldsSurfaces(FrameFormat format);
 absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view names);
 
 struct FrameWriterOptions {
-  std::filesystem::path directory = {};  ///< Made, with its parents, when it is not there.
+  std::filesystem::path directory = {};  ///< Created, with its parents, if absent.
   std::vector<FrameFormat> formats = {};
   /// Visible box of all pictures of a sequence, in world units. Parts outside are cut off. Absent:
   /// each picture fits its frame.
@@ -98,14 +99,14 @@ struct FrameWriterOptions {
 
 /// The bytes of a frame in one of AllFrameFormats().
 /// Errors: INVALID_ARGUMENT as for CheckHoldsSurfaces; DATA_LOSS if a coordinate is not finite;
-/// OUT_OF_RANGE for coordinates or sizes that the format cannot hold; INTERNAL from VTK.
+/// OUT_OF_RANGE for coordinates or sizes that the format cannot hold; INTERNAL if VTK fails.
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options);
 
 /// Writes each frame and each of its sections in each format. Files appear complete or not at all.
 class FrameWriter {
  public:
-  /// Errors: as for AtomicFile, for the directory.
+  /// Creates the directory. Errors: as for AtomicFile.
   static absl::StatusOr<FrameWriter> Create(FrameWriterOptions options);
 
   /// Errors: as for EncodeFrame and AtomicFile. If a format fails, the formats before it have been

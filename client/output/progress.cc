@@ -43,7 +43,6 @@ double Rate(std::uint64_t done, double seconds) {
   return seconds > 0 ? static_cast<double>(done) / seconds : 0;
 }
 
-/// Rates below ten need a decimal.
 std::string RateText(double rate) {
   return rate < 10 ? absl::StrFormat("%.1f", rate) : absl::StrFormat("%.0f", rate);
 }

@@ -10,9 +10,9 @@
 
 namespace partiemc::client {
 
-/// Shows the progress of a run. On a terminal it is one line, redrawn at most ten times per second,
-/// that never wraps. Elsewhere it is plain lines, at most one every two seconds. If `quiet` is set,
-/// nothing is shown. The last state is always shown. Not thread-safe.
+/// Shows the progress of a run. A terminal shows one line, which never wraps and is redrawn at most
+/// ten times per second. Other outputs get plain lines, at most one every two seconds. If `quiet`
+/// is set, only notes are shown. Not thread-safe.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;
@@ -20,10 +20,10 @@ class Progress {
   struct Options {
     bool quiet = false;
     bool terminal = false;               ///< Redraw one line; otherwise plain lines.
-    std::optional<std::uint64_t> total;  ///< Frames to come; absent: not known.
-    std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< Of the terminal.
+    std::optional<std::uint64_t> total;  ///< Frames of the whole run; absent: unknown.
+    std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< Terminal's width.
     std::function<Clock::time_point()> now = Clock::now;
-    std::function<void(std::string_view)> write;  ///< Gets text as it is to be shown.
+    std::function<void(std::string_view)> write;  ///< Prints text unchanged.
   };
 
   /// Options for the standard error stream, with its kind and width from the system.
@@ -35,18 +35,18 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   /// `done`: number of frames completed since the start. `detail`: text about the last frame, shown
-  /// if it fits.
+  /// only if `total` is absent.
   void Update(std::uint64_t done, std::string detail = {});
 
-  /// Shows `text` instead of the progress until the next Update, while no frame can arrive. Without
-  /// a terminal, prints a line at once and then every ten seconds.
+  /// Shows `text` instead of the progress, while no frame can arrive. Call it repeatedly until the
+  /// next Update. Without a terminal, at most one call in ten seconds prints a line.
   void Wait(std::string_view text);
 
   /// Shows a separate line, such as a warning, without breaking the line of progress. Also shown if
   /// `quiet` is set.
   void Note(std::string_view line);
 
-  /// Shows the last state and ends the line. Further calls do nothing.
+  /// Shows the last state and ends the line. Afterwards only Note has an effect.
   void Finish();
 
  private:
@@ -58,7 +58,7 @@ class Progress {
   Options options_;
   Clock::time_point start_;
   std::optional<Clock::time_point> shown_at_;
-  std::optional<Clock::time_point> wait_shown_at_;  // While waiting.
+  std::optional<Clock::time_point> wait_shown_at_;  // Absent unless waiting.
   std::uint64_t done_ = 0;
   std::string detail_;
   std::optional<std::uint64_t> shown_done_;

@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::string_view kFramesMark = "{{frames}}";
 
-// Digits of a displayed number.
+// Significant digits of a displayed number.
 constexpr int kShownDigits = 7;
 
 // Rings below this share of the largest area do not extend the initial view. Otherwise spray that
@@ -202,7 +202,7 @@ std::string FrameNumbers(const FrameRecord& frame, const ReportOptions& options)
   return out;
 }
 
-/// `shown`: null if the frame has no picture, because the report has reached its limit.
+/// `shown`: null if the frame has no picture (ReportOptions::max_surface_bytes).
 std::string SurfaceNumbers(const FrameRecord& frame, const ReportSurface* shown) {
   const Surface& surface = *frame.surface;
   const SurfaceTotals totals = TotalsOf(surface);

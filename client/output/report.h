@@ -26,8 +26,8 @@ struct ReportOptions {
   std::size_t max_triangles = 300'000;
   /// A surface with more triangles is simplified, with a note.
   std::size_t max_surface_triangles = 100'000;
-  /// Once the pictures of surfaces have this many bytes in the file, further frames have numbers
-  /// but no picture, with a note.
+  /// Limit on the total size of the pictures of surfaces in the file. The first frame that exceeds
+  /// it and all later frames have numbers but no picture, with a note.
   std::size_t max_surface_bytes = 200'000'000;
   std::string color_by = {};  ///< As in FrameWriterOptions.
 };
@@ -36,11 +36,11 @@ struct ReportOptions {
 std::vector<std::pair<std::string, std::string>> DescribeParameters(
     const ReconstructionParameters& parameters);
 
-/// Writes one HTML file that requires no network and no other file. Each frame is written at once,
+/// Writes one HTML file that requires no network and no other file. Add writes its frame to disk,
 /// so memory does not grow. The file appears with Finish. Its size is 190 kB, plus about four bytes
 /// per particle and vertex, eight per triangle and 200 per ring. Geometry is rounded to 1/128 of
 /// the spacing.
-/// With surfaces it has 235 kB more, which draw in space, plus about seven bytes per triangle and
+/// With surfaces it has 233 kB more, for drawing in space, plus about seven bytes per triangle and
 /// per particle, and four per value of an attribute (report_surface.h).
 class ReportWriter {
  public:
@@ -64,7 +64,7 @@ class ReportWriter {
   AtomicFile file_;
   ReportOptions options_;
   bool has_surfaces_ = false;
-  std::size_t surface_bytes_ = 0;  ///< Of all pictures of surfaces.
+  std::size_t surface_bytes_ = 0;  ///< Total size of the pictures of surfaces.
 };
 
 }  // namespace partiemc::client

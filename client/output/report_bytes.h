@@ -8,8 +8,8 @@
 
 namespace partiemc::client {
 
-/// Counts are varints (7 bits per byte, lowest first). Signed numbers have the sign in the lowest
-/// bit.
+/// Counts are LEB128 varints (7 bits per byte, lowest first). Signed numbers have the zigzag
+/// encoding (sign in the lowest bit). Float64 is little-endian.
 class ReportBytes {
  public:
   void Count(std::uint64_t value) {

@@ -15,7 +15,7 @@
 namespace partiemc::client {
 namespace {
 
-// Number of rounding steps per spacing. The steps are finer than visible, and differences between
+// Rounding steps per spacing. Smaller steps would not be visible, and differences between
 // neighbours fit in two bytes.
 constexpr double kStepsPerSpacing = 128;
 
@@ -169,7 +169,7 @@ void EncodeColors(const FrameRecord& frame, const ReportGeometryOptions& options
   const std::size_t points =
       attribute->values.size() / static_cast<std::size_t>(attribute->components);
   // The values begin with the points of the rings. If the mesh shares these points, the values of
-  // its further points follow.
+  // the other points of the mesh follow.
   const bool has_mesh = result.mesh.TriangleCount() > 0 &&
                         result.mesh.TriangleCount() <= options.max_triangles &&
                         points == result.mesh.PointCount();

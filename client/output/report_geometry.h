@@ -16,7 +16,8 @@ struct ReportGeometryOptions {
 };
 
 /// Bytes, before base64. Integers are LEB128 varints, with zigzag encoding if signed. A coordinate
-/// is a multiple of `step` from the origin, written as the difference from the previous coordinate.
+/// is a multiple of `step` from the origin. Each point is written as its difference from the point
+/// before it in the bytes, also of another part; the first as its difference from (0, 0).
 ///
 ///   float64 origin_x, origin_y, step       little-endian
 ///   rings       count; per ring: number of points, index of its outer ring + 1 (0: an outer ring)

@@ -30,8 +30,8 @@ constexpr double kMostParticleSteps = 1 << 28;
 // Side of the columns in which particles are sorted, in steps: two spacings.
 constexpr std::int64_t kParticleColumn = 2 * static_cast<std::int64_t>(kParticleStepsPerSpacing);
 
-/// The surface that the report shows, with at most `max_triangles` triangles; without shells if
-/// there is none.
+/// The surface that the report shows, with at most `max_triangles` triangles; empty if it cannot be
+/// simplified to this number.
 Surface ShownSurface(const FrameRecord& frame, std::size_t max_triangles) {
   Surface surface = *frame.surface;
   surface.normals.clear();  // The page computes them from the triangles.
@@ -52,7 +52,7 @@ v1::ReconstructedFrame Message(const FrameRecord& frame, Surface surface) {
   result.statistics = frame.result.statistics;
   result.sections = frame.result.sections;
   v1::ReconstructedFrame message;
-  // Without a surface the message has no rings of its own, but those of the sections.
+  // Sections have rings, but no meshes.
   const wire::Outputs outputs = {.mesh = false, .coordinates = wire::Coordinates::kCompact};
   if (!wire::EncodeResult(result, {frame.stages_ms, frame.total_ms}, outputs, message).ok()) {
     message.Clear();  // Coordinates are too far apart.
@@ -82,7 +82,8 @@ class Particles {
     if (!(step_ > 0) || !std::isfinite(step_)) step_ = 1;
   }
 
-  /// An even selection of at most `most` particles, in columns of two spacings along x.
+  /// An even selection of at most `most` particles. They are sorted in columns along x, two
+  /// spacings wide, so that differences between successive particles are small.
   std::vector<Steps> Selection(std::size_t most) const {
     const std::size_t count = positions_.size() / 3;
     const std::size_t shown = std::min(count, most);
@@ -125,7 +126,7 @@ class Particles {
     Steps steps;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double from_origin = (positions_[3 * k + axis] - origin_[axis]) / step_;
-      // The difference of extreme coordinates is infinite.
+      // The difference of extreme coordinates may be infinite.
       steps[axis] = std::llround(std::min(from_origin, kMostParticleSteps));
     }
     return steps;

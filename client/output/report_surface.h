@@ -18,15 +18,14 @@ struct ReportSurfaceOptions {
 
 struct ReportSurface {
   std::string bytes;
-  /// 0: the surface is left out, because the simplified one has too many triangles, or because its
-  /// coordinates do not fit.
+  /// Shown triangles. 0 if the surface is empty, or left out because it cannot be simplified to
+  /// `max_triangles` or because its coordinates do not fit.
   std::uint64_t triangles = 0;
-  std::uint64_t particles = 0;
+  std::uint64_t particles = 0;  ///< Shown particles.
 };
 
 /// Encodes surface, sections and particles of a frame. Points are rounded to about 1/1024 of the
-/// spacing, particles to 1/32. Counts and differences are varints, differences with the sign in the
-/// lowest bit:
+/// spacing, particles to 1/32. ReportBytes encodes counts and differences:
 ///
 ///   message     count of bytes; a partiemc.v1.ReconstructedFrame with a compact surface without
 ///               normals, the rings of the sections, and the statistics

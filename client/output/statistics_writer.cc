@@ -57,7 +57,7 @@ constexpr std::string_view kStageSuffix = "_ms";
 constexpr std::size_t kColumnCount =
     kBeforeStages.size() + kStageCount + kAfterStages.size() + kAtWalls.size();
 
-// The columns of outlines at walls. Outlines without walls have the same without the last.
+// The columns of outlines at walls. Outlines without walls lack the last ones (kAtWalls).
 const std::array<std::string_view, kColumnCount>& Columns() {
   static const std::array<std::string, kStageCount> stages = [] {
     std::array<std::string, kStageCount> names;
@@ -102,7 +102,6 @@ double MeanContactAngle(const Rings& rings) {
   return sum / static_cast<double>(rings.contact_angles.size()) * (180 / std::numbers::pi);
 }
 
-/// A line of CSV.
 template <typename Values>
 std::string CsvLine(const Values& values) {
   std::string line;
@@ -204,7 +203,7 @@ class Row {
     }
   }
   void Digest(std::uint64_t value) { Words(DigestText(value)); }
-  // Has no quote and no comma.
+  // Requires: `words` has no quote and no comma.
   void Words(const std::string& words) {
     values_.push_back(json_ ? Concat("\"", words, "\"") : words);
   }

@@ -30,22 +30,22 @@ enum class StatisticsOf : std::uint8_t {
 /// dropped_components, dropped_spray, rings_digest, mesh_digest, time, doubts (names separated by
 /// blanks), section.
 ///
-/// Section 0 is the frame's own outline; a row for each section follows. After `section` come the
-/// columns of the gauges (partiemc/gauges.h): NAME for a gauge with one value, otherwise
+/// Section 0 is the frame's own outline; a row for each section follows. The gauges
+/// (partiemc/gauges.h) have the last columns: NAME for a gauge with one value, otherwise
 /// NAME_VALUE. A gauge is "nan" if the outline has no such point. Digests have 16 hexadecimal
 /// digits. Milliseconds are wall time. Areas and lengths are in world units. `polylines` counts
 /// rings, `vertices` their vertices.
 ///
-/// Outlines at walls have these columns after `section`: wetted_length, the length of the outline
-/// that lies on walls; contacts, the number of points where the outline meets a wall; and
-/// contact_angle, the mean angle of the fluid at these points, in degrees ("nan" without contacts).
+/// Outlines at walls have these columns between `section` and the gauges: wetted_length, the length
+/// of the outline that lies on walls; contacts, the number of points where the outline meets a
+/// wall; and contact_angle, the mean angle of the fluid at these points, in degrees ("nan" without
+/// contacts).
 ///
 /// The columns of surfaces in order: frame, particles, bodies, cavities, points, triangles, genus,
 /// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, surface_digest,
 /// time, doubts. Sections of a surface have no rows.
 ///
-/// `genus` counts handles: the sum over bodies and
-/// cavities, from their Euler characteristics. `volume` is the volume of bodies minus their
+/// `genus` counts the handles of bodies and cavities. `volume` is the volume of bodies minus their
 /// cavities. `area` is the sum over bodies and cavities.
 std::span<const std::string_view> StatisticsColumns(StatisticsOf what = StatisticsOf::kOutlines);
 
@@ -55,7 +55,7 @@ absl::StatusOr<std::vector<Gauge>> ParseGauges(const std::vector<std::string>& t
                                                StatisticsOf what = StatisticsOf::kOutlines);
 
 /// Writes CSV with a header line, or a JSON array with one object per row, in which non-finite
-/// numbers are null. Rows are written at once; the file appears with Finish.
+/// numbers are null. The file appears with Finish.
 class StatisticsWriter {
  public:
   /// INVALID_ARGUMENT if `path` ends neither in .csv nor in .json.
@@ -68,7 +68,8 @@ class StatisticsWriter {
                                                  std::vector<Gauge> gauges = {},
                                                  StatisticsOf what = StatisticsOf::kOutlines);
 
-  /// Errors: INVALID_ARGUMENT for a surface among outlines, or an outline among surfaces.
+  /// Errors: INVALID_ARGUMENT for a surface among outlines, or an outline among surfaces; as for
+  /// AtomicFile.
   absl::Status Add(const FrameRecord& frame);
   absl::Status Finish();
 

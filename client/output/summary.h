@@ -31,8 +31,8 @@ class Summary {
   std::uint64_t frame_count() const { return particles_.size(); }
   std::uint64_t refused_count() const { return refused_; }
 
-  /// Mean of 1 - triangles / triangles_grid, in percent, over the frames with triangles. 0 if there
-  /// are none.
+  /// Mean of 1 - triangles / triangles_grid, in percent, over the frames with triangles_grid > 0. 0
+  /// without such frames.
   double MeanReductionPercent() const;
 
   /// Mean, median and 99th percentile (nearest rank) over frames. Outlines: particles, rings,
@@ -44,7 +44,8 @@ class Summary {
   /// One line per kind of doubt: number of frames, explanation.
   std::vector<std::string> Warnings() const;
 
-  /// One line: frames, refused frames, seconds, frames per second, reason of an early end.
+  /// One line: frames, refused frames, seconds, frames per second, reason of an early end, numbers
+  /// of self-intersections and folded triangles. Leaves out what is zero or absent.
   /// `wall_seconds`: of the whole replay.
   std::string Headline(double wall_seconds) const;
 
@@ -55,11 +56,11 @@ class Summary {
   void AddOutline(const FrameRecord& frame);
   std::vector<SummaryRow> SurfaceRows() const;
 
-  std::vector<double> bodies_, cavities_;  // Of surfaces, with `particles_`, `vertices_`, ...
+  std::vector<double> bodies_, cavities_;  // Empty for outlines.
   std::vector<double> particles_, rings_, vertices_, triangles_grid_, triangles_, reduction_;
   std::array<std::vector<double>, kStageCount> stages_ms_;
   std::vector<double> total_ms_;
-  std::array<std::uint64_t, kAllDoubts.size()> doubted_{};  // Frames, by kind.
+  std::array<std::uint64_t, kAllDoubts.size()> doubted_{};  // Frames, by kind of doubt.
   std::uint64_t self_intersections_ = 0, folded_triangles_ = 0, refused_ = 0;
   std::string ended_early_;
 };

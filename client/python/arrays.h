@@ -14,13 +14,14 @@
 namespace partiemc::python {
 
 /// The arrays of a frame, and a view of them. NumPy arrays are used in place with any strides.
-/// Lists, other number types and other byte orders are converted, which copies them.
+/// Lists, and arrays of other number types or byte orders, are converted to float64, which copies
+/// them. Requires the GIL, except arrays().
 class PythonParticles {
  public:
-  /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes` and
-  /// `ids`: N. `velocities`: like positions. `attributes`: a dict from names to (N,), (N, 2), (N,
-  /// 3), or tuples. `box`: a dict of periodic axes with their bounds. None: absent. Raises
-  /// partiemc.Error (reasons COUNT, UNSUPPORTED).
+  /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes`: N.
+  /// `ids`: N integers of 32 or 64 bits; others are refused. `velocities`: like positions.
+  /// `attributes`: a dict from names to (N,), (N, 2), (N, 3), or tuples. `box`: see BoxOf. None:
+  /// absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
                   const pybind11::object& ids, const pybind11::object& velocities,
                   const pybind11::object& attributes,
@@ -39,10 +40,10 @@ class PythonParticles {
   pybind11::array Real(const pybind11::array& given, const char* field);
   void ExpectCount(const pybind11::array& array, const char* field) const;
 
-  std::vector<pybind11::array> kept_;
-  std::vector<std::string> names_;
+  std::vector<pybind11::array> kept_;  // Keeps the memory of the views.
+  std::vector<std::string> names_;     // Of attributes_.
   std::vector<client::AttributeArrays> attributes_;
-  bool counted_ = false;
+  bool counted_ = false;  // True once an array has set arrays_.count.
   client::ParticleArrays arrays_;
 };
 

@@ -14,7 +14,7 @@ namespace partiemc::python {
 
 /// Throws partiemc.Error for `status`, which must not be OK. Requires the GIL.
 [[noreturn]] void Raise(const absl::Status& status);
-/// Throws partiemc.Error for frame `sequence`, which the server refused.
+/// Throws partiemc.Error for frame `sequence`, which the server refused. Requires the GIL.
 [[noreturn]] void Raise(const std::string& message, const Violation& violation,
                         std::uint64_t sequence);
 
@@ -22,7 +22,7 @@ inline void RaiseUnlessOk(const absl::Status& status) {
   if (!status.ok()) Raise(status);
 }
 
-/// INVALID_ARGUMENT with a Violation, for an argument of the wrong kind.
+/// Returns INVALID_ARGUMENT with a Violation, for a wrong argument of a Python function.
 absl::Status Invalid(std::string_view reason, std::string field, std::string value,
                      std::string rule);
 

@@ -150,7 +150,7 @@ void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
   const auto given = Take<std::vector<py::object>>(arguments, "walls");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
-    const Numbers points = Numbers::ensure((*given)[k]);  // Null for what is no array of numbers.
+    const Numbers points = Numbers::ensure((*given)[k]);  // Null unless it is an array of numbers.
     const bool is_flat = points && points.ndim() == 1;
     if (!is_flat && !(points && points.ndim() == 2 && points.shape(1) == 2)) {
       Raise(Invalid("UNSUPPORTED", "walls[" + std::to_string(k) + "]",

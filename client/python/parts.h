@@ -1,4 +1,4 @@
-// The parts of a result as Python objects: what rings, meshes and surfaces have in common.
+// Helpers for Rings, Mesh and Surface in Python: views of members of a result.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -10,15 +10,16 @@
 
 namespace partiemc::python {
 
-/// A part of a result. `owner` is the Python object that keeps the arrays alive.
+/// A member of a result, such as its rings. `owner` is the Python object that keeps it alive.
 template <typename Part>
 struct PartOf {
   pybind11::object owner;
   const Part& part;
 };
 
-/// One member of the measures of all rings or shells, as a strided view. With `columns`, the
-/// members that follow it in memory are the other columns.
+/// One number of the measures of all rings or shells, as a strided view of shape (count,). With
+/// `columns`, its shape is (count, columns), and the following numbers in memory are the other
+/// columns.
 template <typename As, typename T, typename Measures, typename Part>
 pybind11::array Column(const PartOf<Part>& of, T Measures::*member, pybind11::ssize_t columns = 0) {
   const std::vector<Measures>& measures = of.part.measures;
@@ -29,8 +30,7 @@ pybind11::array Column(const PartOf<Part>& of, T Measures::*member, pybind11::ss
   return View<As>(first, {count, columns}, {kStride, sizeof(T)}, of.owner);
 }
 
-/// Pickles a part of a result (such as its rings) as a reference: the result, and the name of the
-/// attribute that holds the part.
+/// Pickles a member of a result as a reference: the result, and the name of its attribute.
 template <typename Part>
 auto Reduce(const char* attribute) {
   return [attribute](const PartOf<Part>& view) {

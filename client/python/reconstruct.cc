@@ -25,7 +25,7 @@ namespace {
 
 namespace py = pybind11;
 
-// Reconstructs a sequence of frames. Keeps parameters, state and warm buffers.
+// Implements partiemc.Reconstructor. Any thread may call it; calls run one after another.
 class Sequence {
  public:
   explicit Sequence(py::dict arguments) {
@@ -94,8 +94,8 @@ class Sequence {
 
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::optional<Reconstructor> reconstructor_;
-  std::unique_ptr<Arena> arena_;  // Null: all threads.
-  Doubts warned_;                 // With the GIL.
+  std::unique_ptr<Arena> arena_;  // Null: one thread per processor.
+  Doubts warned_;                 // Guarded by the GIL.
 
   Mutex mutex_;
   State state_ ABSL_GUARDED_BY(mutex_);

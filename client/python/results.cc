@@ -84,7 +84,7 @@ OwnedDiscs DiscsOf(const py::kwargs& given) {
   return discs;
 }
 
-// The arguments of a gauge by name, in the order of its kind.
+// Converts keyword arguments to a gauge. Raises partiemc.Error.
 Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
   const std::span<const GaugeTraits> all = AllGauges();
   const auto traits = std::ranges::find(all, kind, &GaugeTraits::name);
@@ -249,7 +249,7 @@ py::dict AttributesOf(const py::object& self) {
   return ByName(from.in_space ? result.surface.attributes : result.attributes, self);
 }
 
-// Coordinates of a particle.
+// Number of coordinates of each of the result's particles.
 std::size_t CoordinatesOf(const PythonResult& result) { return result.in_space ? 3 : 2; }
 
 template <typename T>
@@ -306,7 +306,7 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
 // Returns the state that pickle stores: the result as a message of the protocol, and the values
 // that the message cannot hold.
 py::tuple ToState(PythonResult& result) {
-  const auto& sections = SectionsOf(result);  // Leaves empty results in their places in the frame.
+  const auto& sections = SectionsOf(result);  // Moved out of the frame, so encoded empty there.
   const client::FrameResult& frame = result.frame;
   v1::ReconstructedFrame message;
   RaiseUnlessOk(wire::EncodeResult(frame.result, {frame.times.stages_ms, frame.times.total_ms},
@@ -353,7 +353,7 @@ AttributeValues AttributeFromState(const py::handle& state) {
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
-  // Without surfaces, the state had 6 parts; without attributes of particles 7.
+  // States of older versions have 6 entries (before surfaces) or 7 (before particle attributes).
   if (state.size() < 6 || state.size() > 8) {
     throw py::value_error("pickle: not the state of a partiemc Result");
   }

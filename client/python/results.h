@@ -17,23 +17,21 @@
 
 namespace partiemc::python {
 
-/// A result. Constant once Python holds it.
+/// A result. Constant once Python holds it, except for digests and sections (filled later).
 struct PythonResult {
   std::uint64_t sequence = 0;
   double time = 0;
   client::FrameResult frame;
-  /// False if the digests are not computed yet; they are computed at the first access.
-  bool has_digests = true;
-  /// True if the output of the stream is surfaces: particles then have three coordinates.
+  bool has_digests = true;  ///< False: the first access computes the digests.
+  /// True if the output of the stream is surfaces: `particles` then has three coordinates each.
   bool in_space = false;
-  // Set for watched frames:
-  std::optional<SurfaceLevel> level;  ///< Absent: the surface is exact.
+  // As in client::WatchedFrame, for watched frames only:
+  std::optional<SurfaceLevel> level;
   std::vector<double> particles;
   std::vector<AttributeValues> particle_attributes;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
-  /// Sections as Python objects, filled at the first access. Their results are then moved out of
-  /// `frame`.
+  /// Sections as Python objects. The first access moves them here from `frame`.
   std::vector<std::shared_ptr<PythonResult>> sections;
 };
 

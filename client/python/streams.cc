@@ -98,7 +98,7 @@ class ProducerStream {
     return latest_ != nullptr ? std::nullopt : std::optional(*sent);
   }
 
-  // Returns None if no event arrives in time, or if the event is the acceptance of a part.
+  // Returns null (None) if no event arrives in time, or if the event is the acceptance of a part.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     const ReceiveMark mark(*this);
@@ -150,7 +150,8 @@ class ProducerStream {
     RaiseUnlessOk(status);
   }
 
-  // Finishes the stream and drops unreceived results, so that frames on the way are still sent.
+  // Finishes the stream. Receives and drops the results that are left, so that waiting frames are
+  // still sent.
   void Close() {
     const py::gil_scoped_release others_may_run;
     std::thread receiver([this] {
@@ -226,7 +227,7 @@ class ProducerStream {
     return status;
   }
 
-  // Whether no thread has received so far, or only the calling thread.
+  // True if no thread is in Receive, and no other thread was the last to receive.
   bool NoOtherReceives() const {
     const std::thread::id last = last_receiver_;
     return receives_ == 0 && (last == std::thread::id() || last == std::this_thread::get_id());
@@ -256,10 +257,10 @@ class ProducerStream {
   std::unique_ptr<client::Stream> stream_;
   std::unique_ptr<client::LatestSender> latest_;           // Destroyed before the stream.
   std::thread finisher_;                                   // Runs LatestSender::Finish.
-  Doubts warned_;                                          // With the GIL.
-  std::atomic<std::uint64_t> offered_ = 0, answered_ = 0;  // With `latest`; answers of any stream.
-  std::atomic<int> receives_ = 0;                          // Threads in Receive.
-  std::atomic<std::thread::id> last_receiver_;             // The default: none.
+  Doubts warned_;                                          // Guarded by the GIL.
+  std::atomic<std::uint64_t> offered_ = 0, answered_ = 0;  // Counts of frames; used with `latest`.
+  std::atomic<int> receives_ = 0;                          // Number of threads in Receive.
+  std::atomic<std::thread::id> last_receiver_;             // Default: no thread has received.
   std::timed_mutex receiving_;                             // Held by the receiving thread.
   Mutex sending_;                                          // Held by the sending thread.
   std::uint64_t frames_ ABSL_GUARDED_BY(sending_) = 0;

@@ -1,4 +1,4 @@
-// What streams and watches share: waiting for events, and addresses.
+// Helpers of streams and watches: waiting for events, and addresses.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -16,14 +16,14 @@ namespace partiemc::python {
 /// Poll interval for Ctrl-C while waiting for a response.
 inline constexpr std::chrono::milliseconds kSlice(100);
 
-/// Calls `receive` repeatedly, each time with a short wait, until it returns an event or `seconds`
-/// have passed. Waits without the GIL. Between the waits it checks for signals, whose handlers may
-/// raise.
+/// Calls `receive` repeatedly, each time with a short wait, until it returns something other than
+/// kNothingYet or `seconds` have passed (absent: no limit). Waits without the GIL. Between the
+/// waits it runs Python's signal handlers, which may raise.
 absl::StatusOr<client::Received> Wait(
     std::optional<double> seconds,
     absl::FunctionRef<absl::StatusOr<client::Received>(std::chrono::milliseconds slice)> receive);
 
-/// Implements `__next__` by `receive`: the iteration ends where `receive` raises EOFError.
+/// Implements `__next__` by `receive`: the iteration ends when `receive` raises EOFError.
 template <typename Receive>
 auto NextBy(Receive receive) {
   try {
@@ -34,7 +34,7 @@ auto NextBy(Receive receive) {
   }
 }
 
-/// `address`, or the address from the environment.
+/// `address`, or the address from the environment. Also keeps gRPC initialized from now on.
 std::string AddressOf(const std::optional<std::string>& address);
 
 }  // namespace partiemc::python

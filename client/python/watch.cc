@@ -40,7 +40,7 @@ class Watch {
     watcher_.reset();
   }
 
-  // Returns None if no frame arrives in time. Raises an exception at the end of the watch.
+  // Returns null (None) if no frame arrives in time. Raises EOFError at the end of the watch.
   std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
     const auto result = results_->Take();
     client::WatchedFrame frame;
@@ -85,7 +85,7 @@ class Watch {
  private:
   const std::shared_ptr<ResultPool> results_ = std::make_shared<ResultPool>();
   std::unique_ptr<client::Watcher> watcher_;
-  Doubts warned_;               // With the GIL.
+  Doubts warned_;               // Guarded by the GIL.
   std::timed_mutex receiving_;  // Held by the receiving thread.
 };
 

@@ -18,7 +18,8 @@
 
 namespace partiemc::client::recording {
 
-/// Maximum size of a decompressed block: enough for a frame of 2^24 particles with all arrays.
+/// Limit on a decompressed block: enough for a frame of 2^24 particles with all arrays. A larger
+/// block is refused, at the latest at twice this size.
 inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
 
 inline constexpr std::string_view kFileTag = "PEMCFILE";
@@ -29,14 +30,14 @@ inline constexpr std::uint64_t kVersion = 1;
 /// of 8 bytes.
 inline constexpr std::size_t kMarkBytes = 4 + 4 + 8 + 8;
 std::string MakeMark(std::string_view tag, std::uint64_t value);
-/// The value of a mark with this tag. Requires: bytes.size() == kMarkBytes.
+/// The value of a mark. Empty if `bytes` are no mark with this tag. Requires: bytes.size() ==
+/// kMarkBytes.
 std::optional<std::uint64_t> ParseMark(std::string_view bytes, std::string_view tag);
 
-/// Compresses blocks.
 class BlockPacker {
  public:
   explicit BlockPacker(int compression_level);
-  /// Valid until the next call. Errors: RESOURCE_EXHAUSTED.
+  /// Returns `block` compressed, valid until the next call. Errors: RESOURCE_EXHAUSTED.
   absl::StatusOr<std::string_view> Pack(std::string_view block);
 
  private:
@@ -47,7 +48,7 @@ class BlockPacker {
   std::string packed_;
 };
 
-/// Reads marks and blocks from a file, one after the other.
+/// Reads marks and blocks from a file, in order.
 class BlockReader {
  public:
   enum class Piece : std::uint8_t {
@@ -56,8 +57,9 @@ class BlockReader {
     kTruncated,  ///< The file ends without a tail.
   };
 
-  /// Reads the first mark. `max_expansion` as in input::ExpandsTooMuch. Errors: kNotFound,
-  /// kPermissionDenied, kUnimplemented (another version), kDataLoss (not a recording).
+  /// Reads the first mark. `max_expansion` limits the decompressed bytes of all blocks
+  /// (input::ExpandsTooMuch). Errors: kNotFound, kPermissionDenied, kUnimplemented (another
+  /// version), kDataLoss (not a recording).
   static absl::StatusOr<BlockReader> Open(const std::string& path,
                                           double max_expansion = input::kMaxExpansion);
 
@@ -83,9 +85,9 @@ class BlockReader {
   std::unique_ptr<ZSTD_DCtx, Free> context_;
   double max_expansion_;
   std::uint64_t read_ = 0;      // Bytes read from the file.
-  std::uint64_t unpacked_ = 0;  // Bytes of the blocks before this one.
-  std::string input_;           // Bytes of the file.
-  std::size_t position_ = 0;    // Number of consumed bytes of input_.
+  std::uint64_t unpacked_ = 0;  // Decompressed bytes of the earlier blocks.
+  std::string input_;           // Buffered bytes of the file.
+  std::size_t position_ = 0;    // Number of consumed bytes of `input_`.
   std::string block_;
   std::uint64_t frame_count_ = 0;
 };

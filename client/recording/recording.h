@@ -2,12 +2,13 @@
 //
 //   mark     zstd skippable frame: "PEMCFILE", version (uint64, 1)
 //   block    zstd frame with checksum: RecordingHeader
-//   block    zstd frame with checksum: 1 to 8 x ParticleFrame       each message after its length,
-//   ...                                                             a varint
+//   block    zstd frame with checksum: 1 to 8 x ParticleFrame
+//   ...
 //   mark     zstd skippable frame: "PEMCTAIL", number of frames (uint64)
 //
-// Blocks are independent, so a truncated file loses only its last block. The file is a valid zstd
-// file: `zstd -dc FILE` prints the length-delimited messages for other Protobuf tools.
+// A varint with its length precedes each message. Blocks are independent, so a truncated file loses
+// only its last block. The file is a valid zstd file: `zstd -dc FILE` prints the length-delimited
+// messages for other Protobuf tools.
 //
 // Positions are float32 unless float64 is requested. float32 resolves 1e-4 of a spacing up to a
 // thousand spacings from the origin and takes half of the size. Reading returns the same bits.
@@ -51,10 +52,10 @@ class RecordingWriter {
                                                                  const RecordingOptions& options);
   ~RecordingWriter();
 
-  /// Appends a frame with its arrays. Frames are numbered in the order of calls. If a frame has no
-  /// time, the number of its time step is stored as time, else the number of the frame; its
-  /// velocities are not stored. Errors: INVALID_ARGUMENT (float32 is too coarse); the errors of
-  /// AtomicFile.
+  /// Appends a frame with its arrays, without its box. Frames are numbered in the order of calls.
+  /// If a frame has no time, its velocities are left out, and its time is the number of its time
+  /// step, else the number of the frame. Errors: INVALID_ARGUMENT (float32 is too coarse); the
+  /// errors of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();
@@ -73,8 +74,8 @@ bool IsRecording(const std::string& path);
 
 /// Reads a recording. A truncated file ends after its last complete block, with a notice; a damaged
 /// block is kDataLoss. Every block is checked before its frames are delivered. Files are not
-/// trusted: a block is at most 1 GiB, and memory grows with its actual content. Ids are returned
-/// unchanged. Velocities are returned only if all velocities of the frame are finite.
+/// trusted: blocks are limited (kMaxBlockBytes), and memory grows with their actual content. Ids
+/// are returned unchanged. Velocities are returned only if all velocities of the frame are finite.
 class RecordingReader final : public Sequence {
  public:
   /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.

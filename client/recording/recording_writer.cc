@@ -20,10 +20,11 @@
 namespace partiemc::client {
 namespace {
 
-// Most frames per block: a compromise between the frames that a truncation loses and the size. The
-// bundled dam break takes 1.89 MB with 8 frames per block, 2.16 MB with 1, 1.73 MB in one block.
+// Maximum number of frames per block: a compromise between the frames that a truncation loses and
+// the size. The bundled dam break takes 1.89 MB with 8 frames per block, 2.16 MB with 1, 1.73 MB in
+// one block.
 constexpr int kFramesPerBlock = 8;
-// Large frames do not compress better together.
+// A block of this size gets no more frames: large frames do not compress better together.
 constexpr std::size_t kFullBlockBytes = std::size_t{8} << 20;
 
 constexpr double kPrecisionSpacings = 1e-4;

@@ -35,7 +35,7 @@ def read_edges(path):
 
 
 class View:
-    """From world coordinates to whole pixels, y downward."""
+    """Maps world coordinates to whole pixels, y downward."""
 
     def __init__(self, points, width, margin):
         left, right = min(x for x, _ in points), max(x for x, _ in points)
@@ -51,7 +51,7 @@ class View:
 
 
 def path_of(lines, view, closed):
-    """Polylines as the data of a path, in relative steps, which are short."""
+    """SVG path data of polylines, in relative steps, because these have fewer digits."""
     words = []
     for line in lines:
         pixels = [view(point) for point in line]

@@ -13,7 +13,8 @@ import numpy as np
 LIGHT = np.array([-0.35, 0.55, 0.75]) / np.linalg.norm([-0.35, 0.55, 0.75])
 BODY, SKY = np.array([0.16, 0.47, 0.71]), np.array([0.83, 0.9, 0.97])
 OVERSAMPLING = 3
-CREASE = 0.8  # Cosine between a triangle and a normal at its corner, below which the corner is an edge.
+# Least cosine between the normals of a triangle and of its corner. Below it the corner is drawn sharp.
+CREASE = 0.8
 
 
 def read_obj(path):
@@ -78,7 +79,7 @@ def shade(facing, is_body):
 
 
 def shrunk(image):
-    """The mean over blocks of OVERSAMPLING x OVERSAMPLING pixels."""
+    """The mean over blocks of OVERSAMPLING x OVERSAMPLING pixels. Changes `image`."""
     height, width, _ = image.shape
     image[..., :3] *= image[..., 3:]
     blocks = image.reshape(height // OVERSAMPLING, OVERSAMPLING, width // OVERSAMPLING,

@@ -17,12 +17,12 @@ namespace partiemc {
 /// The steps of `virtual-plane` (core/METHOD.md, "The default placement"). By default, all steps
 /// are on.
 struct VirtualPlaneSteps {
-  bool edge_vertices = true;  ///< A vertex on each crossed lattice edge, besides the cell's.
+  bool edge_vertices = true;  ///< Vertices on crossed lattice edges, not only in cells.
   bool normals = true;        ///< Normals smoothed along the ring, the second time bilaterally.
   bool curvature = true;      ///< Undo the kernel's rounding of curved boundaries.
   bool support = true;        ///< Shift planes to the particles that support them.
   bool smoothing = true;      ///< Vertices smoothed along the ring, but not across corners.
-  bool area = true;           ///< Match the particles' volumes where they are known.
+  bool area = true;           ///< Match the particles' area, if volumes or the spacing are given.
 
   /// No step: one vertex per cell, placed by one Newton step from the middle of its segment.
   static constexpr VirtualPlaneSteps None() { return {false, false, false, false, false, false}; }
@@ -44,7 +44,7 @@ struct VirtualPlaneConstants {
   double rounding = 0.5;            ///< The kernel moves a bend inward by this times R^2 kappa / 9.
   double support_radius = 2;        ///< Particles within this distance may support a plane.
   double support_depth = 2;         ///< Particles deeper below the plane have no weight.
-  double support_height = 0.6;      ///< Particles higher above it do not count; limits the shift.
+  double support_height = 0.6;      ///< Higher particles do not count; limits the shift.
   double support_scatter = 0.01;    ///< Variance in h^2 at which the support counts half.
   double smoothing_reach = 3;       ///< Window of the mean of the neighbours' planes.
   double thinning_distance = 0.01;  ///< Edge vertices nearer to the chord are removed.
@@ -70,13 +70,11 @@ struct VirtualPlaneVariant {
   friend bool operator==(const VirtualPlaneVariant&, const VirtualPlaneVariant&) = default;
 };
 
-/// A step by its name.
 struct NamedStep {
   std::string_view name;  ///< "edge-vertices", ...
   bool VirtualPlaneSteps::*value;
 };
 
-/// A constant by its name.
 struct NamedConstant {
   std::string_view name;  ///< "normal-reach", ...
   double VirtualPlaneConstants::*value;

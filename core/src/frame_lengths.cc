@@ -17,8 +17,8 @@ namespace partiemc {
 namespace {
 
 // With SpacingRule::kEveryFrame, the estimate of a later frame is clamped to these limits, in cells
-// of the existing lattice (with grains, in double cells), so that a kernel spans a sensible number
-// of cells.
+// of the existing lattice (with grains, in pairs of cells), so that a kernel spans a sensible
+// number of cells.
 constexpr double kMinSpacingInCells = 0.25;
 constexpr double kMaxSpacingInCells = 4;
 
@@ -30,7 +30,7 @@ constexpr double kMaxVolumeRatio = 1e6;
 // below h^2 divided by it. Disks of diameter h have 0.79 h^2, hexagonal packing 0.87 h^2.
 constexpr double kDoubtfulVolumeRatio = 2;
 
-// The side of a square with the median volume.
+// The side of a square whose area is the median volume.
 double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scratch) {
   scratch.assign(volumes.begin(), volumes.end());
   const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(scratch.size() / 2);
@@ -45,7 +45,7 @@ double SpacingOfSizes(std::span<const float> volumes) {
   return std::sqrt(sum / static_cast<double>(volumes.size()));
 }
 
-// The spacing for grains: the smallest diameter, unless the largest would be too large for this
+// The spacing for grains: the smallest diameter, or more if the largest would be too large for this
 // spacing or its lattice. Requires: the frame has volumes.
 double SpacingOfGrains(const ReconstructionParameters& parameters, std::span<const float> volumes) {
   const auto [least, most] = std::ranges::minmax_element(volumes);

@@ -21,23 +21,23 @@ struct Lengths {
   bool is_provisional = false;  ///< No spacing is given, and no frame so far agreed on one.
 };
 
-/// Returns the lengths of a checked frame. They come from the parameters, else from the state, else
-/// from the particles. The spacing of own sizes is then their root mean square, so the lattice
-/// keeps its number of nodes per particle. For grains see ReconstructionParameters::boundary. Empty
-/// if the particles give no estimate. Errors: INVALID_ARGUMENT if the spacing on which the
-/// particles agree is out of range.
+/// Returns the lengths of a checked frame. The cell size comes from the state, if it has one. The
+/// spacing comes from the parameters, else, with SpacingRule::kFirstFrame, from the state, else
+/// from particles that agree on one (own sizes always do), else from the state. Without any of
+/// these, the lengths are provisional. Empty if the particles give no estimate either. Errors:
+/// INVALID_ARGUMENT if the spacing on which the particles agree is out of range.
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,
                                                      SpacingScratch& scratch);
 
 /// Returns the smallest volume of the frame, or `usual` if the particles have no volumes. `usual`
-/// is h^2, of a slice h^3. Adds the doubts about volumes. Errors: INVALID_ARGUMENT for a volume too
-/// far from `usual`.
+/// is h^2, for slices and surfaces h^3. Adds kVolumesContradictSpacing. Errors: INVALID_ARGUMENT
+/// for a volume that differs from `usual` by more than a factor of 1e6.
 absl::StatusOr<double> LightestVolume(const Frame& frame, double usual, Doubts& doubts);
 
-/// Returns the range of the sizes of a frame with own sizes; with `parameters.slice`, particles
-/// fill space, as for a surface. Errors: INVALID_ARGUMENT for the size that is farthest from the
-/// spacing, if it is out of range (ReconstructionParameters::sizes and boundary).
+/// Returns the range of the sizes of a frame with own sizes. `parameters.slice` must be set if
+/// particles fill space, also for a surface. Errors: INVALID_ARGUMENT for the smallest or the
+/// largest size, if it is out of range (ReconstructionParameters::sizes and boundary).
 absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
                                        const ReconstructionParameters& parameters,
                                        const Lengths& lengths);

@@ -12,8 +12,8 @@
 
 namespace partiemc {
 
-/// Reserves memory for the outlines and the surface of a frame, one after another. The memory of
-/// earlier ones stays reserved.
+/// Reserves memory for the outlines and the surface of a frame, one after another. Each Reserve
+/// replaces the one before, until Done.
 class FrameMemory final : public MemoryGuard {
  public:
   explicit FrameMemory(MemoryGuard* guard) : guard_(guard) {}
@@ -23,8 +23,7 @@ class FrameMemory final : public MemoryGuard {
     return guard_ == nullptr || guard_->Reserve(done_ + last_);
   }
 
-  /// Returns RESOURCE_EXHAUSTED if the guard refuses the memory of this outline and the earlier
-  /// ones.
+  /// Returns RESOURCE_EXHAUSTED if the guard refuses the memory of the outlines so far.
   absl::Status ReserveOutline(const FrameSize& size) {
     const std::uint64_t bytes = done_ + WorkspaceBytes(size);
     if (Reserve(WorkspaceBytes(size))) return absl::OkStatus();
@@ -35,6 +34,7 @@ class FrameMemory final : public MemoryGuard {
          absl::StrCat("must fit into the memory budget, but needs ", (bytes >> 20) + 1,
                       " MiB: reach fewer tiles, or try again later")});
   }
+  /// Keeps the memory reserved last, in addition to what is reserved later.
   void Done() { done_ += last_; }
 
   /// Returns RESOURCE_EXHAUSTED if the guard refuses the memory to filter or lift particles.

@@ -55,7 +55,7 @@ std::uint64_t AttributeValuesOf(const Frame& frame) {
   return values;
 }
 
-// Sets the sizes of the mesh inside of rings.
+// Adds the sizes of a mesh over these interior cells to `size`.
 void AddMesh(const ReconstructionParameters& parameters, const std::vector<BitRows>& interior,
              FrameSize& size) {
   if (parameters.fill == Fill::kGrid) size.grid_cells = CountCells(interior);
@@ -65,7 +65,7 @@ void AddMesh(const ReconstructionParameters& parameters, const std::vector<BitRo
   }
 }
 
-// Requires: segments are known.
+// Requires: TraceRings has run.
 FrameSize SizeOf(const ReconstructionParameters& parameters, const Frame& frame,
                  const Workspace::Buffers& b) {
   FrameSize size{.particles = frame.ParticleCount(),
@@ -124,8 +124,8 @@ absl::Status SortParticles(const OutlineTask& task, Workspace::Buffers& b, Frame
   return JudgeLengths(seen, parameters.plane, *lengths, scale, b.bins, statistics.doubts);
 }
 
-// Finds the tiles near walls, and adds their number to `size`. Errors: RESOURCE_EXHAUSTED if memory
-// is short.
+// Finds the tiles near walls. Adds the numbers of tiles, lines and pairs to `size`. Errors:
+// RESOURCE_EXHAUSTED if memory is short.
 absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& size,
                        FrameMemory& memory, Workspace::Buffers& b) {
   const TileDirectory& directory = b.bins.tiles;
@@ -164,7 +164,7 @@ struct FillTask {
   const Crossings& crossings;
   const RingTopology& topology;
   const PlacedVertices& placed;
-  ParticleSubset particles;  // Those inside.
+  ParticleSubset particles;  // All, or those of one phase.
 };
 
 // Runs the stages mesh and attributes for `result.rings`. Requires: `b.attribute_scratch.sorted` is
@@ -213,8 +213,8 @@ absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Sca
   return absl::InternalError("outlines of phases cross although every point is at its root");
 }
 
-// Keeps the next state of an outline, unless its lengths are provisional: then its rings lose their
-// identities, because no next frame could continue them.
+// Keeps the next state of an outline, unless its lengths are provisional. Then no next frame could
+// continue its rings, so they lose their identities.
 void KeepState(const Lengths& lengths, Workspace::Buffers& b, NextState& next, Result& result) {
   if (lengths.is_provisional) {
     ClearIdentities(result.rings);
@@ -226,8 +226,8 @@ void KeepState(const Lengths& lengths, Workspace::Buffers& b, NextState& next, R
   std::swap(next.state.history, b.next_history);
 }
 
-// Runs the stages from normals to attributes. Errors: INTERNAL if RepairRings, RepairPhases or
-// BuildMesh fails, which is a bug; their comments explain why no input should cause it.
+// Runs the stages from normals to attributes. Errors: RESOURCE_EXHAUSTED if memory for phases is
+// short; INTERNAL if rings cannot be repaired, cut or triangulated, which is a bug.
 absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scale& scale,
                          FrameMemory& memory, Workspace::Buffers& b, Result& result) {
   const ReconstructionParameters& parameters = task.parameters;
@@ -297,7 +297,8 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
   if (percolates) {
     const double spacing = scale.spacing * scale.cell_size;
     if (TraitsOf(parameters.placement).refines) {
-      // Rings may have moved away from cells that they pass only outside of the window.
+      // Before the cut drops the segments outside of the window: while their vertices moved, these
+      // segments may have passed over cells inside.
       ExcludeTouchedCells(b.bins.tiles, result.rings.points, result.rings.offsets, b.placed.roots,
                           scale.cell_size, b.crossings.interior);
     }
@@ -398,7 +399,7 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
   statistics.spacing = last.lengths->spacing;
   statistics.cell_size = last.lengths->cell_size;
   SumMeasures(result.rings, statistics);
-  // Phases have no normals to remember and no offset.
+  // A phase has neither cell normals nor an area offset.
   next.state.normals.clear();
   next.state.area_offset.reset();
   KeepState(*last.lengths, b, next, result);

@@ -23,21 +23,21 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;                         ///< The first outline checks the frame.
-  const Prepared* prepared;              ///< Null for a frame as given.
-  const Rings* wall_outlines = nullptr;  ///< Outlines of wall particles; null without.
+  bool is_first;                         ///< Whether this outline has to check the frame.
+  const Prepared* prepared;              ///< Null: `frame` is the given frame.
+  const Rings* wall_outlines = nullptr;  ///< Of wall particles; null: none.
 
   bool HasCopies() const { return prepared != nullptr && prepared->HasCopies(); }
 };
 
-/// Computes one outline and its next state; for a stream whose sections have phases, also divides
-/// it among them (`buffers.phases`). Errors: see Reconstruct.
+/// Computes one outline and its next state. If sections of `task.parameters` have phases, also
+/// divides the outline among them (`buffers.phases`). Errors: see Reconstruct.
 absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory,
                                 Workspace::Buffers& buffers, NextState& next, Result& result);
 
-/// Writes the outline of a phase, and its next state. `task`: of the outline that was divided, with
-/// the state of the phase. Requires: that outline is the last one that was reconstructed. Errors:
-/// see Reconstruct.
+/// Writes the outline of one phase, and its next state. `task`: as for the outline that was
+/// divided, but with the state of the phase. Requires: ReconstructOutline was last called for that
+/// outline. Errors: see Reconstruct.
 absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMemory& memory,
                               Workspace::Buffers& buffers, NextState& next, Result& result);
 

@@ -15,9 +15,9 @@
 namespace partiemc {
 namespace {
 
-// Copies of percolating bodies reach this many kernel radii beyond the box, at most one length. Two
-// radii inside this margin, the field and the windows of an outline do not depend on where the
-// copies end. Means along a whole ring do (vertices/virtual_plane.cc), but little.
+// In kernel radii: copies of percolating bodies reach kCopyMargin beyond the box, at most one
+// length. More than kCopyEnd before the end of the copies, the field and the windows of an outline
+// do not depend on this end. Means along a whole ring (vertices/virtual_plane.cc) do, but little.
 constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
 // Checks a frame as the output of the stream requires.
@@ -49,7 +49,7 @@ std::span<const int> AxesInUse(const PreparationInput& input, std::array<int, 3>
   return std::span(axes).first(2);
 }
 
-// CORRUPT_STATE if the state belongs to a stream with another number of coordinates.
+// Errors: CORRUPT_STATE if the state belongs to a stream with another number of coordinates.
 absl::Status CheckHistory(const NoiseHistory& noise, std::size_t axes) {
   if (noise.given.size() == axes * noise.ids.size()) return absl::OkStatus();
   return ViolationError(
@@ -89,7 +89,8 @@ absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<
                        Prepared& prepared) {
   const ReconstructionParameters& parameters = input.parameters;
   const double radius = parameters.kernel_radius * spacing;
-  // Rings that may cross themselves cannot be cut.
+  // Rings that may cross themselves cannot be cut. Without a margin, Lift refuses bodies that
+  // percolate.
   const double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
   absl::Status status =
       Lift({.frame = frame,

@@ -22,15 +22,15 @@
 
 namespace partiemc {
 
-/// What is known about a frame that was filtered or lifted before its outlines.
+/// A frame that was filtered, lifted or divided from its walls before its outlines.
 struct Prepared {
-  std::optional<Lengths> lengths;
+  std::optional<Lengths> lengths;  ///< Empty: the particles give no estimate.
   Doubts doubts;
   bool is_filtered = false, is_lifted = false;
-  LiftedFrame lifted;  ///< As given, if no particle was lifted.
+  LiftedFrame lifted;  ///< Unless `is_lifted`: the given particles, no copies.
   Window window;       ///< The box along the axes along which bodies percolate.
-  /// Bodies are complete up to this far beyond the sides of the window, along each of its axes.
-  /// World units.
+  /// Images of bodies are complete if they end at most this far beyond the window, along each of
+  /// its axes. World units.
   std::array<double, 2> reach{};
 
   bool HasCopies() const { return !lifted.originals.empty(); }
@@ -50,7 +50,7 @@ struct PreparationScratch {
   LiftScratch& lift;
 };
 
-/// Whether frames are prepared. A surface lifts its frame itself.
+/// Whether frames need PrepareFrame. SurfaceReconstructor lifts its frames itself.
 inline bool IsPrepared(const ReconstructionParameters& parameters) {
   return parameters.noise_filter || (parameters.box && parameters.output == Output::kOutline);
 }

@@ -97,7 +97,7 @@ absl::Status PrepareWalls(const Frame& given, const ReconstructionParameters& pa
   prepared.lengths = *lengths;
   if (!prepared.lengths) return absl::OkStatus();
   const double spacing = prepared.lengths->spacing;
-  // Before they are divided, particles have the caller's numbers.
+  // Checks the frame as given, so that errors name the caller's numbers of particles.
   Doubts of_volumes;
   if (auto lightest = LightestVolume(given, spacing * spacing, of_volumes); !lightest.ok()) {
     return lightest.status();
@@ -167,7 +167,7 @@ void SummariseSurface(const ReconstructionParameters& parameters, const Frame& f
   }
 }
 
-// CORRUPT_STATE if the state belongs to a stream with another output.
+// Errors: CORRUPT_STATE if the state belongs to a stream with another output.
 absl::Status CheckOutput(const State& state, Output output) {
   const bool is_other = output == Output::kSurface ? state.cell_size.has_value()
                                                    : state.surface.cell_size.has_value();
@@ -305,7 +305,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     return outlined;
   };
   if (!is_surface) status = reconstruct(parameters_, state, 0, result);
-  // Phases divide the outline before other sections take its buffers.
+  // Phases first: they read buffers of the outline that other sections overwrite.
   PhaseLabel label = kNoPhase;
   for (const bool is_phase : {true, false}) {
     for (std::size_t k = 0; status.ok() && k < sections_.size(); ++k) {
@@ -320,7 +320,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   if (!status.ok()) return status;
   state.sections.reserve(sections_.size());
   if (is_surface) {
-    // The last step that can fail, because it commits its state.
+    // This step commits its state, so no later step may fail.
     status = surface_->Reconstruct(
         frame, state.surface, b.surface, result.surface,
         {.observer = control.observer, .memory = &memory, .cancelled = control.cancelled});

@@ -66,7 +66,7 @@ std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& paramete
 }
 
 bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface) {
-  // Above the largest move of a plane (CutSurface), so that no other shell reaches a moved plane.
+  // More than CutSurface moves a plane, so that no other shell reaches a moved plane.
   constexpr double kReach = 1e-4;
   scratch.planes.clear();
   scratch.is_cut.assign(surface.ShellCount(), 0);

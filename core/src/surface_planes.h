@@ -24,38 +24,37 @@ struct PlaneCuts {
   space::SurfacePieces pieces;
 };
 
-/// Copies of particles reach this many kernel radii beyond the faces of a periodic box, at most one
-/// length. kCopyEnd radii inside this margin, the level set and its windows do not depend on where
-/// the copies end.
+/// Copies of particles reach kCopyMargin kernel radii beyond the faces of a periodic box, at most
+/// one length of the box. A body that stays kCopyEnd kernel radii away from the end of the copies
+/// does not depend on it.
 inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
-/// The periodic box along the axes along which bodies percolate or wrap; infinite along the others.
-/// World units.
+/// The periodic box of a frame with copies. Infinite along axes without copies. World units.
 struct CopiedBox {
   space::ClipBox faces;     ///< The faces of the box.
   space::ClipBox complete;  ///< Bodies within these planes are complete.
-  bool any = false;         ///< There are copies.
+  bool any = false;         ///< Any axis has copies.
   std::array<bool, 3> has_copies{};
 };
 
 CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted);
 
-/// Images of particles reach two kernel radii behind walls: F is exact for one of them, which
-/// windows require. Particles up to half a spacing behind a wall are before it.
-/// A particle on a wall would have no image, and half of a lone one would be cut off: such
-/// particles move to kLeastHeight before the wall.
+/// Mirror images reach kImageRadii kernel radii behind walls. So F is exact up to one radius behind
+/// them, as smoothing near a wall requires. Particles up to kWallTolerance spacings behind a wall
+/// count as before it. Particles closer to a wall are moved to kLeastHeight spacings before it,
+/// because a particle on the wall would have no image.
 inline constexpr double kImageRadii = 2, kWallTolerance = .5, kLeastHeight = .05;
 
 /// The number of axes with walls.
 std::uint64_t CountWallAxes(const SurfaceParameters& parameters);
 
-/// Checks the walls, and that nothing excludes them. Errors: INVALID_ARGUMENT.
+/// Checks the walls, and that no other parameter excludes them. Errors: INVALID_ARGUMENT.
 absl::Status CheckWallsOf(const SurfaceParameters& parameters);
 
 /// The space before the walls, in world units; absent without walls.
 std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters);
 
-/// Cuts the shells that reach a wall. Returns false if CutSurface does.
+/// Cuts the bodies that reach a wall. Returns false if CutSurface does.
 bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface);
 
 /// Cuts the bodies of `shells` at the faces of the box. Returns false if CutSurface does.

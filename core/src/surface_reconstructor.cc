@@ -61,8 +61,8 @@ struct SurfaceWorkspace::Buffers {
   space::Bodies bodies;
   space::CleaningScratch cleaning;
   LiftScratch lift;                     // Empty without a periodic box.
-  space::BodyImageScratch body_images;  // Empty unless bodies percolate or wrap.
-  space::CutShells cut_shells;          // Empty unless bodies percolate or wrap.
+  space::BodyImageScratch body_images;  // Empty unless particles have copies.
+  space::CutShells cut_shells;          // Empty unless particles have copies.
   WallImageScratch images;              // Empty without walls.
   PlaneCuts plane_cuts;                 // Empty unless walls or a box cut.
   std::vector<Vec3> anchors, positions, normals;
@@ -78,8 +78,7 @@ struct SurfaceWorkspace::Buffers {
 
 namespace {
 
-/// The parameters in the form that the stages require: as for a slice, so that lengths and weights
-/// are in space.
+/// The parameters in the form that the stages require: as for a slice, because both are in space.
 ReconstructionParameters InSpace(const SurfaceParameters& parameters) {
   ReconstructionParameters in_space;
   in_space.spacing = parameters.spacing;
@@ -103,11 +102,11 @@ ReconstructionParameters Resolved(const SurfaceParameters& parameters) {
   return in_space;
 }
 
-// Cleaning fills cavities below this volume, in cubed spacings: they are dents of the level set,
-// not voids of the fluid (core/METHOD.md, "Cleaning").
+// Cleaning fills cavities below this volume, in cubed spacings, because they are no voids of the
+// fluid but dents of the level set (core/METHOD.md, "Cleaning").
 constexpr double kMinCavityParticles = 2;
 
-/// Finds the bodies, and drops cavities and bodies as `parameters` require.
+/// Finds the bodies. Fills cavities and drops bodies as `parameters` require, and counts both.
 SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& copied,
                                   const SurfaceParameters& parameters,
                                   SurfaceWorkspace::Buffers& b) {
@@ -135,7 +134,7 @@ SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& co
                          .wraps = lifted.frame.box->wraps},
                         b.body_images, b.bodies);
   }
-  // Bodies without particles have no particle that says where they end.
+  // With copies, also drops bodies without particles: ChooseImages cannot recognise their images.
   const space::DroppedBodies dropped =
       space::DropBodies({.drops_empty = is_cleaned || copied.any,
                          .least_volume = parameters.min_component_volume * h * h * h,
@@ -158,8 +157,7 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
                     " MiB: reach fewer bricks, or try again later")});
 }
 
-/// Sets the counts that identities and attributes require. `particles`: without images behind
-/// walls.
+/// Sets bodies, samples and attribute values of `size`. `particles`: their number without images.
 void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& bodies,
                space::SurfaceSize& size) {
   const bool wraps = frame.box && frame.box->wraps;
@@ -170,7 +168,7 @@ void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& b
     in_bodies += body.particles;
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
-  // In a box that wraps, copies may become ellipsoids, too.
+  // In a box that wraps, copies without a body may become ellipsoids, too.
   const std::uint64_t alone =
       wraps ? static_cast<std::uint64_t>(std::ranges::count(bodies.body_of_particle, kNoIndex))
             : particles - in_bodies;
@@ -191,9 +189,9 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
                               b.normals);
 }
 
-// The certificate and the cuts of the quads change the volumes of small bodies, so volumes are
-// corrected again afterwards: at most kVolumeRounds times, if they are wrong by more than the
-// tolerance. kVolumeLimit is in spacings.
+// The certificate and the cuts of the quads change the volumes of small bodies. So the volumes of
+// bodies with a larger relative error than kVolumeTolerance are corrected again afterwards, at most
+// kVolumeRounds times. kVolumeLimit: longest offset in spacings.
 constexpr int kVolumeRounds = 4;
 constexpr double kVolumeTolerance = .001;
 constexpr double kVolumeLimit = .4;
@@ -204,8 +202,8 @@ void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
   }
 }
 
-/// Moves the vertices of the bodies whose triangles do not enclose the volume of their particles by
-/// at most `limit` spacings. Positions are in world units. Returns whether any vertex moved.
+/// A step of SearchVolumes with offsets of at most `limit` spacings. Positions are in world units.
+/// Returns whether any body moved.
 bool CorrectVolumes(const Scale& scale, double limit, SurfaceWorkspace::Buffers& b) {
   space::BodyVolumes& volumes = b.virtual_plane.volumes;
   space::MeasureTriangles(b.bins.bricks, scale.cell_size, b.bodies, b.positions, b.mesh.triangles,
@@ -219,7 +217,7 @@ bool CorrectVolumes(const Scale& scale, double limit, SurfaceWorkspace::Buffers&
 }
 
 /// Places vertices away from their anchors and connects them by quads that the certificate accepts.
-/// The certificate checks the final coordinates, so positions are in world units.
+/// Positions are in world units afterwards, because the certificate checks the final coordinates.
 absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale& scale,
                                 SurfaceWorkspace::Buffers& b) {
   const SurfacePlacement placement = parameters.placement;
@@ -273,15 +271,15 @@ void MakeEmpty(Surface& surface) {
   surface.attributes.clear();
 }
 
-/// Sets the bodies of the shells that are ellipsoids, for FindCutShells.
+/// Sets `body_of_shell` of ellipsoids, for FindCutShells.
 void NameDrops(SurfaceWorkspace::Buffers& b) {
   for (const space::Drops::Drop& drop : b.drops.drops) {
     if (drop.is_taken) b.mesh.body_of_shell[b.mesh.shell_of[drop.first_vertex]] = drop.body;
   }
 }
 
-/// Adds the ellipsoids of particles without a body to the shells that are cut. A particle
-/// and its copies are one body.
+/// Adds the ellipsoids of particles without a body to the shells that are cut. The ellipsoids of a
+/// particle and its copies are images of one body.
 void CutLoneDrops(const LiftedFrame& lifted, SurfaceWorkspace::Buffers& b) {
   space::CutShells& cut = b.cut_shells;
   cut.first.assign(lifted.particles, kNoShell);
@@ -301,7 +299,7 @@ void CutLoneDrops(const LiftedFrame& lifted, SurfaceWorkspace::Buffers& b) {
   }
 }
 
-/// The periods of the lattice; without a box, none.
+/// The periods of the box in cells; none without a box.
 LatticePeriods PeriodsOf(const std::optional<PeriodicBox>& box, double cell_size) {
   LatticePeriods periods;
   if (!box) return periods;
@@ -312,7 +310,7 @@ LatticePeriods PeriodsOf(const std::optional<PeriodicBox>& box, double cell_size
   return periods;
 }
 
-/// The history after a frame without particles: no shell, no identity given.
+/// Sets `next` to the history after a frame without particles: no shells, no new identities.
 void EndIdentities(const Frame& frame, const ShellHistory& previous, ShellHistory& next) {
   next.identities_given = previous.identities_given;
   next.time.reset();
@@ -385,7 +383,7 @@ absl::Status SurfaceReconstructor::ReconstructFrame(const Frame& frame, SurfaceS
   if (!status.ok()) {
     MakeEmpty(surface);
   } else if (state != nullptr) {
-    // Buffers are swapped, so that both histories keep their memory.
+    // Swaps the histories, so that both keep their memory.
     state->cell_size = parameters_.cell_size * parameters_.spacing;
     std::swap(state->history, workspace.buffers().next_history);
   }

@@ -41,10 +41,10 @@ struct NextState {
   State state;
 };
 
-// The outline that was reconstructed last.
+// The last outline of ReconstructOutline, for ReconstructPhase.
 struct LastOutline {
   Frame frame;                     // Its particles.
-  std::optional<Lengths> lengths;  // Empty if it has no rings.
+  std::optional<Lengths> lengths;  // Empty: the spacing is unknown, so no rings.
   Scale scale;
   Doubts doubts;
 };
@@ -54,14 +54,14 @@ struct Workspace::Buffers {
   SpacingScratch spacing;
   LiftScratch lift;  // Empty without a periodic box.
   BodyChoice choice;
-  RingCutScratch ring_cut;   // Empty unless bodies percolate.
+  RingCutScratch ring_cut;   // Empty unless bodies are cut.
   NoiseFilterScratch noise;  // Empty without a noise filter.
   Slab slab;
   ParticleBins bins;
   LevelSet level_set;
   WallField walls;               // Empty without walls.
   WallParticles wall_particles;  // Empty unless particles of some phases are walls.
-  NextState wall_state;          // The same. Nothing is kept.
+  NextState wall_state;          // The same. It is never committed.
   Result wall_result;
   WallCornerScratch wall_corners;
   Crossings crossings;
@@ -78,11 +78,11 @@ struct Workspace::Buffers {
   RingHistory next_history;
   MeshScratch mesh_scratch;
   AttributeScratch attribute_scratch;
-  std::vector<AttributeValues> node_attributes;  // At the nodes around interior cells.
+  std::vector<AttributeValues> node_attributes;  // At the nodes where blocks are tested.
   std::vector<NextState> next_states;            // By outline: the main one, then the sections.
   LastOutline last;
   Phases phases;                      // Empty unless sections have phases.
-  std::vector<Attribute> attributes;  // Without that of the phases.
+  std::vector<Attribute> attributes;  // Without the attribute of the phases.
   PlacedVertices placed_phase;
   SurfaceWorkspace surface;
 };

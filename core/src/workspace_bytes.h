@@ -9,7 +9,7 @@ namespace partiemc {
 struct FrameSize {
   std::uint64_t particles = 0;
   std::uint64_t tiles = 0;
-  std::uint64_t segments = 0;          ///< Pieces of the outline, one per cell.
+  std::uint64_t segments = 0;          ///< Of the outline: one per active cell, two per saddle.
   std::uint64_t cut_segments = 0;      ///< Segments if rings are cut at a periodic box, else 0.
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
@@ -42,9 +42,9 @@ inline constexpr std::uint64_t kBytesPerBlockCell = kBytesPerGridCell + 24;
 inline constexpr std::uint64_t kBytesPerValueOfBlockCell = 10;
 
 /// If the mesh has blocks: bytes for each tile with interior cells. They hold sums over the
-/// particles of each of the tile's 64 windows (mesh/blocks.cc): moments, and the values of
-/// attributes. A vector of two components has a third sum, of its length, so each value is allowed
-/// one and a half.
+/// particles in each of the tile's 64 windows (mesh/blocks.cc): moments, and values of attributes.
+/// A vector of two components also has a sum of its length, so each value counts one and a half
+/// times.
 inline constexpr std::uint64_t kBytesPerBlockTile = 2'048;
 inline constexpr std::uint64_t kBytesPerValueOfBlockTile = 768;
 
@@ -63,10 +63,9 @@ inline constexpr std::uint64_t kBytesPerWallLine = 300;
 /// Bytes that any frame takes.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
-/// Upper bound of the memory of a new Workspace, Result and State after frames of this size. The
-/// bound is at most 2.2 times the actual memory, if that exceeds a few MB
-/// (tests/core/allocation_test.cc); at most 4 times if attributes are smooth, because their meshes
-/// are small.
+/// Upper bound of the memory of a new Workspace, Result and State after frames of this size. Above
+/// a few MB, it is at most 2.2 times the actual memory (tests/core/allocation_test.cc), or 4 times
+/// if attributes are smooth, because their meshes are small.
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +

@@ -17,7 +17,7 @@ class Clock {
   virtual TimePoint Now() const = 0;
   /// Time of day, comparable between machines.
   virtual std::chrono::system_clock::time_point TimeOfDay() const = 0;
-  /// As CondVar::WaitUntil of `changed`, with the time of this clock.
+  /// As CondVar::WaitUntil of `changed`, but `until` is a time of this clock.
   virtual bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) = 0;
 };

@@ -1,4 +1,4 @@
-// Text in JSON.
+// Writes text as JSON.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace partiemc {
 
-/// `text` as a JSON string with its quotes. Control characters are escaped, so that the output is
-/// safe to print on a terminal. Invalid UTF-8 becomes U+FFFD.
+/// `text` as a JSON string with its quotes. Control characters (IsControl) are escaped, so that the
+/// output is safe to print on a terminal. A byte that belongs to no character becomes U+FFFD.
 std::string JsonString(std::string_view text);
 
 }  // namespace partiemc

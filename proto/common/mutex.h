@@ -75,7 +75,7 @@ class ABSL_SCOPED_LOCKABLE MutexUnlock {
 
 #undef PARTIEMC_RELEASE
 
-/// Waits may end without a notification, so that callers repeat them in a loop.
+/// A wait may end without a notification, so callers wait in a loop.
 class CondVar {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -86,7 +86,7 @@ class CondVar {
     changed_.wait(lock);
     lock.release();
   }
-  /// Returns false if `until` has passed.
+  /// As Wait, at most until `until`. Returns false if `until` has passed.
   bool WaitUntil(Mutex& mutex, TimePoint until) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     std::unique_lock lock(mutex.mutex_, std::adopt_lock);
     const bool in_time = changed_.wait_until(lock, until) == std::cv_status::no_timeout;

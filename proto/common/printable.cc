@@ -8,7 +8,7 @@
 namespace partiemc {
 namespace {
 
-// First and last of each range. No escape in use needs more than four hexadecimal digits.
+// First and last character of each range. All of them have at most four hexadecimal digits.
 constexpr std::array<std::pair<char32_t, char32_t>, 7> kControls = {{
     {0x00, 0x1f},
     {0x7f, 0x9f},
@@ -19,7 +19,7 @@ constexpr std::array<std::pair<char32_t, char32_t>, 7> kControls = {{
     {0xfeff, 0xfeff},
 }};
 
-// Bytes of the character that `lead` begins, and the bits that it gives; 0 where it begins none.
+// Length of the character that begins with a byte, and its bits in this byte; 0: none begins so.
 struct Lead {
   std::size_t bytes = 0;
   char32_t bits = 0;

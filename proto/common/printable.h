@@ -1,4 +1,4 @@
-// Text of others, names and labels say, as it may stand on a terminal, in a log or in a message.
+// Makes untrusted text, such as names and labels, safe for terminals, logs and messages.
 #pragma once
 
 #include <optional>
@@ -12,14 +12,14 @@ namespace partiemc {
 std::optional<char32_t> TakeCharacter(std::string_view& text);
 
 /// True for characters that a terminal interprets instead of showing: C0, DEL and C1, line and
-/// paragraph separators, and characters that change the direction of text.
+/// paragraph separators, the byte order mark, and characters that change the direction of text.
 bool IsControl(char32_t character);
 
 /// Whether `text` is UTF-8 without control characters.
 bool IsPrintable(std::string_view text);
 
-/// `text` with escapes in place of all else: "\u001b" for a control character, "\xff" for a byte
-/// that belongs to no character. Always valid UTF-8.
+/// `text` with escapes: "\u001b" for a control character, "\xff" for a byte that belongs to no
+/// character. Always valid UTF-8.
 std::string Printable(std::string_view text);
 
 }  // namespace partiemc

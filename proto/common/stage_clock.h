@@ -10,10 +10,10 @@
 
 namespace partiemc {
 
-/// Reads the clock on behalf of the core.
+/// Measures the stages of one frame, because the core reads no clock.
 class StageClock final : public StageObserver {
  public:
-  /// Wall-clock time of each stage in milliseconds; 0 for a stage that did not run.
+  /// Wall-clock milliseconds of all runs of each stage; 0 for a stage that did not run.
   const std::array<double, kStageCount>& stages_ms() const { return stages_ms_; }
   /// Milliseconds since the construction of this object.
   double TotalMs() const { return MillisecondsSince(start_); }

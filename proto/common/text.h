@@ -1,5 +1,4 @@
-// Splits text and reads numbers, in terms of std::string_view (which Debian's abseil does not
-// accept), independent of the locale.
+// Splits text and reads numbers, independent of the locale.
 #pragma once
 
 #include <charconv>
@@ -19,11 +18,11 @@ std::string_view Strip(std::string_view text, std::string_view blanks = kAsciiBl
 std::vector<std::string_view> Split(std::string_view text, char separator,
                                     std::string_view blanks = kAsciiBlanks);
 
-/// Removes `prefix` from the front of `text`, if it is there.
+/// Removes `prefix` from the front of `text`. Returns false if `text` does not begin with it.
 bool ConsumePrefix(std::string_view& text, std::string_view prefix);
 
 /// Removes a decimal number from the front of `text`: digits for unsigned integers, "-1.5e3", "nan"
-/// or "inf" for floating point. Nothing if there is no number, or it is out of range.
+/// or "inf" for floating point. Removes and returns nothing if there is none in range.
 template <typename Number>
 std::optional<Number> ConsumeNumber(std::string_view& text) {
   Number number{};
@@ -33,7 +32,7 @@ std::optional<Number> ConsumeNumber(std::string_view& text) {
   return number;
 }
 
-/// As ConsumeNumber, for a text that is nothing but the number.
+/// The number that `text` consists of. Returns nothing if `text` is anything else.
 template <typename Number>
 std::optional<Number> ParseNumber(std::string_view text) {
   const auto number = ConsumeNumber<Number>(text);

@@ -25,8 +25,7 @@ void AssignBytes(std::span<const T> values, std::string& bytes) {
 }
 
 /// A view of `bytes` as numbers. Requires: the size is a multiple of sizeof(T). The alignment
-/// suffices: std::string allocates at multiples of 16 and stores short strings at multiples of 8
-/// (libstdc++).
+/// suffices, because the strings of libstdc++ begin at multiples of 8.
 template <typename T>
 std::span<const T> ViewBytes(const std::string& bytes) {
   assert(reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(T) == 0);

@@ -174,7 +174,7 @@ v1::Plane ToWire(Plane plane) {
   return v1::PLANE_UNSPECIFIED;
 }
 
-// The layout of a particle in a PositionFormat; 0 components for an unknown format.
+// The layout of a particle in a PositionFormat. 0 components: unknown format.
 struct PositionLayout {
   int components = 0;
   std::size_t component_bytes = 0;
@@ -247,7 +247,7 @@ absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, const Positio
   return absl::OkStatus();
 }
 
-// A frame without particles may omit its attributes.
+// Whether a frame has an attribute. Without particles, its values are empty.
 bool IsThere(const v1::NamedScalar& scalar, std::size_t particles) {
   return particles == 0 || !scalar.values().empty();
 }

@@ -1,5 +1,5 @@
-// The codec converts between messages of partiemc.v1 and types of the core. No other file does. The
-// server decodes requests and encodes results, the client encodes requests and decodes results.
+// The codec: only wire/ converts between messages of partiemc.v1 and types of the core. The server
+// decodes requests and encodes results, the client encodes requests and decodes results.
 #pragma once
 
 #include <array>
@@ -28,14 +28,14 @@ using partiemc::kReasonResolution;
 /// v1::CoordinateFormat.
 enum class Coordinates : std::uint8_t { kFloat64, kRelativeFloat32, kCompact };
 
-/// The requested outputs (v1::Outputs), with defaults filled in.
+/// The requested outputs (v1::Outputs). Defaults as for an absent message.
 struct Outputs {
   bool rings = true;
   bool mesh = true;
   bool surface = true;  ///< For streams with Output::kSurface.
   bool normals = false;
   Coordinates coordinates = Coordinates::kFloat64;
-  bool echo_particles = false;               ///< To watchers.
+  bool echo_particles = false;               ///< Watchers receive the particles, too.
   std::vector<std::string> attributes = {};  ///< Names, all different.
 
   friend bool operator==(const Outputs&, const Outputs&) = default;
@@ -56,7 +56,7 @@ struct ReconstructedFrame {
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::uint64_t surface_digest = 0;
-  std::vector<OutlineDigests> section_digests = {};  ///< Of result.sections.
+  std::vector<OutlineDigests> section_digests = {};  ///< By section of `result`.
 };
 
 v1::Output ToWire(Output output);
@@ -68,16 +68,16 @@ v1::PeriodicBox ToWire(const PeriodicBox& box);
 PeriodicBox FromWire(const v1::PeriodicBox& message);
 
 /// Decodes parameters and fills in defaults. The core's Validate checks the values.
-/// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value, or for more points of walls
-/// than kMaxWallPoints.
+/// Errors: INVALID_ARGUMENT with a Violation for an unknown enum value, and as DecodeWalls and
+/// DecodeWallPlanes.
 absl::StatusOr<ReconstructionParameters> DecodeParameters(
     const v1::ReconstructionParameters& message);
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// `present`: whether the request sets the message. Errors: INVALID_ARGUMENT with a Violation for
-/// normals without rings and surface, for a format or attributes without rings, mesh and surface,
-/// and for too many or repeated attributes.
+/// `present`: whether the request has the message. Errors: INVALID_ARGUMENT with a Violation for an
+/// unknown format, and for more than 16 or repeated attributes. Normals require rings or surface. A
+/// format and attributes require rings, mesh or surface.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 
@@ -86,11 +86,11 @@ struct AttributeViews {
   std::vector<Attribute> carried, chosen;
 };
 
-/// Returns a view into `message`, with the attributes in `names` that the message has. Checks the
-/// format and every byte count against the number of particles; the core checks the values. Copies
-/// nothing. Requires: `message` and `views` outlive the result unchanged.
-/// Errors: INVALID_ARGUMENT with a Violation: BYTE_COUNT, UNSUPPORTED, OUT_OF_RANGE for the
-/// components of a scalar, NO_SUCH_ATTRIBUTE.
+/// Returns a view into `message` with the attributes `names`, in this order. Copies nothing. Checks
+/// the format, and every byte count against the number of particles; the core checks the values.
+/// Requires: `message` and `views` outlive the result unchanged. Errors: INVALID_ARGUMENT with a
+/// Violation: BYTE_COUNT, UNSUPPORTED, OUT_OF_RANGE for the components of a scalar,
+/// NO_SUCH_ATTRIBUTE.
 absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message,
                                   std::span<const std::string> names, AttributeViews& views);
 /// DecodeFrame without attributes.
@@ -99,20 +99,20 @@ absl::StatusOr<Frame> DecodeFrame(const v1::ParticleFrame& message);
 /// Requires: frame.components is 2 or 3.
 void EncodeFrame(const Frame& frame, v1::ParticleFrame& message);
 
-/// Writes every field except sequence and time. Reuses the buffers of `message`. The digests cover
-/// the whole result, even if `outputs` omits a part of it. Errors: OUT_OF_RANGE with a Violation
-/// (RESOLUTION) if relative float32 coordinates would move a vertex by more than 1e-4 spacings, or
-/// if a surface is too large for compact ones. Rings, mesh, surface and sections of `message` are
-/// then absent.
+/// Writes every field except sequence, time and particles. Reuses the buffers of `message`. The
+/// digests cover the whole result, even if `outputs` omits a part of it. Errors: OUT_OF_RANGE with
+/// a Violation (RESOLUTION) if relative float32 coordinates would move a vertex by more than 1e-4
+/// spacings, or if a surface is too large for compact coordinates. Rings, mesh, surface and
+/// sections of `message` are then absent.
 absl::Status EncodeResult(const Result& result, const FrameTimes& times, const Outputs& outputs,
                           v1::ReconstructedFrame& message);
 
-/// Decodes a result, for clients. Checks every count and index, because the message is untrusted.
+/// Decodes a result. Checks every count and index, because clients do not trust the message.
 /// Errors: DATA_LOSS with the field and the broken rule. `frame.result` is then empty.
 absl::Status DecodeResult(const v1::ReconstructedFrame& message, ReconstructedFrame& frame);
 
-/// Writes a FrameError with the Violation of `status`. A status without a Violation gives the name
-/// of its code as reason, and its message.
+/// Writes a FrameError with the message and the Violation of `status`. Without a Violation, the
+/// reason is the name of the status code.
 void EncodeFrameError(const absl::Status& status, std::uint64_t sequence,
                       std::uint64_t next_sequence, v1::FrameError& message);
 

@@ -20,26 +20,26 @@
 namespace partiemc::wire {
 namespace {
 
-// The versions that PROTOCOL.md names. They are global in meshoptimizer, so they are set before any
-// thread encodes.
+// The versions of PROTOCOL.md. They are global variables of meshoptimizer, so they are set before
+// any thread encodes.
 [[maybe_unused]] const bool kVersionsAreSet = [] {
   meshopt_encodeVertexVersion(0);
   meshopt_encodeIndexVersion(1);
   return true;
 }();
 
-// Steps per spacing, at least: an error of at most .0009 spacings.
+// Least number of steps per spacing. The error is then at most .0009 spacings.
 constexpr double kSteps = 1024;
 constexpr double kMostSteps = 1 << 30;
 
-// An unrolled pair of octahedral coordinates, as meshoptimizer's filter expects it.
+// Bytes and bits of a normal for the octahedral filter of meshoptimizer.
 constexpr std::size_t kNormalBytes = 4;
 constexpr int kNormalBits = 8;
 
 // The vertex codec stores at least 2 bits for 16 bytes.
 constexpr std::size_t kMostExpansion = 64;
 
-// Limits the memory that one array of a message takes.
+// Most bytes of a decompressed array.
 constexpr std::size_t kMostArrayBytes = std::size_t{1} << 30;
 
 const unsigned char* Data(const std::string& bytes) {
@@ -226,8 +226,8 @@ absl::Status DecodeValues(const NamedAttributes& messages, std::size_t points,
   return absl::OkStatus();
 }
 
-// The largest power of two that is at most `spacing` / kSteps, so that multiples are exact. Without
-// a spacing there are no points, and any step will do.
+// The largest power of two that is at most `spacing` / kSteps: its multiples are exact. A spacing
+// of 0 means that there are no points.
 double StepOf(double spacing) {
   return spacing > 0 ? std::ldexp(1.0, std::ilogb(spacing / kSteps)) : 1;
 }

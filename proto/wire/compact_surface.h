@@ -9,16 +9,16 @@
 
 namespace partiemc::wire {
 
-/// Writes points, triangles, cuts, attributes and, if `has_normals`, normals. Points and triangles
-/// are reordered within their shells, so that they compress better. Sets `step`. meshoptimizer
-/// allocates memory. Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if a coordinate is more
+/// Writes points, triangles, cuts, attributes, `step` and, if `has_normals`, normals. Reorders
+/// points and triangles within their shells, so that they compress better. `origin` and `spacing`
+/// are in world units. Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if a coordinate is more
 /// than 2^30 steps from the origin.
 absl::Status EncodeCompact(const Surface& surface, const Origin& origin, double spacing,
                            bool has_normals, v1::Surface& message);
 
-/// Reads what EncodeCompact writes. Requires: `surface` has the offsets of `message`, checked.
-/// Indices may be out of range. Errors: DATA_LOSS for arrays that do not decompress. No array is
-/// allocated that its bytes could not fill.
+/// Reads the fields that EncodeCompact writes, except cuts. Requires: `surface` has the offsets of
+/// `message`, checked. Does not check the indices of triangles. Errors: DATA_LOSS for arrays that
+/// do not decompress. Allocates no array that its bytes could not fill.
 absl::Status DecodeCompact(const v1::Surface& message, const Origin& origin, Surface& surface);
 
 }  // namespace partiemc::wire

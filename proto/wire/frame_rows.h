@@ -11,9 +11,9 @@
 
 namespace partiemc::wire {
 
-/// An array of rows with a function that writes them, or in contiguous memory.
+/// An array of rows, in contiguous memory or written by a function.
 struct RowArray {
-  std::size_t rows = 0;       ///< 0: none.
+  std::size_t rows = 0;       ///< 0: no array.
   std::size_t row_bytes = 1;  ///< At most 24.
   /// Writes rows [begin, end) to `to`. Used if `in_place` is null.
   std::function<void(std::size_t begin, std::size_t end, std::byte* to)> write = {};
@@ -36,7 +36,7 @@ struct AttributeRows {
 
 /// A view of a frame, with its arrays separate from its scalars.
 struct FrameRows {
-  /// `positions` is empty but has the type of the coordinates; there are no attributes.
+  /// All arrays are empty. `scalars.positions` has the type of the coordinates.
   Frame scalars;
   RowArray positions, ids, volumes, velocities;
   std::vector<AttributeRows> attributes = {};

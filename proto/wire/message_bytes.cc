@@ -26,7 +26,7 @@ constexpr std::uint32_t LengthTag(int field) {
   return WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_LENGTH_DELIMITED);
 }
 
-// Sizes of parsed fields, at most. Arrays of numbers grow by doubling.
+// Upper bounds of the sizes of parsed fields. Arrays of numbers grow by doubling.
 constexpr std::uint64_t kBytesOfMessage = 1024, kBytesOfField = 96, kBytesOfPackedByte = 24,
                         kBytesOfUnknownByte = 64;
 
@@ -63,7 +63,7 @@ bool CountFields(CodedInputStream& input, const google::protobuf::Descriptor& ty
   return true;
 }
 
-// Adds what the fields in `input` take to `bytes`. Returns false for a malformed message.
+// Adds the memory of the parsed fields in `input` to `bytes`. Returns false if malformed.
 bool AddParsedBytes(CodedInputStream& input, const google::protobuf::Descriptor& type, int nested,
                     std::uint64_t& bytes) {
   while (const std::uint32_t tag = input.ReadTag()) {
@@ -97,7 +97,7 @@ bool AddParsedBytes(CodedInputStream& input, const google::protobuf::Descriptor&
   return true;
 }
 
-// The last `sequence` of the ParticleFrame in `input`.
+// Reads the last `sequence` of a ParticleFrame. Returns false if malformed or with too many fields.
 bool ReadSequence(CodedInputStream& input, google::protobuf::uint64& sequence, int& fields) {
   constexpr std::uint32_t kSequence = WireFormatLite::MakeTag(
       v1::ParticleFrame::kSequenceFieldNumber, WireFormatLite::WIRETYPE_VARINT);
@@ -128,7 +128,7 @@ bool FindSequence(grpc::ByteBuffer& bytes, google::protobuf::uint64& sequence) {
     } else if (!WireFormatLite::SkipField(&input, tag)) {
       return false;
     } else if (tag == LengthTag(v1::ReconstructRequest::kOpenFieldNumber)) {
-      sequence = 0;  // It replaces an earlier frame.
+      sequence = 0;  // `open` replaces an earlier frame.
     }
   }
   return input.ConsumedEntireMessage();
@@ -176,7 +176,7 @@ void WriteRows(const RowArray& array, CodedOutputStream& out) {
   }
 }
 
-// The contents of a NamedScalar.
+// The size of a serialised NamedScalar.
 std::uint64_t BytesOf(const AttributeRows& attribute) {
   std::uint64_t bytes = 0;
   if (!attribute.name.empty()) {

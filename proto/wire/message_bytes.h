@@ -17,17 +17,17 @@
 
 namespace partiemc::wire {
 
-/// Most fields of a request, nested and unknown ones included. Valid requests have far fewer. A
-/// parsed field can take thirty times its serialised size.
+/// Most fields of a request, nested and unknown ones included. Bounds the memory of parsing,
+/// because a parsed field can take thirty times its serialised size. Valid requests have far fewer.
 inline constexpr int kMaxFields = 4096;
 
-/// Whether `bytes` has at most kMaxFields fields and no groups, read as a message of `type` up to
-/// the first malformed field. Parsing such a message takes about as much memory as its bytes. Skips
-/// the contents of strings.
+/// Whether a message of `type` in `bytes` has at most kMaxFields fields and no groups, up to the
+/// first malformed field. Parsing it then takes little more memory than its bytes. Skips the
+/// contents of strings.
 bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& type);
 
-/// Estimate of the memory that a message of `type` takes, parsed from `bytes`, beside the contents
-/// of its strings. Never too low. Reads up to the first malformed field, as a parser does.
+/// Upper bound of the memory of a message of `type` parsed from `bytes`, without the contents of
+/// its strings. Reads up to the first malformed field, as a parser does.
 std::uint64_t ParsedBytes(std::string_view bytes, const google::protobuf::Descriptor& type);
 
 /// The number of the set field of a message that consists of a oneof with the fields 1 to `last`; 0
@@ -35,8 +35,8 @@ std::uint64_t ParsedBytes(std::string_view bytes, const google::protobuf::Descri
 /// the contents of the field.
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 
-/// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest. Empty if `bytes` is
-/// malformed or has more than kMaxFields fields. Skips the arrays.
+/// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest; 0 without a frame. Empty
+/// if `bytes` is malformed or has more than kMaxFields fields. Skips the arrays.
 std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes);
 
 /// SequenceOf for damaged messages and messages with more than kMaxFields fields: the last
@@ -47,20 +47,20 @@ std::uint64_t ReadableSequence(grpc::ByteBuffer& bytes);
 /// `bytes` is malformed; `message` then holds a part of it.
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);
 
-/// Requires: a message of less than 2 GiB.
+/// Serialises a message. Requires: less than 2 GiB.
 grpc::ByteBuffer ToBytes(const google::protobuf::MessageLite& message);
 
 /// A view of the arrays of `frame`.
 FrameRows RowsOf(const Frame& frame);
 
-/// A ReconstructRequest with a frame. Without a box the same bytes as of EncodeFrame and ToBytes,
-/// but copied directly from the caller's arrays. A box comes before the arrays.
+/// Serialises a ReconstructRequest with a frame directly from the caller's arrays. Without a box,
+/// the bytes equal those from EncodeFrame and ToBytes. A box comes before the arrays.
 class FrameRequest {
  public:
-  /// A view of `frame`. Requires: frame.components is 2 or 3.
+  /// Keeps views of the arrays of `frame`. Requires: frame.components is 2 or 3.
   FrameRequest(const Frame& frame, std::uint64_t sequence)
       : FrameRequest(RowsOf(frame), sequence) {}
-  /// A view of arrays with any memory layout.
+  /// Keeps views of arrays with any memory layout.
   FrameRequest(const FrameRows& frame, std::uint64_t sequence);
 
   /// Size of the ParticleFrame, as counted by Limits.max_frame_bytes.

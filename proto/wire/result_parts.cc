@@ -116,7 +116,7 @@ void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t p
     v1::NamedAttribute& to = messages[static_cast<int>(k)];
     to.set_name(from.name);
     to.set_components(static_cast<std::uint32_t>(from.components));
-    // An empty frame has none.
+    // Without points, `values` may be empty.
     AssignBytes(
         std::span(from.values).first(std::min(from.values.size(), points * from.components)),
         *to.mutable_values());

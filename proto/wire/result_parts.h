@@ -16,13 +16,13 @@
 
 namespace partiemc::wire {
 
-/// DATA_LOSS: `field` of a server's response breaks `rule`.
+/// DATA_LOSS, because `field` of a server's response breaks `rule`.
 absl::Status Lost(absl::string_view field, absl::string_view rule);
 
 using Origin = std::array<double, 3>;
 
-/// The centre of the bounding box of all points, which minimises the largest relative coordinate;
-/// zeros without points. Each array has `components` coordinates per point.
+/// The centre of the bounding box of all points in `arrays`, which minimises the largest relative
+/// coordinate; zeros without points. Points have `components` coordinates, at most 3.
 Origin MiddleOf(std::span<const std::span<const double>> arrays, std::size_t components);
 
 Origin OriginOf(const v1::ReconstructedFrame& message);
@@ -30,20 +30,20 @@ void SetOrigin(const Origin& origin, v1::ReconstructedFrame& message);
 
 /// The format and scale of the points of a result.
 struct PointFormat {
-  v1::CoordinateFormat format;  ///< FLOAT64 or FLOAT32_RELATIVE.
+  v1::CoordinateFormat format;  ///< FLOAT32_RELATIVE; all others are read as FLOAT64.
   Origin origin;
   std::size_t components;  ///< 2 or 3.
 };
 
-/// Errors: OUT_OF_RANGE with a Violation (RESOLUTION) if float32 would move a point by more than
-/// 1e-4 spacings.
+/// Writes points. `field` names them in errors. Errors: OUT_OF_RANGE with a Violation (RESOLUTION)
+/// if float32 would move a point by more than 1e-4 spacings.
 absl::Status EncodePoints(std::span<const double> points, const PointFormat& format, double spacing,
                           absl::string_view field, std::string& bytes);
 /// Errors: DATA_LOSS for a wrong number of bytes and for coordinates that are not finite.
 absl::Status DecodePoints(const std::string& bytes, const PointFormat& format,
                           absl::string_view field, std::vector<double>& points);
 
-/// Resizes a repeated field. Existing elements keep their buffers; Clear() would free them.
+/// Resizes a repeated field. Existing elements keep their contents and buffers.
 template <typename Repeated>
 void Resize(Repeated& messages, std::size_t size) {
   while (messages.size() > static_cast<int>(size)) messages.RemoveLast();
@@ -55,6 +55,7 @@ using NamedAttributes = google::protobuf::RepeatedPtrField<v1::NamedAttribute>;
 /// Writes the attributes of the first `points` vertices.
 void EncodeAttributes(std::span<const AttributeValues> attributes, std::size_t points,
                       NamedAttributes& messages);
+/// Errors: DATA_LOSS for a wrong number of components or bytes. `of`: "rings", "mesh" or "surface".
 absl::Status CheckAttributes(absl::string_view of, const NamedAttributes& messages,
                              std::size_t points);
 /// Requires: CheckAttributes.

@@ -110,7 +110,7 @@ absl::Status DecodeShells(const v1::Surface& message, Surface& surface) {
   return absl::OkStatus();
 }
 
-// Every shell uses its own points.
+// Checks that the triangles of each shell use only points of this shell.
 absl::Status CheckTriangles(const Surface& surface) {
   for (std::size_t k = 0; k < surface.ShellCount(); ++k) {
     const std::uint32_t first = surface.point_offsets[k], end = surface.point_offsets[k + 1];

@@ -12,9 +12,9 @@ namespace partiemc::wire {
 absl::Status EncodeSurface(const Result& result, const Outputs& outputs,
                            v1::ReconstructedFrame& message);
 
-/// Replaces points, triangles, normals and attributes of the surface in `message` by those of
-/// `surface`, which has the same shells. Keeps the coordinate format and the origin. Requires: a
-/// surface that DecodeSurface has read from `message`, with fewer points. Errors: as EncodeResult.
+/// Replaces offsets, points, triangles, cuts, normals and attributes of the surface in `message`.
+/// Keeps coordinate format, origin, measures and identities. Requires: DecodeSurface has read
+/// `surface` from `message`, and only points were removed since. Errors: as EncodeResult.
 absl::Status ReplaceGeometry(const Surface& surface, double spacing,
                              v1::ReconstructedFrame& message);
 

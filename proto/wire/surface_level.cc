@@ -22,11 +22,10 @@ std::uint64_t LastOf(const std::string& offsets) {
   return last;
 }
 
-// Refuses counts that the arrays of no coordinate format can hold, before memory is reserved for
-// them.
+// Before memory is reserved, refuses counts that are too large for the arrays in every format.
 absl::Status CheckCounts(const v1::Surface& surface) {
-  // The vertex codec compresses 12 bytes of a point to a 64th at least, and the index codec stores
-  // at least a byte for each triangle (compact_surface.cc).
+  // The vertex codec stores at least a 64th of the 12 bytes of a point, the index codec at least a
+  // byte for each triangle (compact_surface.cc).
   constexpr std::uint64_t kMostPointsOfByte = 6;
   if (LastOf(surface.point_offsets()) > kMostPointsOfByte * surface.points().size()) {
     return Lost("surface.point_offsets", "gives more points than surface.points can hold");
@@ -38,10 +37,10 @@ absl::Status CheckCounts(const v1::Surface& surface) {
 }
 
 std::uint64_t BytesOfLevel(const v1::Surface& surface) {
-  // Three surfaces have the names of attributes and the parents.
+  // Three surfaces exist at a time, each with its names of attributes and its parents.
   constexpr std::uint64_t kCopies = 3, kBytesOfParent = 40;
   std::uint64_t values = 0, names = 0, parents = 0;
-  // More components are refused later.
+  // DecodeSurface refuses more components.
   for (const v1::NamedAttribute& attribute : surface.attributes()) {
     values += std::min(attribute.components(), 3u);
     names += attribute.name().size();
@@ -95,10 +94,9 @@ absl::Status ReplaceByLevel(const LevelOfDetail& level, SurfaceOrigin origin,
     if (!made.ok()) return made.status();
     error = *made;
   }
-  // Measures and identities stay in the message.
+  // Without a removed point the exact surface stays.
   if (error > 0) status = ReplaceGeometry(decoded, spacing, message);
-  // The message has another order of points and triangles: a compact surface, or one of which no
-  // point was removed.
+  // The digest is over points and triangles in the order of the message.
   if (status.ok()) status = DecodeSurface(message, decoded);
   if (!status.ok()) return status;
   surface.mutable_level()->set_error(error);

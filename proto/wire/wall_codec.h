@@ -9,10 +9,9 @@
 
 namespace partiemc::wire {
 
-/// Copies the walls of a message. The core's Validate checks the coordinates. Counts the walls and
-/// their points before it copies any.
-/// Errors: INVALID_ARGUMENT with a Violation for more than kMaxWallPoints points together, or for
-/// more walls than these points can make.
+/// Copies the walls of a message, after it has counted their points. The core's Validate checks the
+/// coordinates. Errors: INVALID_ARGUMENT with a Violation for more than kMaxWallPoints points
+/// together, and for more than kMaxWallPoints / 2 walls.
 absl::StatusOr<std::vector<Wall>> DecodeWalls(const v1::ReconstructionParameters& message);
 
 /// Adds walls to `message`, which has none.

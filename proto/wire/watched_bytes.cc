@@ -42,7 +42,7 @@ struct Span {
   std::size_t offset = 0, length = 0;
 };
 
-// Adds what Find returns. Returns false if the message is malformed.
+// Appends the result of Find to `found`. Returns false if the message is malformed.
 bool FindIn(CodedInputStream& input, std::span<const int> path, std::vector<Span>& found) {
   std::uint32_t length = 0;
   while (const std::uint32_t tag = input.ReadTag()) {
@@ -63,8 +63,8 @@ bool FindIn(CodedInputStream& input, std::span<const int> path, std::vector<Span
   return true;
 }
 
-// The contents of field `path` of the message in `bytes`, in order: the first number is a field of
-// the message, the next one of the message in that field. Empty if the message is malformed.
+// The contents of the field with the path `path` in the message in `bytes`, in order. Each number
+// of a path is a field of the message in the field before it. Empty if the message is malformed.
 std::vector<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
   std::vector<Span> found;
   grpc::ProtoBufferReader reader(&bytes);
@@ -85,7 +85,7 @@ std::vector<grpc::Slice> SlicesOf(const grpc::ByteBuffer& bytes) {
 
 WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
   constexpr int kPath[] = {v1::ReconstructResponse::kFrameFieldNumber};
-  // Of several frames the last one counts, as for a parser.
+  // If there are several frames, the last one counts, as for a parser.
   const std::vector<Span> frames = Find(response, kPath);
   if (!frames.empty()) Append(SlicesOf(response), frames.back().offset, frames.back().length);
 }

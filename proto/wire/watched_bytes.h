@@ -1,4 +1,4 @@
-// A serialised result for watchers. All messages share the bytes of the producer's response.
+// A serialised result for watchers, who all share the bytes of the producer's response.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -16,16 +16,16 @@ namespace partiemc::wire {
 /// Immutable except for EchoParticles. Copies share reference-counted slices.
 class WatchedBytes {
  public:
-  /// Takes the frame of `response`, without the checkpoint, which only the producer receives.
-  /// Shares the memory of `response`. Requires: `response` is ToBytes of a ReconstructResponse that
-  /// holds a frame without particles.
+  /// Takes the frame of `response`, but not the checkpoint, which only the producer receives.
+  /// Shares the memory of `response`. Requires: `response` is ToBytes of a ReconstructResponse with
+  /// a frame without particles.
   explicit WatchedBytes(grpc::ByteBuffer& response);
 
-  /// Copies a serialised ReconstructedFrame, which may be malformed.
+  /// Copies a serialised ReconstructedFrame. Does not check it.
   explicit WatchedBytes(const std::string& frame) { AppendOwn(frame); }
 
-  /// Adds positions, ids, volumes, velocities and scalars of the frame in `request`. Shares the
-  /// memory of `request`. Requires: `frame` is the parsed frame of `request`.
+  /// Adds the format, positions, ids, volumes, velocities and scalars of the frame in `request`.
+  /// Shares the memory of `request`. Requires: `frame` is the parsed frame of `request`.
   void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
 
   /// Size of the serialised ReconstructedFrame.
@@ -48,7 +48,7 @@ class WatchedBytes {
 
   std::vector<grpc::Slice> slices_;
   std::size_t size_ = 0, memory_ = 0;
-  const std::uint8_t* counted_ = nullptr;  // The slice that memory_ counted last.
+  const std::uint8_t* counted_ = nullptr;  // Begin of the slice that memory_ counted last.
 };
 
 }  // namespace partiemc::wire

@@ -17,15 +17,15 @@ inline constexpr std::string_view kReasonIdle = "IDLE";
 /// Reason for ending a call or refusing a frame whose bytes are not the expected message.
 inline constexpr std::string_view kReasonMalformed = "MALFORMED";
 
-/// INVALID_ARGUMENT (PROTOCOL): the client has sent a request that is not allowed in the current
-/// state of the call.
+/// INVALID_ARGUMENT (PROTOCOL): the current state of the call does not allow the client's request.
+/// `found` and `rule` become the value and the rule of the Violation.
 absl::Status ProtocolError(std::string found, std::string rule);
 /// UNAVAILABLE with a Violation (DRAINING): the server is draining.
 absl::Status DrainingError();
-/// CANCELLED: the client has disconnected.
+/// CANCELLED: the client has disconnected or cancelled the call.
 absl::Status ClientGone();
-/// DEADLINE_EXCEEDED (IDLE) for a client that has done `what` for the time `limit`. Example of
-/// `what`: "sends no `open`".
+/// DEADLINE_EXCEEDED (IDLE): the client has kept the call waiting for the time `limit`. `what`
+/// completes the sentence "The client ...": "sends no `open`".
 absl::Status IdleError(std::string what, std::chrono::milliseconds limit);
 
 }  // namespace partiemc::server

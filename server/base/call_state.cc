@@ -22,8 +22,7 @@ constexpr LegalStates kLegalStates[] = {
     {{K::kStream, K::kUnary, K::kWatch}, P::kOpening, R::kFirst, C::kIdle, W::kIdle},
     {{K::kStream, K::kWatch}, P::kOpening, R::kIdle, C::kOpen, W::kIdle},
 
-    // Serving. A stream reads, computes and writes at the same time; a unary call does one after
-    // the other.
+    // Serving. A stream reads, computes and writes at the same time, a unary call in this order.
     {K::kStream, P::kServing, {R::kIdle, R::kMemory, R::kPermit, R::kNext},
      {C::kIdle, C::kResult}, {W::kIdle, W::kOpened, W::kResult}},
     {K::kUnary, P::kServing, R::kIdle, C::kResult, W::kIdle},

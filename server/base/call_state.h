@@ -12,8 +12,8 @@ enum class MachineKind { kStream, kUnary, kWatch };
 enum class Phase {
   kOpening,    ///< The first request has not been accepted.
   kServing,    ///< Requests are answered.
-  kEnding,     ///< Accepts no further request, and still sends all that it owes.
-  kClosing,    ///< As kEnding, but does not wait: for parts of frames, or for a watcher's credit.
+  kEnding,     ///< Accepts no further request, and still sends all responses that are due.
+  kClosing,    ///< Like kEnding, but waits neither for parts of frames nor for a watcher's credit.
   kAbandoned,  ///< Sends nothing more. Ends when the computation and the write have ended.
   kFinished,
 };
@@ -82,8 +82,8 @@ struct LegalStates {
   }
 };
 
-/// The table of all states that a call can have between two events. A row contains a set of values
-/// for each field of CallState; each combination of these values is legal.
+/// The table of all states that a call can have between two events. A row has a set of values for
+/// each field of CallState. Each combination of these values is legal.
 std::span<const LegalStates> AllLegalStates();
 
 bool IsLegal(const CallState& state);

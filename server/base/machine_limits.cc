@@ -11,16 +11,14 @@ namespace {
 
 constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 
-// Reads the number at the beginning of a file. Returns kUnlimited for the text "max" and for
-// errors.
+// Returns the number at the beginning of a file; kUnlimited for the text "max" and for errors.
 std::uint64_t NumberIn(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
   return file >> number ? number : kUnlimited;
 }
 
-// Calls visit(folder) for the folder of a control group and the folders of its parents, up to
-// `top`.
+// Calls visit(folder) for the folders of a control group and of its parents, up to `top`.
 template <typename Visit>
 void ForEachFolder(const std::string& top, std::string group, Visit visit) {
   for (;;) {
@@ -32,10 +30,10 @@ void ForEachFolder(const std::string& top, std::string group, Visit visit) {
 }
 
 // Calls visit(version, folder) for the control groups that limit this process by `controller`
-// ("memory", "cpu"), and for their parents. Lines of /proc/self/cgroup have the form "0::/a/b" for
-// version 2, and "4:memory:/a/b" or "3:cpu,cpuacct:/" for version 1. Inside a container, version 1
-// names the groups as the host sees them, so their folders may be missing. A missing folder sets no
-// limit, and the top folder is always visited.
+// ("memory", "cpu"), and for their parents. A line of /proc/self/cgroup is "0::/a/b" for version 2,
+// and "4:memory:/a/b" or "3:cpu,cpuacct:/" for version 1. Inside a container, version 1 names the
+// groups as the host sees them, so their folders may be missing. `visit` receives them all the
+// same. The top folder is always visited; there a container sees its own limits.
 template <typename Visit>
 void ForEachGroup(const std::string& root, std::string_view controller, Visit visit) {
   std::ifstream groups(root + "/proc/self/cgroup");
@@ -56,8 +54,8 @@ void ForEachGroup(const std::string& root, std::string_view controller, Visit vi
   }
 }
 
-// The processor time of a group per period, divided by the period: the number of processors that
-// the group may use. Infinite without a limit.
+// Returns the number of processors that a group may use: its processor time per period, divided by
+// the period. Infinite without a limit.
 double QuotaOf(int version, const std::string& folder) {
   double quota = -1, period = 0;
   if (version == 2) {

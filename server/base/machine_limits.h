@@ -6,12 +6,13 @@
 
 namespace partiemc::server {
 
-/// Memory of the machine, or the limit of this process's control group if that is lower. `root` is
-/// the folder that contains proc and sys. Missing or malformed files set no limit.
+/// Returns the memory of the machine in bytes, or the lowest limit of this process's control group
+/// and its parents if that is lower. `root` is the folder that contains proc and sys; "" is the
+/// root folder. A missing or malformed file sets no limit. Without any limit returns 2^64 - 1.
 std::uint64_t AvailableMemory(const std::string& root = "");
 
-/// The lower of `processors` and the control group's CPU quota, rounded up; at least 1. `root` and
-/// missing files: see AvailableMemory.
+/// Returns the lower of `processors` and the lowest CPU quota of the control groups, rounded up; at
+/// least 1. `root` and missing files: see AvailableMemory.
 unsigned AvailableProcessors(unsigned processors, const std::string& root = "");
 
 }  // namespace partiemc::server

@@ -16,8 +16,8 @@ class RateLimit {
 
   explicit RateLimit(std::uint32_t per_second) : per_second_(per_second) {}
 
-  /// Counts one event at `now`. Returns true if the event is within the limit of the current
-  /// second. A second begins with the first event after the previous second has passed.
+  /// Counts an event at `now`. Returns whether it is within the limit of the current second. A
+  /// second begins with the first event after the previous second has passed.
   bool Allow(Clock::time_point now) {
     const MutexLock lock(mutex_);
     if (now - begin_ >= std::chrono::seconds(1)) {

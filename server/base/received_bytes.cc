@@ -33,7 +33,7 @@ std::string PeerV6(const in6_addr& address, std::uint16_t port) {
   return absl::StrCat("ipv6:%5B", text, "%5D:", ntohs(port));
 }
 
-// The peer of a socket in gRPC's format; empty if the descriptor is not a TCP connection.
+// Returns the peer of a socket in gRPC's format, or nothing if the descriptor is no socket of IP.
 std::optional<std::string> PeerOf(int file) {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
@@ -49,7 +49,7 @@ std::optional<std::string> PeerOf(int file) {
   return std::nullopt;
 }
 
-// The bytes that a TCP connection has received; empty if the kernel is too old to report them.
+// Returns the bytes that a TCP connection has received, or nothing if the kernel is too old.
 std::optional<std::uint64_t> ReceivedBytesOf(int file) {
   tcp_info info{};
   socklen_t size = sizeof info;

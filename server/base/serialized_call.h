@@ -43,8 +43,7 @@ class SerializedCall : public std::enable_shared_from_this<SerializedCall> {
     const std::shared_ptr<SerializedCall> call_;
   };
 
-  /// Adds the actions that follow from the state. Called at the end of each event, with the mutex
-  /// held.
+  /// Adds the actions that follow from the state, by Do. Called at the end of each event.
   virtual void Decide() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) = 0;
 
   void Do(Action action) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {

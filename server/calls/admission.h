@@ -11,25 +11,24 @@
 
 namespace partiemc::server {
 
-/// Describes where a call comes from, as reported by its transport.
+/// Where a call comes from, as its transport reports.
 struct CallOrigin {
   std::string peer;                          ///< As CallChannel::peer.
-  std::optional<std::string> authorization;  ///< "Bearer TOKEN".
+  std::optional<std::string> authorization;  ///< "Bearer TOKEN"; absent without a token.
 };
 
-/// An admitted call. `place` counts it against the caller's quota until the call ends.
+/// An admitted call. While `place` exists, the call counts against the caller's quota.
 struct AdmittedCall {
   Caller caller;
   CallerAccount::Place place;
 };
 
-/// A function that checks a permission of the caller, such as Caller::CheckMayProduce. Null: no
-/// check.
+/// Checks a permission of a caller, such as Caller::CheckMayProduce. Null: no check.
 using Permission = absl::Status (Caller::*)() const;
 
-/// Authenticates the caller of a new call and checks its permission and its quota. Called before
-/// anything of a request is read. Thread-safe.
-/// Errors: UNAUTHENTICATED, PERMISSION_DENIED (NOT_PERMITTED), RESOURCE_EXHAUSTED (CALLER_CALLS).
+/// Authenticates the caller of a new call and checks its permission and its quota, before the
+/// server reads a request. Thread-safe. Errors: UNAUTHENTICATED, PERMISSION_DENIED (NOT_PERMITTED),
+/// RESOURCE_EXHAUSTED (CALLER_CALLS).
 absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
                                    Permission permission = nullptr);
 

@@ -20,7 +20,7 @@ void ByteCall::OnReadDone(bool ok) {
     return OnRequest();
   }
   // A read fails if the client half-closes or disconnects. After a disconnect, the channel may call
-  // OnCancel only later, so calls it here.
+  // OnCancel only later, but OnRequestsEnded would take the disconnect for a half-close.
   if (channel_.IsCancelled()) OnCancel();
   OnRequestsEnded();
 }

@@ -21,7 +21,7 @@
 
 namespace partiemc::server {
 
-/// Channel and meters outlive the call.
+/// A new call, and the result of Admit. The channel and the meters outlive the ByteCall.
 struct ArrivedCall {
   CallChannel& channel;
   const MethodMeters* meters;  ///< Null: the call is not counted.
@@ -29,7 +29,7 @@ struct ArrivedCall {
 };
 
 /// Connects a CallChannel to a state machine (StreamStateMachine, WatchStateMachine,
-/// UnaryStateMachine). The state machine ensures that the rules of the channel are kept. Never
+/// UnaryStateMachine). The state machine keeps the rules of the channel (call_channel.h). Never
 /// blocks. Any thread may call.
 class ByteCall {
  public:
@@ -40,11 +40,11 @@ class ByteCall {
 
   // Called by the channel:
 
-  /// A read has ended. `ok`: it has returned a message; otherwise no further message will arrive.
+  /// A read has ended. `ok`: a message has arrived; otherwise no further message will arrive.
   void OnReadDone(bool ok);
   /// A write has ended, so its message may be freed.
   void OnWriteDone(bool ok);
-  /// The client has disconnected. May be called at any time before OnDone.
+  /// The client has disconnected. May be called at any time before OnDone, and repeatedly.
   virtual void OnCancel() = 0;
   /// The last call of the channel; this object may be deleted afterwards.
   virtual void OnDone() = 0;
@@ -57,8 +57,7 @@ class ByteCall {
   CallChannel& channel() { return channel_; }
   const CallChannel& channel() const { return channel_; }
   const ServerContext& context() const { return context_; }
-  /// Ends the call. A second call of End is a bug of the state machine: it is logged and has no
-  /// effect.
+  /// Ends the call. A second End, a bug of the state machine, is logged and has no effect.
   void End(const absl::Status& status);
 
   /// OK, or the error with which the caller was refused.

@@ -17,8 +17,7 @@
 
 namespace partiemc::server {
 
-/// Counts the calls of one method. The counters are atomic; an increment takes about ten
-/// nanoseconds. Thread-safe.
+/// Counts the calls of one method. An increment takes about ten nanoseconds. Thread-safe.
 class MethodMeters {
  public:
   static constexpr std::size_t kCodes = 17;

@@ -86,8 +86,7 @@ absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits) 
 std::chrono::milliseconds FrameArrival::LookEvery() const {
   using std::chrono::milliseconds;
   if (assembler_ == nullptr) return milliseconds(0);
-  // An interval that is short compared to the timeout, so that a frame waits hardly longer than its
-  // timeout.
+  // Short compared to the timeout, so that a frame waits hardly longer than its timeout.
   return std::clamp(assembler_->timeout() / 20, milliseconds(5), milliseconds(500));
 }
 

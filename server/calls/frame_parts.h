@@ -24,15 +24,15 @@
 namespace partiemc::server {
 
 /// Parses a request with a frame into `request` and reuses its buffers; drops unknown fields.
-/// Errors: MALFORMED (names `field`), OUT_OF_MEMORY (always names "frame"). After an error, the
-/// frame in `request` contains its `sequence`, or 0 if the sequence cannot be read.
+/// Errors: MALFORMED (names `field`), OUT_OF_MEMORY (always names "frame"). After an error, only
+/// the `sequence` of the frame in `request` is valid; it is 0 if it cannot be read.
 absl::Status ParseFrame(grpc::ByteBuffer& bytes, v1::ReconstructRequest& request,
                         const std::string& field = "frame");
 
 /// Checks the fields of `open` that concern parts. Errors: INVALID_ARGUMENT (OUT_OF_RANGE).
 absl::Status CheckParts(const v1::OpenStream& open, const ServerLimits& limits);
 
-/// The steps that ReconstructCall takes for frames in parts. This base class is for frames that
+/// The steps of ReconstructCall that differ for frames in parts. This base class is for frames that
 /// arrive whole, each in one message; its steps do nothing. There is one slot for each frame in
 /// flight. The thread rules of StreamHandler apply. OnFrame is called at the end of a read.
 class FrameArrival {
@@ -43,7 +43,7 @@ class FrameArrival {
 
   /// The assembler that the calls of all parts share; null if frames arrive whole.
   const std::shared_ptr<FrameAssembler>& assembler() const { return assembler_; }
-  /// As StreamHandler.
+  /// As StreamHandler::LookEvery.
   std::chrono::milliseconds LookEvery() const;
 
   /// A frame was read into `slot`.
@@ -53,9 +53,9 @@ class FrameArrival {
   virtual std::uint64_t ComputedBytes(std::uint64_t bytes) const { return bytes; }
   virtual bool DropFrame(std::size_t /*slot*/, const absl::Status& /*why*/) { return false; }
 
-  /// Completes the frame in `slot`: `request` is its parsed message, `bytes` its serialised
-  /// message. If the client has requested an echo, `bytes` becomes the message of the complete
-  /// frame.
+  /// Completes the frame in `slot` from its parts: `request` is its parsed message, `bytes` its
+  /// serialised message. If the client has requested an echo, `bytes` becomes the message of the
+  /// complete frame.
   virtual absl::Status Complete(std::size_t /*slot*/, const wire::Outputs& /*outputs*/,
                                 v1::ReconstructRequest& /*request*/, grpc::ByteBuffer& /*bytes*/) {
     return absl::OkStatus();
@@ -65,8 +65,8 @@ class FrameArrival {
   virtual std::optional<v1::ReconstructResponse> RespondToPart(std::size_t /*slot*/) {
     return std::nullopt;
   }
-  /// The server has responded to all frames below `next_sequence`. `with_checkpoint`: the last
-  /// response contained a checkpoint.
+  /// The responses to all frames below `next_sequence` are made. `with_checkpoint`: the last one
+  /// contains a checkpoint.
   virtual void OnAnswered(std::uint64_t /*next_sequence*/, bool /*with_checkpoint*/) {}
   /// The call has ended.
   virtual void End(const absl::Status& /*status*/) {}
@@ -79,11 +79,10 @@ class FrameArrival {
   const std::shared_ptr<FrameAssembler> assembler_;
 };
 
-/// The call of part 0, which also has the session of the stream.
+/// The steps for the call of part 0, which owns the session of the stream.
 class PartZero final : public FrameArrival {
  public:
-  /// Requires: CheckParts was OK, and `open` has parts > 0. `next_sequence` is the number of the
-  /// first frame.
+  /// `next_sequence`: number of the first frame. Requires: CheckParts was OK; `open` has parts > 0.
   PartZero(const v1::OpenStream& open, const ServerLimits& limits, std::uint64_t next_sequence);
 
   void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;
@@ -106,7 +105,7 @@ class PartZero final : public FrameArrival {
   std::vector<Slot> slots_;
 };
 
-/// The call of another part.
+/// The steps for the call of another part.
 class OtherPart final : public FrameArrival {
  public:
   OtherPart(JoinedPart joined, std::size_t window);

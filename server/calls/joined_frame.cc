@@ -41,7 +41,7 @@ absl::Status OfPart(std::size_t part, const absl::Status& status) {
 
 std::string Amount(std::size_t bytes) { return absl::StrCat(bytes, " bytes"); }
 
-// Returns an error unless an array of particles is present in all parts or in none.
+// Checks that part number `part` has the array `field` exactly if the first part has it.
 absl::Status CheckSame(std::size_t part, std::string_view field, std::size_t bytes,
                        bool first_has_it) {
   if ((bytes > 0) == first_has_it) return absl::OkStatus();

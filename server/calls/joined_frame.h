@@ -13,17 +13,17 @@ namespace partiemc::server {
 /// The reason of the error if the parts of a frame do not fit together (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonPartMismatch = "PART_MISMATCH";
 
-/// Appends the particles of `parts` to `frame`, which is part 0. If particles have ids, they are
-/// sorted by id, so the result does not depend on their distribution over the parts. Otherwise they
-/// stay in the order of the parts. Of the scalars, keeps only the ones in `attributes`. Consumes
-/// the arrays of the parts. `frame` keeps its sequence number, its time and its box. Formats of
-/// parts without particles are ignored. Additional memory: at most the size of the arrays, and 8
+/// Appends the particles of `parts` (parts 1, 2, ...) to `frame` (part 0). If particles have ids,
+/// they are sorted by id, so the result does not depend on their distribution over the parts.
+/// Otherwise they stay in the order of the parts. Drops scalars that are not in `attributes`.
+/// Consumes the arrays of the parts. `frame` keeps its sequence number, its time and its box. Parts
+/// without particles may have any format. Additional memory: at most the size of the arrays, and 8
 /// bytes per particle.
 ///
-/// Errors: INVALID_ARGUMENT with a Violation that names a field of parts[k]; `frame` is invalid
-/// afterwards. BYTE_COUNT, UNSUPPORTED (see wire::DecodeFrame); PART_MISMATCH if parts differ in
-/// position format, time (0: not set), box (absent: not set), optional arrays, or the number of
-/// components of a scalar.
+/// Errors: INVALID_ARGUMENT with a Violation whose field is "parts[k].FIELD" for part number k;
+/// `frame` is invalid afterwards. BYTE_COUNT, UNSUPPORTED (see wire::DecodeFrame); PART_MISMATCH if
+/// parts differ in position format, optional arrays, components of a scalar, time or box. The time
+/// of parts 1, 2, ... may be 0, and their box may be absent.
 absl::Status JoinParts(std::span<v1::ParticleFrame> parts, std::span<const std::string> attributes,
                        v1::ParticleFrame& frame);
 

@@ -197,7 +197,7 @@ absl::StatusOr<v1::ListStreamsResponse> Methods::ListStreams(const v1::ListStrea
   return response;
 }
 
-// Fills the page up to `page_size`.
+// Adds streams of other replicas with ids above `after`, until the page has `page_size` streams.
 void Methods::AddRemoteStreams(const std::string& after, std::size_t page_size,
                                const Caller& caller, v1::ListStreamsResponse& response) const {
   const std::size_t room = page_size - static_cast<std::size_t>(response.streams_size());
@@ -217,7 +217,7 @@ v1::GetServerInfoResponse Methods::GetServerInfo() const {
   EncodeLimits(context_.limits, *response.mutable_limits());
   response.set_frames_in_flight(context_.limits.frames_in_flight);
   response.set_compute_threads(context_.pool.threads());
-  // Lists only the placements that work: a build of the core may lack some placements and fills.
+  // Lists only placements and fills that work, because a build of the core may lack some.
   for (const Placement placement : AllPlacements()) {
     ReconstructionParameters parameters;
     parameters.placement = placement;

@@ -24,7 +24,7 @@ class Methods {
                                       Method::kWatchStream, Method::kListStreams,
                                       Method::kGetServerInfo};
 
-  /// As in the .proto.
+  /// The method's name in the .proto.
   static std::string_view Name(Method method);
 
   /// `metrics` and `context` outlive this object; this object outlives its calls.

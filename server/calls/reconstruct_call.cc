@@ -155,7 +155,7 @@ absl::Status ReconstructCall::OpenStream(const v1::OpenStream& open) {
     auto status = Resume(open.resume(), context(), *session, terms);
     if (!status.ok()) return status;
   }
-  // Before other parts can join.
+  // Before streams.Open, after which other parts can join.
   if (open.parts() > 0) {
     frames_ = std::make_unique<PartZero>(open, context().limits, session->next_sequence());
   }
@@ -268,7 +268,7 @@ Answered ReconstructCall::AnswerWhole(std::size_t slot, Worker& worker,
                            *error.mutable_error());
     error.set_checkpoint(std::move(checkpoint));
     answers_[slot] = wire::ToBytes(error);
-    messages->request.Clear();  // Its size was not checked.
+    messages->request.Clear();  // It may exceed the limit of a frame.
   }
   messages->Shrink(request_bytes);
   worker.message_buffers = std::move(messages);
@@ -286,8 +286,8 @@ absl::Status ReconstructCall::ParseWhole(std::size_t slot, v1::ReconstructReques
   return status;
 }
 
-// Computes a frame. Sequence numbers begin with 1, so 0 means that the number of a malformed frame
-// could not be read; such a frame is neither a gap nor a duplicate.
+// Computes a frame. Sequence numbers begin with 1. If the number of a malformed frame is 0, it
+// could not be read, so the frame is neither a gap nor a duplicate.
 absl::Status ReconstructCall::Compute(const absl::Status& parsed, FrameMessages& messages,
                                       Worker& worker, const std::atomic<bool>& cancelled) {
   const v1::ParticleFrame& frame = messages.request.frame();

@@ -29,8 +29,8 @@
 namespace partiemc::server {
 
 /// Keeps requests and responses as bytes, one of each per slot. A worker parses a frame only when
-/// it computes the frame, into the worker's own buffers. So an idle stream holds almost no memory.
-/// The thread rules of StreamTransport and StreamHandler apply.
+/// it computes the frame, into the worker's own buffers. So an idle stream holds little more than
+/// its state. The thread rules of StreamTransport and StreamHandler apply.
 class ReconstructCall final : public ByteCall, public StreamHandler, private StreamTransport {
  public:
   ReconstructCall(ArrivedCall call, const ServerContext& context);
@@ -38,8 +38,7 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
   void OnCancel() override { machine_->Cancelled(); }
   void OnDone() override;
 
-  // The steps of a frame. Public for the fuzz target, which takes the place of the channel and the
-  // state machine.
+  // The steps of a frame. Public for the fuzz target, which replaces channel and state machine.
 
   grpc::ByteBuffer& Request(std::size_t slot) { return requests_[slot]; }
   grpc::ByteBuffer& Response(Outgoing what, std::size_t slot);

@@ -18,7 +18,7 @@ class WatchDispatcher;
 class WatchRegistry;
 struct ServerLimits;
 
-/// The context and its parts outlive the calls. All parts are thread-safe.
+/// The context and all objects in it outlive the calls. The objects are thread-safe.
 struct ServerContext {
   const ServerLimits& limits;
   const Authentication& authentication;

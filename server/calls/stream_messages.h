@@ -29,8 +29,8 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
 absl::Status ParseOpen(grpc::ByteBuffer& bytes, std::uint64_t max_bytes,
                        v1::ReconstructRequest& request);
 
-/// Decodes a frame (wire::DecodeFrame) after checking its size. Errors: the errors of
-/// wire::DecodeFrame; FRAME_BYTES for a frame above the limit.
+/// Decodes a frame (wire::DecodeFrame) after checking its size. The result refers to `frame` and
+/// `views`. Errors: the errors of wire::DecodeFrame; FRAME_BYTES for a frame above the limit.
 absl::StatusOr<Frame> DecodeFrameWithin(const v1::ParticleFrame& frame, const ServerLimits& limits,
                                         const wire::Outputs& outputs, wire::AttributeViews& views);
 
@@ -44,10 +44,10 @@ absl::Status AnswerFrame(const absl::StatusOr<Frame>& frame, std::uint64_t seque
 struct FrameMessages final : MessageBuffers {
   v1::ReconstructRequest request;
   v1::ReconstructResponse result;   ///< Never an error, which would free its buffers.
-  wire::AttributeViews attributes;  ///< Into `request`.
+  wire::AttributeViews attributes;  ///< Views into `request`.
 
-  /// Takes the messages out of the worker. So they remain if the session frees all buffers of the
-  /// worker because memory is short.
+  /// Takes the messages out of the worker, or creates them. So they remain if the session frees all
+  /// buffers of the worker because memory is short.
   static std::unique_ptr<FrameMessages> Take(Worker& worker);
   /// Frees the buffers if they are far larger than the last request, which had `request_bytes`.
   /// Otherwise the buffers would add up if different fields are large in different requests.

@@ -19,10 +19,10 @@ namespace {
 
 constexpr char kField[] = "open.level_of_detail";
 
-// The bytes of a result, the message in it, and the bytes of the level.
+// Number of copies at the same time: a result's bytes, the message in them, the level's bytes.
 constexpr std::uint64_t kCopies = 3;
 
-// Bytes of the budget, until the end of the scope.
+// Holds bytes of the budget until the end of the scope.
 class Reservation {
  public:
   explicit Reservation(MemoryBudget& budget) : budget_(budget) {}

@@ -18,13 +18,12 @@ namespace partiemc::server {
 
 class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
-  /// The method: computes the response to a request, unless `cancelled`. It may clear the request.
-  /// `worker` is null except for UnaryKind::kFrame.
+  /// Computes the response to a request, unless `cancelled`. It may clear the request. `worker` is
+  /// null except for UnaryKind::kFrame.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;
 
-  /// A worker of the pool computes calls with a frame; a thread of the channel runs `method` for
-  /// other kinds.
+  /// A compute thread runs `method` for UnaryKind::kFrame, a thread of the channel for other kinds.
   UnaryCall(ArrivedCall call, const ServerContext& context, UnaryKind kind, Method method);
 
   void OnCancel() override { machine_->Cancelled(); }

@@ -188,7 +188,7 @@ void WatchCall::WriteFrame(const Published& published, std::uint64_t dropped,
   if (level_) {
     level_dropped_ = dropped;
     level_oldest_ = oldest_sequence;
-    // The frames of the history come without gaps.
+    // A watcher that starts in the history receives every frame of it.
     const bool may_skip = terms_.mode == WatchMode::kLatest && !terms_.from_sequence;
     return context().levels.Request(level_, published.frame, may_skip, *this);
   }

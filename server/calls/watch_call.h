@@ -53,10 +53,10 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
 
   grpc::ByteBuffer request_, response_;
   v1::WatchStreamRequest parsed_;
-  v1::WatchStreamResponse opened_;  // Once open.
+  v1::WatchStreamResponse opened_;  // Filled in when the stream is found.
   WatchTerms terms_;
-  LevelQueue::Seat level_;                              // Without a level: exact frames.
-  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Numbers of the frame that waits.
+  LevelQueue::Seat level_;  // Empty: the watcher receives exact results.
+  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Of WriteFrame, until LevelDone.
   std::string stream_name_;
   std::string end_reason_;
   std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();

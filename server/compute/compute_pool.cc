@@ -7,10 +7,10 @@
 
 namespace partiemc::server {
 
-// The pool's threads ("runners") are plain threads, not tasks of the oneTBB arena. A thread that
-// waits in an arena for the parallel parts of one frame may run parts of another frame. If frames
-// were tasks, it could even begin a whole other frame. The number of runners equals the number of
-// slots of the arena. So small frames run concurrently, and a single large frame uses all slots.
+// The pool's threads ("runners") are plain threads, not tasks of the oneTBB arena. If frames were
+// tasks, a thread that waits for the parallel parts of one frame could begin a whole other frame.
+// The number of runners equals the number of slots of the arena. So small frames run concurrently,
+// and a single large frame uses all slots.
 ComputePool::ComputePool(unsigned threads, WarmSize::Clock::duration warm_time,
                          FrameObserver* observer, MemoryBudget* budget)
     : threads_(std::max(threads, 1u)),
@@ -65,8 +65,7 @@ void ComputePool::Run() {
     {
       const MutexUnlock unlock(mutex_);
       if (shares && !narrow) narrow.emplace(threads_ - 1);
-      // Runs outside the arena, because BeginFrame may block, and other frames use the arena's
-      // threads too.
+      // Outside the arena, because BeginFrame may block, and other frames use the arena's slots.
       worker->memory.BeginFrame(task->frame_bytes);
       (shares ? *narrow : arena_).Execute([&] { task->job(*worker); });
       if (worker->memory.is_beyond()) worker->Empty();  // Another worker may wait for this memory.
@@ -89,7 +88,7 @@ std::optional<ComputePool::Task> ComputePool::WaitForTask() {
     if (auto task = NextTask()) return task;
     if (stopping_) return std::nullopt;
     const bool warm = std::ranges::any_of(idle_, [](auto& w) { return w->particles.used(); });
-    if (waiting_ > 0) {  // By then the callers may no longer compete, so a task may run.
+    if (waiting_ > 0) {  // After kSharingTime the callers may no longer compete, so a task may run.
       task_came_.WaitUntil(mutex_, WarmSize::Clock::now() + kSharingTime);
     } else if (warm) {
       task_came_.WaitUntil(mutex_, WarmSize::Clock::now() + warm_time_);
@@ -121,8 +120,7 @@ void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
 void ComputePool::End(const Task& task) {
   running_.erase(std::ranges::find(running_, task.caller));
   recent_.Came(task.caller, WarmSize::Clock::now());
-  // The caller of the finished task may run another job, so a waiting thread checks the tasks
-  // again.
+  // The caller of the finished task may now run another job, so a thread checks the queue.
   if (waiting_ > 0) task_came_.NotifyOne();
 }
 

@@ -22,41 +22,42 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// A worker is dropped after its buffers have been oversized for this time.
+/// A worker is dropped if no frame has needed its large buffers for this time (WarmSize).
 inline constexpr std::chrono::seconds kWarmTime(10);
 
-/// A caller counts as competing for the threads until this time has passed since its last job.
+/// A caller competes for the threads for this time after it submitted or finished a job.
 inline constexpr std::chrono::seconds kSharingTime(1);
 
-/// Minimum interval between two times at which idle workers are dropped because memory is short.
+/// The pool reacts to a shortage of memory at most once in this interval, because dropped workers
+/// must allocate their buffers again.
 inline constexpr std::chrono::seconds kBetweenShortages(1);
 
-/// Runs jobs on several threads and divides these fairly between callers.
+/// Runs jobs on several threads and divides the threads fairly between callers.
 ///
 /// Order: callers take turns. Within a caller, its streams take turns; all its unary calls count as
 /// one stream. A stream has at most one job in the pool. Therefore a stream delays another stream
 /// of its caller by at most one frame, and a caller delays another caller by at most one job.
 ///
-/// Threads: a caller without competitors uses all threads, and its jobs run their parallel parts in
-/// one shared arena. A caller has competitors if another caller had a job within kSharingTime and
-/// the pool has at least two threads. A caller with competitors runs at most `threads - 1` jobs at
-/// once, so one thread stays free for the others. Each such job has its own arena of `threads - 1`
-/// slots, so that it never waits for a part of another job. So a job of a second caller starts as
-/// soon as a thread wakes. If two callers run long jobs, a third caller may wait for one job.
+/// Threads: a caller has competitors if another caller submitted or finished a job within
+/// kSharingTime and the pool has at least two threads. A caller without competitors uses all
+/// threads, and its jobs share one arena. A caller with competitors runs at most `threads - 1` jobs
+/// at once. So one thread stays free, and starts another caller's job as soon as it wakes. Each job
+/// of a caller with competitors has a separate arena of `threads - 1` slots, so that it never waits
+/// for a part of another job. A job may still wait for one job if other callers use all threads.
 ///
 /// Memory: a job gets the worker that was used last, so a single stream always uses the same
-/// worker. A worker is dropped after its buffers were oversized for `warm_time`. Exception: at
-/// least as many streams as there are workers sent frames of that size recently; then all workers
-/// may be needed at any time, so none is dropped. If the budget lacks memory, idle workers whose
-/// bytes count in the budget are dropped at once.
+/// worker. An idle worker is dropped if its buffers are oversized (WarmSize). Exception: all
+/// workers may be needed at any time, because the streams that recently sent frames of this size
+/// are at least as numerous as the workers (BusyStreams). If the budget lacks memory, idle workers
+/// with bytes in the budget are dropped at once.
 class ComputePool {
  public:
   using Job = std::function<void(Worker&)>;
   using Afterwards = std::function<void()>;
 
-  /// `threads`: number of threads for all jobs together, at least 1. While the pool exists, this
+  /// `threads`: number of threads for all jobs together; 0 means 1. While the pool exists, this
   /// number also limits oneTBB in the whole process. `budget`: counts the memory of the workers
-  /// (worker_memory.h). `observer` and `budget` outlive the pool.
+  /// (worker_memory.h). `observer` and `budget` outlive the pool; each may be null.
   explicit ComputePool(unsigned threads, WarmSize::Clock::duration warm_time = kWarmTime,
                        FrameObserver* observer = nullptr, MemoryBudget* budget = nullptr);
   /// Runs all submitted jobs, then joins the threads.
@@ -64,13 +65,13 @@ class ComputePool {
   ComputePool(const ComputePool&) = delete;
   ComputePool& operator=(const ComputePool&) = delete;
 
-  /// Queues `job`. `afterwards` runs after the job, when its worker is free again. So if
-  /// `afterwards` submits another job, that job gets the same worker. Neither function may throw.
-  /// `stream`: the stream of the frame, or null for a unary call; lives as long as `job`.
+  /// Queues `job`. `afterwards` runs after the job on the same thread, when the job's worker is
+  /// free again. So a job that `afterwards` submits can get the same worker. Neither function may
+  /// throw. `stream`: the stream of the frame, or null for a unary call; lives as long as `job`.
   /// `caller`: the caller whose turn the job uses; the pool compares the pointer and never
   /// dereferences it.
-  /// `frame_bytes`: size of the frame's message. While memory is short, large frames are computed
-  /// one after the other (WorkerMemory).
+  /// `frame_bytes`: size of the frame's message. While memory is short, the job waits for the
+  /// memory that such a frame usually needs (WorkerMemory::BeginFrame).
   /// Does not wait for jobs. Thread-safe; jobs may call it.
   void Submit(
       Job job, Afterwards afterwards = [] {}, BusyStreams::Mark* stream = nullptr,
@@ -122,8 +123,8 @@ class ComputePool {
   Workers idle_ ABSL_GUARDED_BY(mutex_);             // The last one was used last.
   std::size_t working_ ABSL_GUARDED_BY(mutex_) = 0;  // Number of workers that are not idle.
   BusyStreams busy_ ABSL_GUARDED_BY(mutex_);
-  // Time at which the budget last lacked memory. Idle workers that were created before it are
-  // dropped.
+  // Time at which the pool last reacted to a shortage of memory. Idle workers that were created
+  // before and have bytes in the budget are dropped.
   WarmSize::Clock::time_point memory_was_short_ ABSL_GUARDED_BY(mutex_){};
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 

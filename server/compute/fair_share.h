@@ -13,10 +13,10 @@ class CallerAccount;
 /// Divides a capacity (the "room", in bytes or slots) between callers: counts the amount that each
 /// caller holds, and decides whether it may take more.
 ///
-/// Rule: a caller that already holds some of the room may take more only if the room that stays
-/// free is at least as large as the caller's total. So a single caller gets up to half of the room,
-/// and two callers get up to a third each. Some room always stays free for the next caller. Not
-/// thread-safe.
+/// Rule: a caller that holds nothing may take any amount that is free. A caller that holds
+/// something may take more only if the amount that then stays free is at least the caller's new
+/// total. So with small amounts a single caller gets half of the room, and two callers get a third
+/// each. Some room stays free for the next caller. Not thread-safe.
 class FairShare {
  public:
   static constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
@@ -24,30 +24,30 @@ class FairShare {
   enum class Fit {
     kYes,
     kNoRoom,         ///< Not enough room is free, although the caller holds nothing.
-    kMoreThanShare,  ///< The caller would exceed its share or its quota.
+    kMoreThanShare,  ///< The caller would exceed its quota or, if it holds some, its share.
   };
 
   explicit FairShare(std::uint64_t room) : room_(room) {}
 
-  /// Whether `caller` may take `amount` more. `most` is the caller's quota. A null caller stands
-  /// for the server itself, which is limited by the room only.
+  /// Whether `caller` may take `amount` more. `most` is the caller's quota. A null caller is the
+  /// server itself, which is limited by the room only.
   Fit Fits(const CallerAccount* caller, std::uint64_t amount, std::uint64_t most = kNoLimit) const {
     return FitsInto(room_ + beyond_, caller, amount, most);
   }
-  /// Whether the amounts of all callers would still fit into the room, and that of `caller` into
-  /// its share and `most`, if the amount permitted beyond the room (AddBeyond) decreased by
-  /// `beyond`.
+  /// Whether all rules would hold for `caller` and for the room if RemoveBeyond(beyond) were called
+  /// now. `most` is the caller's quota.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller, std::uint64_t most) const {
     return FitsInto(room_ + beyond_ - beyond, caller, 0, most) == Fit::kYes;
   }
 
-  /// Enlarges the room by `amount`, for something that may exceed it. So this holding takes no room
-  /// from other callers.
+  /// Enlarges the room by `amount`, for an amount that a caller may take beyond the room. So other
+  /// callers lose no room. RemoveBeyond reverses this.
   void AddBeyond(std::uint64_t amount) { beyond_ += amount; }
   void RemoveBeyond(std::uint64_t amount) { beyond_ -= amount; }
 
   /// Counts `amount` as held by `caller`, even if it does not fit.
   void Take(const CallerAccount* caller, std::uint64_t amount);
+  /// Requires: `caller` holds at least `amount`.
   void GiveBack(const CallerAccount* caller, std::uint64_t amount);
 
   std::uint64_t held() const { return held_; }

@@ -6,8 +6,8 @@
 namespace partiemc::server {
 
 /// Returns all freed memory to the operating system now; otherwise jemalloc does so within
-/// seconds. Other threads allocate meanwhile. Does nothing in programs without jemalloc: tests, and
-/// servers with sanitizers.
+/// seconds. Other threads may allocate at the same time. Does nothing in programs without jemalloc:
+/// tests, and servers with sanitizers.
 void GiveBackFreedMemory();
 
 /// Resident memory of the process in bytes; 0 if unknown. Cost: some microseconds.

@@ -35,7 +35,7 @@ void MemoryBudget::Take(std::uint64_t bytes, const CallerAccount* caller) {
   held_ += bytes;
 }
 
-// Like Fits, but also checks that no earlier claim must be granted first.
+// Like Fits, but also returns an error if the claim must wait behind an earlier claim.
 Fit MemoryBudget::FitsNow(const Claim& claim) const {
   for (const Claim& before : claims_) {
     const Fit fit = Fits(before);
@@ -147,7 +147,7 @@ void MemoryBudget::Grant() {
   std::vector<std::pair<std::shared_ptr<Waiter>, std::uint64_t>> granted;
   {
     const MutexLock lock(mutex_);
-    std::set<const CallerAccount*> waiting;  // Callers whose first claim has to wait.
+    std::set<const CallerAccount*> waiting;  // Callers with an earlier claim that must wait.
     for (auto claim = claims_.begin(); claim != claims_.end();) {
       auto waiter = claim->waiter.lock();
       const Fit fit = waiter == nullptr ? Fit::kYes : Fits(*claim);

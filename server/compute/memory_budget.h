@@ -1,4 +1,4 @@
-// Limits the memory that the requests and responses of all streams hold together.
+// Limits the memory that requests, responses and workers hold together.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +17,19 @@
 
 namespace partiemc::server {
 
-/// The violation's reason if a call of ReconstructFrame does not fit into the budget
-/// (proto/PROTOCOL.md).
+/// The violation's reason if the budget has no room for a unary request, a part of a frame or a
+/// level of detail (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 
-/// RESOURCE_EXHAUSTED (MEMORY_BUDGET): `bytes` do not fit into the budget.
+/// RESOURCE_EXHAUSTED (MEMORY_BUDGET): `bytes` do not fit into a budget of `budget` bytes. `field`
+/// becomes the field of the Violation.
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget);
 
 /// The caller's quota of bytes; FairShare::kNoLimit if it has none.
 std::uint64_t QuotaOf(const CallerAccount* caller);
 
-/// Limits of the memory that streams and one worker may hold beyond the budget, so that large
-/// frames can be computed.
+/// Limits of the memory that streams and one worker may hold beyond the budget. Without this
+/// memory, a large frame could wait forever.
 struct BeyondBudget {
   ReadTerms reads;
   /// Maximum bytes of the one worker that may compute beyond the budget.
@@ -39,10 +40,11 @@ struct BeyondBudget {
 ///
 /// The budget counts held bytes, which exist, and planned bytes, which reads in progress may bring
 /// (ReadPermits). The sum of both must fit. Callers share the budget (FairShare); a null `caller`
-/// is limited by the budget only. If a claim exceeds its caller's share, it waits until that caller
-/// holds less, and later claims of this caller wait behind it. All other claims are granted in
-/// order. A claim never overtakes an earlier claim that does not fit into the budget, so a stream
-/// of small frames cannot starve a stream of large frames.
+/// is limited by the budget only.
+///
+/// Order: a claim waits behind each earlier claim of the same caller. It also waits behind an
+/// earlier claim for which the budget has no room (Fit::kNoRoom), so small claims cannot starve a
+/// large one. It overtakes claims of other callers that only exceed their caller's share.
 ///
 /// Thread-safe. Only TakeForWorker blocks.
 class MemoryBudget {
@@ -50,8 +52,7 @@ class MemoryBudget {
   class Waiter {
    public:
     virtual ~Waiter() = default;
-    /// The waiter now holds `bytes`. The thread that freed memory calls this, without holding a
-    /// lock.
+    /// The claim was granted: the waiter now holds `bytes`. Called without holding a lock.
     virtual void Granted(std::uint64_t bytes) = 0;
   };
 
@@ -63,40 +64,41 @@ class MemoryBudget {
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
-  /// Decides which streams may read.
   ReadPermits& reads() { return reads_; }
 
-  /// Counts bytes that the caller holds already, even if they do not fit.
+  /// Counts bytes that `caller` holds already, even if they do not fit.
   void Take(std::uint64_t bytes, const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes the bytes if they fit and no earlier claim waits. Returns kYes, or the reason why they
-  /// were not taken.
+  /// Takes the bytes if they fit and need not wait behind a claim (see the order above). Returns
+  /// kYes, or the reason why they were not taken.
   FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes the bytes like TryTake. If they do not fit, queues a claim and calls `Granted` as soon
-  /// as they do, provided that `waiter` still exists. The waiter keeps the caller's account alive.
+  /// Takes the bytes and returns true if TryTake would. Otherwise queues a claim and returns false;
+  /// `Granted` is called when the claim is granted, unless `waiter` no longer exists. The waiter
+  /// keeps the caller's account alive.
   bool TakeOrWait(std::uint64_t bytes, const std::shared_ptr<Waiter>& waiter,
                   const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the claims of `waiter`. A call of `Granted` that another thread has already begun
-  /// still arrives.
+  /// Removes the claims of `waiter`, and grants claims that waited behind them. If another thread
+  /// has already granted a claim of `waiter`, `Granted` may still be called after this returns.
   void StopWaiting(const std::shared_ptr<Waiter>& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Gives back bytes and grants claims that then fit. Requires: the calling thread holds no lock.
+  /// Gives back bytes. Grants claims and permits reads that then fit. Requires: the calling thread
+  /// holds no lock.
   void GiveBack(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Takes bytes for a worker. Blocks until they fit into the budget, or until no other worker
-  /// computes beyond the budget. In the second case the bytes are taken beyond the budget, at most
-  /// BeyondBudget::worker_bytes. Returns the number of bytes taken.
+  /// computes beyond the budget. In the second case takes them beyond the budget, where the worker
+  /// may hold at most BeyondBudget::worker_bytes. Returns the number of bytes taken.
   std::uint64_t TakeForWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes bytes for a worker beyond the budget. Returns false if another worker computes beyond
   /// the budget, or if this worker would exceed BeyondBudget::worker_bytes.
   bool TryTakeBeyond(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Whether `worker` holds bytes beyond the budget.
   bool IsBeyond(const void* worker) const ABSL_LOCKS_EXCLUDED(mutex_);
   /// Gives back all `bytes` that a worker holds, both within the budget and beyond it.
   void GiveBackOfWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Sets the function that is called when a claim does not fit into the budget. It is not called
-  /// if a claim only exceeds its caller's share. Empty: no call. `tell` must not call MemoryBudget.
+  /// Sets the function that is called when the budget has no room for bytes or for a read. It is
+  /// not called if these only exceed their caller's share. Empty: no call. It is called with the
+  /// lock held, so it must not call MemoryBudget.
   void OnShortage(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::uint64_t held() const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -110,7 +112,7 @@ class MemoryBudget {
     std::weak_ptr<Waiter> waiter;
     std::uint64_t bytes = 0;
     const CallerAccount* caller = nullptr;
-    std::uint64_t most = FairShare::kNoLimit;  // The caller's quota when the claim was made.
+    std::uint64_t most = FairShare::kNoLimit;  // The caller's quota when it made the claim.
   };
 
   FairShare::Fit Fits(const Claim& claim) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
@@ -124,14 +126,14 @@ class MemoryBudget {
   void Plan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   bool TryPlan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
   void Unplan(std::uint64_t bytes, const CallerAccount* caller) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Changes the bytes that are permitted beyond the budget: removes `before` and adds `after`.
+  // Replaces `before` of the bytes that are permitted beyond the budget by `after`.
   void ChangeBeyond(std::uint64_t before, std::uint64_t after) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether all held and planned bytes would still fit into the budget, and those of the caller
-  // into its quota and share, if `beyond` fewer bytes were permitted beyond the budget.
+  // Whether the budget, and the caller's quota and share, would suffice for all held and planned
+  // bytes if `beyond` fewer bytes were permitted beyond the budget.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  // Returns an error if all counted bytes, which include `bytes`, exceed the budget or the caller's
-  // quota.
+  // Returns an error if the caller's counted bytes exceed its quota, or if all counted bytes exceed
+  // the budget. They include `bytes`, which are for the error only.
   absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::uint64_t PlannedBy(const CallerAccount* caller) const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -140,9 +142,7 @@ class MemoryBudget {
 
   mutable Mutex mutex_;
   CondVar may_compute_;
-  // The worker that computes beyond the budget.
   const void* worker_beyond_ ABSL_GUARDED_BY(mutex_) = nullptr;
-  // Its bytes beyond the budget.
   std::uint64_t bytes_of_worker_beyond_ ABSL_GUARDED_BY(mutex_) = 0;
   FairShare share_ ABSL_GUARDED_BY(mutex_);  // Held and planned bytes; may exceed the budget.
   std::uint64_t held_ ABSL_GUARDED_BY(mutex_) = 0;

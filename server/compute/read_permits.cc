@@ -11,7 +11,7 @@ namespace {
 
 // A connection is idle if it receives fewer bytes than kMovingBytes within kQuiet. Even a slow
 // connection reaches more than 16 kB/s, and a busy client needs less than one second to begin a
-// message. kQuietUnknown applies if the system does not report the received bytes of a connection.
+// message. If the system does not report received bytes, a read is idle after kQuietUnknown.
 constexpr std::uint64_t kMovingBytes = 16 << 10;
 constexpr std::chrono::milliseconds kQuiet(1000), kQuietUnknown(2000);
 
@@ -42,7 +42,7 @@ ReadPermits::Permit& ReadPermits::Renew(const std::shared_ptr<Reader>& reader, R
   auto& item = *permits_.try_emplace(reader.get()).first;
   Finish(item);
   item.second = {.reader = reader, .read = std::move(read), .number = ++numbers_};
-  ++waiting_;  // Before TryPlan: a thread that frees memory after TryPlan then serves this read.
+  ++waiting_;  // Before TryPlan, so that a thread that frees memory after TryPlan serves this read.
   return item.second;
 }
 
@@ -104,8 +104,7 @@ void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
   budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
 }
 
-// Ends the read that the permit allows, or the frame that was read, and releases its bytes and its
-// slot.
+// Releases the planned bytes and the slot of a permit. Its read or its frame has ended.
 void ReadPermits::Finish(Permits::value_type& item) {
   Permit& permit = item.second;
   if (permit.number == 0) return;  // The permit was just created.
@@ -136,7 +135,7 @@ bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
   return true;
 }
 
-// Returns the slot that allows this connection to read beyond the budget; null if there is none.
+// Returns the slot with which this connection may read beyond the budget; null if there is none.
 ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool may_open_slot) {
   const auto found = slots_.find(item.second.read.stream);
   if (found != slots_.end()) {
@@ -149,7 +148,7 @@ ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool m
   return &slots_[item.second.read.stream];
 }
 
-// Frees a slot if its bytes now fit into the budget and into the share of its caller.
+// Frees the slots whose bytes now fit into the budget and into the share of their caller.
 void ReadPermits::FreeSlots() {
   for (auto& [reader, permit] : permits_) {
     if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
@@ -167,21 +166,20 @@ void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
   if (slot->second.open.empty()) slots_.erase(slot);
 }
 
-// Gives a permit to the next waiting read that fits. Returns null if no read fits.
+// Permits the first waiting read that fits (rule 4). Returns null if no read fits.
 std::shared_ptr<ReadPermits::Reader> ReadPermits::PermitNext() {
   std::map<const CallerAccount*, std::size_t> slots_of;
   for (const auto& [reader, permit] : permits_) {
     if (permit.has_slot) ++slots_of[permit.read.caller];
   }
-  // Computes each rank once, before the sort: other threads may change a caller's bytes during the
-  // sort.
+  // Computes the ranks before the sort: other threads may change a caller's bytes during the sort.
   using Rank = std::tuple<bool, std::size_t, std::uint64_t, std::uint64_t>;
   std::vector<std::pair<Rank, Permits::value_type*>> waiting;
   for (auto& item : permits_) {
     const Permit& permit = item.second;
     if (permit.state != State::kWaiting) continue;
     const CallerAccount* const caller = permit.read.caller;
-    // Sorts streams that already have a slot first, because their reads complete frames.
+    // Streams that have a slot come first, because their reads complete frames.
     waiting.push_back({{!slots_.contains(permit.read.stream), slots_of[caller],
                         budget_.PlannedBy(caller), permit.number},
                        &item});
@@ -217,7 +215,6 @@ void ReadPermits::ServeWaiting() {
 
 bool ReadPermits::NeedsLook() const {
   if (NeedsBytes()) return true;
-  // Memory permitted to all streams.
   const std::uint64_t most = budget_.bytes() + terms_.streams_beyond * terms_.message_bytes;
   const std::uint64_t planned = budget_.planned();
   return planned > most || (most - planned) / terms_.message_bytes < reading_;
@@ -244,7 +241,7 @@ void ReadPermits::Measure(Permit& permit, Clock::time_point now, const ReceivedB
   if (bytes && (!permit.received || permit.grown >= kMovingBytes)) {
     permit.received = bytes;
   } else {
-    permit.came -= permit.grown;  // Too little so far. The next Look counts these bytes again.
+    permit.came -= permit.grown;  // Too few bytes so far. The next Look counts them again.
   }
 }
 
@@ -289,9 +286,9 @@ std::size_t ReadPermits::Revoke(std::uint64_t free_bytes) {
   std::vector<std::shared_ptr<Reader>> revoked;
   {
     const MutexLock lock(mutex_);
-    // Orders the reads: sorts each caller's reads by received bytes, most first. Then takes the
-    // first read of every caller, the second read of every caller, and so on. The reads at the
-    // front continue; the others are ended.
+    // Sorts each caller's reads by received bytes, most first. Then takes the first read of every
+    // caller, the second read of every caller, and so on. The first reads of this order continue;
+    // the other reads are ended.
     std::map<const CallerAccount*, std::vector<const Permit*>> of_caller;
     for (const auto& [reader, permit] : permits_) {
       if (IsAtRisk(permit)) of_caller[permit.read.caller].push_back(&permit);

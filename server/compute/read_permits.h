@@ -22,8 +22,7 @@ class CallerAccount;
 class MemoryBudget;
 
 struct ReadTerms {
-  /// Maximum number of streams that may hold a frame beyond the budget at the same time, at least
-  /// 1.
+  /// Maximum number of streams with a frame beyond the budget at the same time, at least 1.
   std::uint32_t streams_beyond = 2;
   /// Size of the largest message, at least 1.
   std::uint64_t message_bytes = 1;
@@ -33,21 +32,21 @@ struct ReadTerms {
 /// arrived, and a read that has begun cannot be stopped. So a stream without a frame in flight
 /// needs a permit for its next read:
 ///
-/// 1. A permit plans the bytes that the read may bring: the size of the stream's last frame, or the
-///    size of the largest message for the first frame. Planned bytes count in the budget like held
-///    bytes.
+/// 1. A permit plans the bytes that the read may bring: Read::expected_bytes, or the size of the
+///    largest message if they are unknown. Planned bytes count in the budget like held bytes.
 /// 2. If the planned bytes do not fit into the budget, the stream may get a slot, which permits one
 ///    frame beyond the budget. There are `streams_beyond` slots. If no slot is free, the read
-///    waits. A stream keeps its slot until the response to the frame is sent. Bytes in a slot do
-///    not count in the budget, so they take no memory from other streams.
+///    waits. A stream keeps its slot until the response to the frame is sent or the bytes fit into
+///    the budget. Bytes in a slot take no memory of the budget from other streams.
 /// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
 ///    other, each connection once, until they have received the size of the largest message.
-/// 4. Waiting reads get slots in this order: first the reads of the caller with the fewest slots,
-///    then of the caller with the fewest bytes, then the read that has waited longest.
+/// 4. Waiting reads get permits in this order: streams that have a slot, callers with the fewest
+///    slots, callers with the fewest bytes, longest wait. A read that does not fit is skipped.
 /// 5. While other reads wait, the permit of an idle connection lapses: its read continues, but its
-///    bytes are no longer planned. So an idle stream does not block others. A lapsed read may
-///    receive bytes after all, and any read may receive more bytes than planned. These bytes are
-///    planned as soon as they fit. If memory is exhausted before that, `Revoke` ends such streams.
+///    bytes are no longer planned and its slot is free. So an idle stream does not block others. A
+///    lapsed read may receive bytes after all, and any read may receive more bytes than planned.
+///    These bytes are planned as soon as they fit. If memory is exhausted before that, `Revoke`
+///    ends such streams.
 ///
 /// So all streams together hold at most the budget plus one message for each slot, or two messages
 /// if the stream's frames arrive in parts. Thread-safe.
@@ -60,16 +59,16 @@ class ReadPermits {
     virtual ~Reader() = default;
     /// The waiting read may begin. Called without holding a lock.
     virtual void ReadPermitted() = 0;
-    /// Memory is exhausted: the stream must end if its read is still in progress. Called without
-    /// holding a lock.
+    /// Memory is exhausted: the stream must end with `status` if its read is still in progress.
+    /// Called without holding a lock.
     virtual void ReadRevoked(const absl::Status& status) = 0;
   };
 
   struct Read {
-    const void* stream = nullptr;      ///< The same for all connections of one stream.
-    std::uint64_t expected_bytes = 0;  ///< 0: unknown.
-    const CallerAccount* caller = nullptr;
-    std::string peer;  ///< As CallChannel::peer.
+    const void* stream = nullptr;           ///< The same for all connections of one stream.
+    std::uint64_t expected_bytes = 0;       ///< 0: unknown.
+    const CallerAccount* caller = nullptr;  ///< Lives until End.
+    std::string peer;                       ///< As CallChannel::peer.
   };
 
   /// Returns the bytes that the connection of a peer has received so far, or nothing if the number
@@ -78,42 +77,41 @@ class ReadPermits {
 
   ReadPermits(MemoryBudget& budget, const ReadTerms& terms);
 
-  // For readers. A reader may hold its own lock during these calls. It calls Serve after it has
-  // released this lock.
+  // For readers. A reader may hold its own lock. It calls Serve after it has released this lock.
 
   /// Requests a permit for a reader that has no frame in flight. Returns false if the read must
   /// wait; ReadPermitted is called later.
   bool Begin(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Like Begin, but always permits the read. Requires: the expected bytes fit into the budget.
+  /// Like Begin, but always permits the read. Requires: MemoryBudget has just granted the bytes.
   void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Records that the read is complete. It has received `bytes`, which count as held in the budget.
-  /// Errors, each with a Violation: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES) if the permit
-  /// has lapsed and the bytes do not fit.
+  /// Records that the read is complete: its bytes are no longer planned. Requires: the received
+  /// `bytes` were taken from the budget (MemoryBudget::Take). Errors: RESOURCE_EXHAUSTED
+  /// (MEMORY_BUDGET, CALLER_BYTES) if the permit has lapsed and the bytes do not fit.
   absl::Status Came(const Reader& reader, std::uint64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the reader and its permit: it does not read, does not wait, and has no frame in
-  /// flight. Idempotent.
+  /// Removes the reader and its permit, when it stops waiting or has ended. Idempotent.
   void End(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Gives permits to waiting reads that fit now. Requires: the calling thread holds no lock.
+  /// Grants claims and permits waiting reads that fit now. Requires: the calling thread holds no
+  /// lock.
   void Serve();
 
   // For the thread that watches the memory of the process (IntakeGuard):
 
-  /// Whether Look is needed. True if reads wait, or if permits have lapsed, or if the following sum
-  /// exceeds the budget plus one largest message for each slot: held bytes, planned bytes, and one
-  /// largest message for each read in progress.
+  /// Whether Look is needed. True if reads wait, if permits have lapsed, or if sum A exceeds sum B.
+  /// A: held bytes, planned bytes and one largest message for each read in progress. B: the budget
+  /// and one largest message for each slot.
   bool NeedsLook() const;
-  /// Whether Look needs the received bytes, because permits may lapse or have lapsed.
+  /// Whether Look needs the received bytes: reads wait, so permits may lapse, or some have lapsed.
   bool NeedsBytes() const { return waiting_ > 0 || lapsed_ > 0; }
-  /// Sets the function that is called when a read begins to wait or NeedsLook becomes true. The
-  /// calling thread may hold a reader's lock. Empty: no call.
+  /// Sets the function that Begin calls if the read must wait or if NeedsLook is true. The calling
+  /// thread may hold a reader's lock. Empty: no call.
   void OnWaiting(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(tell_mutex_);
-  /// Lets the permits of idle connections lapse. Plans the bytes that arrived in addition to the
-  /// planned bytes.
+  /// Lets the permits of idle connections lapse if reads wait. If a read received more bytes than
+  /// planned, plans the bytes that it may still bring. Then calls Serve.
   void Look(Clock::time_point now, const ReceivedBytes& received) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Called if memory is exhausted. Ends the streams whose reads receive more bytes than planned,
-  /// except for one read for each largest message that fits into `free_bytes`. Callers take turns
-  /// in keeping reads. Returns the number of ended streams.
+  /// Ends streams because memory is exhausted: those whose reads receive bytes that are not
+  /// planned. Keeps one such read for each largest message that fits into `free_bytes`; callers
+  /// take turns in keeping a read. Returns the number of ended streams.
   std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const ReadTerms& terms() const { return terms_; }
@@ -126,13 +124,13 @@ class ReadPermits {
     std::weak_ptr<Reader> reader;
     Read read;
     State state = State::kWaiting;
-    std::uint64_t number = 0;   // Order of the requests; 0 if there was none yet.
+    std::uint64_t number = 0;   // Counts requests for permits; 0 if there was none yet.
     std::uint64_t planned = 0;  // Bytes planned in the budget.
     std::uint64_t beyond = 0;   // Bytes in its slot, planned or held.
     bool has_slot = false, has_lapsed = false;
     // Measured by Look:
-    std::optional<std::uint64_t> received;   // The connection's count when `came` last changed.
-    std::uint64_t came = 0, grown = 0;       // Bytes since the first Look; since `received`.
+    std::optional<std::uint64_t> received;  // Received bytes of the connection when `came` was set.
+    std::uint64_t came = 0, grown = 0;      // Bytes from the first Look to `received`; since then.
     std::optional<Clock::time_point> moved;  // When the connection last was not idle.
   };
   using Permits = std::map<const Reader*, Permit>;

@@ -1,5 +1,4 @@
-// Remembers recent callers, so that the compute pool can determine whether a caller competes with
-// another caller.
+// Remembers recent callers: shows whether a caller competes with another caller.
 #pragma once
 
 #include <chrono>
@@ -14,7 +13,7 @@ class RecentCallers {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// `now` never decreases.
+  /// Records that `caller` was active at `now`, which never decreases.
   void Came(const CallerAccount* caller, TimePoint now) {
     if (!last_.came || last_.caller != caller) other_ = last_;
     last_ = {caller, now, true};

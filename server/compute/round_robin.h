@@ -29,7 +29,7 @@ class Line {
 
 /// One queue for each key. The non-empty queues take turns, one item in each turn, in the order in
 /// which they became non-empty. `Lines` is the type of a queue: a Line, or again a RoundRobin.
-/// Cost: O(log(queues)) for each item. Not thread-safe.
+/// Cost for each item: O(log(queues)); PopOf also passes the queues that it skips. Not thread-safe.
 template <typename Key, typename Lines>
 class RoundRobin {
  public:
@@ -45,8 +45,8 @@ class RoundRobin {
 
   /// Requires: not empty.
   Item Pop() { return Take(turns_.begin()); }
-  /// Pops an item from the first queue whose key is `allowed`. Queues before it keep their turn.
-  /// Returns nothing if no key is allowed.
+  /// Pops an item from the first queue for whose key allowed(key) is true. Queues before it keep
+  /// their turn. Returns nothing if there is no such queue.
   template <typename Allowed>
   std::optional<Item> PopOf(Allowed allowed) {
     const auto turn = std::find_if(turns_.begin(), turns_.end(),

@@ -1,4 +1,4 @@
-// The buffers with which a compute thread computes frames.
+// The buffers with which the compute threads compute frames.
 #pragma once
 
 #include <algorithm>
@@ -15,9 +15,9 @@
 
 namespace partiemc::server {
 
-/// Decides when a worker's buffers are oversized. Buffers grow to the size of the largest frame and
-/// keep it. They are oversized if, for `warm_time`, the worker computed no frame of at least a
-/// quarter of that size.
+/// Decides when a worker's buffers are oversized. Buffers grow to the size of the worker's largest
+/// frame and keep it. They are oversized if, for `warm_time`, the worker computed no frame of at
+/// least a quarter of that size.
 class WarmSize {
  public:
   using Clock = std::chrono::steady_clock;
@@ -27,6 +27,7 @@ class WarmSize {
     largest_ = std::max(largest_, size);
     if (size >= LeastFor(largest_)) needed_ = now;
   }
+  /// Whether the buffers are oversized.
   bool Outlived(Clock::time_point now, Clock::duration warm_time) const {
     return largest_ > 0 && now - needed_ >= warm_time;
   }
@@ -52,13 +53,13 @@ class MessageBuffers {
   virtual ~MessageBuffers() = default;
 };
 
-/// The buffers of a compute thread. They are reused from frame to frame, also for frames of
-/// different streams.
+/// The buffers for one frame at a time. They are reused from frame to frame, also for frames of
+/// different streams and on different threads.
 struct Worker {
   WorkerMemory memory;  ///< Counts the bytes of all buffers below.
   Workspace workspace;
   Result result;
-  State next_state;  ///< Copied to the stream when the frame succeeds.
+  State next_state;  ///< The stream's state after the frame; copied to the stream on success.
   std::unique_ptr<MessageBuffers> message_buffers;
   WarmSize particles;  ///< Sizes of the computed frames, in particles.
   const WarmSize::Clock::time_point made = WarmSize::Clock::now();

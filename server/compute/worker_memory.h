@@ -8,13 +8,13 @@
 
 namespace partiemc::server {
 
-/// Bytes of each worker that do not count in the budget. Ordinary frames need no more than these,
-/// so a small budget does not cause the server to refuse them.
+/// Bytes of each worker that do not count in the budget. A compact body of 200,000 particles needs
+/// no more, so the server computes such frames even with a small budget.
 inline constexpr std::uint64_t kWorkerBytes = std::uint64_t{16} << 20;
 
-/// Upper bound of a worker's bytes per particle, with an exception. A compact body needs a tenth of
-/// it, a thousand islands with ids need all of it. Isolated drops, each in its own tile, need up to
-/// 100 times this value.
+/// Usual upper bound of a worker's bytes per particle. A compact body needs a tenth of it, a
+/// thousand islands with ids need all of it. Exception: isolated drops, each in its own tile, need
+/// up to 100 times this value.
 inline constexpr std::uint64_t kWorkerBytesPerParticle = 500;
 
 /// A worker's usual bytes per byte of the frame's message. A particle of a compact body takes 8
@@ -25,30 +25,30 @@ inline constexpr std::uint64_t kUsualBytesPerMessageByte = 10;
 /// worker's buffers are freed. Used by one thread at a time.
 class WorkerMemory {
  public:
-  /// `budget` outlives the account. If it is null, every request is granted and nothing is counted.
+  /// `budget` outlives this object. If it is null, every request is granted and nothing is counted.
   explicit WorkerMemory(MemoryBudget* budget = nullptr) : budget_(budget) {}
   ~WorkerMemory() { GiveBack(); }
   WorkerMemory(const WorkerMemory&) = delete;
   WorkerMemory& operator=(const WorkerMemory&) = delete;
 
-  /// Reserves the memory that a frame usually needs if its message has this size. Blocks until this
-  /// memory fits into the budget, or until no other worker computes beyond the budget. In the
-  /// second case it is reserved beyond the budget, at most BeyondBudget::worker_bytes.
+  /// Reserves the memory that a frame with a message of this size usually needs. Blocks like
+  /// MemoryBudget::TakeForWorker, which may take the memory beyond the budget.
   void BeginFrame(std::uint64_t message_bytes);
-  /// Whether all buffers together may grow to `bytes` for a frame with this number of particles.
-  /// They may always use kWorkerBytes plus the bytes that BeginFrame has reserved. More is granted
-  /// if it fits into the budget and no claim waits. Otherwise the worker may take memory beyond the
-  /// budget if no other worker does, at most kWorkerBytesPerParticle per particle.
+  /// Reserves memory so that all buffers together may grow to `bytes`, for a frame with this number
+  /// of particles. Does not block; returns false if the memory is refused. The buffers may always
+  /// use kWorkerBytes and the bytes reserved before. More is granted if MemoryBudget::TryTake or
+  /// TryTakeBeyond grants it. TryTakeBeyond is tried only if `bytes` are at most kWorkerBytes plus
+  /// kWorkerBytesPerParticle for each particle.
   bool Reserve(std::uint64_t bytes, std::size_t particles);
-  /// Gives back reserved bytes that the frame did not use.
+  /// Gives back reserved bytes that no frame has used since the buffers were last freed.
   void EndFrame();
 
-  /// Gives back all bytes. Called after the buffers were freed.
+  /// Gives back all bytes. Requires: the buffers are freed.
   void GiveBack();
 
-  /// Whether any bytes count in the budget.
+  /// Whether the budget counts bytes of this worker.
   bool counts() const { return counted_ > 0; }
-  /// Whether the worker holds memory beyond the budget. Its buffers are then freed after the frame.
+  /// Whether the worker holds memory beyond the budget, which it must give back after the frame.
   bool is_beyond() const { return is_beyond_; }
 
  private:

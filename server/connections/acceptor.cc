@@ -15,8 +15,7 @@
 namespace partiemc::server {
 namespace {
 
-// Pause after an accept has failed because the process has no free descriptor. Meanwhile new
-// connections wait in the kernel.
+// Pause after AcceptAll has returned false. New connections then wait in the kernel.
 constexpr std::chrono::milliseconds kPause(100);
 
 }  // namespace
@@ -61,8 +60,8 @@ void Acceptor::Run() {
   for (const Descriptor& socket : sockets_) ready.push_back({socket.get(), POLLIN, 0});
   bool full = false;
   while (true) {
-    // After such a failure, polls only the first descriptor (the stop signal) for kPause. The
-    // listening sockets stay ready, so polling them would make this loop spin.
+    // During the pause polls only the first descriptor (the stop signal). The listening sockets
+    // stay ready, so polling them would make this loop spin.
     const nfds_t count = full ? 1 : ready.size();
     if (poll(ready.data(), count, full ? static_cast<int>(kPause.count()) : -1) < 0) continue;
     if ((ready[0].revents & POLLIN) != 0) return;
@@ -73,7 +72,8 @@ void Acceptor::Run() {
   }
 }
 
-// Accepts all waiting connections. Returns false if the process has no free descriptor.
+// Accepts all waiting connections. Returns false if the process lacks descriptors or memory and no
+// idle connection could be evicted.
 bool Acceptor::AcceptAll(int listener) {
   while (true) {
     Descriptor socket(accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));

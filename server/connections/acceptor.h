@@ -16,20 +16,20 @@
 
 namespace partiemc::server {
 
-/// Owns the listening sockets, and passes each accepted connection to a ConnectionWatch and to
-/// gRPC.
+/// Owns the listening sockets. Passes each accepted connection to a ConnectionWatch and, unless the
+/// watch refuses it, to gRPC.
 class Acceptor {
  public:
-  /// Function that takes over the descriptor of a connection.
+  /// Function that takes over the descriptor of a connection. It may block (HandOverThreads).
   using HandOver = std::function<void(int descriptor)>;
 
   /// Opens the listening sockets. Accepts no connection before Start. `watch` outlives the
-  /// acceptor. A connection ends if its peer does not acknowledge sent bytes for `dead_after`.
+  /// acceptor. A TCP connection ends if its peer does not acknowledge sent bytes for `dead_after`.
   /// Errors: UNAVAILABLE if it cannot listen.
   static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const Address& address,
                                                           std::chrono::milliseconds dead_after,
                                                           ConnectionWatch& watch);
-  /// Waits until every call of the hand-over function has returned.
+  /// Stops listening. Waits until every call of the hand-over function has returned.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
@@ -38,7 +38,7 @@ class Acceptor {
 
   void Start(HandOver hand_over);
 
-  /// Closes the listening sockets: further connections are refused.
+  /// Closes the listening sockets and deletes a Unix socket's file. New connections are refused.
   void StopListening();
 
  private:

@@ -14,8 +14,8 @@ constexpr std::uint64_t kOverheadPart = 8;
 constexpr std::uint64_t kMessageOverhead = 256;
 // Overhead of a call in bytes: usual headers, the end of the stream, and window updates.
 constexpr std::uint64_t kCallOverhead = 1'024;
-// A client acknowledges the bytes that it receives by WINDOW_UPDATE frames. Usually these have a
-// thousandth of the received bytes; a sixteenth is allowed.
+// A client acknowledges the bytes that the server sends by WINDOW_UPDATE frames. Usually these
+// frames have a thousandth of the sent bytes; a sixteenth is allowed.
 constexpr std::uint64_t kReplyPart = 16;
 // Minimum of the bytes that a pending read allows. A message of up to twice the maximum size is
 // received completely, so that the error can state its size. A still larger message cuts the
@@ -32,8 +32,7 @@ constexpr double kLingerSeconds = 5;
 constexpr std::uint64_t kLingeringWindows = 64;
 
 // A client sends a header block without pauses. If a stream has not become a call after this time,
-// the ledger assumes that its header block has no end. Exception: gRPC has read fewer bytes than
-// headers may have.
+// and gRPC has read more than `unaccounted_bytes`, its header block has no end.
 constexpr milliseconds kHeaderTime(100);
 // Longer time that applies if gRPC has read fewer bytes. gRPC itself has no time limit for header
 // blocks.

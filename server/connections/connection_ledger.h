@@ -13,13 +13,13 @@ namespace partiemc::server {
 /// Limits of one connection. The defaults are the limits of a server without options.
 struct ConnectionRules {
   /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 uses up to
-  /// 40 bytes of memory for each such byte (if headers have four bytes). 0: no limit.
+  /// 40 bytes of memory for each (if headers have four bytes). 0: no limit, and no Flood::kHeaders.
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;
-  /// Maximum number of open HTTP/2 streams. The same limit applies to the number of streams that
-  /// have not become calls, such as streams that the client resets at once; this number decays by
-  /// `max_streams` in five seconds. Each stream needs 10 to 22 kB. 0: no limit.
+  /// Maximum number of open HTTP/2 streams. The same limit applies to streams that have not become
+  /// calls, such as streams that the client resets at once. Their count decays by `max_streams` in
+  /// five seconds. Each stream needs 10 to 22 kB. 0: no limit.
   std::uint64_t max_streams = 1'000;
 };
 
@@ -42,22 +42,22 @@ enum class Flood {
   kHeaders,           ///< A header block without an end.
 };
 
-/// For the log: "unaccounted bytes".
+/// Returns a text for the log, such as "unaccounted bytes".
 std::string_view FloodName(Flood flood);
 
 /// Keeps account of the bytes of one connection.
 ///
 /// The flow control of HTTP/2 limits DATA frames (by the number of open calls) but no other frames.
-/// Therefore the ledger keeps a debt: the received bytes minus credits for calls, messages and
-/// replies, at least zero. In addition, open calls allow some bytes in flight. A connection is a
-/// flood if its debt exceeds this allowance by more than `unaccounted_bytes`.
+/// Therefore the ledger keeps a debt: the received bytes minus credits for calls, messages, replies
+/// and time, at least zero. Open and recently ended calls allow some bytes in flight. A connection
+/// is a flood if its debt exceeds this allowance by more than `unaccounted_bytes`.
 ///
 /// Within this allowance, a client with an open call could send a header block that never ends. In
-/// gRPC's counts, such a block appears as an open stream that is not a call. While such a stream
-/// exists, no other stream begins and no message ends, the ledger counts every byte that gRPC reads
-/// as part of the header. These bytes get no credit and no allowance.
+/// gRPC's counts, such a block appears as an open stream that is not a call. While the counts show
+/// such a stream, and no stream begins and no message ends, the ledger counts every byte that gRPC
+/// reads as part of the header block. These bytes get no credit and no allowance.
 ///
-/// The methods `On...` are thread-safe. Examine is called by one thread.
+/// The methods `On...`, Take and the counts of calls are thread-safe. One thread uses the rest.
 class ConnectionLedger {
  public:
   using Clock = std::chrono::steady_clock;
@@ -66,7 +66,7 @@ class ConnectionLedger {
 
   void OnCallBegun();
   void OnReadBegun() { reads_open_.fetch_add(1, std::memory_order_relaxed); }
-  /// A read has completed: it has received a message of `bytes`.
+  /// A read has completed with a message of `bytes`.
   void OnReadDone(std::uint64_t bytes);
   /// A call has ended. `reading`: a read of the call was still pending.
   void OnCallEnded(bool reading);
@@ -74,8 +74,8 @@ class ConnectionLedger {
   /// Counts of the connection's calls.
   struct Counts {
     std::uint64_t calls_begun = 0, calls_open = 0, reads_open = 0;
-    std::uint64_t credit = 0;  ///< Bytes of calls and messages.
-    std::uint64_t ended = 0;   ///< The allowance of ended calls, in bytes.
+    std::uint64_t credit = 0;  ///< Sum of the credits for calls and messages, in bytes.
+    std::uint64_t ended = 0;   ///< Sum of the allowances of ended calls, in bytes.
   };
   Counts Take() const;
 
@@ -85,15 +85,15 @@ class ConnectionLedger {
   std::optional<Flood> Examine(const Counts& counts, const ConnectionReading& reading,
                                Clock::time_point now);
 
-  /// The debt in excess of the allowance of open calls, in bytes, at the last call of Examine.
+  /// The debt in excess of the allowance, in bytes, at the last call of Examine.
   std::uint64_t excess() const { return excess_; }
-  /// Number of streams that are open or have not become calls, at the last reading with
-  /// `has_streams`.
+  /// The larger of two numbers at the last reading with `has_streams`: open streams, and streams
+  /// that have not become calls.
   std::uint64_t streams() const { return streams_; }
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }
-  /// Whether some stream has not become a call. If so, the caller should read the counts of streams
-  /// again soon.
+  /// Whether an open stream was not a call, at the last reading with `has_streams`. If so, the
+  /// counts of streams should be read again soon.
   bool headers_pending() const { return headers_pending_; }
 
  private:
@@ -115,7 +115,7 @@ class ConnectionLedger {
   double debt_ = 0;       // Bytes.
   double lingering_ = 0;  // Remaining allowance of ended calls, in bytes.
   std::uint64_t excess_ = 0, streams_ = 0;
-  // Number of streams that have not become calls (it decays), and the counts at its last update.
+  // Number of streams that have not become calls (it decays), and the counts of its last update.
   double waiting_streams_ = 0;
   std::uint64_t counted_started_ = 0, counted_begun_ = 0;
   bool headers_pending_ = false;

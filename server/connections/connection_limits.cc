@@ -9,8 +9,8 @@ namespace {
 // legitimate: the ranks of a simulation connect at the same time.
 constexpr double kBurstSeconds = 2;
 
-// Times for which OnFlood restricts or refuses an address. They are needed because an attacker
-// reconnects at once, before gRPC has freed the memory of the flood.
+// Times for which OnFlood restricts or refuses an address, because an attacker reconnects before
+// gRPC has freed the memory of the flood.
 constexpr std::chrono::seconds kBan(10), kRefusal(1);
 
 }  // namespace

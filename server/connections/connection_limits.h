@@ -10,18 +10,19 @@
 
 namespace partiemc::server {
 
-/// 0: no limit.
+/// An address is a host (Peer::address). 0: no limit.
 struct ConnectionLimits {
-  std::uint32_t connections = 2'048;   ///< Connections of all addresses.
-  std::uint32_t of_address = 1'024;    ///< Connections of one address.
-  std::uint32_t new_of_address = 500;  ///< New connections of one address per second; burst: twice.
+  std::uint32_t connections = 2'048;  ///< Connections of all addresses.
+  std::uint32_t of_address = 1'024;   ///< Connections of one address.
+  /// New connections of one address per second; a burst may be double. 0 also disables OnFlood.
+  std::uint32_t new_of_address = 500;
 };
 
 /// The decision about an accepted connection.
 enum class Admission {
   kKept,
-  /// A limit is exceeded, so the connection may only make health checks. It is not refused, because
-  /// a probe from the address of a flood must not report the server as dead.
+  /// A limit is exceeded or the address has flooded, so the connection may only make health checks.
+  /// It is not refused, because a probe from this address must not report the server as dead.
   kHealthOnly,
   /// Closed at once.
   kRefused,
@@ -34,26 +35,25 @@ class ConnectionCounts {
 
   explicit ConnectionCounts(const ConnectionLimits& limits) : limits_(limits) {}
 
-  /// Counts a connection of `address` (HostOfPeer) and decides how it is admitted. Unless it is
-  /// refused, the caller must call Remove with the same admission when the connection has ended.
+  /// Decides how a connection of `address` is admitted, and counts it. Unless it is refused, the
+  /// caller must call Remove with the same admission when the connection has ended.
   Admission Add(const std::string& address, Clock::time_point now);
   void Remove(const std::string& address, Admission admission);
 
-  /// Called when a connection of `address` was cut because of a flood. For ten seconds, new
-  /// connections of this address may only make health checks. If one of these floods too, all new
-  /// connections of the address are refused for one second. Refusal is necessary because over TLS
-  /// the server must complete an expensive handshake before it can detect a flood. Open connections
-  /// of the address continue.
+  /// Called when a connection of `address`, admitted as `admission`, was cut because of a flood.
+  /// For ten seconds, new connections of this address may only make health checks. If the cut
+  /// connection was kHealthOnly, new ones are refused for one second, because over TLS a flood is
+  /// detected only after an expensive handshake. Open connections of the address continue.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
-  /// Number of connections of all addresses that were admitted as kKept.
+  /// Numbers of connections that were admitted as kKept: of all addresses, of `address`.
   std::size_t count() const { return kept_; }
-  /// Number of connections of `address` that were admitted as kKept.
   std::size_t CountOf(const std::string& address) const;
-  /// Whether a connection must end before another one can be admitted as kKept.
+  /// Whether the limit of all addresses is reached, so no connection can be admitted as kKept.
   bool IsFull() const { return limits_.connections > 0 && kept_ >= limits_.connections; }
 
-  /// Removes the data of addresses that have no connection and whose token bucket is full again.
+  /// Removes addresses that have no connection, ten seconds after the last one was opened and after
+  /// the end of a ban. By then their token bucket is full.
   void Forget(Clock::time_point now);
   std::size_t addresses() const { return addresses_.size(); }
 

@@ -22,15 +22,15 @@ struct TrackedConnection {
 
   ConnectionLedger ledger;
   const Admission admission;
-  /// Whether a connection that may only make health checks has made another kind of call.
+  /// Whether the connection has made another call although it may only make health checks.
   std::atomic<bool> misused = false;
 };
 
 enum class CallKind { kHealthCheck, kOther };
 
-/// Reports one call to the ledger of its connection. Reports nothing if the connection is unknown.
-/// This is the case for calls within the process, and for Unix sockets, where all peers have the
-/// same name. Not thread-safe.
+/// Reports one call to the ledger of its connection: its begin, its reads and its end (destructor).
+/// A null connection is unknown, and nothing is reported. This is the case for calls within the
+/// process, and for Unix sockets, where all peers have the same name. Not thread-safe.
 class CallTally {
  public:
   CallTally() = default;
@@ -52,15 +52,15 @@ class CallTally {
 /// The open connections, by peer. Thread-safe.
 class ConnectionTable {
  public:
-  /// Adds a connection. Returns false if the peer (address and port) has a connection already: a
-  /// client may use the same port for connections to two addresses of the server. The calls of such
-  /// connections cannot be distinguished.
+  /// Adds a connection. Returns false, and adds nothing, if the peer (address and port) has a
+  /// connection already: a client may use one port for connections to two addresses of the server.
+  /// The calls of these connections could not be distinguished.
   bool Add(const std::string& peer, std::shared_ptr<TrackedConnection> connection)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Remove(const std::string& peer) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Finds the connection of a new call; returns null if it is unknown. If the connection may not
-  /// make this kind of call, marks it as misused. `peer` has gRPC's format.
+  /// Returns the connection of a new call, or null if it is unknown. If the connection may not make
+  /// this kind of call, marks it as misused. `peer` has gRPC's format.
   std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const
       ABSL_LOCKS_EXCLUDED(mutex_);
 
@@ -72,7 +72,8 @@ class ConnectionTable {
       ABSL_GUARDED_BY(mutex_);
 };
 
-/// Normalises a peer: "ipv6:%5Bfe80::1%25eth0%5D:50051" becomes "ipv6:[fe80::1]:50051".
+/// Converts a peer from gRPC's format: "ipv6:%5Bfe80::1%25eth0%5D:50051" becomes
+/// "ipv6:[fe80::1]:50051". Other peers stay as they are.
 std::string NormalPeer(std::string_view peer);
 
 }  // namespace partiemc::server

@@ -18,17 +18,18 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// Interval of examinations. The shorter interval applies while at most kMostInAlert connections are
-// new or have an excess. It is short because gRPC can begin 50 calls in a millisecond.
+// Interval of examinations. The shorter interval applies while 1 to kMostInAlert connections are
+// not quiet. It is short because gRPC can begin 50 calls in a millisecond.
 constexpr milliseconds kPeriod(20), kAlertPeriod(5);
 constexpr std::size_t kMostInAlert = 64;
 constexpr seconds kNew(1);
-// Number of quiet connections that are examined in each period. A connection is quiet if it is
-// neither new nor has an excess.
+// Number of quiet connections that are examined in each kPeriod. A connection is quiet if it is
+// older than kNew, and has neither an excess nor pending headers.
 constexpr std::size_t kQuietInPeriod = 128;
 // Limits the reading of stream counts: gRPC returns them as text, which takes 20 us. The counts of
-// a connection are read again after it has received this number of bytes. A stream needs at least
-// 22 bytes, so at most 750 streams are not counted yet.
+// a connection are read again after gRPC has read this number of bytes from it, or one second after
+// the last count if gRPC has read any. A stream needs at least 22 bytes, so at most 750 streams are
+// not counted yet.
 constexpr std::uint64_t kBytesBetweenCounts = 16 << 10;
 constexpr std::size_t kCountsInPeriod = 64;
 constexpr milliseconds kPendingBetweenCounts(500);
@@ -41,9 +42,9 @@ constexpr seconds kHealthOnlyTime(5);
 // Limits of one such connection: unaccounted bytes, and number of streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
-// Such a connection is passed to gRPC after this delay. If by then the peer has sent more than
-// kFirstBytes, which exceeds the bytes that a health check sends before its first reply, the
-// connection is ended instead. So a flooding peer that reconnects costs little.
+// Such a connection is passed to gRPC after this delay. It is ended instead if the peer has sent
+// more than kFirstBytes by then. A health check sends fewer bytes before its first reply. So a
+// flooding peer that reconnects costs little.
 constexpr milliseconds kHealthOnlyDelay(20);
 constexpr std::uint64_t kFirstBytes = 4 << 10;
 
@@ -206,9 +207,9 @@ bool ConnectionWatch::EvictIdleLocked() {
   return true;
 }
 
-// If the number of connections for health checks has reached its limit, ends the oldest of them, so
-// that a new one fits. If `address` has reached its own limit, ends the oldest one of this address,
-// otherwise the oldest one of all addresses.
+// Makes room for a new health-only connection of `address`. If the address has reached its limit,
+// ends its oldest health-only connection. Otherwise, if all addresses together have reached their
+// limit, ends the oldest health-only connection.
 void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   const auto is_health_only = [](const Connection& connection) {
     return connection.tracked->admission == Admission::kHealthOnly;
@@ -228,8 +229,8 @@ void ConnectionWatch::EvictHealthOnly(const std::string& address) {
   Remove(oldest);
 }
 
-// Examines the connections. Connections that are new or have an excess are examined each time. Of
-// the quiet connections, up to kQuietInPeriod are examined in each period, in turn.
+// Examines all connections that are not quiet. Once in each period also examines up to
+// kQuietInPeriod of the quiet connections, in turn.
 void ConnectionWatch::ExamineAll(Clock::time_point now) {
   counts_left_ = kCountsInPeriod;
   const bool is_period = now >= all_at_;
@@ -271,7 +272,7 @@ void ConnectionWatch::Examine(Connections::iterator connection, Clock::time_poin
   }
 }
 
-// False if the connection must end.
+// Returns false if the connection must end. Passes it to gRPC after kHealthOnlyDelay.
 bool ConnectionWatch::ExamineHealthOnly(Connection& connection, Clock::time_point now) {
   const auto time = now - connection.came;
   if (connection.tracked->misused || time > kHealthOnlyTime) return false;

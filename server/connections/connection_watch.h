@@ -33,15 +33,16 @@ class StreamCounter {
 };
 
 /// Watches connections and cuts floods. Holds a duplicate of each connection's descriptor, to read
-/// its byte counts and to end it; does not read its bytes. One thread examines the connections
-/// every 20 ms.
+/// its byte counts and to end it; does not read its bytes. One thread examines the connections. New
+/// ones, and ones with an excess or pending headers, come every 5 or 20 ms, the others in turn.
 class ConnectionWatch {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Function that takes over the descriptor of a connection. It must not block.
+  /// Function that takes over the descriptor of a connection. It is called with a lock held, so it
+  /// must not block and not call the watch.
   using HandOver = std::function<void(Descriptor)>;
 
-  /// Totals since the start.
+  /// Numbers of connections since the start; `accepted` includes `health_only`.
   struct Counters {
     std::atomic<std::uint64_t> accepted = 0, health_only = 0, evicted = 0;
     std::array<std::atomic<std::uint64_t>, 3> floods{};  ///< By Flood.
@@ -58,14 +59,14 @@ class ConnectionWatch {
   /// Starts the thread. `streams` outlives the watch; if it is null, streams are not counted.
   void Start(StreamCounter* streams);
 
-  /// Watches an accepted connection, or refuses it. Unless it is refused, `hand_over` is called
-  /// with its descriptor: at once, or later by the watching thread.
+  /// Watches an accepted connection and calls `hand_over` with its descriptor, or closes it.
+  /// `hand_over` is called at once. For a connection that may only make health checks, the watching
+  /// thread calls it later, unless the connection ends before.
   void Add(Descriptor socket, const HandOver& hand_over) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Ends a connection that has no call, to free its descriptors. Returns false if all connections
-  /// have calls.
+  /// Ends a connection that has no call, to free its descriptors. Returns false if there is none.
+  /// Does not end connections that may only make health checks.
   bool EvictIdle() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Sets the time at which all remaining connections are ended, so that a silent peer does not
-  /// delay the drain.
+  /// Sets the time from which all connections end, so that a silent peer does not delay the drain.
   void EndAllAt(Clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Counters& counters() const { return counters_; }
@@ -123,7 +124,7 @@ class ConnectionWatch {
   Connections connections_ ABSL_GUARDED_BY(mutex_);  // In the order of arrival.
   std::unordered_map<std::uint64_t, Connections::iterator> by_key_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t next_key_ ABSL_GUARDED_BY(mutex_) = 0;
-  // Index of the first quiet connection that the next period examines.
+  // From this index on, the next period also examines quiet connections (kQuietInPeriod).
   std::size_t turn_ ABSL_GUARDED_BY(mutex_) = 0;
   // Number of connections whose streams may still be counted in this period.
   std::size_t counts_left_ ABSL_GUARDED_BY(mutex_) = 0;

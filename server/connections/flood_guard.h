@@ -12,28 +12,29 @@
 
 namespace partiemc::server {
 
-/// All connections together may reach this multiple of the limit of one connection. Without this
-/// limit, many connections that are each below their own limit could exhaust the memory.
+/// All connections together may reach this multiple of each limit of one connection. Otherwise many
+/// connections, each below its own limit, could exhaust the memory.
 inline constexpr std::uint64_t kConnectionsAtLimit = 2;
 
-/// A connection and its address.
+/// A connection and its address (Peer::address).
 struct ExaminedConnection {
   const TrackedConnection* connection = nullptr;
   const std::string* address = nullptr;
 };
 
-/// The connection to cut if all connections together exceed a limit. It is the connection with the
-/// largest excess (or the most streams) of the address with the largest sum.
+/// A connection to cut, and the reason.
 struct Excess {
-  std::size_t index = 0;
+  std::size_t index = 0;  ///< In the `connections` of LargestExcess.
   Flood flood = Flood::kUnaccountedBytes;
 };
+/// Returns the connection to cut if all connections together exceed a limit. It belongs to the
+/// address with the largest sum, and there has the largest excess (or the most streams).
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules);
 
-/// Returns the index of the connection to evict for a new one: the oldest connection without a
-/// call, of the address with the most connections. Returns nothing if all connections have calls.
-/// Requires: `connections` are in the order of arrival.
+/// Returns the index of the connection to evict for a new one: a kept connection without a call. If
+/// there are several, it is the oldest one of the address with the most connections. Returns
+/// nothing if there is none. Requires: `connections` are in the order of arrival.
 std::optional<std::size_t> IdleOfLargestAddress(const std::vector<ExaminedConnection>& connections,
                                                 const ConnectionCounts& counts);
 

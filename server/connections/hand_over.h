@@ -11,8 +11,8 @@
 
 namespace partiemc::server {
 
-/// Threads that pass connections to gRPC. gRPC may read a connection in the thread that passes it,
-/// as long as bytes arrive without a pause. Meanwhile the next connection needs another thread.
+/// Threads that pass connections to gRPC. The thread that passes a connection may have to read it
+/// for gRPC while bytes arrive without a pause. The next connection then needs another thread.
 /// Threads are started on demand, up to kMostThreads; if all are busy, connections wait.
 class HandOverThreads {
  public:
@@ -24,7 +24,7 @@ class HandOverThreads {
   HandOverThreads(const HandOverThreads&) = delete;
   HandOverThreads& operator=(const HandOverThreads&) = delete;
 
-  /// Thread-safe.
+  /// Takes over `descriptor`. Thread-safe; does not wait for the hand-over.
   void Add(int descriptor) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:

@@ -115,7 +115,7 @@ absl::StatusOr<std::vector<SocketAddress>> Resolve(const Address& address) {
 }
 
 // If `address` means all addresses (0.0.0.0 or [::]), returns [::], whose socket also accepts IPv4.
-// Empty for other addresses.
+// Returns nothing for other addresses.
 std::optional<SocketAddress> BothFamilies(SocketAddress address) {
   const bool any = address.family() == AF_INET ? address.v4().sin_addr.s_addr == htonl(INADDR_ANY)
                                                : IN6_IS_ADDR_UNSPECIFIED(&address.v6().sin6_addr);
@@ -197,8 +197,8 @@ bool ReadByteCounts(int socket, ConnectionReading& reading) {
   }
   int waiting = 0;
   if (ioctl(socket, SIOCINQ, &waiting) != 0 || waiting < 0) waiting = 0;
-  // Takes the maximum with the previous values, so that no count decreases. It otherwise could:
-  // bytes may arrive between the two system calls, and Abort resets the kernel's counts.
+  // Takes the maximum with the previous values. Otherwise a count could decrease: bytes may arrive
+  // between the two system calls, and Abort resets the kernel's counts.
   const std::uint64_t received = info.tcpi_bytes_received;
   const auto unread = static_cast<std::uint64_t>(waiting);
   reading.bytes_received = std::max(reading.bytes_received, received);

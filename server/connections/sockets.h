@@ -14,7 +14,7 @@
 
 namespace partiemc::server {
 
-/// A file descriptor; the destructor closes it.
+/// A file descriptor, or -1 for none; the destructor closes it.
 class Descriptor {
  public:
   explicit Descriptor(int number = -1) : number_(number) {}
@@ -39,25 +39,26 @@ struct Listeners {
 };
 
 /// Opens listening sockets for `address`, as gRPC itself would:
-/// - a host name: every address of this name;
+/// - a host name: every address of this name on which listening succeeds, at least one;
 /// - 0.0.0.0 and [::]: all addresses of IPv4 and IPv6;
 /// - a Unix socket: replaces the socket file if a crashed server has left one.
 ///
-/// A connection ends if its peer does not acknowledge sent bytes for `dead_after`. Errors:
+/// A TCP connection ends if its peer does not acknowledge sent bytes for `dead_after`. Errors:
 /// ALREADY_EXISTS if another server listens on one of the addresses; UNAVAILABLE with the system's
-/// text.
+/// text if no address can be used.
 absl::StatusOr<Listeners> ListenOn(const Address& address, std::chrono::milliseconds dead_after);
 
 struct Peer {
   std::string name;  ///< As NormalPeer writes it; empty for a Unix socket, where peers have none.
-  std::string address;  ///< The unit of limits per address: HostOfPeer, or a user of this machine.
+  /// The unit of limits per address: HostOfPeer. For a Unix socket, a user: "unix:uid=1000".
+  std::string address;
 };
 
-/// None if the connection has ended.
+/// Returns nothing if the connection has ended.
 std::optional<Peer> PeerOf(int socket);
 
-/// Sets the numbers of bytes received, read and sent. Returns false if the socket does not count
-/// them (Unix sockets).
+/// Sets the numbers of bytes received, read and sent in `reading`; never decreases them. Returns
+/// false if the socket does not count bytes (Unix sockets).
 bool ReadByteCounts(int socket, ConnectionReading& reading);
 
 /// Ends a connection at once: the peer receives a reset, and unread bytes are dropped. After

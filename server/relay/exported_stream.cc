@@ -30,7 +30,7 @@ void ExportedStream::Begin() {
   machine_->Start();
 }
 
-// One request with unlimited credit.
+// Plays the watcher's part: one `open`, whose unlimited credit StartOpen sets.
 void ExportedStream::StartRead() {
   if (!opened_.exchange(true)) machine_->ReadDone({WatchRequest::Kind::kOpen, 0});
 }
@@ -88,8 +88,7 @@ void ExportedStream::End() {
 }
 
 bool ExportedStream::PublishEnd(const WatchEnd& end, std::uint64_t dropped) {
-  // The stream itself continues; only this watcher was too slow. Replicas fetch the results that
-  // they miss.
+  // The stream itself continues; only this export was too slow. Replicas fetch the missed results.
   if (end.reason == kReasonFellBehind) return true;
   relay::v1::StreamEnd& told = *end_.mutable_stream_end();
   told.set_stream_id(id_);
@@ -148,7 +147,7 @@ void ExportedStream::Answer(const relay::v1::Fetch& fetch, const std::string& re
   relay::v1::FetchEnd& end = *message.mutable_fetch_end();
   end.set_stream_id(id_);
   end.set_fetch(fetch.fetch());
-  // Later results are published when they arrive.
+  // The response covers the results so far. Later ones are published to all replicas.
   end.set_last_number(asks_for_frames ? broadcaster_->LastNumber() : last_published_);
   std::size_t bytes = 0;
   for (Published next = First(fetch); next.frame != nullptr && next.number <= end.last_number();

@@ -26,7 +26,8 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
  public:
   using TimePoint = Clock::TimePoint;
 
-  /// Requires: `port` and `clock` live until live() is false; this object is held by shared_ptr.
+  /// `max_bytes`: limit of the results that wait to be sent. Requires: `port` and `clock` live
+  /// until live() is false; this object is held by shared_ptr.
   ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
                  std::size_t max_bytes, RelayPort& port, const Clock& clock);
 
@@ -37,23 +38,23 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   /// Repeats a send that has failed. Until the send succeeds, newer results wait, as for a slow
   /// watcher.
   void Retry();
-  /// True from Begin until the stream has ended or End has completed.
+  /// True from Begin until the watch has ended: with the stream, by End, or because it fell behind.
   bool live() const { return live_; }
 
-  /// Sets the time until which another replica has requested the stream's results.
+  /// Sets the time until which another replica requests the stream's results.
   void WantedUntil(TimePoint until) { wanted_until_ = until; }
   TimePoint wanted_until() const { return wanted_until_; }
   /// The time at which the end of the stream was published; empty if it has not ended. The end is
   /// sent again in response to each later fetch.
   std::optional<TimePoint> ended_at() const { return ended_at_; }
-  /// Sends the response to a `fetch` of `replica`.
+  /// Sends the response to a `fetch` of `replica`: the held results that it requests, up to 4 MiB
+  /// or one larger result, then a FetchEnd.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
  private:
-  // The fetch in whose response a result is sent; 0: a new result, which no replica has fetched.
   struct Answering {
-    std::uint64_t fetch = 0;
-    bool first = false;
+    std::uint64_t fetch = 0;  // Number of the fetch that a result answers; 0: none, a new result.
+    bool first = false;       // Whether the result is the first one of this response.
   };
 
   void StartRead() override;

@@ -30,7 +30,7 @@ class FetchQueue {
   /// Adds a fetch. Drops it if it is too large, or if its replica is new and the queue already has
   /// fetches of kReplicas replicas.
   void Add(const std::string& replica, const relay::v1::Fetch& fetch);
-  /// Removes and returns the oldest fetch of the replica whose turn it is.
+  /// Removes and returns the oldest fetch of the replica whose turn it is; nothing if empty.
   std::optional<Item> TakeNext();
 
   bool empty() const { return turns_.empty(); }
@@ -38,7 +38,7 @@ class FetchQueue {
 
  private:
   std::map<std::string, std::deque<relay::v1::Fetch>> fetches_;  // No queue is empty.
-  std::deque<std::string> turns_;                                // The keys of fetches_.
+  std::deque<std::string> turns_;  // The keys of fetches_, in the order of their turns.
   std::uint64_t dropped_ = 0;
 };
 

@@ -13,10 +13,10 @@ namespace {
 
 using std::chrono::seconds;
 
-// Interval between fetches. They renew the request for results at the replica that owns the stream,
-// so that it continues to publish.
+// Interval between fetches that ask for no earlier result: the owner publishes new results only
+// while it receives fetches.
 constexpr seconds kWantEvery(1);
-// Timeout of a fetch.
+// A fetch fails after this time without a message of its response.
 constexpr seconds kFetchPatience(2);
 // Time for which an import without watchers is kept, so that watchers can reconnect.
 constexpr seconds kLinger(5);
@@ -101,7 +101,7 @@ void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
     return DeliverWaiting(now);
   }
   const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
-  // If the result does not fit, it is dropped here, counts as missing and is fetched later.
+  // A result that does not fit is dropped here, counts as missing and is fetched later.
   if (waiting_bytes_ + bytes <= limits_.waiting_bytes &&
       waiting_.emplace(published.number, published).second) {
     waiting_bytes_ += bytes;
@@ -182,7 +182,7 @@ void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, TimePoint now) {
                 .message = end.message(),
                 .status = {},
                 .last_number = end.last_number()};
-  // This server does not drain.
+  // The owner drains, not this server, so the watchers here receive another reason.
   if (end.reason() == kReasonDraining) {
     told.reason = kReasonProducerLost;
     told.message = "the server of the stream drains";
@@ -206,8 +206,6 @@ void ImportedStream::End(const WatchEnd& end) {
   AnswerWaiting(NoSuchStream(stream_.name()));
 }
 
-// Ends the import without waiting for pending fetches: with the end that the replica reported, if
-// any, otherwise with `otherwise`.
 void ImportedStream::Lost(const WatchEnd& otherwise, TimePoint now) {
   if (ended_) return;
   if (end_) FetchEnded(end_->last_number(), now);

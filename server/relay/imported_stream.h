@@ -35,8 +35,8 @@ class ImportedStream {
     HistoryRoom* history = nullptr;  ///< Outlives this; null: no history for watchers.
   };
 
-  /// Begins the import: fetches the history from `from_sequence`, or the newest result if
-  /// `from_sequence` is absent.
+  /// Begins the import: fetches the history from `from_sequence`. Fetches only the newest result if
+  /// `from_sequence` is absent or `limits` has no history.
   ImportedStream(RemoteStream stream, std::optional<std::uint64_t> from_sequence,
                  WatchDispatcher& dispatcher, const Limits& limits, RelayPort& port, TimePoint now);
 
@@ -47,9 +47,10 @@ class ImportedStream {
   /// ended or had no watcher for kLinger.
   bool IsIdle(TimePoint now) const;
 
-  /// Whether a watcher that starts at `from_sequence` receives the same results from this import as
-  /// from the owner.
+  /// Whether a watcher that starts at `from_sequence` (absent: at the newest result) receives the
+  /// same results from this import as from the owner.
   bool Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const;
+  /// Calls `ready`, at once or later.
   void Await(Ready ready);
 
   void OnMessage(relay::v1::Result& result, TimePoint now);
@@ -57,14 +58,15 @@ class ImportedStream {
   void OnMessage(const relay::v1::StreamEnd& end, TimePoint now);
   /// Fetches the results and the end of the stream that may have been lost on the bus.
   void FetchAgain(TimePoint now);
-  /// The owner does not respond any more. Ends the stream with the end that the owner reported, or
-  /// with `otherwise` if it reported none.
+  /// The owner no longer responds. Ends the stream without waiting for fetches: with the end that
+  /// the owner reported, or with `otherwise` if it reported none.
   void Lost(const WatchEnd& otherwise, TimePoint now);
   /// Ends the stream.
   void End(const WatchEnd& end);
   /// Ends all pending joins with `status`.
   void Refuse(const absl::Status& status) { AnswerWaiting(status); }
-  /// Called periodically.
+  /// Renews the request for results each second, and ends a fetch that gets no response. Called
+  /// every 50 ms. `connected`: whether the bus is.
   void Tick(TimePoint now, bool connected);
 
  private:
@@ -86,13 +88,13 @@ class ImportedStream {
 
   bool ready_ = false, ended_ = false;
   std::vector<Ready> await_;
-  std::uint64_t next_number_ = 0;  // Next number to deliver; 0: unknown.
-  std::uint64_t delivered_ = 0;    // The last number delivered; 0: none.
+  std::uint64_t next_number_ = 0;  // Number of the next result to deliver; 0: unknown.
+  std::uint64_t delivered_ = 0;    // Number of the last delivered result; 0: none.
   std::map<std::uint64_t, Published> waiting_;
   std::size_t waiting_bytes_ = 0;
   relay::v1::Fetch fetch_;  // The latest fetch.
   bool fetching_ = false;
-  std::optional<relay::v1::StreamEnd> end_;  // Delivered after all results.
+  std::optional<relay::v1::StreamEnd> end_;  // Reported by the owner; waits for missing results.
   TimePoint began_, heard_, wanted_, watched_;
 };
 

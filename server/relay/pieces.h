@@ -15,17 +15,18 @@ namespace partiemc::server {
 /// Size of a piece. By default NATS accepts messages of at most one megabyte.
 inline constexpr std::size_t kPieceBytes = std::size_t{512} << 10;
 
-/// Calls `send` with each piece of `message` (a serialised partiemc.relay.v1.Piece), in order,
-/// until `send` returns false. Returns whether all pieces were sent.
+/// Calls `send` with each piece of `message`, in order, until `send` returns false. Each piece is a
+/// serialised partiemc.relay.v1.Piece of the sender `replica`, whose messages are counted by
+/// `number`. Returns whether all pieces were sent.
 bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_view message,
                   absl::FunctionRef<bool(std::string_view piece)> send);
 
-/// Joins the pieces that several senders send. The pieces of one sender arrive in order, and a
-/// sender finishes a message before it begins the next. A message with a missing piece is dropped.
+/// Joins pieces of several senders. The pieces of one sender arrive in order, and a sender finishes
+/// a message before it begins the next. A message with a missing piece is dropped.
 class PieceJoiner {
  public:
-  /// Drops a message of more than `max_bytes`. Also drops a message if the incomplete messages of
-  /// all senders would together exceed four times `max_bytes`.
+  /// Drops a message of more than `max_bytes`. Also drops a message if the incomplete messages
+  /// would together exceed four times `max_bytes` or 1024 senders.
   explicit PieceJoiner(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
   /// Adds a serialised Piece. Returns the whole message if this piece completes it.
@@ -42,7 +43,7 @@ class PieceJoiner {
     std::string bytes;
   };
 
-  // Removes a message and returns its bytes.
+  // Removes an incomplete message and returns its bytes.
   std::string TakeOut(std::map<std::string, Begun>::iterator begun);
 
   const std::size_t max_bytes_;

@@ -21,20 +21,20 @@ using std::chrono::seconds;
 
 constexpr milliseconds kTickEvery(50);
 constexpr seconds kAnnounceEvery(1);
-// A replica counts as lost after this time without an announcement: three announcements are
-// missing.
+// A replica counts as lost after this time without an announcement, so after three missing ones.
 constexpr seconds kReplicaPatience(3);
 // Time for which the knowledge about other replicas is kept while the bus is disconnected.
 constexpr seconds kBusPatience(30);
+// A stream is exported for this time after each fetch.
 constexpr seconds kExportLease(3);
-// Interval of the responses to fetches while new results of this server's streams wait to be sent,
-// which have priority. A response has up to 4 MiB.
+// While new results of this server's streams wait to be sent, they have priority: the relay
+// responds to one fetch in this interval. A response has up to 4 MiB.
 constexpr milliseconds kAnswerEvery(20);
 // Time for which the end of a stream is kept, so that replicas that were disconnected can fetch it.
 constexpr seconds kEndKept(30);
 // If a replica no longer announces a stream, it gets this time to report the stream's end.
 constexpr seconds kLastWord(2);
-// Time that other replicas get to connect to the bus and to send their announcements.
+// Time that other replicas get, after this one has connected, to connect and to announce.
 constexpr milliseconds kSettle(300);
 // Timeout of a search for a stream, and the interval between the requests for announcements during
 // a search.
@@ -48,7 +48,7 @@ constexpr milliseconds kDrainPatience(300), kSendPatience(900);
 constexpr seconds kLongestDrain(2);
 // Capacities of the relay's queue in bytes: for news (which contain results), and for fetches.
 constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20};
-// Maximum size of an announcement in bytes.
+// Messages of up to this size are accepted, or larger ones if results may be larger.
 constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
 // The text of the error NO_SUCH_STREAM while the streams of other replicas are unknown.
@@ -90,7 +90,7 @@ bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
   return sent;
 }
 
-// Time of day, comparable between replicas.
+// Converts `time` to Unix time in milliseconds, which replicas can compare.
 std::int64_t Relay::UnixMs(TimePoint time) const {
   const auto ago =
       std::chrono::duration_cast<std::chrono::system_clock::duration>(clock_.Now() - time);
@@ -180,7 +180,7 @@ void Relay::Announce(TimePoint now, bool asks, bool leaving) {
                                : registry_.List(0, std::numeric_limits<std::size_t>::max());
   for (const StreamSummary& stream : streams) {
     const auto found = local_.find(stream.id);
-    if (found == local_.end()) continue;  // Announced with the next change.
+    if (found == local_.end()) continue;  // Opened just now; the next tick announces it.
     relay::v1::LiveStream& live = *announcement.add_streams();
     EncodeSummary(stream, now, *live.mutable_summary());
     live.set_lineage(stream.lineage);
@@ -204,9 +204,9 @@ void Relay::LookAtLocalStreams() {
   local_.swap(streams);
 }
 
-// Handles producers that have resumed their stream at another replica. Such a producer has
-// abandoned the former stream, but the replica of the former stream may not have detected this yet.
-// Ends the watches of the former stream, so that the watchers find the new one.
+// Handles producers that have resumed their stream at another replica. The replica of the former
+// stream may not have detected yet that its producer has left. Ends the watches of the former
+// stream, so that the watchers find the new one.
 void Relay::EndTakenOver() {
   const WatchEnd taken_over{
       std::string(kReasonTakenOver), "another replica has the stream now", {}};
@@ -323,7 +323,7 @@ void Relay::Take(const std::string& piece) {
     case Message::kStreamEnd:
       return tell(message.stream_end().stream_id(),
                   [&](ImportedStream& stream) { stream.OnMessage(message.stream_end(), now); });
-    case Message::kFetch:  // TakeAsked.
+    case Message::kFetch:  // OnAskedPiece receives fetches.
     case Message::MESSAGE_NOT_SET:
       break;
   }
@@ -401,8 +401,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
                  .name = name, .from_sequence = from_sequence, .done = std::move(done)}]() mutable {
         if (draining_since_) return search.done(DrainingError());
         const auto now = clock_.Now();
-        // Waits longer if this replica has just connected, because it does not know the other
-        // replicas yet.
+        // Waits longer if this replica has just connected: it does not know the others yet.
         const auto settled = connected_since_ ? *connected_since_ : began_ + kFirstConnection;
         search.began = now;
         search.settled = settled + kSettle;
@@ -419,8 +418,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
 
 bool Relay::TryFind(const Search& search, TimePoint now) {
   const auto remote = directory_.FindName(search.name);
-  // Whether this server has the stream: a producer has resumed it here, later than it opened the
-  // remote stream.
+  // Whether a producer has resumed the remote stream at this server.
   const auto is_here = [&](const auto& item) {
     return item.second.lineage == remote->stream.lineage() &&
            item.second.opened_unix_ms > remote->stream.opened_unix_ms();
@@ -500,7 +498,7 @@ void Relay::GoOnDraining(TimePoint now) {
   });
   const auto idle = now - std::max(*draining_since_, acted_);
   if (has_more && idle < kDrainPatience && now - *draining_since_ < kSendPatience) {
-    // Remaining streams end with this server.
+    // Streams that have not ended by now end with this server.
     if (idle > kDrainPatience / 2) {
       for (auto& [id, exported] : exports_) exported->End();
     }

@@ -34,17 +34,17 @@ namespace partiemc::server {
 
 /// The public functions are thread-safe; the relay thread does everything else. Messages that
 /// exceed the capacity of its queues are lost; lost results are fetched again. In each step the
-/// thread first does the work of this server, then handles messages, then responds to one fetch. So
-/// a flooding peer can delay neither results nor a drain for long.
+/// thread runs the actions that this server has posted, then handles some messages, then responds
+/// to one fetch. So a flooding peer can delay neither results nor a drain for long.
 class Relay final : private RelayPort {
  public:
   using TimePoint = Clock::TimePoint;
 
   struct Limits {
-    ResultBroadcaster::Limits broadcaster;  ///< For streams of other replicas.
-    std::size_t watcher_bytes = std::size_t{16} << 20;
+    ResultBroadcaster::Limits broadcaster;              ///< For streams of other replicas.
+    std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Maximum of waiting results per stream.
     HistoryRoom* history = nullptr;  ///< Null: no history for streams of other replicas.
-    std::size_t watches = 64;        ///< Most concurrent searches for streams.
+    std::size_t watches = 64;        ///< Maximum number of concurrent searches (Find).
   };
 
   /// Requires: all references outlive this object. The relay announces `address` to the other
@@ -63,7 +63,7 @@ class Relay final : private RelayPort {
   using FindDone = std::function<void(const absl::StatusOr<Found>& found)>;
 
   /// Searches the other replicas for the stream of this name, to watch it from the sequence number
-  /// `from_sequence`. Calls `done` once, during this call or later from another thread. Errors:
+  /// `from_sequence`. Calls `done` once, during this call or later from the relay thread. Errors:
   /// NOT_FOUND (NO_SUCH_STREAM), within some seconds; UNAVAILABLE (DRAINING).
   void Find(const std::string& name, std::optional<std::uint64_t> from_sequence, FindDone done);
   /// Whether a producer has resumed the stream with this lineage (LineageOf the stream token) at
@@ -76,13 +76,13 @@ class Relay final : private RelayPort {
   std::size_t replicas() const { return directory_.replicas(); }
   std::size_t remote_streams() const { return directory_.streams(); }
 
-  /// Returns the addresses of some other replicas that accept streams.
+  /// Returns the addresses of other replicas that accept streams, at most 16.
   std::vector<std::string> Addresses() const { return directory_.Addresses(kMaxAddresses); }
 
   /// Announces that this replica accepts no further streams. The caller calls Drain later.
   void WillDrain();
   /// Ends pending searches with an error, sends the last results and the ends of streams, and
-  /// stops. Takes at most 300 ms plus the time that the bus needs, but at most two seconds.
+  /// announces that this replica leaves. Blocks for at most two seconds.
   void Drain();
 
   bool connected() const { return connected_; }
@@ -100,12 +100,12 @@ class Relay final : private RelayPort {
     std::shared_ptr<ResultBroadcaster> broadcaster;
     std::string lineage;
     std::int64_t opened_unix_ms = 0;
-    bool was_told = false;  // Its watchers know that it was resumed at another replica.
+    bool was_told = false;  // Its watches were ended, because another replica has the stream.
   };
   struct Import {
     std::unique_ptr<ImportedStream> stream;
     std::unique_ptr<MessageBus::Subscription> results;
-    std::optional<TimePoint> missing_since;  // Since when its replica does not announce it.
+    std::optional<TimePoint> missing_since;  // When its replica stopped announcing it.
   };
   struct Search {
     std::string name;
@@ -151,7 +151,7 @@ class Relay final : private RelayPort {
   std::atomic<std::size_t> exported_count_ = 0, imported_count_ = 0;
   std::atomic<std::uint64_t> unsent_ = 0, dropped_fetches_ = 0;
 
-  // Owned by the relay thread:
+  // Used by the relay thread only:
   PieceJoiner joiner_, asked_joiner_{FetchQueue::kFetchBytes};
   FetchQueue fetches_;
   std::uint64_t sent_ = 0;
@@ -161,7 +161,7 @@ class Relay final : private RelayPort {
   std::vector<Import> imports_;
   std::vector<Search> searches_;
   std::uint64_t local_changes_ = 0;
-  bool loss_logged_ = false;  // The loss of the connection is logged.
+  bool loss_logged_ = false;  // A log line has reported that NATS was lost or not reached.
   bool changed_ = false;      // The set of streams has changed, here or at another replica.
   bool was_asked_ = false;    // Another replica has requested an announcement.
   bool will_drain_ = false;

@@ -15,8 +15,7 @@ class RelayPort {
 
   /// Runs `action` on the relay thread, in the order of the calls. Thread-safe; does not block.
   virtual void Post(std::function<void()> action) = 0;
-  /// Sends a message. Called by the relay thread only. Returns false if the message was certainly
-  /// lost.
+  /// Sends a message. Called by the relay thread only. Returns false if it was certainly lost.
   virtual bool Send(const std::string& subject, relay::v1::RelayMessage& message) = 0;
 };
 

@@ -37,21 +37,19 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
     std::array<std::deque<std::string>, kLanes> messages;
   };
 
-  /// A message is dropped if its lane already holds its `max_bytes`. Requires: `clock` lives during
-  /// Take.
+  /// A message is dropped if its lane would exceed its `max_bytes`. `clock` lives during Take.
   explicit RelayQueue(std::array<std::size_t, kLanes> max_bytes, const Clock& clock = SystemClock())
       : max_bytes_(max_bytes), clock_(clock) {}
 
   void Post(std::function<void()> action) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Subscribes to `subject` and queues its messages in `lane`. Returns null if memory is
-  /// exhausted.
+  /// Queues the messages of `subject` in `lane` from now on. Returns null if memory is exhausted.
   std::unique_ptr<MessageBus::Subscription> Listen(MessageBus& bus, const std::string& subject,
                                                    Lane lane);
 
   /// Moves all actions and the next messages to `work`, in order. Waits at most `patience` for the
   /// first item. Returns false if Stop was called and no action is left. Requires: `work` is empty.
   bool Take(std::chrono::milliseconds patience, Work& work);
-  /// Drops all further messages.
+  /// Wakes Take, and drops all further messages. Actions can still be posted.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::uint64_t lost_messages() const ABSL_LOCKS_EXCLUDED(mutex_);

@@ -9,10 +9,10 @@
 namespace partiemc::server {
 namespace {
 
-// Limits the memory of announcements.
+// Limits the memory of announcements. Further replicas are ignored.
 constexpr std::size_t kMaxReplicas = 1024;
 
-// Empty for replicas that accept no streams.
+// Returns the address at which a replica accepts streams; empty if it drains or has no TCP address.
 std::string AddressOf(const relay::v1::Announcement& announcement) {
   const auto address = ParseAddress(announcement.address());
   const bool can_be_reached = address.ok() && address->unix_path.empty() && address->port != 0;

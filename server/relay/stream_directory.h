@@ -32,21 +32,20 @@ class StreamDirectory {
  public:
   using TimePoint = Clock::TimePoint;
 
-  /// Replaces the streams of a replica by the announced ones. Returns whether the streams have
-  /// changed.
+  /// Replaces the streams of a replica by the announced ones. Returns whether their ids have
+  /// changed. Ignores a new replica if 1024 are known.
   bool Announced(const std::string& replica, const relay::v1::Announcement& announcement,
                  TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
   void Left(const std::string& replica) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes and returns the replicas that have sent no announcement since `before`.
   std::vector<std::string> Expire(TimePoint before) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Treats all replicas as if they had sent an announcement at `now`. Called after a disconnection
-  /// of the bus.
+  /// For Expire, treats all replicas as if they had sent an announcement at `now`.
   void Refresh(TimePoint now) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Returns at most `count` distinct addresses of replicas. Omits draining replicas.
   std::vector<std::string> Addresses(std::size_t count) const ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Whether every known replica has sent an announcement since `since`.
+  /// Whether every known replica has really sent an announcement since `since`.
   bool HaveAllAnnouncedSince(TimePoint since) const ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Returns the stream of this name; if there are several, the one that was opened last.

@@ -12,8 +12,8 @@
 namespace partiemc::server {
 
 /// Guards services that come with gRPC (reflection). Counts each call for its connection, and ends
-/// a call with UNAUTHENTICATED if Authentication refuses its caller. Health checks need no token.
-/// The arguments outlive the server. Thread-safe.
+/// a call with UNAUTHENTICATED if Authentication refuses its caller. Leaves the server's own
+/// service and health checks alone. The arguments outlive the server. Thread-safe.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeGuardOfForeignServices(
     const Authentication& authentication, const ConnectionTable& connections);
 

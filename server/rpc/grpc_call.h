@@ -18,7 +18,7 @@
 
 namespace partiemc::server {
 
-/// The CallChannel of a gRPC call. Deletes itself and its ByteCall in OnDone, which is the last
+/// The CallChannel of a gRPC call. Owns its ByteCall. Deletes itself in OnDone, which is the last
 /// call that gRPC makes.
 class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                        private CallChannel {
@@ -48,13 +48,12 @@ class GrpcCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::By
   grpc::CallbackServerContext& context_;
   CallTally tally_;
   grpc::ByteBuffer* message_ = nullptr;  // The read in progress.
-  // Created at the end of the constructor; gRPC calls no method before the constructor has
-  // returned.
+  // Created last in the constructor; gRPC calls no method before the constructor has returned.
   std::unique_ptr<ByteCall> call_;
 };
 
-/// The origin of a gRPC call. If the header `authorization` occurs several times, it counts as
-/// missing, because a choice would depend on the order of the headers.
+/// Returns the origin of a gRPC call. If the header `authorization` occurs several times, it counts
+/// as missing, because a choice would depend on the order of the headers.
 CallOrigin OriginOf(const grpc::ServerContextBase& context);
 
 }  // namespace partiemc::server

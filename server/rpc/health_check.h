@@ -1,4 +1,4 @@
-// Checks whether a running server is serving. Containers use it as their health check.
+// Checks whether a running server is serving, for containers and probes.
 #pragma once
 
 #include <chrono>
@@ -14,8 +14,7 @@ namespace partiemc::server {
 /// serving state of the response.
 struct HealthCheckSecurity {
   bool tls = false;
-  /// Paths of PEM files, for a server that requires client certificates. Empty: no client
-  /// certificate.
+  /// Paths of PEM files of a client certificate. Empty: no client certificate.
   std::string certificate_file, key_file;
 };
 

@@ -9,10 +9,9 @@
 
 namespace partiemc::server {
 
-/// gRPC's health service. Serves only the method Check, whose calls have separate slots
-/// (UnaryKind::kProbe). Does not serve the method Watch: without it gRPC's clients derive the
-/// health of the server from the state of the connection, and streams receive drain notices anyway.
-/// Thread-safe.
+/// Serves only the method Check, whose calls have separate slots (UnaryKind::kProbe). Does not
+/// serve the method Watch: without it gRPC's clients derive the health of the server from the state
+/// of the connection, and streams receive drain notices anyway. Thread-safe.
 class HealthService final : public ByteService {
  public:
   /// The arguments outlive the service.

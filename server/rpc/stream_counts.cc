@@ -11,13 +11,13 @@
 namespace partiemc::server {
 namespace {
 
-// If the list of peers exceeds this number, it is cleared and read again.
+// If listed_ exceeds this number of peers, Find clears it and lists all sockets again.
 constexpr std::size_t kMostListed = 20'000;
 
 using Text = std::unique_ptr<char, decltype(&gpr_free)>;
 
 // Finds the next `"name":"` at or after `from`, returns the value that follows, and moves `from`
-// behind the value. Empty if there is none. This simple search suffices, because channelz writes
+// behind the value. Returns "" if there is none. This search suffices, because channelz writes
 // numbers as strings and its output contains no text of clients.
 std::string_view NextValue(std::string_view text, std::string_view name, std::size_t& from) {
   const std::string key = "\"" + std::string(name) + "\":\"";

@@ -12,7 +12,7 @@ namespace partiemc::server {
 /// Reads channelz, the statistics that gRPC keeps for every connection. Used by one thread.
 class ChannelzStreams final : public StreamCounter {
  public:
-  /// Uses the server that was built last in this process.
+  /// Reads the connections of the gRPC server that was built last in this process.
   ChannelzStreams();
 
   bool Read(const std::string& peer, std::int64_t& socket, ConnectionReading& reading) override;
@@ -21,8 +21,8 @@ class ChannelzStreams final : public StreamCounter {
   std::int64_t Find(const std::string& peer);
 
   std::int64_t server_ = 0;
-  std::int64_t next_socket_ = 0;                // The first one that is not listed.
-  std::map<std::string, std::int64_t> listed_;  // By peer; some may be closed.
+  std::int64_t next_socket_ = 0;                // Sockets with smaller numbers were listed.
+  std::map<std::string, std::int64_t> listed_;  // Sockets by peer, until found; may be closed.
 };
 
 }  // namespace partiemc::server

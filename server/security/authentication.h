@@ -34,12 +34,12 @@ class Authentication {
   void Set(BearerTokens tokens) ABSL_LOCKS_EXCLUDED(mutex_);
   bool required() const { return Current() != nullptr; }
 
-  /// Finds the caller of a request. `authorization` is the request header of this name, "Bearer
-  /// TOKEN"; `peer` is the client's address in gRPC's format. Errors: UNAUTHENTICATED with a
-  /// Violation that does not contain the token.
+  /// Finds the caller of a request. Before the first Set, same as `Anybody`. `authorization` is the
+  /// request header of this name, "Bearer TOKEN"; `peer` is the client's address in gRPC's format.
+  /// Errors: UNAUTHENTICATED with a Violation that does not contain the token.
   absl::StatusOr<Caller> Authenticate(std::optional<std::string_view> authorization,
                                       std::string_view peer) const;
-  /// Returns a caller without a token, which is identified by its address.
+  /// Returns a caller with all permissions and the account of its host (PeerAccounts).
   Caller Anybody(std::string_view peer) const { return Caller(everything_, peers_.Of(peer)); }
 
  private:

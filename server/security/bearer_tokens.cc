@@ -14,7 +14,7 @@
 namespace partiemc::server {
 namespace {
 
-// Each call is compared with all tokens.
+// Limits the time of Find, which compares the token of each call with all tokens.
 constexpr std::size_t kMaxTokens = 1000;
 
 absl::Status Wrong(std::size_t line, const std::string& rule) {

@@ -23,9 +23,10 @@ inline constexpr std::string_view kReasonCallerStreams = "CALLER_STREAMS";
 inline constexpr std::string_view kReasonCallerWatchers = "CALLER_WATCHERS";
 inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 
-/// Counts the resources that a caller holds. All calls with the same token share an account.
-/// All calls without a token from the same host share one (HostOfPeer). ComputePool and FairShare
-/// identify callers by the memory address of this object. Thread-safe.
+/// Counts the resources that a caller holds. Health checks (kProbe) count apart from other calls,
+/// with the same limit. All calls with the same token share an account. All calls without a token
+/// from the same host share one (HostOfPeer). ComputePool and FairShare identify callers by the
+/// memory address of this object. Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
   enum class Kind { kCall, kStream, kWatcher, kProbe };
@@ -73,7 +74,8 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   std::array<std::uint32_t, kKinds> held_ ABSL_GUARDED_BY(mutex_){};
 };
 
-/// RESOURCE_EXHAUSTED (CALLER_BYTES): a request of `bytes` exceeds the caller's quota.
+/// RESOURCE_EXHAUSTED (CALLER_BYTES): with `bytes` more, the caller would exceed its quota or its
+/// fair share (FairShare).
 absl::Status TooManyBytesOfCaller(std::uint64_t bytes);
 
 /// An admitted caller. A call keeps the terms with which it began, even if the token file changes;

@@ -83,7 +83,7 @@ bool ReadBytes(std::string_view text, std::optional<std::uint64_t>& bytes) {
   return true;
 }
 
-// The rule that `value` breaks, or null.
+// Stores the value of the word `key=value` in `terms`. Returns the rule that it breaks, or null.
 const char* Read(std::string_view key, std::string_view value, CallerTerms& terms) {
   CallerQuota& quota = terms.quota;
   if (key == "may") return ReadMay(value, terms) ? nullptr : kMayRule;

@@ -23,9 +23,9 @@ class FileReloader {
   FileReloader(const FileReloader&) = delete;
   FileReloader& operator=(const FileReloader&) = delete;
 
-  /// Calls `load` now and after each change of `files`. `what` names the files in the log. `load`
-  /// is called by one thread at a time. Requires: Start was not called yet. Errors: the error of
-  /// the first load; the files are then not watched.
+  /// Calls `load` now, and after each change of `files` on the polling thread. `what` names the
+  /// files in the log. Requires: Start was not called yet. Errors: the error of the first load; the
+  /// files are then not watched.
   absl::Status Add(std::string what, std::vector<std::string> files, Load load);
 
   /// Starts a thread that polls the files every `interval`. Starts no thread if there are no files.
@@ -42,7 +42,7 @@ class FileReloader {
   void Run(std::chrono::milliseconds interval);
   static void Look(Watched& watched);
 
-  std::vector<Watched> watched_;  // Owned by the thread after Start.
+  std::vector<Watched> watched_;  // After Start, only the thread uses it.
   Mutex mutex_;
   CondVar stop_asked_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;

@@ -18,7 +18,7 @@ struct PeerAccounts::Known {
 namespace {
 
 // Returns the /64 network of an IPv6 address: "[2001:db8::1]" -> "2001:db8::". Returns other
-// addresses unchanged.
+// addresses, also IPv4 addresses mapped to IPv6, without brackets and zone.
 std::string NetworkOf(std::string_view host) {
   // Removes brackets and zone, because gRPC writes IPv6 addresses as in a URI.
   for (const std::string_view before : {"[", "%5B"}) {

@@ -1,4 +1,4 @@
-// The accounts of callers without a token: one account for each peer address.
+// The accounts of callers without a token: one account for each host (HostOfPeer).
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ namespace partiemc::server {
 /// Returns the host of a peer, without its port: "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Keeps
 /// only the first 64 bits of an IPv6 address, because one host can use all addresses with this
 /// prefix: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". Returns "unix" for all peers of Unix
-/// sockets.
+/// sockets, and other texts unchanged.
 std::string HostOfPeer(std::string_view peer);
 
 /// Thread-safe.
@@ -24,7 +24,7 @@ class PeerAccounts {
   /// Returns the account of a peer's host (HostOfPeer). An account exists while a caller holds it.
   std::shared_ptr<CallerAccount> Of(std::string_view peer);
 
-  /// Number of held accounts.
+  /// Number of accounts that exist.
   std::size_t size() const;
 
  private:

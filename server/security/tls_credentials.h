@@ -11,8 +11,8 @@
 namespace partiemc::server {
 
 /// New connections use the current identity; open connections keep the identity with which they
-/// began. If the identity has a client authority, clients need a certificate that this authority
-/// has signed. Requires: `current` has an identity and outlives the server.
+/// began. If the identity has client authorities at this call, clients need a certificate that one
+/// of them has signed. Requires: `current` has an identity and outlives the server.
 std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const CurrentTlsIdentity& current);
 
 }  // namespace partiemc::server

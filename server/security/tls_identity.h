@@ -20,7 +20,7 @@ struct TlsFiles {
   /// certificate.
   std::string client_ca;
 
-  /// Returns the paths that are not empty.
+  /// Returns the paths of the certificate, the key and, if set, the client authorities.
   std::vector<std::string> All() const;
 };
 
@@ -35,7 +35,7 @@ struct TlsIdentity {
 class CurrentTlsIdentity {
  public:
   struct Version {
-    std::uint64_t number = 0;  ///< Counts changes; 0: none yet.
+    std::uint64_t number = 0;  ///< Number of calls of Set; 0: `identity` is null.
     std::shared_ptr<const TlsIdentity> identity;
   };
 
@@ -54,9 +54,9 @@ class CurrentTlsIdentity {
   Version version_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// Reads the files. Checks that certificate and key match, and that client_ca contains an
-/// authority. Accepts an expired certificate: clients refuse it, and the operator can replace it at
-/// run time. Errors: INVALID_ARGUMENT with flag, file and problem, but without content of the file.
+/// Reads the files. Checks that certificate and key match, and that client_ca begins with a
+/// certificate. Accepts an expired certificate: clients refuse it, and the operator can replace it
+/// at run time. Errors: INVALID_ARGUMENT with flag, file and problem, without content of the file.
 absl::StatusOr<TlsIdentity> ReadTlsIdentity(const TlsFiles& files);
 
 /// Reads a file of secrets or certificates.

@@ -31,7 +31,6 @@ static_assert(kHeaderBytes + kMaxStreamNameBytes + kChecksumBytes +
 
 constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 
-// Returns a hash of all values of the parameters.
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
   // Lists each member by name. If a member is added, this statement does not compile until the
   // author also hashes the new member.

@@ -1,5 +1,5 @@
-// Checkpoints: the bytes with which a client resumes a stream on any server. The client does not
-// interpret them; the server treats them as untrusted input.
+// Checkpoints: the bytes with which a client resumes a stream, on this or another server. The
+// client does not interpret them; the server treats them as untrusted input.
 #pragma once
 
 #include <cstddef>
@@ -23,16 +23,16 @@ inline constexpr std::string_view kReasonCheckpointSignature = "CHECKPOINT_SIGNA
 /// Properties of a stream that must be the same when a client resumes it, in addition to the
 /// parameters.
 struct StreamTerms {
-  std::string lineage = {};   ///< LineageOf the stream token.
-  std::string name = {};      ///< With the default resolved.
-  std::uint64_t labels = 0;   ///< FingerprintOf the labels.
-  std::uint32_t outputs = 0;  ///< A bit for each requested output.
-  std::uint32_t checkpoint_interval = 0;
+  std::string lineage = {};               ///< LineageOf the stream token.
+  std::string name = {};                  ///< The stream's name; generated if the client gave none.
+  std::uint64_t labels = 0;               ///< FingerprintOf the labels.
+  std::uint32_t outputs = 0;              ///< A bit for each requested output.
+  std::uint32_t checkpoint_interval = 0;  ///< In frames.
 };
 
 std::uint64_t FingerprintOf(const std::map<std::string, std::string>& labels);
 
-/// A stream between two frames.
+/// The contents of a checkpoint: a stream between two frames.
 struct Checkpoint {
   std::uint64_t next_sequence = 1;
   std::string name = {};  ///< Name of the stream.
@@ -43,9 +43,9 @@ struct Checkpoint {
 inline constexpr std::size_t kMaxCheckpointOverhead = 300;
 
 /// Serialises a checkpoint, with a version and a checksum. The checkpoint is valid only for this
-/// version of the method, for `parameters` (with defaults resolved) and for `terms`, because other
-/// values would change the results. It is signed if `keys` is not null. The bytes do not depend on
-/// the machine.
+/// version of the method, for `parameters` (with defaults resolved) and for `terms`, so a client
+/// can continue only the same stream. It is signed if `keys` is not null. The bytes do not depend
+/// on the machine.
 /// Requires: `terms` has a valid lineage and name.
 std::string Serialize(std::uint64_t next_sequence, const State& state,
                       const ReconstructionParameters& parameters, const StreamTerms& terms,

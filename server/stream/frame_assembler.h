@@ -39,7 +39,8 @@ class AssemblyMember {
   virtual ~AssemblyMember() = default;
   /// A frame of part 0, or a part, may be ready for its response: the call should check again.
   virtual void LookAgain() = 0;
-  /// The assembler has removed this call. `status` is OK if all its frames were answered.
+  /// The assembler has removed this call. `status` is OK if the call of part 0 has ended with OK;
+  /// frames that it did not answer are then refused (OutcomeOf).
   virtual void LeftOut(const absl::Status& status) = 0;
 };
 
@@ -54,9 +55,9 @@ class FrameAssembler {
 
   struct Terms {
     std::uint32_t parts = 1;
-    std::size_t window = 1;                ///< Number of frames, from the next to be answered.
+    std::size_t window = 1;                ///< Frames assembled at once, from the next answer on.
     std::uint64_t max_frame_bytes = 0;     ///< Limit for a frame without its part 0.
-    std::chrono::milliseconds timeout{0};  ///< From the first part of a frame, of any rank.
+    std::chrono::milliseconds timeout{0};  ///< Time for all parts of a frame, from the first on.
     bool has_checkpoints = false;          ///< Responses may have checkpoints.
     std::uint64_t next_sequence = 1;       ///< Number of the first frame.
   };
@@ -118,7 +119,8 @@ class FrameAssembler {
   /// failed. If part 0 has not arrived within the timeout after the first part, this function
   /// closes the frame. It drops the parts, and part 0 will be refused.
   bool IsOver(std::uint64_t sequence, Clock::time_point now);
-  /// The outcome of a frame for the sender of a part; OK if the frame was answered.
+  /// The outcome of a frame for the sender of a part. OK: the frame was answered, perhaps by an
+  /// error.
   /// Errors: DEADLINE_EXCEEDED (PARTS_MISSING) if part 0 arrived too late, PART_LATE if the call of
   /// part 0 ended before this frame.
   absl::Status OutcomeOf(std::uint64_t sequence) const;
@@ -137,7 +139,7 @@ class FrameAssembler {
     std::vector<std::uint64_t> bytes;                     // Sizes of `parts`.
     std::uint64_t all_bytes = 0;
     std::uint32_t count = 0;
-    Clock::time_point since;  // The first part came.
+    Clock::time_point since;  // Arrival of the first part.
     bool is_over = false;     // Part 0 came too late; the parts were dropped.
   };
   struct Member {

@@ -8,8 +8,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Returns the shortest limit. A call that begins now cannot exceed any limit before this time has
-// passed.
+// Returns the shortest limit, at most an hour. A call that begins now cannot exceed any limit
+// before this time has passed.
 milliseconds ShortestLimit(const ServerLimits& limits) {
   milliseconds shortest = std::chrono::hours(1);
   for (const milliseconds limit :

@@ -19,8 +19,8 @@ constexpr std::chrono::milliseconds kBetweenGivingBack(250);
 
 // Interval between readings of the bytes that each connection has received (ReadPermits::Look). A
 // reading costs two system calls for each connection. The shorter interval applies while streams
-// wait for memory. The thread reads at once if memory is exhausted, or if the memory of the process
-// has grown by kMuchMore since the last check.
+// wait for memory. The thread takes a reading at once if memory is exhausted, or if the memory of
+// the process has grown by kMuchMore since the last check.
 constexpr std::chrono::milliseconds kBetweenLooks(250), kBetweenLooksWhileWaiting(50);
 constexpr std::uint64_t kMuchMore = 16 << 20;
 

@@ -15,11 +15,11 @@ namespace partiemc::server {
 
 /// gRPC collects a whole message before it reports the size, even if the message exceeds the limit.
 /// So the server cannot count the bytes that arrive for opening calls (calls without a first
-/// request) and for watchers. While there are such calls (OpeningCalls), a thread checks the memory
-/// of the whole process every 10 ms. If the process exceeds its limit, the thread returns freed
-/// memory to the system. If that does not suffice, it evicts opening calls: the older half of the
-/// calls of the caller that has the most. A call that sends its request at once is hardly ever
-/// evicted. Watchers are evicted last.
+/// request) and for watchers. While there are such calls (OpeningCalls) or large reads
+/// (ReadPermits::NeedsLook), a thread checks the memory of the whole process every 10 ms. If the
+/// process exceeds its limit, the thread returns freed memory to the system. If that does not
+/// suffice, it evicts opening calls: the older half of the calls of the caller that has the most. A
+/// call that sends its request at once is hardly ever evicted. Watchers are evicted last.
 ///
 /// Bytes that arrive for open streams are planned in advance (ReadPermits), so open streams
 /// continue. A stream is ended only if memory is exhausted and its read receives more bytes than
@@ -33,7 +33,7 @@ class IntakeGuard {
     /// expensive, so it is only called if the memory exceeds `most_bytes`.
     std::function<std::uint64_t()> most_bytes, more_bytes;
     std::function<void()> give_back_freed;
-    /// Upper limit of the resident memory, constant.
+    /// The largest value that `most_bytes` can return.
     std::uint64_t limit_bytes = 0;
     /// Bytes that each connection has received, by peer address (ReceivedBytesOfConnections).
     std::function<std::map<std::string, std::uint64_t>()> received_bytes = {};

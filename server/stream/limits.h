@@ -1,4 +1,4 @@
-// The limits of a server. StreamOpened and GetServerInfo announce them to clients.
+// The limits of a server. StreamOpened and GetServerInfo announce most of them to clients.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace partiemc::server {
 
-/// The sum of these terms bounds the server's memory (MemoryPlan computes it):
+/// MemoryPlan computes the server's maximum memory from these limits. Among its terms are:
 /// - `memory_budget` for requests, responses, workers and histories;
 /// - frames beyond the budget (ReadBytesBeyond);
 /// - the worker that computes a frame beyond the budget (WorkerBytesBeyond);
@@ -36,13 +36,13 @@ struct ServerLimits {
 
   /// Maximum size of a checkpoint, sent or received. A resuming client sends its checkpoint in
   /// `open`, so this limit keeps `open` as small as a frame. A state has one or two bytes for each
-  /// particle of a compact body, but 370 or more for an isolated particle, and 32 to 44 for each
-  /// particle of a stream with a noise filter. Therefore the limits of
-  /// tiles and particles would permit states larger than any message.
+  /// particle of a compact body. It has 370 or more for an isolated particle, and 32 to 44 for each
+  /// particle of a stream with a noise filter. Therefore the limits of tiles and particles would
+  /// permit states larger than any message.
   std::uint64_t MaxCheckpointBytes() const { return max_frame_bytes; }
 
-  /// Maximum number of open streams. A separate limit of the same size applies to concurrent calls
-  /// of ReconstructFrame.
+  /// Maximum number of open streams. The same number limits the concurrent calls of
+  /// ReconstructFrame of one caller. All callers together get twice the number (UnaryRegistry).
   std::uint32_t max_streams = 32;
 
   /// Maximum number of frames of one stream that the server holds. A frame counts from the start of
@@ -103,19 +103,19 @@ struct ServerLimits {
   /// An idle stream costs little memory except for its state, but it occupies a name and a slot.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};
 
-  /// Limits of unary calls. If the client does not receive a response in time, the server drops it,
-  /// because the response holds memory.
+  /// Limits of unary calls. A response that the client does not receive in time is dropped, because
+  /// it holds memory.
   UnaryLimits unary{.request = std::chrono::seconds(30), .answer = std::chrono::minutes(2)};
 
   /// Maximum number of watchers of all streams together.
   std::uint32_t max_watchers = 64;
 
   /// Maximum number of parts of a frame. The same number limits, for all streams together, the
-  /// connections that send parts 1 and above. 0: the server accepts whole frames only.
+  /// calls that send parts 1 and above. 0: the server accepts whole frames only.
   std::uint32_t max_parts = 256;
 
   /// Maximum memory that one watcher can pin: the results that it has not received yet. It usually
-  /// shares them with other watchers. A larger result is not sent to watchers.
+  /// shares them with other watchers. A larger result ends the watch.
   std::uint64_t max_watcher_bytes = std::uint64_t{16} << 20;
 
   /// A stream's last result is kept for new watchers if it is at most this large: 64 MiB divided by

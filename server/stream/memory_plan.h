@@ -30,8 +30,8 @@ struct MemoryPlan {
 /// Bytes that a connection may buffer before the server reads the messages of its call.
 inline constexpr std::uint64_t kUnreadBytes = 256 << 10;
 
-/// The results that watchers have not received yet may use 1/16 of the budget, in addition to the
-/// budget.
+/// Results that watchers have not received yet, and kept levels of detail, may use 1/16 of the
+/// budget in addition to it.
 inline constexpr std::uint64_t kPartsOfBudgetBeyond = 16;
 
 }  // namespace partiemc::server

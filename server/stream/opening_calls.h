@@ -31,8 +31,9 @@ inline constexpr std::string_view kReasonTooManyOpening = "TOO_MANY_OPENING";
 /// their number. This class evicts watchers only if memory is exhausted. Thread-safe.
 class OpeningCalls {
  public:
-  /// Function that evicts a call: ends it with this status, unless its first request has arrived.
-  /// Called from any thread, possibly after the call's Place was destroyed.
+  /// Function that evicts a call: ends it with this status. Does nothing to an opening call whose
+  /// first request has arrived. Called from any thread, possibly after the call's Place was
+  /// destroyed.
   using GiveWay = std::function<void(const absl::Status&)>;
 
  private:
@@ -101,8 +102,8 @@ class OpeningCalls {
   /// Same as GiveWayToAll, but evicts watchers instead of opening calls.
   void WatchersGiveWay() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Blocks until at least one call is tracked or `also` returns true, then returns true. Returns
-  /// false after StopWaiting. Only one thread may wait.
+  /// Blocks until at least one call is tracked or `also` returns true, then returns true. Calls
+  /// `also` with the lock held. Returns false after StopWaiting. Only one thread may wait.
   bool WaitForOne(const std::function<bool()>& also = [] { return false; })
       ABSL_LOCKS_EXCLUDED(mutex_);
   /// Makes WaitForOne evaluate `also` again.

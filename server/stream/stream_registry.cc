@@ -101,7 +101,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
     const MutexLock lock(mutex_);
     opened = OpenLocked(machine, std::move(description), std::move(token), former_machine);
   }
-  // Called without the lock, because TakenOver may call Leave, which takes the lock.
+  // Without the lock, because TakenOver may call Leave.
   if (former_machine != nullptr) former_machine->TakenOver();
   return opened;
 }
@@ -211,8 +211,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
     entries_.at(&machine).sends_part = true;
     if (tell_earlier_look_) tell_earlier_look_();
   }
-  // Called without the lock: Join may end an earlier call that sent this part, and that call then
-  // calls Leave, which takes the lock.
+  // Without the lock, because Join may end an earlier call of this part, which then calls Leave.
   const auto& assembler = stream->description.assembler;
   const auto seat = assembler->Join(terms.part, member);
   if (!seat.ok()) return seat.status();
@@ -266,8 +265,7 @@ void StreamRegistry::Leave(const StreamStateMachine& machine) {
   const auto found = entries_.find(&machine);
   if (found == entries_.end()) return;  // The machine was not admitted.
   entries_.erase(found);
-  // Notifies while it holds the lock. Otherwise a thread in WaitUntilEmpty could destroy the
-  // registry before the notification.
+  // Holds the lock, because a thread in WaitUntilEmpty may destroy the registry afterwards.
   left_.NotifyAll();
 }
 
@@ -349,8 +347,7 @@ void StreamRegistry::Drain() {
     draining_ = true;
     machines = Machines();
   }
-  // Called without the lock, because a state machine that drains may call Leave, which takes the
-  // lock.
+  // Without the lock, because a state machine that drains may call Leave.
   for (const auto& machine : machines) machine->Drain();
 }
 

@@ -108,8 +108,8 @@ class StreamRegistry {
   absl::StatusOr<JoinedPart> JoinPart(const StreamStateMachine& machine, const PartTerms& terms)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends the stream of the state machine: frees its name and its slot. Returns the stream's
-  /// summary if it was open.
+  /// Ends the stream of the state machine: frees its name and its slot, unless another call has
+  /// taken them over. Returns the stream's summary; absent if the machine has opened no stream.
   std::optional<StreamSummary> Close(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Removes the state machine. Called after the status of its call was sent.
   void Leave(const StreamStateMachine& machine) ABSL_LOCKS_EXCLUDED(mutex_);
@@ -133,7 +133,7 @@ class StreamRegistry {
   /// the servers.
   std::vector<std::string> TakeElsewhere() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Drains the present state machines one after the other in the order of their arrival, evenly
-  /// distributed over the time `within`. New calls are still admitted.
+  /// distributed over the time `within`. Blocks for this time. New calls are still admitted.
   void SendAway(std::chrono::milliseconds within) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Refuses new calls and drains every state machine.
   void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -161,7 +161,7 @@ class StreamRegistry {
     std::uint64_t arrival = 0;  // Number of calls that were admitted before this one.
     Caller caller;
     CallerAccount::Place place;           // Set while the stream is open.
-    std::optional<StreamSummary> stream;  // Set while open; `counts` is stale, the machine has it.
+    std::optional<StreamSummary> stream;  // Set from Open to Close; its `counts` are out of date.
     std::string token;                    // The stream token.
     bool taken_over = false;              // Whether another entry continues the stream.
     bool sends_part = false;              // Whether it sends parts of another entry's stream.

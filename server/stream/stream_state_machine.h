@@ -46,8 +46,8 @@ class StreamStateMachine;
 
 /// Carries the messages of a stream. There are `window` slots; each holds a request and its
 /// response. The transport shares the slots with the handler. StreamStateMachine has at most one
-/// read, one write and one computation in progress, each on another slot. It calls the transport
-/// without holding a lock.
+/// read, one write and one computation in progress, each on a different slot. It holds no lock when
+/// it calls the transport, except for `peer`.
 class StreamTransport {
  public:
   virtual ~StreamTransport() = default;
@@ -99,7 +99,7 @@ class StreamHandler {
 
 /// Time for which a client may keep a stream waiting; 0: no limit.
 struct IdleLimits {
-  std::chrono::milliseconds opening{0};    ///< From the call to its `open`.
+  std::chrono::milliseconds opening{0};    ///< From the call's start to its `open`.
   std::chrono::milliseconds streaming{0};  ///< Between frames, and from a write's start to its end.
 };
 
@@ -112,20 +112,19 @@ struct StreamCounts {
 
 /// The state machine of one stream (phases: server/base/call_state.h):
 ///
-///   opening --open--> serving --half-close, broken protocol, drain--> ending or closing -->
-///   finished
-///      |                 |                                                |                    ^
-///      |                 +----------- cancelled, write failed ------------+--> abandoned ------+
+///   opening --open--> serving --half-close, bad request, drain--> ending or closing --> finished
+///      |                 |                                            |                     ^
+///      |                 +----------- cancelled, write failed --------+--> abandoned -------+
 ///      +-- no open, or refused: ending, with nothing to answer
 ///
 /// While serving, frame n uses slot n % window from the start of its read to the end of its
 /// response's write. So if a client does not read its responses, the server stops reading from it.
 /// In the phase `ending` the stream still answers all frames that it has read. In the phase
-/// `abandoned` it sends nothing more. Thread-safe.
+/// `closing` it does so too, except for frames with missing parts. In the phase `abandoned` it
+/// sends nothing more. Thread-safe.
 ///
-/// A frame that arrives in parts is computed when MayAnswer permits it for each of the calls. If
-/// the server, or the stream that the parts belong to, closes this stream, frames with missing
-/// parts get no response.
+/// A frame that arrives in parts is computed when MayAnswer permits it for each of the calls. A
+/// drain, or an error that ends the call of part 0, leads to the phase `closing`.
 ///
 /// Memory: the budget of all streams counts requests that were read and responses that are not
 /// written yet. While a stream has frames in flight, it reads another frame only if the budget has
@@ -161,16 +160,15 @@ class StreamStateMachine final : public SerializedCall,
   /// The client has resumed this stream in another call, so the connection of this call may be
   /// dead. Abandons the stream with ABORTED.
   void TakenOver();
-  /// Ends this stream with this error if it has not received its `open`. Has no effect on other
-  /// streams.
+  /// Ends this stream with this error if it has not received its `open`. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
   /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read, and
   /// ends the stream with UNAVAILABLE.
   void Drain();
   /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`. The
   /// client has either not sent a request, or not received a response; in the second case the call
-  /// is cut. The time in which the stream waits for a worker or for memory does not count. Returns
-  /// the time of the next check.
+  /// is cut. A frame's wait for parts or a worker does not count. The stream's wait for a permit to
+  /// read does. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 

@@ -35,8 +35,7 @@ bool IsStreamToken(std::string_view text) {
 
 absl::Status CheckStreamToken(std::string_view text) {
   if (IsStreamToken(text)) return absl::OkStatus();
-  // The error does not contain the text, because the client may have sent another secret by
-  // mistake.
+  // Without the text, which may be another secret that the client has sent by mistake.
   return ViolationError(
       absl::StatusCode::kInvalidArgument,
       {std::string(kReasonStreamToken), "open.resume.stream_token",

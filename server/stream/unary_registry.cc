@@ -62,8 +62,7 @@ void UnaryRegistry::Leave(const UnaryStateMachine& call) {
   const MutexLock lock(mutex_);
   FreePlace(call);  // A request that arrives while the call ends may have taken a slot.
   calls_.erase(&call);
-  // Notifies while it holds the lock. Otherwise a thread in WaitForFrames could destroy the
-  // registry before the notification.
+  // Holds the lock, because a thread in WaitForFrames may destroy the registry afterwards.
   left_.NotifyAll();
 }
 
@@ -75,7 +74,7 @@ std::size_t UnaryRegistry::count() const {
 std::chrono::steady_clock::time_point UnaryRegistry::EndIdle(
     const UnaryLimits& limits, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Called without the lock, because a call that ends may call Leave, which takes the lock.
+  // Without the lock, because a call that ends may call Leave.
   for (const auto& call : All()) look_again = std::min(look_again, call->EndIfIdle(limits, now));
   return look_again;
 }
@@ -87,8 +86,7 @@ std::vector<std::shared_ptr<UnaryStateMachine>> UnaryRegistry::All() const {
   return all;
 }
 
-// Ends the calls without holding the lock, because a call that ends may call Leave, which takes the
-// lock.
+// Ends the calls without the lock, because a call that ends may call Leave.
 void UnaryRegistry::Drain() {
   {
     const MutexLock lock(mutex_);

@@ -23,8 +23,8 @@ inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 /// Limits the number of concurrent calls of each kind. Thread-safe.
 class UnaryRegistry {
  public:
-  /// Maximum number of calls of one caller that only return information, and of health checks. Such
-  /// calls take little time.
+  /// Maximum number of one caller's calls for information, and of its health checks. Such calls
+  /// take little time.
   static constexpr std::uint32_t kInformationCalls = 64;
 
   /// `max_frame_calls`: maximum number of calls with a frame of one caller. Each kind has twice
@@ -38,7 +38,7 @@ class UnaryRegistry {
   /// Errors, each with a Violation: UNAVAILABLE (DRAINING), for calls with a frame only.
   absl::Status Enter(std::shared_ptr<UnaryStateMachine> call, UnaryKind kind)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes a slot after the call's request has arrived. The account must live until GiveBackPlace.
+  /// Takes a slot after the call's request has arrived. The account outlives the slot.
   /// Errors, each with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_CALLS).
   absl::Status TakePlace(const UnaryStateMachine& call, const CallerAccount& caller)
       ABSL_LOCKS_EXCLUDED(mutex_);
@@ -55,7 +55,7 @@ class UnaryRegistry {
   std::chrono::steady_clock::time_point EndIdle(const UnaryLimits& limits,
                                                 std::chrono::steady_clock::time_point now);
 
-  /// Refuses further calls with a frame, and ends the calls that have not sent their request.
+  /// Refuses further calls with a frame. Ends the calls of all kinds that have sent no request.
   void Drain() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Blocks until all calls with a frame have left. Returns false if `deadline` passes first. Other
   /// kinds of calls may continue.

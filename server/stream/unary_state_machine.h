@@ -56,7 +56,7 @@ struct UnaryLimits {
 ///      +-- refused, no request, drained: ending
 ///
 /// Memory: the budget of all streams counts the request after it was read, and the response until
-/// it was written. If one of them does not fit into the budget, the call ends. Thread-safe.
+/// it was written. If one does not fit into the budget, a call of kind kFrame ends. Thread-safe.
 class UnaryStateMachine final : public SerializedCall {
  public:
   /// Requires: `transport` lives until its Finish returns; `budget`, `pool` and `caller` live
@@ -75,7 +75,7 @@ class UnaryStateMachine final : public SerializedCall {
   void WriteDone(bool ok);
   /// The client has disconnected.
   void Cancelled();
-  /// Ends this call with this error if it has no request or no slot. Has no effect on other calls.
+  /// Ends this call with this error if ReadDone was not called yet. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
   /// Ends the call if its client has exceeded a limit at `now`: with DEADLINE_EXCEEDED (IDLE), or
   /// by cutting the call if the response is being written. Returns the time of the next check.

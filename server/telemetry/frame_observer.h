@@ -10,8 +10,7 @@ class StageClock;
 
 namespace server {
 
-/// Receives the events of frames. Compute threads call it, so implementations must be fast and
-/// thread-safe.
+/// Compute threads call it, so implementations must be fast and thread-safe.
 class FrameObserver {
  public:
   virtual ~FrameObserver() = default;

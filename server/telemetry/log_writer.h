@@ -40,7 +40,7 @@ class LogWriter {
   void FlushInSignal(std::chrono::milliseconds patience) const;
 
   /// Flushes for at most half a second and ends the writer thread. Lines that follow are dropped.
-  /// If the thread blocks on a full pipe, it is abandoned.
+  /// If the thread blocks on a full pipe for another half second, it is abandoned.
   void Stop();
 
   std::uint64_t dropped() const;

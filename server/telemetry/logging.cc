@@ -104,7 +104,7 @@ class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
   const std::shared_ptr<LogWriter> to_;
 };
 
-// Lines about missing lines.
+// Logs how many refusals were held back, and how many lines were dropped since the last call.
 void TellLosses() {
   if (const auto count = refusals.TakeHeldBack(); count > 0) {
     LogEvent(spdlog::level::warn, "more refusals", {{"count", count}});

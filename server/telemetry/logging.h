@@ -30,7 +30,7 @@ void RefuseTraces();
 /// Installs a handler that flushes the log if the process aborts (an assertion, std::terminate).
 void FlushLogOnAbort();
 
-/// Logs the number of dropped lines, then waits at most `patience` until everything is written.
+/// Logs the losses since the last log of them. Waits at most `patience` until all is written.
 void FlushLog(std::chrono::milliseconds patience = std::chrono::milliseconds(500));
 
 /// Losses since the start: lines that were dropped because standard error was too slow, and

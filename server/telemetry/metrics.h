@@ -20,10 +20,9 @@
 
 namespace partiemc::server {
 
-/// The metrics of the server. Events update counters and histograms; this costs some hundred
-/// nanoseconds per frame. Each scrape calls the functions of gauges and of external counters. No
-/// label has a value that a client can choose, so the number of time series is bounded.
-/// Thread-safe.
+/// Events update counters and histograms; this costs some hundred nanoseconds per frame. Each
+/// scrape calls the functions of gauges and of external counters. No label has a value that a
+/// client can choose, so the number of time series is bounded. Thread-safe.
 class Metrics final : public prometheus::Collectable, public FrameObserver {
  public:
   Metrics();
@@ -33,7 +32,7 @@ class Metrics final : public prometheus::Collectable, public FrameObserver {
 
   /// Adds a gauge; each scrape calls `value`. Requires: no scrape has begun.
   void AddGauge(std::string name, std::string help, std::function<double()> value);
-  /// Adds a counter; each scrape calls `value`.
+  /// Same as AddGauge, for a counter.
   void AddCounter(std::string name, std::string help, std::function<double()> value);
 
   /// The registry to which other components add their counters.

@@ -91,7 +91,7 @@ void LevelQueue::Request(const Seat& seat, Frame exact, bool may_skip, Waiter& w
   job_came_.NotifyOne();
 }
 
-// The watchers that may skip frames take the newest frame instead of the frames in the queue.
+// Ends the requests of the queue that may be skipped. Their watchers take the newest frame instead.
 void LevelQueue::SkipOlder(Group& group) {
   for (Job& job : group.jobs) {
     std::erase_if(job.requests, [this](const Asked& request) {
@@ -166,7 +166,7 @@ void LevelQueue::Serve() {
 
 void LevelQueue::Run() {
   pthread_setname_np(pthread_self(), "levels");
-  setpriority(PRIO_PROCESS, 0, kNice);  // Linux: of this thread only.
+  setpriority(PRIO_PROCESS, 0, kNice);  // Under Linux only this thread.
   Arena arena(1);
   const MutexLock lock(mutex_);
   while (true) {

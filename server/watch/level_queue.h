@@ -28,26 +28,27 @@ namespace partiemc::server {
 inline constexpr std::string_view kReasonTooManyLevels = "TOO_MANY_LEVELS";
 
 /// Computes each level once for each frame, for all watchers that share it. A level waits for its
-/// turn: all pairs of a stream and a level take turns, and a pair computes its frames in order. A
-/// watcher that may skip frames leaves a frame that has not begun as soon as another watcher of the
-/// pair requests a newer frame. So these watchers meet at the newest frame, and a pair has at most
-/// one such frame in the queue.
+/// turn: all pairs of a stream and a level take turns, and a pair computes its frames in order.
+/// Some watchers may skip frames. If one of them requests a frame that is not in the queue, the
+/// others skip the frames in the queue. So these watchers meet at the newest frame, and at most one
+/// frame of a pair waits for them.
 ///
 /// Compute threads never wait for levels: the thread has a low priority, uses one processor, and
 /// passes its results to the dispatcher. Computed levels are kept for further watchers of the same
-/// frame, within `kept_bytes`, until a later frame needs the memory or the last watcher of the pair
+/// frame, within `kept_bytes`, until another level needs the memory or the last watcher of the pair
 /// leaves.
 ///
 /// Thread-safe. Held by shared_ptr.
 class LevelQueue final : public Dispatched {
  public:
   using Frame = std::shared_ptr<const WatchFrame>;
-  /// A level, or why there is none.
+  /// A level, or the error that prevented it.
   struct Made {
     absl::StatusOr<Frame> level = Frame();
     bool may_succeed_later = false;  ///< After an error: watchers that may skip the frame skip it.
   };
-  /// Makes the level of a frame. Ends soon after `cancelled` was set. Does not throw.
+  /// Makes the level of a frame, on the queue's thread. Ends soon after `cancelled` is set. Does
+  /// not throw.
   using Compute = std::function<Made(const Frame& exact, const LevelOfDetail& level,
                                      const std::atomic<bool>& cancelled)>;
 
@@ -69,7 +70,7 @@ class LevelQueue final : public Dispatched {
   struct Group;
 
  public:
-  /// The share of a watcher in a level of a stream; move-only.
+  /// The registration of a watcher for a level of a stream; move-only. The destructor ends it.
   class Seat {
    public:
     Seat() = default;
@@ -98,20 +99,21 @@ class LevelQueue final : public Dispatched {
       : dispatcher_(dispatcher), compute_(std::move(compute)), limits_(limits) {}
   ~LevelQueue() override { Stop(); }
 
-  /// Adds a watcher to a level of the stream with this address, which outlives the seat. The seat
-  /// must not outlive the queue.
-  /// Errors, with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_LEVELS).
+  /// Adds a watcher to a level of a stream. `stream`: address of an object that identifies the
+  /// stream and outlives the seat. The seat must not outlive the queue.
+  /// Errors, with a Violation: RESOURCE_EXHAUSTED (TOO_MANY_LEVELS), if `levels_per_stream` other
+  /// levels have watchers.
   absl::StatusOr<Seat> Join(const void* stream, const LevelOfDetail& level)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Requests the level of `exact`. Requires: the waiter has no other request. Never blocks.
+  /// Requests the level of `exact`; returns at once. Requires: the waiter has no other request.
   void Request(const Seat& seat, Frame exact, bool may_skip, Waiter& waiter)
       ABSL_LOCKS_EXCLUDED(mutex_);
   /// Withdraws the request of `waiter`. Returns false if there is none, or if LevelDone has begun
-  /// or is about to.
+  /// or is about to begin.
   bool Withdraw(const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends the thread. Requests that are not answered yet never are.
+  /// Ends the thread. LevelDone is not called for the remaining requests.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of levels that were computed, and of requests that another request's level has served.
@@ -119,9 +121,9 @@ class LevelQueue final : public Dispatched {
   std::uint64_t shared() const { return shared_; }
   /// Bytes of the levels that are kept.
   std::uint64_t kept_bytes() const { return kept_bytes_; }
-  /// Different levels of all streams.
+  /// Number of levels of all streams that have watchers.
   std::size_t level_count() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Levels that wait for the thread or are computed.
+  /// Number of levels that wait for the thread or are being computed.
   std::size_t waiting() const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
@@ -169,7 +171,7 @@ class LevelQueue final : public Dispatched {
   const Compute compute_;
   const Limits limits_;
   std::atomic<std::uint64_t> computed_ = 0, shared_ = 0, kept_bytes_ = 0;
-  std::atomic<bool> cancelled_ = false;  // No watcher waits for the running job.
+  std::atomic<bool> cancelled_ = false;  // The running job must end: no watcher waits, or Stop.
 
   mutable Mutex mutex_;
   CondVar job_came_;

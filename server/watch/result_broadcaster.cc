@@ -51,7 +51,7 @@ std::vector<Published> ResultBroadcaster::HandOver() {
   if (!history_) return frames;
   frames.reserve(history_->size());
   for (std::size_t k = 0; k < history_->size(); ++k) frames.push_back(history_->at(k));
-  if (watchers_.empty()) history_.reset();  // Watchers may still read it.
+  if (watchers_.empty()) history_.reset();  // Present watchers may still read it.
   return frames;
 }
 

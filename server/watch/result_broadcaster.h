@@ -22,7 +22,7 @@ namespace partiemc::server {
 class ResultBroadcaster final : public Dispatched {
  public:
   struct Limits {
-    /// Maximum bytes of frames that the dispatcher has not processed yet.
+    /// Maximum bytes of frames that the dispatcher has not taken yet. A frame beyond it drops them.
     std::size_t mailbox_bytes = std::size_t{16} << 20;
     /// If there are no watchers and no history, the newest frame is kept for later watchers if it
     /// is at most this large.
@@ -64,11 +64,12 @@ class ResultBroadcaster final : public Dispatched {
     HeldFrames held;
     Published first;  ///< The newest result, to deliver at once; may be empty.
     std::uint64_t next_held =
-        0;  ///< Otherwise the first number to read with Held; 0: live results only.
+        0;  ///< First number to read with Held, if `first` is empty; 0: live results only.
     std::uint64_t last_number = 0;  ///< Number of the last published result.
   };
-  /// Adds a watcher. It starts with the frame `from`, or with the oldest available frame after
-  /// `from`; without `from`, it starts with the newest frame. All results published after this call
+  /// Adds a watcher. It starts with the frame of sequence number `from`, or else with the oldest
+  /// available frame after it. Without `from`, it starts with the newest frame. If all are older
+  /// than `from`, it starts with the next published result. All results published after this call
   /// are offered to the watcher.
   Joined Join(std::shared_ptr<WatchStateMachine> watcher, std::optional<std::uint64_t> from)
       ABSL_LOCKS_EXCLUDED(mutex_);
@@ -94,8 +95,7 @@ class ResultBroadcaster final : public Dispatched {
   std::uint64_t oldest_here() const { return oldest_sequence_; }
 
   std::uint32_t watcher_count() const { return watcher_count_; }
-  /// Number of voluntary context switches of the producer's thread in Publish and Announce: how
-  /// often it had to wait.
+  /// Number of calls of Publish and Announce, with watchers, in which the producer's thread waited.
   std::uint64_t producer_waits() const { return producer_waits_; }
 
  private:

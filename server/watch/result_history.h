@@ -45,7 +45,7 @@ class HistoryRoom {
 };
 
 /// The newest frames without gaps. If a frame cannot be added because it exceeds the limit, all
-/// frames are dropped. Not thread-safe. Allocates nothing once it has been full.
+/// frames are dropped. Not thread-safe. Allocates only if it holds more frames than ever before.
 class ResultHistory {
  public:
   /// Requires: `room` outlives this.

@@ -43,8 +43,7 @@ void WatchRegistry::Leave(const WatchStateMachine& watcher) {
   const MutexLock lock(mutex_);
   placed_.erase(&watcher);
   watchers_.erase(&watcher);
-  // Notifies while it holds the lock. Otherwise the waiting thread could delete the registry before
-  // the notification.
+  // Holds the lock, because the waiting thread may destroy the registry afterwards.
   left_.NotifyAll();
 }
 
@@ -62,7 +61,7 @@ std::uint64_t WatchRegistry::held_bytes() const {
 std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
   auto look_again = std::chrono::steady_clock::time_point::max();
-  // Called without the lock, because a watch that ends may call Leave, which takes the lock.
+  // Without the lock, because a watch that ends may call Leave.
   for (const auto& watcher : All()) {
     look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
   }
@@ -76,8 +75,7 @@ std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
   return all;
 }
 
-// Ends the watches without holding the lock, because a watch that ends may call Leave, which takes
-// the lock.
+// Ends the watches without the lock, because a watch that ends may call Leave.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   {
     const MutexLock lock(mutex_);

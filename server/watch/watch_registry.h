@@ -46,8 +46,8 @@ class WatchRegistry {
   std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
                                                   std::chrono::steady_clock::time_point now);
 
-  /// Refuses new watchers and ends every watch. At the time `patience`, cuts the watches whose
-  /// clients have not read the end.
+  /// Refuses new watchers and ends every watch. Blocks until all have left, at most until
+  /// `patience`; then cuts the watches whose clients have not read the end.
   void Drain(std::chrono::steady_clock::time_point patience) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Waits until all watchers have left. Returns false if the deadline passes first.
   bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);

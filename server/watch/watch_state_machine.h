@@ -57,8 +57,9 @@ class WatchTransport {
   /// WriteOpened; completes by WatchStateMachine::Opened, during this call or later.
   virtual void StartOpen() = 0;
 
-  /// Each starts a write; completes by WatchStateMachine::WriteDone, WriteFrame also by
-  /// WriteSkipped or WriteRefused.
+  /// Each of these three starts a write, which completes by WatchStateMachine::WriteDone.
+  /// WriteFrame may complete by WriteSkipped or WriteRefused instead. `dropped`: number of results
+  /// that were not sent since the last frame that was sent.
   virtual void WriteOpened(const HeldFrames& held) = 0;
   /// `oldest_sequence`: the oldest frame that a watcher can request now.
   virtual void WriteFrame(const Published& published, std::uint64_t dropped,
@@ -91,7 +92,8 @@ struct WatchCounts {
 /// then a watch in mode `latest` holds only the newest frame. A watch in mode `every` holds all
 /// frames, up to `max_bytes` including the frame being written; it reads further frames from the
 /// history later. If the history lacks such a frame, the watch ends. After the end of the stream,
-/// pending frames are still written as credit arrives. Thread-safe.
+/// pending frames are still written as credit arrives, unless the stream ended with an error
+/// status. Thread-safe.
 ///
 /// A watcher that starts in the history reads it frame by frame, in both modes, and holds only the
 /// frame being written. When it has read the whole history, it continues with the frames that are
@@ -117,8 +119,8 @@ class WatchStateMachine final : public SerializedCall {
   /// Completes StartOpen. If `terms` is an error, the watch ends.
   void Opened(const absl::StatusOr<WatchTerms>& terms);
   void WriteDone(bool ok);
-  /// The transport has not begun to write the frame of WriteFrame, and never will: the watcher
-  /// misses it. Takes the place of WriteDone.
+  /// Instead of WriteDone: the transport will not write the frame of WriteFrame. The watcher misses
+  /// the frame and keeps its credit.
   void WriteSkipped();
   /// As WriteSkipped, and ends the watch with this error.
   void WriteRefused(const absl::Status& status);
@@ -136,7 +138,7 @@ class WatchStateMachine final : public SerializedCall {
   /// the time `now`. `limit` 0: no limit. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
                                                     std::chrono::steady_clock::time_point now);
-  /// Ends this watch with this error if it has received no `open`. Has no effect on other watches.
+  /// Ends this watch with this error if it has received no `open`. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
   /// Ends an open watch with this error at once. Pending frames and the message `ended` are not
   /// sent. A pending write is cut, because it may never complete.
@@ -188,9 +190,9 @@ class WatchStateMachine final : public SerializedCall {
   std::deque<Published> pending_ ABSL_GUARDED_BY(mutex_);
   Published in_write_ ABSL_GUARDED_BY(mutex_);
   std::size_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;     // Of pending_ and in_write_.
-  std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;      // The last offered frame; 0: none.
-  std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;    // Next of the history; 0: live.
-  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;    // Next frame if none is dropped.
+  std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;      // Last offered number; 0: none.
+  std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;    // Next number of the history; 0: live.
+  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;    // Next number if none is dropped.
   std::uint64_t told_before_ ABSL_GUARDED_BY(mutex_) = 0;  // next_told_ before in_write_.
   WatchCounts counts_ ABSL_GUARDED_BY(mutex_);
 };

@@ -48,11 +48,12 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   }
   /// Closes the connection at once. Called on the strand.
   void Close();
-  /// Sets a function that runs once, when this side closes the connection. It ends operations that
-  /// wait for something other than the socket.
+  /// Sets a function that runs once, when this side closes the connection. The function ends
+  /// operations that wait for something other than the socket. Null: none.
   void WhenClosed(std::function<void()> closed) { closed_ = std::move(closed); }
 
-  /// Closes the connection after `time`. A later call replaces the deadline.
+  /// Closes the connection after `time`, and counts this as a timeout. A later call replaces the
+  /// deadline.
   void CloseAfter(std::chrono::milliseconds time);
   void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
 
@@ -65,7 +66,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebContext& context;
   const std::string peer;
   ConnectionSlots::Slot slot;
-  /// Received bytes that are not used yet.
+  /// Received bytes that were not parsed yet.
   boost::beast::flat_buffer buffer{kMaxHeaderBytes};
 
  protected:

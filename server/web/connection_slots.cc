@@ -11,8 +11,7 @@ ConnectionSlots::Slot::~Slot() {
   const auto found = slots_->connections_.find(number_);
   if (!found->second.evicted) slots_->Uncount(found->second);
   slots_->connections_.erase(found);
-  // Notifies while it holds the lock. Otherwise a thread that waits for the last connection could
-  // destroy this object before the notification.
+  // Holds the lock, because the waiting thread may destroy this object afterwards.
   slots_->left_.NotifyAll();
 }
 

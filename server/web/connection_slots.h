@@ -21,9 +21,9 @@ namespace partiemc::server {
 /// If a new connection would exceed the limit of its address or of the server, an idle connection
 /// is evicted. At the limit of the address, it is the oldest idle connection of this address. At
 /// the limit of the server, it is the oldest one of the address with the most idle connections. If
-/// no connection is idle, the new connection gets a reserved slot, in which the gateway answers
-/// health checks only. Connections in reserved slots always count as idle and are evicted by the
-/// same rule, so each new connection gets a slot. Thread-safe.
+/// there is none, the new connection gets a reserved slot, in which the gateway answers health
+/// checks only. Connections in reserved slots always count as idle and are evicted by the same
+/// rule, so each new connection gets a slot. Thread-safe.
 class ConnectionSlots {
  public:
   struct Limits {
@@ -33,9 +33,9 @@ class ConnectionSlots {
   };
 
   enum class State {
-    kNoCall,   ///< Idle. Closing it loses nothing.
+    kNoCall,   ///< Idle: no call, at most a response to be sent, such as a file.
     kPending,  ///< Idle: a call without a request, or an ended call whose status is being sent.
-    kServed,   ///< Not idle.
+    kServed,   ///< Busy.
   };
 
   /// Function that closes the connection soon. Called from any thread, possibly after the
@@ -73,7 +73,7 @@ class ConnectionSlots {
   Slot Enter(const std::string& address, End end, bool& evicted) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::size_t count() const ABSL_LOCKS_EXCLUDED(mutex_);
-  /// EndUnused closes the connections that have no call; EndAll closes all connections.
+  /// EndUnused closes the connections in state kNoCall; EndAll closes all connections.
   void EndUnused() { EndSome(false); }
   void EndAll() { EndSome(true); }
   /// Waits until all connections are closed. Returns false if the deadline passes first.

@@ -54,7 +54,7 @@ struct WebContext {
 
 /// Time limit for the handshakes of a connection, and for receiving the header of a request.
 inline constexpr std::chrono::seconds kWebHeaderTime{10};
-/// Time limit for sending a response that does not belong to a call.
+/// Time limit for sending a response that does not belong to a call, and for each piece of a file.
 inline constexpr std::chrono::seconds kWebResponseTime{30};
 /// Time limit for sending the end of a call and for closing the connection afterwards.
 inline constexpr std::chrono::seconds kWebCloseTime{5};

@@ -10,8 +10,8 @@
 
 namespace partiemc::server {
 
-/// Collects the bytes of a message as they arrive. Allocates memory for received bytes, not for the
-/// announced length: at most about the received bytes plus 16 KiB.
+/// Collects the bytes of a message as they arrive. Allocates at most twice the received bytes plus
+/// 16 KiB, whatever length the client announces.
 class GatheredMessage {
  public:
   /// Received bytes.

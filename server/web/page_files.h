@@ -40,10 +40,9 @@ class PageFiles {
   /// An empty `root` has no files.
   explicit PageFiles(std::string root) : root_(std::move(root)) {}
 
-  /// True if the page is installed.
   bool HasPage() const { return Find({.path = "index.html"}).has_value(); }
-  /// Opens a regular file of the folder. If `wanted.takes_gzip` is set and NAME.gz exists, opens
-  /// NAME.gz instead. Follows no symbolic links.
+  /// Opens a regular file of the folder; returns nothing if there is none. If `wanted.takes_gzip`
+  /// is set and NAME.gz exists, opens NAME.gz instead. Follows no symbolic links.
   std::optional<PageFile> Find(const WebFile& wanted) const;
 
  private:

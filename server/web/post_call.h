@@ -46,7 +46,7 @@ class PostCall final : public WebChannel {
     if (length && *length > message_limit()) {
       return Break(WebRefusal::kTooLarge, TooLarge(*length));
     }
-    parser_->body_limit(message_limit());  // For chunked bodies: limit of all chunks.
+    parser_->body_limit(message_limit());  // Also limits chunked bodies, all chunks together.
     const auto expect = parser_->get()[boost::beast::http::field::expect];
     if (!boost::beast::iequals(expect, "100-continue")) return ReadMore();
     static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";

@@ -27,11 +27,10 @@ struct WebRequest {
   bool has_body = false;
 };
 
-/// Rules for allowed hosts and origins.
 struct WebRules {
-  /// See WebOptions::origins.
+  /// WebOptions::origins in the form of NormalOrigin.
   std::vector<std::string> origins = {};
-  /// See WebOptions::hosts.
+  /// WebOptions::hosts in the form of NormalHostName.
   std::vector<std::string> hosts = {};
   /// Whether the server listens on a loopback address only.
   bool is_local = true;
@@ -58,7 +57,7 @@ enum class WebMethod { kInfo, kStreams, kFrame, kWatch, kReconstruct };
 struct WebCall {
   WebMethod method = WebMethod::kInfo;
   std::optional<std::string> authorization = {};  ///< See CallOrigin::authorization.
-  bool from_page = false;  ///< From a browser, which does not read the body of a refusal.
+  bool from_page = false;  ///< Has an Origin header, so a browser sent it (SocketCall).
 };
 
 /// A file of the page. `path` is relative to the root: names separated by '/', none of which begins
@@ -72,8 +71,8 @@ struct WebHealth {
   bool head_only = false;
 };
 
-/// A CORS preflight: with this request a browser checks whether a page of another host may POST to
-/// this server.
+/// A CORS preflight: with this request a browser checks whether a page of another origin may POST
+/// to this server.
 struct WebPreflight {};
 
 struct WebRefused {
@@ -85,20 +84,21 @@ struct WebRefused {
 
 struct WebAnswer {
   std::variant<WebRefused, WebHealth, WebFile, WebPreflight, WebCall> what;
-  /// If not empty, the origin of a page on another host that may read the response.
+  /// If not empty, the origin of the page that sent the request and may read the response.
   std::string allowed_origin = {};
 };
 
 WebAnswer Understand(const WebRequest& request, const WebRules& rules);
 
-/// Whether a request may name `host`. A server on a loopback address accepts only names and
-/// addresses of this machine, the hosts of `rules`, and the hosts of the origins in `rules`. This
-/// prevents DNS rebinding, in which a page whose name resolves to 127.0.0.1 reads the server's
-/// responses.
+/// Whether a request may name `host`. A server on another than a loopback address accepts every
+/// host. A server on a loopback address accepts only names and addresses of this machine, the hosts
+/// of `rules`, and the hosts of the origins in `rules`. This prevents DNS rebinding, in which a
+/// page whose name resolves to 127.0.0.1 reads the server's responses.
 bool IsHostAllowed(std::string_view host, const WebRules& rules);
 
-/// Whether a page of `origin` may call the server under the name `host`. The origin must have the
-/// same host and port, or be one of the origins in `rules`. `host` must be allowed (IsHostAllowed).
+/// Whether a page of `origin` may call the server under the name `host`. It may if the origin is
+/// one of the origins in `rules`. It also may if the origin has the host and port of `host`, and
+/// `host` is allowed (IsHostAllowed).
 bool IsOriginAllowed(std::string_view origin, std::string_view host, const WebRules& rules);
 
 /// Returns the decoded path of a file of the page, without the query; "index.html" for "/". Returns
@@ -110,7 +110,7 @@ std::optional<std::string> FilePathOf(std::string_view target);
 struct OfferedProtocols {
   bool ours = false;
   std::vector<std::string> tokens = {};
-  bool is_malformed = false;
+  bool is_malformed = false;  ///< A token is invalid, or there are several.
 };
 OfferedProtocols ParseProtocols(const std::vector<std::string_view>& headers);
 
@@ -121,12 +121,12 @@ std::optional<std::string> DecodeBase64Url(std::string_view text);
 /// Whether `accept_encoding` lists "gzip" with a weight other than 0.
 bool AcceptsGzip(std::string_view accept_encoding);
 
-/// Returns the origin in normal form: "https://host[:port]" in lower case, without the scheme's
-/// default port. Errors: INVALID_ARGUMENT unless `text` is an origin.
+/// Returns the origin in normal form: "https://host[:port]" or "http://host[:port]" in lower case,
+/// without the scheme's default port. Errors: INVALID_ARGUMENT unless `text` is an origin.
 absl::StatusOr<std::string> NormalOrigin(std::string_view text);
 
-/// Returns a host name or address in lower case. Errors: INVALID_ARGUMENT for any other text, such
-/// as a name with a port.
+/// Returns a host name or address (IPv6 in brackets) in lower case. Errors: INVALID_ARGUMENT for
+/// any other text, such as a name with a port.
 absl::StatusOr<std::string> NormalHostName(std::string_view text);
 
 }  // namespace partiemc::server

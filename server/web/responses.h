@@ -1,4 +1,4 @@
-// Responses of the gateway that are not responses of a call, such as files and refusals.
+// The HTTP responses of the gateway: files, refusals, health, and the heads of calls' responses.
 #pragma once
 
 #include <cstdint>
@@ -37,14 +37,14 @@ std::string PagePolicy(const std::vector<std::string>& frame_ancestors);
 /// result of PagePolicy.
 WebResponse ResponseOf(const PageFile& file, const WebFile& asked, std::string_view if_none_match,
                        const std::string& policy);
-/// Returns the response for a missing file. If the page itself is missing, the response explains
-/// how to install it.
+/// Returns the response for a missing file. If the page is not installed, the response for
+/// "index.html" explains how to install it.
 WebResponse ResponseWithoutFile(const WebFile& asked, bool has_page);
 /// Returns the response to a call that ended without a response message: its status as JSON.
 WebResponse ResponseTo(const absl::Status& status);
 /// Returns the head of the response with a call's response message of `bytes`.
 WebResponse ResponseOfCall(std::uint64_t bytes);
-/// Permits the page of `origin`, an allowed origin on another host, to read the response.
+/// Permits pages of `origin`, which must be an allowed origin, to read the response.
 void AllowOrigin(const std::string& origin, WebResponse& response);
 
 }  // namespace partiemc::server

@@ -16,7 +16,7 @@ class SignsOfLife {
   using TimePoint = std::chrono::steady_clock::time_point;
   enum class Next { kWait, kPing, kGiveUp };
 
-  /// `write`: time limit for writing one message.
+  /// `write`: time limit for writing one message; 0: no limit.
   SignsOfLife(WebPings pings, std::chrono::milliseconds write, TimePoint now)
       : pings_(pings), write_(write), last_(now) {}
 

@@ -72,7 +72,7 @@ class SocketCall final : public WebChannel {
                    boost::beast::string_view(kWebProtocol.data(), kWebProtocol.size()));
     }));
     socket_.auto_fragment(false);
-    socket_.read_message_max(0);  // Checked here, where the client can be informed.
+    socket_.read_message_max(0);  // No limit: OnSome refuses with a reason.
     socket_.control_callback([this](websocket::frame_type kind, auto) {
       signs_.OnSign(Now::now());
       if (kind == websocket::frame_type::close) OnClientClose();

@@ -10,7 +10,7 @@
 namespace partiemc::server {
 
 /// Provides the TLS context for new connections. Open connections keep the context with which they
-/// began.
+/// began. Not thread-safe.
 class TlsContexts {
  public:
   /// `current` must have an identity and outlive this object. Whether clients need a certificate is

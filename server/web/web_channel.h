@@ -17,7 +17,7 @@
 namespace partiemc::server {
 
 /// Runs the requests of a call's state machine on the connection's strand. Keeps the contract of
-/// CallChannel: each read and each write is answered once, OnCancel is called at most once, and
+/// CallChannel: each read and each write completes once, OnCancel is called at most once, and
 /// OnDone is called last. Keeps itself alive until then. Held by shared_ptr.
 class WebChannel : public CallChannel, public std::enable_shared_from_this<WebChannel> {
  public:
@@ -40,7 +40,7 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
 
   /// Starts to read the next message. Completes by Deliver, or by ReadEnded if no message follows.
   virtual void Read() = 0;
-  /// Ends with Written.
+  /// Starts to send the message. Completes by Written.
   virtual void Write(const grpc::ByteBuffer& message) = 0;
   /// Sends the end of the call; completes by OnEndSent. The connection may already be closed.
   virtual void SendEnd(const absl::Status& status) = 0;
@@ -52,13 +52,13 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
   /// The client sends no further message, because it has half-closed or disconnected.
   void ReadEnded();
   void Written(bool ok);
-  /// The client has disconnected, or has stopped waiting although a status could still be sent to
-  /// it.
+  /// The client has disconnected: cancels the call, and sends nothing more.
   void OnDisconnect();
+  /// Cancels the call. Its status is still sent, unless the client has disconnected.
   void CancelCall();
   /// The client has broken the protocol: cancels the call and sends `status`.
   void Break(WebRefusal refusal, absl::Status status);
-  /// The end was sent, or cannot be sent.
+  /// The end was sent, or cannot be sent. Deletes the call.
   void OnEndSent();
 
   bool is_gone() const { return gone_; }

@@ -42,8 +42,8 @@ class WebGateway {
   /// With the actual port.
   const Address& address() const;
 
-  /// Stops accepting connections, then waits until all calls have ended and all connections are
-  /// closed. At the deadline, cuts the remaining connections.
+  /// Stops accepting connections and closes the connections without a call. Waits until all others
+  /// are closed. At the deadline, cuts the remaining connections.
   void Stop(std::chrono::steady_clock::time_point deadline);
 
  private:

@@ -17,8 +17,8 @@ struct Percentiles {
 /// Returns 0 for every percentile if `times` is empty. Sorts `times`.
 Percentiles PercentilesOf(std::vector<double>& times);
 
-/// Whether medians and 99th percentiles of two windows of equal length differ by at most 5 % or
-/// .2 ms. False if a window is empty.
+/// Whether the medians of two windows of equal length agree, and their 99th percentiles: within 5 %
+/// of the larger one or within 0.2 ms. False if a window is empty.
 bool HaveSettled(const Percentiles& before, const Percentiles& after);
 
 /// Collects times from many threads.

@@ -56,7 +56,6 @@ double CpuSecondsOf(std::thread& thread) {
   return pthread_getcpuclockid(thread.native_handle(), &clock) == 0 ? SecondsOf(clock) : 0;
 }
 
-// State that all threads share.
 struct Shared {
   const LoadFlags& flags;
   std::vector<std::vector<float>> frames;
@@ -65,7 +64,7 @@ struct Shared {
   std::atomic<std::uint64_t> answered = 0, late = 0, refused = 0;
   std::atomic<bool> stop = false;
   Mutex mutex;
-  absl::Status error ABSL_GUARDED_BY(mutex);  // The first one.
+  absl::Status error ABSL_GUARDED_BY(mutex);  // The first error.
 
   void Fail(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mutex) {
     const MutexLock lock(mutex);
@@ -112,7 +111,8 @@ class LoadedStream {
   // Processor time of the two threads, which includes most of gRPC's work.
   double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
-  // Arrival time of the response to a frame; empty if the response has not arrived.
+  // Arrival time of the response to a frame. Empty if the response has not arrived, except after
+  // kRemembered frames: then the time of the frame kRemembered earlier.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
     const auto at = answered_at_[sequence % kRemembered].load();
     if (at == Clock::duration::rep{0}) return std::nullopt;
@@ -177,7 +177,6 @@ class LoadedStream {
   std::thread sender_, receiver_;
 };
 
-// Watches a stream until it ends.
 void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& server) {
   const auto watcher =
       Watcher::Open(server, stream.name(), {.credentials = shared.flags.server.credentials});
@@ -212,7 +211,8 @@ double MemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-// Results of the run. They leave out the first window, in which buffers grow.
+// Results of the run without its first window, in which buffers grow. Only `refused` and the memory
+// are of the whole run.
 struct Figures {
   double seconds = 0;
   bool settled = false;

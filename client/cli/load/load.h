@@ -22,8 +22,8 @@ struct LoadFlags {
   int watchers = 0;                        ///< In total.
   std::vector<std::string> watch_servers;  ///< Servers of the watchers, in turn; empty: `server`.
   bool no_ids = false;
-  double seconds = 60;
-  std::string metrics;
+  double seconds = 60;  ///< Longest duration.
+  std::string metrics;  ///< HOST:PORT of the server's metrics; empty: not read.
   bool json = false;
   bool quiet = false;
 };

@@ -176,6 +176,7 @@ void FrameFeeder::ViewAttributes(const RecordedFrame& recorded) {
       attributes_.push_back({one.name, one.components, one.values});
       break;  // A recording may hold a name twice.
     }
+    // The core takes this attribute from Frame::velocities, which View leaves out without times.
     if (name == kVelocityAttribute && !recorded.time && !recorded.velocities.empty()) {
       attributes_.push_back({kVelocityAttribute, recorded.components, recorded.velocities});
     }
@@ -202,15 +203,14 @@ bool FrameFeeder::Offer(LatestSender& sender, FramePointer owned) {
   const Frame frame = View(recorded);
   const double time = TimeOf(recorded);
   {
-    // The frame is queued before Offer, because its response may arrive before Offer returns.
     const MutexLock lock(mutex_);
     offered_.push_back(std::move(owned));
   }
   return sender.Offer(frame, time).ok();
 }
 
-// The sender sends or skips frames in the order of Offer, so the first two hooks concern the front
-// of `offered_`.
+// LatestSender sends or skips frames in the order of Offer, so the first two hooks concern the
+// front of `offered_`.
 OfferHooks FrameFeeder::Hooks() {
   return {.sending =
               [this](std::uint64_t) {

@@ -25,7 +25,7 @@
 
 namespace partiemc::client {
 
-/// Policy for frames that arrive while the stream is busy.
+/// Policy for frames that are due while the stream is busy.
 enum class SendPolicy {
   kBlock,   ///< Wait; no frame is lost.
   kLatest,  ///< Send the newest frame, skip and count the others.
@@ -46,7 +46,7 @@ class FrameFeeder {
 
   /// Starts both threads. Requires: `input` and `stream` outlive this object. If
   /// `frames_per_second` is absent, frames are sent as fast as possible. `attributes` names the
-  /// attributes to send. `box`: the box of the stream, if frames have their own recorded boxes.
+  /// attributes to send. `box`: the box of the stream; absent: recorded boxes are not sent.
   FrameFeeder(Sequence& input, FrameStream& stream, std::optional<double> frames_per_second,
               SendPolicy policy, std::vector<std::string> attributes,
               std::optional<PeriodicBox> box);
@@ -57,6 +57,7 @@ class FrameFeeder {
   /// or refusal, in order.
   std::unique_ptr<RecordedFrame> TakeAnswered() ABSL_LOCKS_EXCLUDED(mutex_);
   void Recycle(std::unique_ptr<RecordedFrame> frame) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// The frames refused since the last call.
   std::vector<Refused> TakeRefused() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Number of frames that newer ones replaced before they were sent.
   std::uint64_t skipped_count() const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -90,12 +91,12 @@ class FrameFeeder {
   const std::vector<std::string> attribute_names_;
   const std::optional<PeriodicBox> box_;
   std::vector<float> as_float32_;      // Owned by the sender thread.
-  std::vector<Attribute> attributes_;  // Likewise.
+  std::vector<Attribute> attributes_;  // Owned by the sender thread.
 
   mutable Mutex mutex_;
   CondVar stopped_;
   bool stop_ ABSL_GUARDED_BY(mutex_) = false;
-  std::deque<FramePointer> offered_ ABSL_GUARDED_BY(mutex_);  // Neither sent nor skipped yet.
+  std::deque<FramePointer> offered_ ABSL_GUARDED_BY(mutex_);  // kLatest: not sent or skipped.
   std::deque<FramePointer> unanswered_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t skipped_ ABSL_GUARDED_BY(mutex_) = 0;
   std::vector<FramePointer> free_ ABSL_GUARDED_BY(mutex_);

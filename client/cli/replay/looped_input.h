@@ -16,7 +16,7 @@ namespace partiemc::client {
 
 /// Repeats the frames of `input` with their recorded times. The time therefore decreases when a new
 /// round begins, so the stream ignores velocities between the last frame and the first. Ends if
-/// `input` is empty or cannot be opened again.
+/// `input` has no frames. Opens `input` for each round; an error of OpenInput is an error of Next.
 class LoopedInput final : public Sequence {
  public:
   /// `first` is OpenInput(input, options).

@@ -70,7 +70,6 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
   return *std::move(stream);
 }
 
-// How a replay ended.
 struct ReplayEnd {
   ExitCode code = kGood;
   std::string error = {};  // Empty for kGood and kInterrupted.
@@ -88,7 +87,7 @@ class Receiver {
         progress_(progress),
         sections_in_plane_(SectionsInPlane(stream.info().parameters)) {}
 
-  /// kGood if every frame has a response.
+  /// kGood at the end of the stream, when every frame has a response.
   ReplayEnd Run() {
     while (!Interrupted()) {
       const auto received = stream_.Receive(event_, kPollInterval);
@@ -271,7 +270,7 @@ absl::StatusOr<std::optional<RecordedBox>> BoxOfInput(const ReplayFlags& flags) 
 
 int Replay(const ReplayFlags& given) {
   ReplayFlags flags = given;
-  // The reader keeps this attribute, too.
+  // The reader must also read the attribute of phases.
   std::vector<std::string>& attributes = flags.sequence.attributes;
   const std::string phases = PhaseAttributeOf(flags);
   if (!phases.empty() && std::ranges::find(attributes, phases) == attributes.end()) {
@@ -279,8 +278,8 @@ int Replay(const ReplayFlags& given) {
   }
   const auto rate = RateOf(flags.rate);
   if (!rate.ok()) return Complain(kUsage, rate.status());
-  // Checks the flags before the input is opened. Slices and surfaces require a spacing, which the
-  // input will provide, so 1.0 stands for it here.
+  // Checks the flags before the input is opened. Slices and surfaces require a spacing; 1.0 stands
+  // for the spacing of the input.
   const auto without_input = ParametersOf(flags, 1.0);
   if (!without_input.ok()) return Complain(kUsage, without_input.status());
 
@@ -351,8 +350,7 @@ int Replay(const ReplayFlags& given) {
   } else if (early.empty()) {
     return Complain(kInput, Concat(flags.input, ": has no frame to replay; check --frames"));
   }
-  // After kFailed an output is broken, and Finish fails for the same reason. Its error is not
-  // printed again.
+  // After kFailed an output is broken, so Finish fails, too. Only the first error is printed.
   if (!finished.ok() && ended.code != kFailed) Complain(kFailed, finished);
   if (ended.code == kInterrupted) {
     return Complain(kInterrupted,

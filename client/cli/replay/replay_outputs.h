@@ -19,11 +19,11 @@ namespace partiemc::client {
 class ReplayOutputs {
  public:
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: INVALID_ARGUMENT for a wrong format or extension; the errors of AtomicFile.
+  /// Errors: as FrameOutputs::Create.
   static absl::StatusOr<ReplayOutputs> Create(const ReplayFlags& flags,
                                               const ReconstructionParameters& parameters);
 
-  /// Whether an output shows the normals of the vertices.
+  /// Whether an output shows the normals of ring vertices.
   bool WantsNormals() const;
 
   absl::Status Write(const FrameRecord& frame);
@@ -32,7 +32,7 @@ class ReplayOutputs {
   void EndEarly(std::string why) { frames_.EndEarly(std::move(why)); }
 
   /// Completes the statistics and the report. If one of them fails, the other is still written.
-  /// Neither file exists before this call.
+  /// Until then neither file is created or replaced.
   absl::Status Finish(double wall_seconds);
 
   const Summary& summary() const { return frames_.summary(); }

@@ -1,4 +1,4 @@
-"""How the methods of PartiEMC are measured: scenes with exact truth, recordings, metrics, the paper.
+"""Measures the methods of PartiEMC: scenes with exact truth, recordings, metrics, the paper's claims.
 
 python3 -m partiemc_evaluation --help
 """

@@ -1,10 +1,10 @@
 """How the particles of a recording carry points from one frame to the next, and how accurately.
 
-The displacement at a point is that of an affine field, fitted to the particles within three spacings by weighted
-least squares. The error of the fit is estimated by leaving each particle out in turn, as is done with linear
-smoothers (Hastie, Tibshirani, Friedman, "The Elements of Statistical Learning", 7.10): the residual of a particle
-divided by one minus its leverage. The way back has to meet its start, which is the test for occlusions of optical
-flow (Sundaram, Brox, Keutzer, "Dense Point Trajectories by GPU-accelerated Large Displacement Optical Flow", 2010).
+An affine field is fitted to the displacements of the particles within three spacings of a point, by weighted least
+squares. The error of the fit is estimated by leaving each particle out in turn: the residual of a particle divided by
+one minus its leverage (Hastie, Tibshirani, Friedman, "The Elements of Statistical Learning", 7.10). A point that is
+carried forward and back must return to its start, the test of optical flow for occlusions (Sundaram, Brox, Keutzer,
+"Dense Point Trajectories by GPU-accelerated Large Displacement Optical Flow", 2010).
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ from scipy.spatial import cKDTree
 from .geometry import SAMPLE_STEP, Bools, Floats, Indices, Outline, Points, norm
 from .scenes import Frame
 
-# Radius of the fit in spacings, and its ridge regularisation as a share of the squared radius. With these values the
-# fit moves contours of the bundled dam break with the least jitter: 14 % less than the mean displacement within two
-# spacings.
+# Radius of the fit in spacings, and its ridge regularisation as a share of the squared radius. With these values
+# contours of the bundled dam break jitter least: 14 % less than with the mean displacement within two spacings.
 _REACH, _RIDGE = 3.0, 0.03
 _BLOCK = 256        # Points fitted at a time, so that the arrays stay in the cache.
-_LEAST_REST = 1e-9  # A particle with a larger leverage than one minus this says nothing of its error.
+_LEAST_REST = 1e-9  # Particles with a leverage above one minus this are left out of the error.
 
 
 class DisplacementField:
     """Displacements of the particles of one frame, continued to all points around them. positions, displacements:
-    (N, d). strangers: (N,), particles of one of the two frames only, whose displacement is unknown. reach: radius of
-    the fit, world units."""
+    (N, d). strangers: (N,), particles that the other frame lacks, whose displacement is unknown. reach: radius of the
+    fit, world units."""
 
     def __init__(self, positions: Points, displacements: Points, strangers: Bools, reach: float) -> None:
         self._positions, self._strangers, self._reach = positions, strangers, reach
@@ -37,8 +36,9 @@ class DisplacementField:
         self._known_tree = cKDTree(positions[self._known])
 
     def __call__(self, points: Points) -> tuple[Points, Floats]:
-        """Displacements (P, d), far from all particles that of the nearest one, and their standard errors along one
-        axis (P,), infinite where no particle is in reach or where a particle in reach comes or goes."""
+        """Displacements (P, d), and their standard errors along one axis (P,). Without a known particle in reach, the
+        displacement is that of the nearest known particle and the error infinite. With a stranger in reach, the error
+        is infinite, too."""
         parts = [self._fit(points[k:k + _BLOCK]) for k in range(0, max(1, len(points)), _BLOCK)]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
@@ -99,19 +99,20 @@ class Advection(NamedTuple):
 
     @staticmethod
     def between(before: Frame, after: Frame, spacing: float) -> Advection | None:
-        """By ids where both frames have them, else by the velocities of the frame that is left. None if `before` has
-        neither. If `after` has neither, no place is known."""
+        """By ids if both frames have them, else by the velocities of the frame from which points move. None if `before`
+        has no velocities either, or no id is in both frames. If only `after` lacks them, `back` is None."""
         there = _field(before, after, spacing)
         return Advection(there, _field(after, before, spacing), spacing) if there else None
 
     def carry(self, outline: Outline) -> Outline:
-        """An outline of the frame before, sampled every tenth of a spacing, in the frame after."""
+        """Moves an outline of the frame before to the frame after, sampled every tenth of a spacing."""
         dense = outline.densified(SAMPLE_STEP * self.spacing)
         return dense.moved(dense.points + self.there(dense.points)[0])
 
     def follow(self, points: Points, forward: bool) -> tuple[Points, Floats]:
-        """Where points (P, d) of the frame before are in the frame after, or the reverse, and what is unknown of that
-        place, a length (P,): the largest of both standard errors and the miss of the way back."""
+        """Moves points (P, d) from the frame before to the frame after, or the reverse. Returns their positions and the
+        uncertainty of each, a length (P,): the largest of both standard errors and the distance between the start and
+        the point carried forward and back."""
         there, back = (self.there, self.back) if forward else (self.back, self.there)
         if there is None or back is None:
             return points, np.full(len(points), np.inf)

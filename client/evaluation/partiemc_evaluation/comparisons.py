@@ -9,10 +9,10 @@ from .geometry import Floats
 from .metrics import ABSENT
 from .study import Row, mean_of
 
-TIE_SHARE = 0.01     # A sequence is a tie if its numbers differ by less than this share.
-LOSS_RATIO = 1.25    # Sequences above this are listed by name.
-RATIO_LIMIT = 10.0   # Limits a ratio both ways, so that a number near 0 by accident decides no mean.
-STILL_JITTER = 0.01  # Known jitter is compared above this only: a ratio says nothing of a body at rest.
+TIE_SHARE = 0.01     # A sequence is a tie if its numbers differ by at most this share of the baseline's.
+LOSS_RATIO = 1.25    # Sequences with a larger ratio are listed by name.
+RATIO_LIMIT = 10.0   # Limits ratios to [1 / this, this], so that one number near 0 does not decide a mean.
+STILL_JITTER = 0.01  # Known jitter of the baseline, in spacings, up to which a body rests and is not compared.
 _RESAMPLES, _SEED = 2000, 20_240_117
 
 
@@ -33,7 +33,7 @@ class Comparison(NamedTuple):
 
 
 def ratios(pairs: Floats) -> Floats:
-    """(N,) of pairs (N, 2), method and baseline, neither negative; 1 if both are 0, within RATIO_LIMIT."""
+    """(N,) ratios of pairs (N, 2) of method and baseline, not negative; 1 if both are 0. Limited by RATIO_LIMIT."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where((pairs == 0).all(axis=1), 1.0, pairs[:, 0] / pairs[:, 1])
     return np.clip(ratio, 1 / RATIO_LIMIT, RATIO_LIMIT)
@@ -54,7 +54,7 @@ def bootstrap(pairs: Floats, seed: int = _SEED) -> Ratio:
 
 
 def ratio_of_means(pairs: Floats) -> float:
-    """As the paper compares: sequences with large numbers decide. Infinite if only the baseline is 0."""
+    """Ratio of the means, as in the paper: sequences with large numbers decide. Infinite if only the baseline is 0."""
     if not len(pairs):
         return ABSENT
     method, baseline = pairs.sum(axis=0)
@@ -62,7 +62,8 @@ def ratio_of_means(pairs: Floats) -> float:
 
 
 def match(method: Seq[Row], baseline: Seq[Row], metric: str) -> Floats:
-    """(N, 2): the numbers of the judged sequences that both have, in the order of `method`."""
+    """(N, 2) numbers of method and baseline, for judged sequences that have both, in the order of `method`. Known
+    jitter only above STILL_JITTER."""
     numbers = {row.sequence: row[metric] for row in baseline}
     pairs = np.array([(row[metric], numbers[row.sequence]) for row in method
                       if row.judged and row.sequence in numbers], float).reshape(-1, 2)

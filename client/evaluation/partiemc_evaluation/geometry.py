@@ -1,7 +1,7 @@
 """Boundaries of regions: closed polylines, sampled curves, nearest points.
 
-`Boundary` is all that samplers and metrics need of a boundary. `Curve` provides it in the plane; a triangulated surface
-can provide it in space. Arrays of points are (N, d) float64, d = 2 here, in the unit of the caller.
+`Boundary` is the interface that samplers and metrics use. `Curve` implements it in the plane, solids.py in space.
+Arrays of points are (N, d) float64, d = 2 here, in the unit of the caller.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Outline:
 
     @cached_property
     def ring_areas(self) -> Floats:
-        """(R,) signed; relative to each ring's first point, so that a distant origin costs no digits."""
+        """(R,) signed areas. Computed relative to each ring's first point, so that a distant origin costs no digits."""
         start = np.repeat(self.points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         twice = cross(self.points - start, self.points[self.following] - start)
         return np.add.reduceat(twice, self.offsets[:-1]) / 2 if self else np.empty(0)
@@ -103,7 +103,7 @@ class Outline:
 
     def eroded(self, depth: float) -> Outline:
         """The boundary of all points at least `depth` inside. Convex corners stay sharp, reentrant ones become arcs.
-        Empty where a part of the region vanishes or parts, because the curve is not defined then."""
+        Empty if the numbers of outer rings and holes change, because the curve is not defined then."""
         inner = Outline.of_shapely(self.to_shapely().buffer(-depth, resolution=20))
         return inner if inner.loop_counts == self.loop_counts else Outline()
 
@@ -122,8 +122,8 @@ class Outline:
 
 
 class Samples(NamedTuple):
-    """Points of a boundary. middles: (N, d), each stands for the same measure and counts in means. corners: (M, d),
-    where the boundary bends sharply; they count in maxima only."""
+    """Points of a boundary. middles: (N, d), each of the same length or area; they count in means and maxima. corners:
+    (M, d), where the boundary bends sharply; they count in maxima only."""
     middles: Points
     corners: Points
 
@@ -202,8 +202,8 @@ class Curve:
         return np.asarray(shapely_contains(self._region, points[:, 0], points[:, 1]), np.bool_)
 
     def nearest(self, points: Points) -> tuple[Floats, Points, Points]:
-        """Exact: of the k pieces with the nearest middles the best is the nearest of all if no other middle is near
-        enough. Where one may be, k grows. Requires: not empty."""
+        """Exact: examines the k pieces with the nearest middles. Increases k for points to which another piece may be
+        nearer. Requires: not empty."""
         count = len(points)
         distance, foot, piece = np.empty(count), np.empty((count, 2)), np.empty(count, np.int64)
         pending, k = np.arange(count), min(4, len(self._from))

@@ -10,7 +10,8 @@ from .paper import Shot
 from .study import Row, map_in_processes, mean_of
 from .tables import Table, fixed
 
-# Figures to reach, must and aim: group, beginnings of kinds, metric, at rest or with noise (None: both).
+# Limits of metrics: group, beginnings of kinds, metric, noise (False: at rest, None: both), must, aim. The must is
+# required, the aim is wanted. The first entry that fits counts.
 _Target = tuple[str, tuple[str, ...], str, bool | None, float, float]
 _TARGETS: tuple[_Target, ...] = (
     ("sizes", ("1:3",), "deviation", False, 0.08, 0.05), ("sizes", ("2:1",), "deviation", False, 0.05, 0.035),
@@ -25,14 +26,14 @@ _TARGETS: tuple[_Target, ...] = (
     ("walls", ("tank of", "round tank of"), "rms", False, 0.04, 0.015),
     ("walls", ("tank of",), "corner", False, 0.25, 0.12), ("walls", ("tank",), "corner", False, 0.0, 0.0),
     ("walls", ("tank",), "offset", False, 0.0, 0.0), ("walls", ("tank",), "rms", False, 0.0, 0.0))
-_BY_WORST = ("cut", "lone area", "area", "gap and overlap")  # The worst scene must reach these, else the mean.
+_BY_WORST = ("cut", "lone area", "area", "gap and overlap")  # The worst scene is judged; for other metrics the mean.
 _ROUNDING, _NEGLIGIBLE = 1e-9, 1e-3
 _PICTURED = ("1:10 bidisperse", "2:1 zone", "pile 1:3", "loose 1:3", "sectors", "drop of 30", "tank of particles",
              "drop at 120", "layer", "across a corner")
 
 
 class Found(NamedTuple):
-    """Two rows for each scene; pictures by group, with the feature and without it."""
+    """Rows and, by group, pictures: two for each scene, with the feature and without it."""
     rows: list[Row]
     shots: dict[str, list[Shot]]
 
@@ -58,7 +59,7 @@ def run_matter(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None] 
 
 
 def target_of(group: str, kind: str, state: str, metric: str) -> tuple[float, float] | None:
-    """Must and aim of core's figures to reach; the first target that fits."""
+    """Must and aim; None if the metric has no limit."""
     for of_group, kinds, of_metric, noisy, must, aim in _TARGETS:
         if (group, metric) == (of_group, of_metric) and kind.startswith(kinds) and noisy in (None, state != "at rest"):
             return must, aim

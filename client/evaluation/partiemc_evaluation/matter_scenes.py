@@ -1,8 +1,8 @@
 """Scenes of real matter with known truth: different sizes, grains, phases, walls and periodic boxes. Each is measured
 with the feature and without it. Lengths are in spacings, areas relative.
 
-The truth, its particles and all random choices follow from a recipe. Scenes and seeds are others than those in
-tests/core; no constant is chosen by them.
+The truth, its particles and all random choices follow from a recipe. Scenes and seeds differ from those in tests/core.
+No constant of the core was chosen by these scenes.
 """
 
 import warnings
@@ -80,7 +80,7 @@ def _sampled(region: Any, seed: int, rng: Rng) -> Points:
 # Sizes, in root mean squares.
 
 def _of_two(large: float, share: float) -> Draw:
-    """share: of the area."""
+    """Sizes `large` and 1. share: the share of the area that the large particles have."""
     chance = share / (share + (1 - share) * large ** 2)
     return lambda rng, points: np.where(rng.random(len(points)) < chance, large, 1.0)
 
@@ -101,7 +101,7 @@ _PARTICLES = 700
 
 
 def _local_sizes(points: Points, particles: Points, sizes: Floats) -> Floats:
-    """(M,) mean sizes around points, weighted by the kernels of core/SIZES.md; 1 where no kernel reaches."""
+    """(M,) mean sizes of particles around points, weighted by the kernels of core/SIZES.md; 1 outside all kernels."""
     square = ((points[:, None] - particles) ** 2).sum(axis=-1) / (9 * sizes ** 2)
     weights = np.maximum(0, 1 - square) ** 3
     total = weights.sum(axis=1)
@@ -174,7 +174,7 @@ def _half_plane(x: float, y: float, angle: float) -> Any:
 
 
 def _phase_regions(kind: str, center: Points, rng: Rng) -> list[Any]:
-    """A region around `center` for each phase but the first one, which has the rest of the body."""
+    """A region around `center` for each phase except the first. The first phase fills the rest of the body."""
     (x, y), angle = center, rng.uniform(0, 2 * np.pi)
     half = _half_plane(x, y, angle)
     if kind == "straight":
@@ -218,7 +218,7 @@ def _phases(recipe: Recipe, rng: Rng) -> Measured:
 
 
 def _gap_and_overlap(curves: Seq[Curve], inner: Any, length: float) -> float:
-    """Mean width along interfaces."""
+    """Mean width of gaps and overlaps of the curves, over interfaces of this length inside `inner`."""
     shapes = [curve.outline.to_shapely().buffer(0) for curve in curves]
     union = unary_union(shapes)
     excess = max(0.0, sum(shape.area for shape in shapes) - union.area)
@@ -255,7 +255,7 @@ def _drop(recipe: Recipe, rng: Rng) -> Measured:
         outline = outline_of(result)
         if at_wall:
             contacts, angles = outline.points[result.rings.contacts], np.degrees(result.rings.contact_angles)
-        else:  # By a circle above the wall.
+        else:  # Contacts of a circle that the gauge fits to the outline above the wall.
             (x, y), (dx, dy) = line[0], line[1] - line[0]
             fit = result.rings.gauge("contact", x=x, y=y, dx=dx, dy=dy, reach=6)
             contacts = line[0] + np.outer([fit["start"], fit["end"]], line[1] - line[0])

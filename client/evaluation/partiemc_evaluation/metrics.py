@@ -1,4 +1,4 @@
-"""How good a boundary is, and how calm. Distances are in spacings, areas relative.
+"""Accuracy and jitter of a boundary. Distances are in spacings, areas relative.
 
 `compare` and `jitter` take any two `Boundary` objects, curves or surfaces.
 """
@@ -13,8 +13,8 @@ from .advection import Advection
 from .geometry import SAMPLE_STEP, Bools, Boundary, Curve, Floats, Outline, Points, cross, dot
 from .motions import Motion
 
-# Jitter ignores a sample if the motion there deviates from the assumed motion, or is uncertain, by more than this, in
-# spacings. The limit is well below the differences between methods and well above the errors of truths and fits.
+# Jitter ignores samples where the motion deviates from the assumed motion, or is uncertain, by more spacings than
+# this. The limit is well below the differences between methods and well above the errors of truths and fits.
 _MOTION_TOLERANCE = 0.1
 ABSENT = float("nan")
 
@@ -27,8 +27,8 @@ class Deviation(NamedTuple):
 
 
 def nearest_neighbours(positions: Points, spacing: float) -> tuple[float, float]:
-    """Mean and standard deviation of the distances of nearest neighbours, in spacings. Spray, which has no neighbour
-    within two spacings, is left out. 0 and 0 if nothing else is there."""
+    """Mean and standard deviation of the distances of nearest neighbours, in spacings. Particles without a neighbour
+    within two spacings (spray) are left out. 0 and 0 if no others are left."""
     distances = cKDTree(positions).query(positions, 2)[0][:, 1] / spacing
     near = distances[distances < 2]
     return (float(near.mean()), float(near.std())) if len(near) else (0.0, 0.0)
@@ -39,7 +39,7 @@ Trace = Callable[[Points], tuple[Points, Bools]]
 
 def _directed(source: Boundary, target: Boundary, trace: Trace | None) -> tuple[float, float, int]:
     """Largest and mean distance from the samples of one boundary to another, and the number of samples in the mean.
-    trace: where each sample is, and whether it counts."""
+    trace: moves samples, and selects those that count; None: all count, unmoved."""
     distances = []
     for points in source.samples:
         points, counts = (points, slice(None)) if trace is None else trace(points)
@@ -59,8 +59,8 @@ def _compare(a: Boundary, b: Boundary, spacing: float, there: Trace | None,
 def compare(a: Boundary, b: Boundary, spacing: float,
             counts: Callable[[Points], Bools] | None = None) -> Deviation:
     """Symmetric deviation of two boundaries. If one of them is empty, both distances are the extent of the other.
-    counts: which samples enter; all of them without it. Accuracy: the maximum misses half a sample step at most on
-    smooth parts, nothing at corners."""
+    counts: selects the samples that enter; None: all. Error of the maximum: at most half a sample step on smooth
+    parts, none at corners."""
     if not a or not b:
         extent = max(a.extent, b.extent) / spacing
         return Deviation(extent, extent)
@@ -76,9 +76,9 @@ def carried(outline: Outline, motion: Motion, frame: int, spacing: float) -> Cur
 
 def jitter(before: Boundary, after: Boundary, spacing: float, carried_truth: Boundary | None = None,
            truth: Boundary | None = None) -> Deviation:
-    """Deviation of the boundary of the frame before, carried along, from the boundary of the frame. Where bodies merge
-    the truth does not move as the map says, and a change is no jitter: with the two truths given, samples whose
-    distances to them differ by more than 0.1 spacings are left out."""
+    """Deviation between two boundaries: of the frame before, carried along by the motion, and of the frame. Where
+    bodies merge, the truth does not follow the motion, and a change is no jitter. With both truths given, samples
+    whose distances to them differ by more than 0.1 spacings are therefore left out."""
     if carried_truth is None or truth is None:
         return compare(before, after, spacing)
 
@@ -92,9 +92,9 @@ def known_jitter(before: Boundary, after: Boundary, advection: Advection,
                  spacing: float) -> tuple[Deviation, float]:
     """Jitter of a recording where its particles determine the motion, and the share of samples there.
 
-    Samples of the frame before go forward and samples of the frame back, each by its own particles. A sample counts if
-    its place in the other frame is known within 0.1 spacings. That depends on the particles around it alone, never on
-    the method.
+    The particles around a sample carry it to the other frame: samples of the frame before forward, samples of the frame
+    back. A sample counts if its position in the other frame is known within 0.1 spacings, which does not depend on the
+    method.
     """
     if not before or not after:
         return Deviation(), 0.0
@@ -111,9 +111,9 @@ def find_defects(result: Any, truth: Curve | None) -> dict[str, float]:
     """The defects of a partiemc.Result. truth: the true boundary, None if unknown.
 
     self_intersections: pairs of ring segments that cross. folds: triangles that are clockwise or degenerate.
-    spurious_components: outer rings without a particle. component_error, hole_error: difference of their numbers from
-    the truth's. wrong_normals: share of vertices whose normal is more than a right angle from that of the nearest
-    true point.
+    spurious_components: outer rings without a particle. component_error, hole_error: difference of the numbers of outer
+    rings and of holes from the truth. wrong_normals: share of vertices whose normal is more than a right angle from the
+    true normal at the nearest point. 0 without the truth.
     """
     rings, mesh = result.rings, result.mesh
     outer = rings.outer_of < 0

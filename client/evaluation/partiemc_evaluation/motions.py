@@ -18,7 +18,7 @@ from .shapes import CURVE_STEP
 
 class Motion(Protocol):
     def carry(self, frame: int, points: Points) -> Points:
-        """The points of frame `frame`, (N, d), where they are in frame `frame + 1`."""
+        """Positions in frame `frame + 1` of the points of frame `frame`, (N, d)."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Body:
         return self.start + frame * self.step
 
     def distance(self, frame: int, points: Points) -> Floats:
-        """(N,) distances from the ellipse, negative inside: exact to first order near the boundary, the sign
+        """(N,) distances from the ellipse, negative inside: exact to first order near the boundary. The sign is exact
         everywhere."""
         axes = np.array([self.a, self.b])
         q = Similarity.plane(-self.angle)(points - self.center(frame)) / axes
@@ -128,7 +128,7 @@ class BodiesMotion:
 
 @dataclass(frozen=True)
 class InUnits:
-    """A motion in other units: point p of `motion` is point units(p) here."""
+    """A motion in other units: point p of `motion` is point units(p) of this motion."""
     motion: Motion
     units: Similarity
 

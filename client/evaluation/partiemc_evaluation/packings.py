@@ -9,19 +9,20 @@ from scipy.spatial import cKDTree
 from .geometry import Curve, Floats, Points, dot, norm
 from .samplers import Rng, sums_by_owner
 
-# Particles repel each other, and the boundary repels them like a mirror image, up to this distance in mean sizes.
+# Reach of the repulsion between particles, in mean sizes of the two. The boundary repels like a mirror image.
 _REACH = 1.5
 _STEPS, _SEARCH_STEPS = 240, 8     # Steps until particles rest; steps between two searches of neighbours.
-_PUSHES, _LONGEST = (0.7, 0.35), 0.15  # In the first and the second half; longest step, in own sizes.
+_PUSHES, _LONGEST = (0.7, 0.35), 0.15  # Factor of the force in each half of the steps; longest step, in own sizes.
 _INSET = 0.1                       # Least depth of a centre, in own sizes.
-_LANDING_WIDTH = 4.0               # A grain rests at most this far from the place above which it falls.
+_LANDING_WIDTH = 4.0               # A grain rests within this times (1 + its radius) of the x at which it falls.
 
-# The sizes of particles at random places (N, 2), in any unit. 0: no particle is there.
+# Draws the sizes of particles at random points (N, 2), in any unit. 0: no particle is there.
 Draw = Callable[[Rng, Points], Floats]
 
 
 def fill_sizes(region: Curve, draw: Draw, rng: Rng) -> tuple[Points, Floats]:
-    """Centres (N, 2) and sizes (N,) of particles at rest. N and the sum of squared sizes are the region's area."""
+    """Centres (N, 2) and sizes (N,) of particles at rest. N is the region's area, rounded; the sum of squared sizes is
+    the area."""
     low, high = region.bounds
     count, centers, sizes = round(region.measure), np.empty((0, 2)), np.empty(0)
     while len(sizes) < count:

@@ -1,4 +1,4 @@
-"""The runs behind the paper's tables and figures, and what of them reproduces.
+"""The runs behind the paper's tables and figures, and a verdict on each claim of the paper.
 
 The paper: "PartiEMC: Stable Isoline Reconstruction from Particle-Based Scalar Fields via Virtual-Plane Projection".
 Its placement is measured as `farthest-particle`, section 3.5 to the letter.
@@ -46,15 +46,15 @@ class Shot:
 
 
 class Film(NamedTuple):
-    """One placement and fill over all frames. milliseconds: processor time of a frame, one thread. Counts of triangles
-    and digests of rings: a frame each."""
+    """One placement and fill over all frames. milliseconds: mean processor time of a frame, one thread. triangles,
+    digests (of rings): one for each frame."""
     milliseconds: float
     triangles: Floats
     digests: list[int]
 
 
 class Grid(NamedTuple):
-    """One frame on one grid. triangles, t_junctions: by fill. same_rings: between the fills, bit for bit."""
+    """One frame on one grid. triangles, t_junctions: by fill. same_rings: all fills have the same rings, to the bit."""
     cell_size: float
     triangles: dict[str, float]
     t_junctions: dict[str, int]
@@ -65,9 +65,10 @@ class Grid(NamedTuple):
 
 @dataclass
 class PaperRuns:
-    """conditions: frames of Table 1. films: by placement and fill. features: rows of Figure 5. thinned: by placement
-    and share, rows of Figures 6 and 10 with the factor that turns their lengths into spacings of the full set. grids:
-    by placement and cells across the bounding square. fills: by shape and cells. shots: by figure."""
+    """conditions: frames of Table 1. films: by placement and fill. features: rows of Figure 5. thinned: by placement and
+    share of particles, rows of Figures 6 and 10; the factor converts their lengths to spacings of the full set.
+    grids: by placement and cells across the bounding square. resolution: by placement, between the two grids. fills:
+    by shape and cells. shots: by figure."""
     film: Sequence
     conditions: tuple[int, int] = (0, 0)
     films: dict[tuple[str, str], Film] = field(default_factory=dict)
@@ -89,8 +90,8 @@ def default_film() -> Sequence:
 
 
 def run_paper(film: Sequence, progress: Callable[[str], None], shapes: Seq[str] = TUNING_SHAPES) -> PaperRuns:
-    """All of the paper's tables and figures on our own scenes, one thread, so that times mean something. progress:
-    called with the name of each part. shapes: those of the fills."""
+    """All of the paper's tables and figures on our own scenes, in one thread, so that times are comparable. progress:
+    called with the name of each part. shapes: for the comparison of fills."""
     runs = PaperRuns(film)
     for part in (_run_film, _run_features, _run_thinned, _run_grids):
         progress(part.__name__[5:])
@@ -159,7 +160,7 @@ def _run_thinned(runs: PaperRuns) -> None:
 
 def _run_grid(sequence: Sequence, t: int, placement: str, side: float, cells: int,
               fills: Seq[str]) -> tuple[Grid, dict[str, Any]]:
-    """One frame on a lattice of so many cells across `side`, within the range that the core accepts."""
+    """Frame t on a lattice of `cells` cells across `side`; the cell size is limited to the range of the core."""
     cell_size = float(np.clip(side / cells / sequence.spacing, *_CELLS))
     results = {fill: partiemc.reconstruct(sequence.frames[t].positions, spacing=sequence.spacing, threads=1,
                                           placement=placement, fill=fill, cell_size=cell_size)
@@ -171,8 +172,8 @@ def _run_grid(sequence: Sequence, t: int, placement: str, side: float, cells: in
 
 
 def _run_grids(runs: PaperRuns) -> None:
-    """Figures 11 and 13: two grids over one frame, from the middle of the film back to a frame that is small enough
-    for the coarsest cells. The square is that of the largest ring, so spray does not count."""
+    """Figures 11 and 13: two grids over one frame. The frame is halved from the middle of the film until the bounding
+    square is small enough for the coarsest cells. The square is around the largest ring, so spray does not count."""
     film, t, side = runs.film, len(runs.film.frames), np.inf
     while t > 0 and side > GRIDS[0] * _CELLS[1] * film.spacing:
         t //= 2
@@ -196,13 +197,14 @@ def _run_grids(runs: PaperRuns) -> None:
 
 FINDINGS = {"reproduces": "reproduces", "weaker": "the direction reproduces, the size does not",
             "fails": "does not reproduce"}
-_SHARE_OF_EFFECT, _NO_EFFECT = 0.9, 0.98  # An effect is 1 - ratio; a ratio above the second is no gain.
+# An effect is 1 - ratio. A claim reproduces with this share of the paper's effect; a ratio above _NO_EFFECT is no gain.
+_SHARE_OF_EFFECT, _NO_EFFECT = 0.9, 0.98
 # The paper claims that results are "stable" and "consistent" but gives no numbers. These limits are our own choice.
 _STABLE, _CONSISTENT_CELLS, _CONSISTENT_AREA = 1.5, 0.25, 0.02
 
 
 class Claim(NamedTuple):
-    """What of one table or figure reproduces, for one of ours. finding: a key of FINDINGS."""
+    """The verdict on one claim of a table or figure. subject: our placement or fill. finding: a key of FINDINGS."""
     about: str
     subject: str
     finding: str
@@ -210,7 +212,7 @@ class Claim(NamedTuple):
 
 
 def judge(paper: float, measured: float) -> str:
-    """The paper reports `paper` times something, we measured `measured` times; less is better."""
+    """A key of FINDINGS. paper, measured: ratios to a baseline; less is better."""
     if not measured < _NO_EFFECT:  # Also where nothing was measured.
         return "fails"
     return "reproduces" if 1 - measured >= _SHARE_OF_EFFECT * (1 - paper) else "weaker"
@@ -221,8 +223,7 @@ def worst(*findings: str) -> str:
 
 
 def judge_claims(study: Study, runs: PaperRuns) -> list[Claim]:
-    """The 27 claims, in the paper's order. Of the study it uses synthetic rows that were given the first of
-    `study.given`."""
+    """The 27 claims, in the paper's order. Uses the synthetic rows of the study with `study.given[0]` given."""
     found = [*_merging(runs), *_efficiency(runs), *_accuracy(study), *_stability(study, runs), *_features(runs),
              *_thinning(runs), *_merged_frames(runs), *_resolutions(runs), *_counts(runs)]
     return [Claim(*claim[:3], f"{claim[3]}: {FINDINGS[claim[2]]}.") for claim in found]
@@ -304,7 +305,7 @@ def _features(runs: PaperRuns) -> _Claims:
 
 
 def thinned_values(runs: PaperRuns, placement: str, metric: str) -> list[float]:
-    """By share, in spacings of the full set."""
+    """The metric for each share of particles, in spacings of the full set."""
     return [row[metric] * ratio for row, ratio in (runs.thinned[placement, share] for share in SHARES)]
 
 

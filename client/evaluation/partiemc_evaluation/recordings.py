@@ -1,4 +1,4 @@
-"""Recordings (.pemc) as sequences, and what is known of them beside their particles."""
+"""Reads recordings (.pemc) as sequences, and their known facts: walls, ellipses, spray."""
 
 import pathlib
 from typing import Any, Iterator
@@ -24,7 +24,7 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def _fields(message: memoryview) -> dict[int, Any]:
-    """The fields of a Protobuf message by number: varints, doubles and bytes; of several the last."""
+    """The fields of a Protobuf message by number: varints, doubles and bytes. Of a repeated field the last."""
     fields: dict[int, Any] = {}
     at = 0
     while at < len(message):
@@ -66,7 +66,7 @@ def _frame(fields: dict[int, Any]) -> Frame:
 
 
 def read_recording(path: pathlib.Path, notes: list[str], frames: slice = slice(None)) -> Sequence:
-    """Reads a .pemc file, and NAME.truth beside NAME.pemc if there is one.
+    """Reads NAME.pemc, and NAME.truth in the same folder if it exists.
 
     A spacing that the file lacks is estimated from the first frame, and `notes` says so. Raises ValueError with the
     file's name.
@@ -90,10 +90,10 @@ def read_recording(path: pathlib.Path, notes: list[str], frames: slice = slice(N
 
 
 def add_truth(text: str, sequence: Sequence) -> None:
-    """Adds to a recording what `text` states, a fact each line; '#' begins a comment:
+    """Adds the facts of `text` to a recording, one on each line; '#' begins a comment. Raises ValueError.
 
     wall X0 Y0 X1 Y1: a rigid straight wall, world units; the particles' volume ends on it. ellipse: one body that is an
-    ellipse in every frame; its truth is moment_ellipse. spray: parts come off that no outline holds; areas are not
+    ellipse in every frame; its truth is moment_ellipse. spray: spray comes off that no outline contains; areas are not
     compared.
     """
     walls = list(sequence.walls)
@@ -119,8 +119,8 @@ def add_truth(text: str, sequence: Sequence) -> None:
 
 
 def moment_ellipse(positions: Points, spacing: float, area: float) -> Outline:
-    """The ellipse with the centroid and the second moments' directions and ratio of particles (N, 2), each a square
-    of side `spacing`, and with the area `area`, world units squared."""
+    """The ellipse of area `area` (world units squared) with the centroid of the particles (N, 2). The directions and
+    the ratio of its axes follow from the particles' second moments; each particle is a square of side `spacing`."""
     center = positions.mean(axis=0)
     moments = np.cov(positions.T, bias=True) + np.eye(2) * spacing ** 2 / 12
     values, vectors = np.linalg.eigh(moments)
@@ -131,16 +131,17 @@ def moment_ellipse(positions: Points, spacing: float, area: float) -> Outline:
     return Outline.of([units(ellipse_ring((0, 0), ratio * b, b, angle, CURVE_STEP))])
 
 
-_PIECE, _WET_PIECES, _WET_HEIGHT = 2.0, 2, 1.25   # Of a wall, in spacings.
-_SAMPLES, _HIGHEST, _FEWEST = 20, 1.5, 30         # Samples of a piece, largest height, fewest samples.
+# Length of a piece of a wall, and height of particles that wet it, in spacings; wet pieces required on either side.
+_PIECE, _WET_PIECES, _WET_HEIGHT = 2.0, 2, 1.25
+_SAMPLES, _HIGHEST, _FEWEST = 20, 1.5, 30         # Samples of a piece; largest height, in spacings; fewest samples.
 
 
 def wall_roughness(outline: Outline, positions: Points, walls: Floats, spacing: float) -> float:
-    """How far from straight an outline is along walls: the standard deviation of its distance from each, in spacings.
+    """Standard deviation of an outline's distance from each wall, in spacings.
 
-    Samples lie every tenth of a spacing where the wall is wet: particles are nearer than 1.25 spacings in each of
-    five pieces of two spacings around, so contact lines and corners are left out for every method. An outline that is
-    farther than 1.5 spacings counts as that far. Absent if fewer than three spacings of wall are wet.
+    Samples lie every tenth of a spacing where the wall is wet: a piece of two spacings, and two pieces on either side,
+    have particles within 1.25 spacings. This leaves out contact lines and corners, for every method. Distances are
+    limited to 1.5 spacings. Absent if fewer than three spacings of wall are wet.
     """
     squares, samples = 0.0, 0
     for start, end in walls:
@@ -167,8 +168,8 @@ def wall_roughness(outline: Outline, positions: Points, walls: Floats, spacing: 
 
 
 def _heights(at: Floats, height: Floats, outline: Outline, count: int) -> Floats:
-    """(count,) height of the outline over the middle of each step of a wall, of several the one of least size. at,
-    height: (P,) of the outline's points, in spacings."""
+    """(count,) height of the outline over the middle of each step of a wall, in spacings: of several the smallest
+    magnitude, _HIGHEST without one. at, height: (P,) coordinates of the outline's points along and above the wall."""
     step = _PIECE / _SAMPLES
     heights = np.full(count, _HIGHEST)
     first = np.minimum(at, at[outline.following])

@@ -89,8 +89,8 @@ def _draw(axis: Any, shot: Shot) -> None:
 
 
 def shots_figure(shots: Seq[Shot], columns: int) -> Figure:
-    """A picture for each shot, all of the same section of the world. Rings below a hundredth of the largest do not
-    decide the section."""
+    """A picture for each shot, all of the same part of the world. Rings smaller than a hundredth of the largest do not
+    enlarge this part."""
     corners = []
     for shot in shots:
         areas = np.abs(shot.outline.ring_areas)
@@ -108,7 +108,7 @@ def shots_figure(shots: Seq[Shot], columns: int) -> Figure:
 
 
 def ratio_figure(study: Study, given: str, recordings: bool) -> Figure:
-    """Geometric means of ratios to marching squares with their intervals, a group for each metric that is there."""
+    """Geometric means of ratios to marching squares with their intervals, grouped by metric."""
     baseline = study.of(BASELINE, given, recordings)
     metrics = [metric for metric in judged_metrics(recordings) if len(match(baseline, baseline, metric))]
     methods = [m.name for m in study.methods[1:] if not m.is_step and study.of(m.name, given, recordings)]
@@ -198,7 +198,7 @@ _ABOUT = ("Hausdorff and mean deviation: symmetric, curves sampled every 0.1 spa
 
 
 def as_html(evaluation: Evaluation) -> str:
-    """One page that needs nothing else, no script either."""
+    """One page without other files and without scripts."""
     study, sections = evaluation.study, []
     if evaluation.claims:
         count = ", ".join(f"{f}: {sum(c.finding == f for c in evaluation.claims)}" for f in FINDINGS)

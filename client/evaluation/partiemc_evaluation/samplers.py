@@ -13,11 +13,11 @@ from shapely.geometry import box
 
 from .geometry import Boundary, Curve, Floats, Indices, Outline, Points, dot
 
-INSET = 0.5  # A layer of particles has its centres this far inside the boundary.
+INSET = 0.5  # Depth of the outermost centres inside the boundary.
 # Minimum distance of thrown darts (Poisson disc sampling), in spacings. Above about 0.83 the required number of darts
 # does not fit. The distance shrinks after 200 rejected darts for each accepted one.
 _DART_DISTANCE, _DART_SHRINK, _DART_ATTEMPTS = 0.75, 0.97, 200
-_RASTER_STEP, _RASTERS = 0.2, 4  # 25 points for each particle of the plane.
+_RASTER_STEP, _RASTERS = 0.2, 4  # 25 raster points for each particle in the plane; number of shifted rasters.
 _SETTLING_NOISE, _RAGGED_MARGIN = 0.05, 2.0
 # With this noise the distances of nearest neighbours in clumps have mean 0.61 and standard deviation 0.24. A dam break
 # after its wave broke is similar (frame 50 of the bundled recording: 0.59 and 0.24).
@@ -38,8 +38,8 @@ def raster(region: Boundary, step: float, offset: Floats) -> Points:
 
 def throw_darts(region: Boundary, count: int, rng: Rng, inset: float = INSET,
                 others: Points | None = None) -> Points:
-    """`count` darts at random places, `inset` inside the region or more, at least 0.75 (less where they do not fit)
-    from each other and from `others`, which are not part of the result."""
+    """`count` random points, at least `inset` inside the region. Their distance from each other and from `others` is at
+    least 0.75, or less if they do not fit. `others` are not part of the result."""
     low, high = region.bounds
     accepted = np.empty((0, len(low))) if others is None else others
     first, distance, rejected = len(accepted), _DART_DISTANCE, 0
@@ -69,8 +69,8 @@ def _first_apart(points: Points, distance: float) -> Indices:
 
 
 def push_inside(region: Boundary, centers: Points, inset: float = INSET) -> Points:
-    """Moves centres to `inset` inside the boundary or more; in tips that are too narrow for that they end near the
-    tip's axis."""
+    """Moves centres to at least `inset` inside the boundary. In tips that are too narrow they end near the axis of the
+    tip."""
     centers, moving = centers.copy(), np.arange(len(centers))
     for _ in range(3):
         distance, foot, outward = region.nearest(centers[moving])
@@ -87,8 +87,8 @@ def push_inside(region: Boundary, centers: Points, inset: float = INSET) -> Poin
 
 def relax(region: Boundary, centers: Points, rounds: int) -> Points:
     """Lloyd's iteration: each centre moves to the centroid of its Voronoi cell within the region, then to the inset
-    if it is nearer to the boundary. Cells are sets of raster points; rounds alternate between shifted rasters,
-    because on one alone the iteration stops within thirty rounds."""
+    if it is nearer to the boundary. Cells are sets of raster points. Rounds alternate between shifted rasters, because
+    with a single raster the centres stop moving within thirty rounds."""
     rasters = [raster(region, _RASTER_STEP, np.full(centers.shape[1], k * _RASTER_STEP / _RASTERS))
                for k in range(_RASTERS)]
     for k in range(rounds):
@@ -106,8 +106,8 @@ def sums_by_owner(owner: Indices, vectors: Points, count: int) -> Points:
 
 
 def _repulsion(centers: Points, others: Points) -> Points:
-    """(N, d) sums over `others` of minus the gradient of a kernel (1 - s^2)^3 of integral 1, s the distance over the
-    shift radius. The gradient vanishes at distance 0, so pairs and clumps stay."""
+    """(N, d): for each centre, the sum over `others` of minus the gradient of the kernel (1 - s^2)^3, normalised to the
+    integral 1; s is the distance over _SHIFT_RADIUS. The gradient vanishes at distance 0, so pairs and clumps stay."""
     pairs = cKDTree(centers).sparse_distance_matrix(cKDTree(others), _SHIFT_RADIUS, output_type="ndarray")
     pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
     arm = centers[pairs["i"]] - others[pairs["j"]]
@@ -118,8 +118,8 @@ def _repulsion(centers: Points, others: Points) -> Points:
 
 
 def shift_particles(region: Boundary, centers: Points, rounds: int) -> Points:
-    """Particle shifting: each centre moves down the gradient of the density around it less that of an even density of
-    1 within the region. Evens the density at the kernel's scale, up to the boundary."""
+    """Particle shifting: evens the density at the scale of the kernel, up to the boundary. Each centre moves down the
+    gradient of the density around it, minus the gradient of an even density of 1 within the region."""
     dimension = centers.shape[1]
     points = raster(region, _RASTER_STEP, np.full(dimension, _RASTER_STEP / 2))
     for _ in range(rounds):
@@ -130,7 +130,8 @@ def shift_particles(region: Boundary, centers: Points, rounds: int) -> Points:
 
 
 def _lattice(region: Boundary, fits: bool, rng: Rng) -> Points:
-    """A square lattice, as simulators start from. Half a spacing beside whole numbers if it `fits`."""
+    """A square lattice, as simulators start from. Coordinates are whole numbers plus 0.5 if it `fits`, otherwise plus a
+    random offset."""
     offset = rng.random(region.bounds.shape[1])
     return raster(region, 1.0, np.full_like(offset, 0.5) if fits else offset)
 
@@ -164,8 +165,8 @@ def _clumped(region: Boundary, fits: bool, rng: Rng) -> Points:
 
 
 def _ragged(region: Boundary, fits: bool, rng: Rng) -> Points:
-    """A piece cut out of darts in a larger box: thrown into the region itself they would crowd along its boundary,
-    because nothing outside keeps them away."""
+    """A piece cut out of darts in a larger box. Darts thrown into the region itself would crowd along its boundary,
+    because no darts outside keep a distance."""
     (x0, y0), (x1, y1) = region.bounds + np.array([[-_RAGGED_MARGIN], [_RAGGED_MARGIN]])
     around = Curve(Outline.of_shapely(box(x0, y0, x1, y1)), 1.0)
     darts = throw_darts(around, round(around.measure), rng, inset=0)

@@ -29,12 +29,12 @@ class Frame:
 
 @dataclass
 class Sequence:
-    """Frames in their order, with what is known of them.
+    """Frames in their order, and known facts about them.
 
-    spacing: that at which N h^2 is the area of the first frame, world units; metrics are in it. judged: whether the
-    sequence counts in comparisons. whole: whether areas are compared (not where spray comes off). walls: (W, 2, 2),
-    the ends of rigid straight walls. motion: None of recordings. truth_follows_motion: False where outlines appear or
-    vanish.
+    spacing: h with N h^2 = area of the first frame, world units; of recordings given or estimated. It is the unit of
+    metrics. judged: whether the sequence counts in comparisons. whole: whether areas are compared (not if spray comes
+    off). walls: (W, 2, 2), the ends of rigid straight walls. motion: None of recordings. truth_follows_motion: False if
+    outlines appear or vanish.
     """
     name: str
     group: str
@@ -58,9 +58,9 @@ PACES = {"drift": (0.05, 0.3, 0.01), "steady": (0.5, 3.0, 0.1), "leaps": (5.0, 3
 class Recipe:
     """A scene before it is made.
 
-    group: what makes it hard: rigid motion, new noise in each frame, thinned, deformed by a flow, topology (bodies
-    merge or part), ragged, growth by new particles. noise: standard deviation along each axis, in spacings.
-    kept_share: of the particles. backwards: of `topology`, bodies part instead of merging.
+    group: the difficulty: rigid (motion only), noise (new in each frame), thinned, deformed (by a flow), topology
+    (bodies merge or part), ragged, growth (by new particles). noise: standard deviation along each axis, in spacings.
+    kept_share: share of the particles that is kept. backwards: in `topology`, bodies part instead of merging.
     """
     name: str
     group: str = "rigid"
@@ -75,9 +75,10 @@ class Recipe:
     backwards: bool = False
 
 
-_STRAIGHT_STEP = 0.25  # Points on straight sides that a scene bends, in spacings.
-_STRAIN, _WAVE, _VORTEX_ANGLE = (0.04, 0.10), (0.8, 1.6), (0.075, 0.15)  # Of a flow, each step.
-_AREA_GROWTH = 1.05    # A frame.
+_STRAIGHT_STEP = 0.25  # Distance of points on straight sides, in spacings, in scenes that do not bend them.
+# Ranges of a flow: strain of a shear in a step, its wavelength over the body's size, angle of the vortex in a step.
+_STRAIN, _WAVE, _VORTEX_ANGLE = (0.04, 0.10), (0.8, 1.6), (0.075, 0.15)
+_AREA_GROWTH = 1.05    # Factor of the area from frame to frame.
 _BODY_GAP, _BODY_DEPTH = 3.1, 7.3  # Bodies come from this gap and end this deep in each other, in spacings.
 
 # Per set of bodies: size of the second body over the size of the first; half axis of the first body towards the second
@@ -144,8 +145,8 @@ def _moving(recipe: Recipe, rng: Rng) -> _Draft:
 
 
 def _growing(recipe: Recipe, rng: Rng) -> _Draft:
-    """The region swells around the origin. New particles come in where they fit, and all settle as their sampler
-    requires: darts stay, clumps are shifted, all others are relaxed."""
+    """The region swells around the origin. New particles are thrown where they fit. Then all settle by the rule of
+    their sampler: darts stay, clumps are shifted, all others are relaxed."""
     outline = make_shape(recipe.shape, recipe.particles, _STRAIGHT_STEP)
     points = SAMPLERS[recipe.sampler](Curve(outline, 1.0), fits_lattice(recipe.shape), rng)
     motion = SimilarityMotion([Similarity.plane(scale=_AREA_GROWTH ** 0.5)] * (recipe.frames - 1))
@@ -164,7 +165,7 @@ def _growing(recipe: Recipe, rng: Rng) -> _Draft:
 
 
 def _make_bodies(shape: str, area: float, steps: int, rng: Rng) -> BodiesMotion:
-    """Two or three bodies whose areas sum to `area`, on their way towards the first."""
+    """Two or three bodies whose areas sum to `area`. The others move towards the first."""
     second, stretch, sideways, third = _BODIES[shape]
     radius = (area / (np.pi * (1 + second ** 2 * (2 if third else 1)))) ** 0.5
     a, b, heading = radius * stretch, radius / stretch, rng.uniform(0, 2 * np.pi)
@@ -221,15 +222,15 @@ def digest(sequence: Sequence) -> str:
     return total.hexdigest()[:16]
 
 
-_SAMPLERS = tuple(name for name in SAMPLERS if name != "ragged")  # Those of every kind of motion.
+_SAMPLERS = tuple(name for name in SAMPLERS if name != "ragged")  # Samplers of every kind of motion.
 _COUNTS = (900, 600, 1400, 700, 2000, 1100, 3000, 500)
 _NOISES, _SHARES = (0.05, 0.10, 0.20), (1.0, 0.8, 0.5, 0.3)
 _Plan = Seq[tuple[str, Seq[str]]]
 
 
 def _recipes(shapes: Seq[str], bodies: Seq[str], seed: int, plan: _Plan) -> Iterator[Recipe]:
-    """plan: groups with the samplers of their sequences. Shapes follow each other through all of them, so that no
-    shape always meets the same pace, count or sampler."""
+    """plan: groups with the samplers of their sequences. Shapes follow each other through all sequences, so that no
+    shape always has the same pace, count or sampler."""
     serial, next_shape = 0, 0
     for group, samplers in plan:
         for k, sampler in enumerate(samplers):
@@ -264,10 +265,10 @@ SETS = ("smoke", "tuning", "validation", "discs")
 
 
 def make_set(name: str) -> list[Recipe]:
-    """The recipes of a set of SETS. smoke: one small sequence a group. tuning: every sampler on rigid, deformed,
+    """The recipes of a set of SETS. smoke: one small sequence for each group. tuning: every sampler on rigid, deformed,
     topology and growth, two seeds each, and noise, thinned, ragged; methods are chosen by these. validation: the same
-    of other shapes, bodies and seeds, three seeds each; never used for choosing. discs: discs and ellipses, relaxed
-    by 30 and by 100 rounds, still and turning."""
+    with other shapes, bodies and seeds, three seeds each; never used to choose methods. discs: discs and ellipses,
+    relaxed by 30 and by 100 rounds, still and turning."""
     if name == "tuning":
         return list(_recipes(TUNING_SHAPES, _TUNING_BODIES, 91_000, _full(2)))
     if name == "validation":

@@ -1,8 +1,8 @@
 """Outlines of the synthetic scenes, by name, in units of the particle spacing.
 
-A shape is a function of h, the spacing in the shape's own unit, that returns its region as a Shapely polygon. The first
-call measures its area, the second has the h at which the area is the requested one. Gaps between bodies are multiples
-of h; all else scales.
+A shape is a function of h, the spacing in the shape's own unit, that returns its region as a Shapely polygon. A first
+call measures the area, a second call uses the h that gives the requested area. Gaps between bodies are multiples of h;
+all other lengths do not depend on h.
 """
 
 from typing import Any, Callable
@@ -34,14 +34,14 @@ def _polygon(*corners: tuple[float, float]) -> Shape:
 
 
 def _teeth(count: int, corners: tuple[tuple[float, float], ...]) -> Shape:
-    """`count` times the corners (share of a tooth's angle, radius)."""
+    """A wheel of `count` teeth. corners: share of the angle of a tooth, radius."""
     turn = 2 * np.pi / count
     return _polygon(*((r * np.cos(turn * (k + at)), r * np.sin(turn * (k + at)))
                       for k in range(count) for at, r in corners))
 
 
 def _polar(radius: Callable[[Callable[[float, float], Floats]], Floats]) -> Shape:
-    """radius(wave) around the origin, where wave(k, phase) is sin(k angle + phase)."""
+    """A region around the origin with the radius radius(wave), where wave(k, phase) is sin(k angle + phase)."""
     def region(h: float) -> Any:
         angle = np.linspace(0, 2 * np.pi, int(np.ceil(16 / (CURVE_STEP * h))), endpoint=False)
         length = radius(lambda k, phase: np.sin(k * angle + phase))

@@ -17,8 +17,8 @@ from .motions import Similarity
 from .shapes import make_shape
 
 _BAND = 0.25            # Samples of a solid are the feet of random points within this distance.
-_SAMPLES_PER_AREA = 6.0  # Of a squared spacing.
-_CREASE = 0.05          # Feet of points outside that are nearer than this to each other's solid are corners.
+_SAMPLES_PER_AREA = 6.0  # Samples for each squared spacing of the boundary.
+_CREASE = 0.05          # A point outside that is farther than this from the normal of its foot has the foot on an edge.
 _NEWTON_STEPS = 60      # Bisections for the nearest point of an ellipsoid: to 1e-15 of its size.
 
 
@@ -218,8 +218,8 @@ class Solid:
 
     @cached_property
     def samples(self) -> Samples:
-        """The feet of random points of a thin band inside: even over smooth parts. Corners: where points outside have
-        feet on edges."""
+        """middles: the feet of random points of a thin band inside, even over smooth parts. corners: the feet on edges
+        of points outside."""
         rng = np.random.default_rng(1)
         size = np.ptp(self.bounds, axis=0) + 2 * _BAND
         count = int(np.prod(size) * _SAMPLES_PER_AREA / _BAND)
@@ -264,7 +264,7 @@ class Mesh:
 
     @cached_property
     def samples(self) -> Samples:
-        """Points that stand for equal areas, on the triangles in their order; all vertices count in maxima."""
+        """middles: points of equal areas, on the triangles in their order. corners: all vertices."""
         walked = np.concatenate([[0.0], np.cumsum(self._twice)])
         count = max(1, int(np.ceil(walked[-1] / 2 / self.step ** 2)))
         at = (np.arange(count) + 0.5) * walked[-1] / count
@@ -276,7 +276,7 @@ class Mesh:
         return Samples(middles, self.points[np.unique(self.triangles)])
 
     def nearest(self, points: Points) -> tuple[Floats, Points, Points]:
-        """Exact, as Curve.nearest: k grows where a triangle with a farther middle may be nearer."""
+        """Exact, by the rule of Curve.nearest."""
         count = len(points)
         distance, foot, piece = np.empty(count), np.empty((count, 3)), np.empty(count, np.int64)
         pending, k = np.arange(count), min(8, len(self._a))

@@ -1,4 +1,4 @@
-"""Methods over sequences, in this process: rows of metrics. Methods are not given ids: no outline depends on them."""
+"""Runs methods on sequences and collects rows of metrics. Methods do not receive ids: no outline depends on them."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
@@ -39,9 +39,9 @@ METRICS = (
 
 @dataclass(frozen=True)
 class Method:
-    """Keyword arguments of partiemc.Reconstructor under a name. is_step: the default with something switched off or
-    changed, for a table of its own. needs_spacing: left out where no spacing is given, because it is the same as
-    another method there."""
+    """Keyword arguments of partiemc.Reconstructor under a name. is_step: the default with a step switched off or a
+    constant changed, for a separate table. needs_spacing: not run without a given spacing, because it is the same as
+    another method then."""
     name: str
     parameters: dict[str, Any]
     remark: str = ""
@@ -50,8 +50,8 @@ class Method:
 
 
 def all_methods(steps: bool = False, sensitivity: bool = False) -> list[Method]:
-    """The baseline first, then the other placements and two variants; on request the default without each of its
-    steps, and with each of its constants times 0.7 and 1.4."""
+    """The baseline first, then the other placements and two variants. steps: also the default without each of its
+    steps. sensitivity: also the default with each of its constants times 0.7 and 1.4."""
     def changed(name: str, remark: str, kind: str, value: dict[str, Any], is_step: bool = True) -> Method:
         return Method(f"{DEFAULT}-{name}", {"placement": DEFAULT, "_research": {kind: value}}, remark, is_step,
                       value == {"area": False})
@@ -74,8 +74,8 @@ def all_methods(steps: bool = False, sensitivity: bool = False) -> list[Method]:
 
 @dataclass
 class Row:
-    """One method on one sequence. given: what it was given, "spacing", "volumes" or "nothing". values: by metric. frames:
-    the same by frame."""
+    """One method on one sequence. given: its input beside positions, "spacing", "volumes" (and spacing) or "nothing".
+    values: by metric. frames: the same for each frame."""
     sequence: str
     group: str
     shape: str
@@ -110,16 +110,16 @@ def outline_of(result: Any) -> Outline:
 
 
 class _Reference(NamedTuple):
-    """The truth of one frame: the boundary, the curve through the outermost centres, and, where the truth does not
-    follow the motion, the truth of the frame before, carried along."""
+    """The truth of one frame: the boundary; the curve through the outermost centres; the truth of the frame before,
+    carried along, if the truth does not follow the motion."""
     truth: Curve | None = None
     centers: Curve | None = None
     before: Curve | None = None
 
 
 class Evaluator:
-    """A sequence with its truth prepared, so that several methods share that work. centers: compare with the curve
-    through the outermost centres, too."""
+    """A sequence with its truth prepared once for several methods. centers: also compares with the curve through the
+    outermost centres."""
 
     def __init__(self, sequence: Sequence, centers: bool = True) -> None:
         self.sequence = sequence
@@ -180,7 +180,7 @@ class Evaluator:
 
 
 def mean_of(values: Any, weights: Any = 1.0) -> float:
-    """Of the values that are not NaN; ABSENT if none is."""
+    """Weighted mean of the values that are not NaN; ABSENT if there are none, or their weights are 0."""
     values, weights = np.broadcast_arrays(np.asarray(values, float), weights)
     there = ~np.isnan(values)
     total = weights[there].sum()
@@ -204,7 +204,7 @@ def _summary(frames: list[dict[str, float]]) -> dict[str, float]:
 
 @dataclass
 class Study:
-    """All rows, by sequence, then method, then what was given; recordings last."""
+    """All rows, ordered by sequence, then method, then `given`; recordings last."""
     methods: list[Method]
     given: list[str]
     rows: list[Row]
@@ -222,8 +222,8 @@ def _run_all(methods: list[Method], given: list[str], source: Recipe | Sequence)
 
 def map_in_processes(run: Callable[[Source], Found], sources: Seq[Source], jobs: int,
                      progress: Callable[[int], None] = lambda done: None) -> Iterator[Found]:
-    """run(source) of each source, in their order. jobs: processes that each take one source at a time. progress: called
-    with the number of sources done."""
+    """run(source) of each source, in their order. jobs: number of processes; 1: this one. progress: called with the
+    number of sources done."""
     # Starts new processes instead of forking, because a fork would lose the threads of the native module.
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) if jobs > 1 else None
     try:

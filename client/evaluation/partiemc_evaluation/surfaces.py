@@ -19,18 +19,18 @@ from .tables import Table, fixed
 BASELINE, DEFAULT = "marching-cubes", "virtual-plane"
 PLACEMENTS = (BASELINE, "qef", DEFAULT)
 _NAMES_OF_OUTLINES = {BASELINE: "marching-squares"}  # The parameter `placement` where it has another name.
-ON_TRUTH = "points on the truth"  # The default's triangles with all points on the truth: a bound for this mesh.
+ON_TRUTH = "points on the truth"  # The default's triangles with all points on the truth: the least error of a mesh.
 # Means over the frames of a scene; lengths in spacings, angles in radians, volumes relative.
 METRICS = ("mean_deviation", "hausdorff", "normal_error", "mean_jitter", "hausdorff_jitter", "volume_error",
            "shell_error", "genus_error", "triangles")
 _PARTICLES, _FRAMES = 1200, 5
 _NOISE = {"noise-5": 0.05, "noise-10": 0.10}
 _KEPT_SHARE, _STRETCH = 0.85, 1.05
-_SHIFT, _TURN = (0.5, 3.0), 0.1     # Rigid motion, a frame: spacings, radians.
+_SHIFT, _TURN = (0.5, 3.0), 0.1     # Rigid motion in each frame: range in spacings; largest turn, radians.
 _GAP, _DEPTH = 3.1, 6.0             # Balls come from this gap and end this deep in each other.
 _SPRAY_SIZES, _LONE = (2, 3, 5, 8, 12, 20, 30, 60), 30
 _RAGGED_MARGIN = 2.0
-_APART = 3.0                        # Where two balls merge, in spacings.
+_APART = 3.0                        # Points nearer than this to both balls, in spacings, may merge.
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Recipe:
 
 @dataclass
 class Frame:
-    """positions: (N, 3). motion: where points of this frame are in the next one; None for the last frame."""
+    """positions: (N, 3). motion: maps points of this frame to the next one; None for the last frame."""
     positions: Points
     truth: Solid
     motion: Callable[[Points], Points] | None
@@ -113,7 +113,7 @@ def _stretched(recipe: Recipe, rng: Rng) -> Iterator[Frame]:
 
 
 def _merging(recipe: Recipe, rng: Rng) -> Iterator[Frame]:
-    """Two balls that come together; where they overlap, only the first has particles. Backwards for odd seeds."""
+    """Two balls that merge, or part for odd seeds. Where they overlap, only the first has particles."""
     share = rng.uniform(0.3, 0.5)
     radii = (np.array([1 - share, share]) * _PARTICLES / (4 / 3 * np.pi)) ** (1 / 3)
     samples = [_sample(Solid(Balls(np.zeros((1, 3)), radii[k:k + 1])), recipe.sampler, rng) for k in range(2)]
@@ -133,8 +133,8 @@ def _merging(recipe: Recipe, rng: Rng) -> Iterator[Frame]:
 
 
 def _spray(recipe: Recipe, rng: Rng) -> Iterator[Frame]:
-    """A ball, drops of some particles and lone particles on straight paths. A drop of n particles counts as a ball of
-    volume n."""
+    """A ball, drops of some particles and lone particles, all moving by the same step. The truth of a drop of n
+    particles is a ball of volume n."""
     counts = [_PARTICLES // 2, *_SPRAY_SIZES, *[1] * _LONE]
     radii = (np.array(counts) / (4 / 3 * np.pi)) ** (1 / 3)
     centers = np.zeros((1, 3))
@@ -198,7 +198,7 @@ def surface_sets() -> dict[str, list[Recipe]]:
 
 
 def surface_digest(recipe: Recipe) -> str:
-    """Of the particles, in thousandths of a spacing."""
+    """16 hexadecimal digits of all positions, in thousandths of a spacing."""
     total = hashlib.sha256()
     for frame in make_frames(recipe):
         total.update(np.round(1000 * frame.positions).astype(np.int64).tobytes())
@@ -223,7 +223,7 @@ def _measure(recipe: Recipe, frame: Frame, surface: dict[str, Any], mesh: Mesh) 
         expected = frame.truth.nearest(mesh.points)[2]
         cosine = np.clip(dot(surface["normals"].astype(float), expected), -1, 1)
         found["normal_error"] = float(np.arccos(cosine).mean())
-    if recipe.group != "topology":  # Elsewhere the particles have the true volume.
+    if recipe.group != "topology":  # There, the particles do not have the true volume.
         found["volume_error"] = abs(mesh.measure / frame.truth.measure - 1)
     shells = len(frame.truth.form.radii) if isinstance(frame.truth.form, Balls) else (
         2 if recipe.shape in ("hollow-ball", "eccentric-shell") else 1)
@@ -281,8 +281,8 @@ def measure_scene(recipe: Recipe, placements: Seq[str] = PLACEMENTS) -> list[Row
 
 
 def _apart(before: Frame, frame: Frame) -> Callable[[Points], Bools]:
-    """Which points of `frame` are so far from the other of two balls, now and in the frame before, that a change there
-    is no merging."""
+    """Returns a function that selects points of `frame` away from a merging: farther than _APART from the ball that is
+    not the nearest, now and in the frame before."""
     then, now = (Balls(f.truth.place(form.centers), f.truth.scale * form.radii) for f in (before, frame)
                  if isinstance(form := f.truth.form, Balls))
 
@@ -301,8 +301,8 @@ def run_surfaces(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None
 
 
 def surface_tables(rows: Seq[Row]) -> list[Table]:
-    """Geometric means of ratios to marching cubes: all scenes, then the default by group and by sampler, worst first;
-    then means of what has no ratio."""
+    """Geometric means of ratios to marching cubes: over all scenes, then of the default by group, sampler and shape,
+    worst first. Last, the means of all metrics."""
     def of(placement: str) -> list[Row]:
         return [row for row in rows if row.method == placement]
     metrics = METRICS[:5] + METRICS[8:]

@@ -1,4 +1,4 @@
-"""What a study and the paper's runs found, as tables for a terminal and for the page."""
+"""Tables of a study and of the paper's runs, for a terminal and for the page."""
 
 import html
 import math
@@ -11,7 +11,7 @@ from .comparisons import LOSS_RATIO, TIE_SHARE, Ratio, compare_parts, compare_ro
 from .paper import FILLS, GRIDS, PAPER_MERGING, PAPER_ROWS, PaperRuns
 from .study import BASELINE, DEFAULT, METRICS, Study
 
-# The metrics by which methods are compared: for scenes against the truth, for recordings with the little that is known.
+# The metrics that compare methods: of scenes against the truth, of recordings by their known facts.
 SCENE_METRICS = ("hausdorff", "mean_deviation", "bias", "area_deviation", "hausdorff_jitter", "mean_jitter")
 RECORDING_METRICS = ("mean_deviation", "area_error_size", "area_deviation", "hausdorff_jitter", "mean_jitter",
                      "known_hausdorff_jitter", "known_mean_jitter", "wall_roughness")
@@ -19,7 +19,7 @@ RECORDING_METRICS = ("mean_deviation", "area_error_size", "area_deviation", "hau
 
 @dataclass
 class Table:
-    """rows: a name and a text for each head. A text that ends with "!" asks for attention."""
+    """rows: a name, and a text for each head. A text that ends with "!" is highlighted."""
     title: str
     note: str
     heads: list[str]
@@ -82,7 +82,7 @@ def ratio_table(study: Study, given: str, recordings: bool) -> Table:
 
 
 def step_table(study: Study, given: str, recordings: bool) -> Table:
-    """What each step of the default is worth; without rows if the study has no such methods."""
+    """The default with each step or constant changed; no rows if the study has no such methods."""
     metrics, baseline = judged_metrics(recordings), study.of(BASELINE, given, recordings)
     table = _table(f"{DEFAULT} with a step or a constant changed", "Geometric means of ratios to marching squares; "
                    "marked where the change is better by 1 %.", given, recordings, metrics)
@@ -129,7 +129,7 @@ def mean_table(study: Study, given: str, recordings: bool) -> Table:
 
 
 def study_tables(study: Study, methods: Seq[str]) -> list[Table]:
-    """What counts first; details of `methods` only."""
+    """The tables, the most important first, with details of `methods` only."""
     tables = []
     for recordings, given in ((r, t) for r in (False, True) for t in study.given if study.of(BASELINE, t, r)):
         tables += [ratio_table(study, given, recordings), step_table(study, given, recordings)]
@@ -176,7 +176,7 @@ def paper_tables(study: Study, runs: PaperRuns) -> list[Table]:
 
 
 def fill_table(runs: PaperRuns) -> Table:
-    """What each fill leaves of the grid's triangles, over all shapes, at both grids."""
+    """The share of the grid's triangles that each fill saves, over all shapes, at both grids."""
     table = Table(f"Triangles by fill, {DEFAULT}", "Mean share of the grid's triangles that a fill saves, over "
                   f"{len(runs.fills) // len(GRIDS)} shapes of about 1,000 particles; N cells across the bounding square.",
                   [*FILLS[1:], "conforming / greedy", "most T-junctions: greedy", "conforming", "rings"], [])

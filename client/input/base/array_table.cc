@@ -24,7 +24,7 @@ ColumnRequest WithComponents(const ColumnRequest& request, const ArrayTable& tab
   return expanded;
 }
 
-// The columns of arrays without data.
+// The columns of `arrays`, with null instead of data.
 ArrayTable NamesOf(std::span<const StoredArray> arrays) {
   ArrayTable table;
   for (const StoredArray& array : arrays) {
@@ -57,7 +57,7 @@ absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request) {
   const ArrayTable table = NamesOf(arrays);
-  // Attributes and conditions can name arrays that the caller adds later.
+  // Attributes and conditions are left out, because the caller may add arrays for them later.
   const ColumnRequest columns{.columns = request.columns};
   const auto plan = PlanNamedColumns(table.names, WithComponents(columns, table));
   if (!plan.ok()) return plan.status();

@@ -43,7 +43,7 @@ struct StoredArray {
 absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count,
                       const ColumnRequest& request, const std::string& source, ParticleRows& rows);
 
-/// The index of the array with the first position. Uses only the `columns` of the request.
+/// The index of the array with the first axis of the positions. Uses only request.columns.
 /// Errors: as PlanNamedColumns.
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request);

@@ -39,7 +39,6 @@ class FileSource final : public ByteSource {
   std::unique_ptr<std::FILE, CloseFile> file_;
 };
 
-// A byte range of a file.
 class FilePart final : public ByteSource {
  public:
   FilePart(const std::string& path, std::uint64_t offset, std::uint64_t size)

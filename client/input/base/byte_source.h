@@ -22,7 +22,7 @@ inline constexpr std::size_t kMaxParticles = std::size_t{1} << 26;
 inline constexpr double kMaxExpansion = 1000;
 inline constexpr std::uint64_t kFreeExpansionBytes = std::uint64_t{64} << 20;
 
-/// Whether `unpacked` bytes are more than a file of `packed` bytes may unpack to (kMaxExpansion).
+/// Whether `unpacked` bytes are more than a file of `packed` bytes may unpack to.
 bool ExpandsTooMuch(std::uint64_t unpacked, std::uint64_t packed, double max_expansion);
 /// The broken rule and the remedy, for an error message.
 std::string ExpansionRule(double max_expansion);
@@ -56,7 +56,8 @@ class InputStream final : public ByteSource {
 
   absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override;
 
-  /// The next `size` bytes, fewer at the end, without consuming them. Requires: size <= 64 KiB.
+  /// The next `size` bytes, fewer at the end, without consuming them; valid until the next call.
+  /// Requires: size <= 64 KiB.
   absl::StatusOr<std::string_view> Peek(std::size_t size);
 
   /// The next line without "\n" or "\r\n", valid until the next call. Returns false at the end.
@@ -65,9 +66,8 @@ class InputStream final : public ByteSource {
 
   const std::string& path() const { return path_; }
   bool compressed() const { return compressed_; }
-  std::size_t line_number() const {
-    return line_number_;
-  }  ///< Number of the last line read, from 1.
+  /// Number of the last line read, from 1.
+  std::size_t line_number() const { return line_number_; }
 
   /// "PATH:LINE: message" with the last line read.
   absl::Status ErrorAtLine(absl::StatusCode code, std::string_view message) const;

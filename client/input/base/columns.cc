@@ -209,8 +209,8 @@ std::vector<std::size_t> FindComponents(const Names& names, const Names& canonic
 absl::Status PlanAttributes(const Names& names, const Names& canonical,
                             const ColumnRequest& request, ColumnPlan& plan) {
   for (const std::string& asked : request.attributes) {
-    // The attribute "velocity" needs no columns here. Rows store velocities by axis, and the
-    // projection selects the axes of the plane.
+    // Velocities are no attribute here. Rows store them by axis, because the projection selects the
+    // axes of the plane.
     if (asked == kVelocityAttribute && CountFound(plan.velocities) >= 2) continue;
     std::vector<std::size_t> columns = FindComponents(names, canonical, asked);
     if (const auto column = FindAsked(names, canonical, asked); column && columns.empty()) {

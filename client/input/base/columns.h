@@ -56,11 +56,11 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> velocities;
   std::optional<std::size_t> id;
   std::optional<std::size_t> volume;
-  /// If not 0, the column of volumes holds lengths: a volume is the square, in space the cube, of
-  /// the length times this.
+  /// If not 0, `volume` is a column of lengths: a volume is the square, in space the cube, of
+  /// size_of_length times the length.
   double size_of_length = 0;
   bool in_space = false;
-  double per_volume = 1;  ///< Factor of a column of volumes.
+  double per_volume = 1;  ///< Factor of the values in a column of volumes.
   std::vector<AttributeColumns> attributes;
   std::vector<std::size_t> conditions;  ///< Parallel to ColumnRequest::conditions.
   /// Columns ix iy iz of LAMMPS (image flags): how often the particle has crossed the periodic box
@@ -73,7 +73,7 @@ struct ColumnPlan {
   /// The volume that a value of the column of volumes stands for.
   double VolumeOf(double value) const {
     if (size_of_length == 0) return per_volume * value;
-    if (!(value > 0)) return value;  // A negative length is no size.
+    if (!(value > 0)) return value;  // The square of a negative length would be positive.
     const double size = size_of_length * value;
     return in_space ? size * size * size : size * size;
   }
@@ -91,7 +91,7 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& name
 /// tables need request.columns.
 absl::StatusOr<ColumnPlan> PlanUnnamedColumns(std::size_t count, const ColumnRequest& request);
 
-/// Marks the columns of the table that a plan uses.
+/// Marks the columns of the table that a plan uses, except `images`.
 std::vector<bool> NeededColumns(const ColumnPlan& plan);
 
 /// Whether PlanNamedColumns would find positions by names alone.

@@ -8,7 +8,6 @@
 namespace partiemc::client {
 namespace {
 
-// Removes the leading digits from `text` and returns them.
 std::string_view TakeDigits(std::string_view& text) {
   const auto end = std::find_if_not(text.begin(), text.end(), absl::ascii_isdigit);
   const auto length = static_cast<std::size_t>(end - text.begin());

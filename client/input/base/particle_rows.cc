@@ -56,7 +56,6 @@ auto Visit(const ArrayColumn& column, std::size_t row, Visitor visitor) {
   return visitor(Load<double>(at, column.swapped));
 }
 
-// The rows that fulfil all conditions.
 absl::StatusOr<std::vector<std::size_t>> SelectedRows(std::span<const ArrayColumn> columns,
                                                       std::size_t row_count, const ColumnPlan& plan,
                                                       const ColumnRequest& request) {

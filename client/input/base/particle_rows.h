@@ -18,7 +18,7 @@
 namespace partiemc::client::input {
 
 struct ParticleRows {
-  std::array<std::vector<double>, 3> positions;  ///< By axis; axes outside the plan are empty.
+  std::array<std::vector<double>, 3> positions;  ///< By axis; empty without has_position.
   std::array<std::vector<float>, 3> velocities;
   std::vector<std::uint64_t> ids;
   std::vector<double> volumes;
@@ -33,7 +33,7 @@ struct ParticleRows {
   std::optional<RecordedBox> box;
   std::string source;
   std::size_t count = 0;
-  std::size_t unselected = 0;  ///< Rows that do not fulfil the conditions.
+  std::size_t unselected = 0;  ///< Number of rows that do not fulfil the conditions.
 
   /// Clears the arrays, keeps their memory, and records which of them `plan` fills.
   void Begin(const ColumnPlan& plan);

@@ -42,7 +42,6 @@ std::size_t CellEnd(std::string_view line, std::size_t begin, char separator) {
   return std::min(line.find(separator, std::min(close, line.size())), line.size());
 }
 
-// The separator between the cells of `line`.
 char Separator(std::string_view line) {
   std::vector<std::string_view> cells;
   SplitAtBlanks(line, cells);

@@ -26,7 +26,7 @@ absl::Status Truncated(const std::string& name, std::string_view packing) {
   return absl::DataLossError(Concat(name, ": the ", packing, " data is truncated"));
 }
 
-// Counts the bytes that pass.
+// Adds the number of bytes read from `source` to `count`.
 class CountedSource final : public ByteSource {
  public:
   CountedSource(std::unique_ptr<ByteSource> source, std::uint64_t& count)
@@ -43,7 +43,7 @@ class CountedSource final : public ByteSource {
   std::uint64_t& count_;
 };
 
-// Unpacks a source. Fails if it expands by more than `max_expansion`.
+// Unpacks gzip or zstd. Fails once the bytes expand too much (ExpandsTooMuch).
 class BoundedSource final : public ByteSource {
  public:
   BoundedSource(Packing packing, const std::string& name, std::unique_ptr<ByteSource> packed,

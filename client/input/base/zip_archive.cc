@@ -57,7 +57,7 @@ class CheckedEntry final : public ByteSource {
   // Returns 0 at the end of the entry. It is an error if the source has more bytes than the entry's
   // size.
   absl::StatusOr<std::size_t> CheckEnd() {
-    if (seen_crc_ != crc_) return WrongChecksum();  // The entry is empty.
+    if (seen_crc_ != crc_) return WrongChecksum();  // An empty entry is checked only here.
     char surplus = 0;
     const auto count = source_->Read(&surplus, 1);
     if (!count.ok() || *count == 0) return count;

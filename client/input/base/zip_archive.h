@@ -24,14 +24,13 @@ struct ZipEntry {
 class ZipArchive {
  public:
   /// kDataLoss if the file is not a zip archive, is truncated, has over 65,535 entries or bytes
-  /// behind its directory.
+  /// behind its directory. kUnimplemented for encrypted entries and entries beyond 4 GiB.
   static absl::StatusOr<ZipArchive> Open(const std::string& path);
 
   const std::vector<ZipEntry>& entries() const { return entries_; }
 
   /// Opens an entry for reading. At the end of the entry its checksum and size are verified:
-  /// kDataLoss if they differ. kUnimplemented for encrypted entries and for methods other than
-  /// stored and deflated.
+  /// kDataLoss if they differ. kUnimplemented for methods other than stored and deflated.
   absl::StatusOr<std::unique_ptr<ByteSource>> OpenEntry(const ZipEntry& entry) const;
 
  private:

@@ -11,7 +11,7 @@ namespace partiemc::client::input {
 namespace {
 
 constexpr std::size_t kBgeoWordBytes = 4;
-constexpr std::size_t kMaxBgeoWords = 4096;  // Of a point.
+constexpr std::size_t kMaxBgeoWords = 4096;  // Per point; also the limit on attributes.
 
 class BgeoReader final : public OneFrameReader {
  public:
@@ -23,7 +23,7 @@ class BgeoReader final : public OneFrameReader {
     std::string name;
     std::size_t components;
     std::size_t offset;  // In words.
-    bool whole;          // Integers or indices of texts.
+    bool whole;          // Int32: integers or indices of texts. Otherwise float32.
   };
 
   absl::Status Read(ParticleRows& rows) override {

@@ -38,8 +38,8 @@ struct FileHead {
   }
 };
 
-// Whether an NPY array has an extent more than one frame needs. Its header can be longer than the
-// head of the file.
+// Whether an NPY array has several frames. Opens the file, because the header of the array can be
+// longer than the head of the file.
 bool HasFramesInNpy(const FileHead& head) {
   if (!head.Begins("\x93NUMPY")) return false;
   const auto stream = InputStream::Open(head.path);

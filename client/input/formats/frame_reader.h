@@ -39,7 +39,7 @@ class OneFrameReader : public FrameReader {
   bool done_ = false;
 };
 
-/// Opens a file of one format. `request` outlives the reader.
+/// Opens a file of one format. Requires: `request` outlives the reader.
 using OpenReader = absl::StatusOr<std::unique_ptr<FrameReader>>(const std::string& path,
                                                                 const ColumnRequest& request);
 

@@ -1,5 +1,5 @@
-// GSD, the format of HOOMD-blue: chunks of numbers with a name and a frame. A chunk that a frame
-// lacks is taken from frame 0. https://gsd.readthedocs.io/en/stable/file-layer.html
+// GSD, the format of HOOMD-blue: chunks of numbers with a name and a frame. If a frame lacks a
+// chunk, the chunk of frame 0 is used. https://gsd.readthedocs.io/en/stable/file-layer.html
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -77,8 +77,7 @@ class GsdIndex {
   }
 
  private:
-  // Multiplies two numbers. On overflow the result is larger than any file, so that later checks
-  // against the file's size fail.
+  // Returns a * b, or on overflow 2^62, which fails the checks against the size of the file.
   static std::uint64_t Product(std::uint64_t a, std::uint64_t b) {
     constexpr std::uint64_t kBeyond = std::uint64_t{1} << 62;
     return b != 0 && a > kBeyond / b ? kBeyond : a * b;
@@ -172,7 +171,7 @@ class GsdReader final : public FrameReader {
     return chunk != nullptr ? chunk : Find(0, name);
   }
 
-  // A chunk with one whole number.
+  // Reads a chunk with one whole number. Empty without such a chunk, or for a negative number.
   absl::StatusOr<std::optional<std::uint64_t>> Number(std::uint64_t frame,
                                                       std::string_view name) const {
     const GsdChunk* const chunk = FindOrInitial(frame, name);
@@ -209,10 +208,9 @@ class GsdReader final : public FrameReader {
                        [this, &chunk](std::vector<char>& bytes) { return Load(chunk, bytes); }};
   }
 
-  // Returns the arrays with one row per particle.
   std::vector<StoredArray> Arrays(std::uint64_t frame, std::uint64_t particles) const {
     std::vector<StoredArray> arrays;
-    // Frame 0 does not replace a broken chunk.
+    // A chunk with another number of rows is broken. The chunk of frame 0 does not replace it.
     std::set<std::string_view> seen;
     for (const std::uint64_t from : {frame, std::uint64_t{0}}) {
       const auto chunks = content_.frames.find(from);
@@ -225,7 +223,7 @@ class GsdReader final : public FrameReader {
     return arrays;
   }
 
-  // Returns the arrays of a frame without particles: those of all frames, without rows.
+  // Returns the arrays of a frame without particles: the arrays of all frames, with no rows.
   const std::vector<StoredArray>& EmptyArrays() {
     if (!empty_.empty()) return empty_;
     std::set<std::string_view> seen;

@@ -23,7 +23,8 @@ constexpr std::size_t kMaxHdf5Members = std::size_t{1} << 20;
 // does not overflow.
 constexpr std::uint64_t kMaxRows = std::uint64_t{1} << 48;
 
-// A long double. libhdf5 allocates memory for an element of any declared size.
+// Maximum size of a floating-point number: a long double. libhdf5 would allocate memory for any
+// declared size.
 constexpr std::size_t kMaxFloatBytes = 16;
 
 Mutex& LibraryMutex() {
@@ -31,7 +32,6 @@ Mutex& LibraryMutex() {
   return mutex;
 }
 
-// Closes an object of the library.
 class Handle {
  public:
   Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
@@ -52,7 +52,7 @@ class Handle {
 // is per thread.
 void Silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
-// Whether every link of `path` exists and leads to an object in the same file.
+// Whether all links of `path` exist and are hard links, which cannot leave the file.
 bool LinksStayInFile(hid_t file, const std::string& path) {
   std::size_t end = 0;
   while (end < path.size()) {
@@ -171,8 +171,9 @@ absl::Status CheckStoredNumbers(hid_t dataset, const Hdf5Array& array, const std
   std::error_code no_size;
   std::uint64_t stored = std::filesystem::file_size(path, no_size);
   const std::uint64_t bytes = array.rows * array.components * ElementBytes(array.type);
-  // The library searches the whole index of chunks for the size, so the bytes of the file come
-  // first. The size of contiguous numbers is a claim of the header.
+  // H5Dget_storage_size walks through the index of chunks, so the size of the file is checked
+  // first. For contiguous numbers it returns what the header claims, so the size of the file limits
+  // it.
   if (!ExpandsTooMuch(bytes, stored, max_expansion)) {
     stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset), stored);
   }
@@ -185,7 +186,7 @@ absl::Status CheckStoredNumbers(hid_t dataset, const Hdf5Array& array, const std
   if (layout != H5D_CHUNKED || H5Pget_chunk(creation.id(), 2, extents) < 1) {
     return absl::OkStatus();
   }
-  // At most 4 GiB in this format, so the product does not overflow. A chunk is unpacked as a whole.
+  // A chunk is unpacked as a whole. HDF5 limits it to 4 GiB, so the product does not overflow.
   const std::uint64_t chunk_bytes = extents[0] * extents[1] * ElementBytes(array.type);
   if (!ExpandsTooMuch(chunk_bytes, stored, max_expansion)) return absl::OkStatus();
   return absl::DataLossError(Concat(place, ": has chunks of ", chunk_bytes,

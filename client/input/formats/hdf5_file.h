@@ -20,8 +20,8 @@ struct Hdf5Array {
   std::size_t components = 1;
 };
 
-/// A file. Paths have the form "group/dataset". Links to other files, virtual datasets and external
-/// data are not followed, so no other file is read.
+/// A file. Paths have the form "group/dataset". Only hard links are followed, and virtual datasets
+/// and external data are refused, so no other file is read.
 class Hdf5File {
  public:
   /// Errors: kDataLoss if libhdf5 cannot open it.
@@ -40,15 +40,15 @@ class Hdf5File {
   /// The description of a dataset. Empty if there is no dataset of numbers.
   std::optional<Hdf5Array> Describe(const std::string& dataset) const;
 
-  /// Whether the file can hold the numbers of a dataset: they are in it, in chunks of a sensible
-  /// size, and do not unpack to too much. Errors: kDataLoss, kUnimplemented.
+  /// Checks that the numbers of a dataset are in this file, and that neither they nor one of their
+  /// chunks unpack to too much. Errors: kDataLoss, kUnimplemented.
   absl::Status CheckStored(const std::string& dataset) const;
 
   /// Reads rows [begin, begin + count). Errors: kDataLoss if the file holds fewer; as CheckStored.
   absl::Status Read(const std::string& dataset, std::uint64_t begin, std::uint64_t count,
                     std::vector<char>& bytes) const;
 
-  /// The first number of an attribute of an object.
+  /// The first number of an attribute of a group or dataset. Empty without such a number.
   std::optional<double> Attribute(const std::string& object, const std::string& name) const;
 
  private:

@@ -15,12 +15,12 @@
 namespace partiemc::client::input {
 namespace {
 
-constexpr std::size_t kMaxListed = 12;  // Datasets in a message.
-constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256}
-                                             << 20;              // Names in the list of frames.
-constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;  // In all frames.
-constexpr std::size_t kMaxVisited = 10000;  // Objects that are searched for them.
-constexpr std::ptrdiff_t kMostLevels = 8;   // Groups in groups.
+constexpr std::size_t kMaxListed = 12;  // Datasets that a message lists.
+// Bytes of the names in the list of frames.
+constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256} << 20;
+constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;  // Points of all frames.
+constexpr std::size_t kMaxVisited = 10000;                       // Objects that Listed visits.
+constexpr std::ptrdiff_t kMostLevels = 8;  // Levels of groups that Listed visits.
 
 std::string JoinPath(std::string_view group, std::string_view name) {
   return group.empty() ? std::string(name) : Concat(group, "/", name);
@@ -47,7 +47,6 @@ struct Hdf5Frame {
   std::optional<double> step;
 };
 
-// The frames of a file.
 struct Hdf5Content {
   std::vector<Hdf5Frame> frames;
   ColumnRequest request;  // With names relative to the group of a frame.
@@ -160,7 +159,7 @@ class Hdf5Survey {
       for (const std::string& group : groups) {
         if (part != "*") next.push_back(JoinPath(group, part));
         if (part != "*") continue;
-        // Hard links can repeat a group any number of times.
+        // Names are limited, because hard links can repeat a group any number of times.
         for (const std::string& name : file_.Members(group)) {
           next.push_back(JoinPath(group, name));
           bytes += sizeof(std::string) + next.back().size();
@@ -189,7 +188,7 @@ class Hdf5Survey {
                : std::nullopt;
   }
 
-  // data/ITERATION/particles/SPECIES; with one species.
+  // Adds the groups data/ITERATION/particles/SPECIES. Refuses several species.
   absl::Status TakeOpenPmd() {
     std::string species;
     for (const std::string& iteration : file_.Members("data")) {
@@ -253,7 +252,7 @@ class Hdf5Survey {
       return absl::DataLossError(Concat(file_.path(), ": has ", *count, " steps of ",
                                         columns.size(), " arrays; their names take over 256 MiB"));
     }
-    // Sums of the first parts. Every count is below 2^48, so a sum beyond that is no frame.
+    // sums[k]: points of the first k parts. The limit keeps sums of counts from overflowing.
     std::vector<std::uint64_t> sums = {0};
     for (const std::uint64_t points_of_part : counts) {
       sums.push_back(sums.back() + points_of_part);
@@ -316,7 +315,7 @@ class Hdf5Survey {
   std::string Listed() const {
     std::vector<std::string> found, queue = {""};
     for (std::size_t k = 0; k < queue.size() && queue.size() < kMaxVisited; ++k) {
-      // Hard links can form cycles.
+      // The depth is limited, because hard links can form cycles.
       if (std::ranges::count(queue[k], '/') > kMostLevels) continue;
       if (!queue[k].empty() && file_.Describe(queue[k])) found.push_back(queue[k]);
       if (found.size() == kMaxListed) return Concat(absl::StrJoin(found, ", "), ", ...");
@@ -365,8 +364,7 @@ class Hdf5Reader final : public FrameReader {
     std::optional<Hdf5Column> offset;
   };
 
-  // Sets `arrays` to the arrays that have the same number of rows as the positions. Returns this
-  // number.
+  // Sets `arrays` to the arrays with the row count of the positions. Returns this count.
   absl::StatusOr<std::size_t> ArraysOf(const Hdf5Frame& frame, const std::string& source,
                                        std::vector<StoredArray>& arrays) const {
     std::vector<Candidate> candidates;

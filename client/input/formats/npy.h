@@ -17,24 +17,24 @@ struct NpyField {
   ElementType type = ElementType::kFloat64;
   bool swapped = false;  ///< Byte order other than this machine's.
   std::size_t components = 1;
-  std::size_t offset = 0;  ///< In bytes, from the begin of an element.
+  std::size_t offset = 0;  ///< In bytes, from the beginning of an element.
 };
 
 /// The header of an array of numbers.
 struct NpyHeader {
   bool structured = false;
-  std::vector<NpyField> fields;  ///< Fields of numbers.
+  std::vector<NpyField> fields;  ///< Without fields that hold no numbers.
   std::size_t element_bytes = 0;
   bool column_major = false;  ///< Fortran order.
   std::vector<std::size_t> shape;
 
   std::size_t element_count() const;  ///< Does not overflow: ReadNpyHeader has checked.
 
-  /// Whether the first extent counts frames: one extent more than a row per particle needs.
+  /// Whether the first extent counts frames: (frames, N) if structured, else (frames, N, K).
   bool holds_frames() const { return shape.size() == (structured ? 2 : 3); }
 };
 
-/// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a size
+/// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a frame of
 /// over 4 GiB; kUnimplemented for elements without plain numbers (Python objects, text, complex,
 /// half precision).
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);

@@ -58,8 +58,8 @@ class NpyReader final : public FrameReader {
   const ColumnRequest& request_;
 };
 
-// If the array holds several frames, removes its first extent, the number of frames, and returns
-// this number.
+// If the first extent counts frames, removes it from `header` and returns it. Returns nothing for
+// an array of one frame.
 absl::StatusOr<std::optional<std::size_t>> TakeFrameCount(NpyHeader& header,
                                                           const std::string& path) {
   if (!header.holds_frames()) return std::nullopt;

@@ -24,7 +24,7 @@ struct NamedArray {
 struct NpzTable {
   std::vector<NamedArray> arrays;
   std::vector<std::string> column_names;
-  absl::Status not_plain;  // Error of the first unreadable array; OK without one.
+  absl::Status not_plain;  // Error of the first array without plain numbers; OK if there is none.
   std::optional<NamedArray> time;
 };
 

@@ -13,8 +13,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// Maximum number of values. A description of arrays has fewer. Limits the memory that a small
-// hostile file can use.
+// Maximum number of values, to limit the memory that a small hostile file can use. Pickles of
+// arrays have fewer.
 constexpr std::size_t kMaxPickleValues = std::size_t{1} << 20;
 constexpr std::size_t kMaxNameBytes = 1 << 16;
 

@@ -46,7 +46,7 @@ class Pickle {
   friend class PickleMachine;
 
   std::vector<char> bytes_;
-  std::deque<PickleValue> values_;  // References stay valid.
+  std::deque<PickleValue> values_;  // A deque, so that pointers to its elements stay valid.
   std::deque<std::string> texts_;
   const PickleValue* root_ = nullptr;
 };

@@ -32,7 +32,7 @@ struct PlyElement {
     }
     return false;
   }
-  // Without lists.
+  // Requires: no lists.
   std::size_t RowBytes() const {
     std::size_t bytes = 0;
     for (const PlyProperty& property : properties) bytes += ElementBytes(property.type);

@@ -22,7 +22,6 @@ const StoredArray* FindArray(const std::vector<StoredArray>& arrays, std::string
   return found == arrays.end() ? nullptr : &*found;
 }
 
-// Returns a column of the quotients above / below.
 StoredArray Quotient(const std::string& name, std::size_t rows, StoredArray above,
                      StoredArray below) {
   const auto load = [rows, above, below](std::vector<char>& bytes) {
@@ -132,7 +131,7 @@ class PysphArchiveReader final : public OneFrameReader {
   std::string path_;
   std::unique_ptr<Pickle> particles_;
   std::unique_ptr<Pickle> solver_;
-  ColumnRequest request_;  // Changed for the array that is read.
+  ColumnRequest request_;  // Read changes it for the chosen array.
 };
 
 }  // namespace

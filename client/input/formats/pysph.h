@@ -17,16 +17,16 @@ namespace partiemc::client::input {
 absl::StatusOr<std::string> ChoosePysphArray(const std::vector<std::string>& names,
                                              ColumnRequest& request, const std::string& path);
 
-/// Does the same as partiemc.read_pysph of the Python package. Keeps real particles only (tag 0),
-/// unless the request selects by tag. Adds an array "volume" of m / rho if there is none. Requires:
-/// all arrays have `rows` rows. The arrays must outlive the result.
+/// Completes arrays and request as partiemc.read_pysph of the Python package does. Selects real
+/// particles (tag 0), unless the request selects by tag. Adds an array "volume" of m / rho if there
+/// is none. Requires: all arrays have `rows` rows.
 void CompletePysphArrays(std::size_t rows, std::vector<StoredArray>& arrays,
                          ColumnRequest& request);
 
 /// Whether an archive is PySPH's output: numbers and text in two pickled dicts.
 bool IsPysphArchive(const ZipArchive& archive);
 
-/// Opens such an archive.
+/// Opens an archive that IsPysphArchive accepts.
 absl::StatusOr<std::unique_ptr<FrameReader>> OpenPysphArchive(const std::string& path,
                                                               const ZipArchive& archive,
                                                               const ColumnRequest& request);

@@ -15,7 +15,7 @@
 namespace partiemc::client::input {
 namespace {
 
-// Smallest number of bytes of a number in a file, with its separator.
+// Fewest bytes of a number in a file: a digit and a separator.
 constexpr std::int64_t kLeastBytes = 2;
 
 // Keywords of cell lists: each cell is a count of points and their indices.

@@ -33,8 +33,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// Number of bytes at the beginning of a file that are searched for declared counts. They contain
-// the XML of usual files, or the POINTS line of a legacy file.
+// Number of bytes at the beginning of a file that are searched for declared counts. They usually
+// contain all of the XML, or the POINTS line of a legacy file.
 constexpr std::size_t kHeadBytes = 65536;
 
 // Smallest number of bytes of a point in a file. A plain point needs at least three digits with
@@ -43,10 +43,10 @@ constexpr std::size_t kHeadBytes = 65536;
 constexpr double kLeastBytesPerPlainPoint = 6;
 constexpr double kLeastBytesPerPackedPoint = 0.01;
 
-// The largest count that messages print.
+// Larger counts become this one, so that they fit in 64 bits.
 constexpr double kMostDeclared = 1e18;
 
-// Stores the first error instead of printing it.
+// Stores VTK's first error and prints nothing.
 class MessageCatcher final : public vtkOutputWindow {
  public:
   static MessageCatcher* New();
@@ -246,7 +246,7 @@ class VtkReader final : public OneFrameReader {
     if (points->GetPoints() != nullptr && points->GetNumberOfPoints() > 0) {
       table = TableOf(*points);
     } else {
-      // Files omit the arrays of a frame without particles, so the names are added here.
+      // Files omit the arrays of a frame without particles, so the requested names are added here.
       table.names = {"Points:0", "Points:1", "Points:2"};
       for (const Condition& condition : request_.conditions) {
         table.names.push_back(condition.column);

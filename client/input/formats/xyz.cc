@@ -1,4 +1,4 @@
-// XYZ text: a count, a line of comment, then lines of "type x y z"; frame after frame. In extended
+// XYZ text: for each frame a count, a line of comment, then lines of "type x y z". In extended
 // XYZ the comment holds KEY=VALUE pairs and describes the columns: Properties=species:S:1:pos:R:3.
 #include <utility>
 

@@ -97,8 +97,8 @@ class AsyncStream::Receiving {
     return oldest;
   }
 
-  /// Removes the callback of the newest frame. Returns null if the end of the stream has already
-  /// called it.
+  /// Removes and returns the callback of the newest frame; null if Run has already called it at the
+  /// end of the stream.
   Answered TakeNewest() ABSL_LOCKS_EXCLUDED(mutex_) {
     const MutexLock lock(mutex_);
     if (waiting_.empty()) return nullptr;

@@ -17,8 +17,9 @@ namespace partiemc::client {
 /// states this for all placements except `farthest-particle`.
 bool MeshSharesRingPoints(const Result& result);
 
-/// The vertices of an outline are those of its mesh, then those of its rings. If the mesh starts
-/// with the points of the rings, both share these vertices. The record must outlive this object.
+/// The vertices of an outline are the points of its mesh, then the points of its rings. If the mesh
+/// starts with the points of the rings, both share these vertices. The record must outlive this
+/// object.
 class FileMesh {
  public:
   explicit FileMesh(const FrameRecord& frame);
@@ -33,15 +34,15 @@ class FileMesh {
   std::span<const float> normals() const;
   /// Empty unless each vertex has a value.
   std::span<const AttributeValues> attributes() const;
-  /// Three vertices each.
+  /// Three vertex indices each.
   std::span<const std::uint32_t> triangles() const;
   std::size_t TriangleCount() const { return triangles().size() / 3; }
 
-  /// Without rings for a surface.
+  /// Empty for a surface.
   const Rings& rings() const;
-  /// The number of the first vertex of the rings.
+  /// Index of the vertex that is the first point of the rings.
   std::uint32_t first_of_rings() const { return first_of_rings_; }
-  /// The two vertices of each side of the rings.
+  /// Two vertices for each segment of the rings.
   std::vector<std::uint32_t> Sides() const;
 
  private:

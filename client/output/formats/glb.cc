@@ -1,4 +1,3 @@
-// Binary glTF.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -156,8 +155,8 @@ constexpr std::string_view kMaterials =
 
 using Vector = std::array<double, 3>;
 
-// Returns the centre of the points. The coordinates of a GLB are relative to it, so that float32 is
-// precise enough far from the origin.
+// Returns the centre of the bounding box. Coordinates are written relative to it, so that float32
+// is precise enough far from the origin.
 Vector CentreOf(std::span<const double> points) {
   Vector centre;
   for (std::size_t c = 0; c < 3; ++c) {

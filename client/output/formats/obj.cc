@@ -1,4 +1,3 @@
-// Wavefront OBJ.
 #include "client/output/formats/file_mesh.h"
 #include "client/output/formats/formats.h"
 #include "client/output/text.h"
@@ -34,7 +33,7 @@ void AppendRings(std::string& out, const FileMesh& mesh) {
   }
 }
 
-/// The faces of one shell, whose corners have the normals of their points, if there are normals.
+/// The faces of one shell. The corners refer to the normals of their points, if there are any.
 void AppendShell(std::string& out, const Surface& surface, std::size_t shell) {
   for (std::size_t k = std::size_t{3} * surface.triangle_offsets[shell];
        k < std::size_t{3} * surface.triangle_offsets[shell + 1]; ++k) {

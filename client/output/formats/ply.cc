@@ -1,4 +1,3 @@
-// Binary PLY.
 #include <set>
 
 #include "absl/strings/ascii.h"

@@ -1,4 +1,3 @@
-// Binary STL.
 #include <array>
 #include <cmath>
 

@@ -11,9 +11,9 @@
 
 namespace partiemc::client {
 
-/// Calls visit(ring, points, is_closed) for each stretch of the rings between cuts (Rings::cuts):
-/// the numbers of its points, in their order. A ring without cuts is one closed stretch; its first
-/// point is not repeated. Stretches have at least two points.
+/// Calls visit(ring, points, is_closed) for each stretch of the rings between cuts (Rings::cuts).
+/// `points` has the indices of its points, along the ring, at least two. A ring without cuts is one
+/// closed stretch; its first point is not repeated.
 template <typename Visit>
 void ForEachStretch(const Rings& rings, const Visit& visit) {
   std::vector<std::uint32_t> points;
@@ -24,7 +24,7 @@ void ForEachStretch(const Rings& rings, const Visit& visit) {
     const std::span<const std::uint32_t> cuts(cut, end);
     cut = end;
     points.clear();
-    // Begins behind the last cut, so that a stretch over the end of the ring is in one piece.
+    // Begins after the last cut, so that a stretch over the end of the ring is in one piece.
     const std::uint32_t start = cuts.empty() ? first : cuts.back() + 1 - first;
     for (std::uint32_t k = 0; k < last - first; ++k) {
       const std::uint32_t point = cuts.empty() ? first + k : first + (start + k) % (last - first);

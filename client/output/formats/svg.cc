@@ -23,11 +23,10 @@ constexpr double kSteps = 1000;  // Rounding steps per unit.
 // Margin around the box, as a share of its longer side.
 constexpr double kMargin = 0.02;
 
-// Diameter of a particle's dot: in spacings; in SVG units, if the spacing is unknown; lower limit,
-// in SVG units.
-constexpr double kDotSpacings = 0.4;
-constexpr double kDefaultDot = 1.5;
-constexpr double kSmallestDot = 0.4;
+// Diameter of a particle's dot.
+constexpr double kDotSpacings = 0.4;  // In spacings.
+constexpr double kDefaultDot = 1.5;   // In SVG units, if the spacing is unknown.
+constexpr double kSmallestDot = 0.4;  // Lower limit, in SVG units.
 
 // Colours of the page's light theme (client/viewer/src/draw/colours.ts).
 constexpr std::string_view kStyle =
@@ -43,12 +42,13 @@ constexpr std::string_view kStyle =
     ".legend{font:22px sans-serif;fill:#333}"
     "</style>\n";
 
-// The legend below a picture that is coloured by an attribute: height of the legend, and length of
-// its colour bar.
+// The legend below a picture that is coloured by an attribute, in SVG units: height of the legend,
+// and length of its colour bar.
 constexpr double kLegendHeight = 70;
 constexpr double kLegendBar = 400;
 
-/// Maps world to picture coordinates: y points down, the upper left corner of the box is (0, 0).
+/// Maps world coordinates to SVG units: y points down, the upper left corner of the box with its
+/// margin is (0, 0).
 class Picture {
  public:
   explicit Picture(Box box) {
@@ -288,7 +288,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   const std::vector<double> values =
       attribute != nullptr ? MagnitudesOf(*attribute) : std::vector<double>();
   const ValueRange range = RangeOf(values);
-  // The values begin with the points of the rings; the further points of the mesh follow.
+  // The mesh is coloured if each of its points has a value, otherwise the rings are.
   const bool inside = values.size() == mesh.PointCount() && !mesh.triangles.empty();
   if (inside) AppendBands(out, "bands", InsideByBand(mesh, values, range, picture));
   AppendAll(out, R"(<path class="mesh" d=")", EdgePath(frame.result.mesh, picture), "\"/>\n");

@@ -101,7 +101,8 @@ void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) 
   data->GetCellData()->AddArray(ring_of);
 }
 
-// Adds point data if the rings touch walls. Points of the mesh alone have 0 and NaN.
+// Adds `wetted` and `contact_angle` if the rings touch walls. Points that only the mesh has get 0
+// and NaN.
 void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
   const WallValues values = WallValuesOf(mesh.rings());
   if (values.wetted.empty()) return;
@@ -119,7 +120,6 @@ void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
   data->GetPointData()->AddArray(angles);
 }
 
-// Adds the cell data of a surface.
 void AddShells(const Surface& surface, vtkPolyData* data) {
   vtkNew<vtkIntArray> shell_of, body_of;
   shell_of->SetName("shell");

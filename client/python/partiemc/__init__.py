@@ -13,8 +13,8 @@
         ...
 
 Positions are (N, 2) or (N, 3) arrays of float32 or float64, or tuples of two or three arrays of N.
-Any strides are allowed; each number is copied once, into the message. Results are read-only views
-that keep the memory of their result alive.
+Any strides are allowed; a stream copies each number once, into the message. Arrays of results are
+read-only views that keep the memory of their result alive.
 """
 
 from . import _convert
@@ -32,15 +32,15 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
 
     positions: (N, 2) float32 or float64, world units; (N, 3) for particles in space, or in a plane
         parallel to `plane`; or a tuple of two or three arrays of N. Finite.
-    volumes: (N,) areas of particles, world units squared; spacing squared if None.
+    volumes: (N,) areas of particles, world units squared; spacing squared if None. Volumes for
+        surfaces and slices.
     ids: (N,) integers of 32 or 64 bits; a particle has the same id in every frame.
     velocities: same shape as positions, world units per unit of time.
     attributes: particle attributes to interpolate to the vertices (Result.attributes): a dict from
         names to (N,), (N, 2) or (N, 3) arrays: {"density": rho, "velocity": v}. `fill` and
         `attribute_tolerance` decide how well triangles represent them.
     output: "outline", or "surface" for closed surfaces of particles in space (Result.surface).
-        A surface requires (N, 3) positions and spacing; `volumes` are then volumes, and each of
-        `sections` is a slice.
+        A surface requires (N, 3) positions and spacing, and each of `sections` must be a slice.
     spacing: particle spacing, world units. If None it is estimated, and the outline is less accurate.
         Required for surfaces and slices, also in Reconstructor and connect: pass
         estimate_spacing(positions) of one frame if you do not know it.
@@ -49,10 +49,10 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         "farthest-particle" (outlines only).
     fill: "greedy", "conforming", "polygon", "grid" or "none": the triangles, and thereby the points
         at which attributes are given. client/python/README.md compares them.
-    kernel_radius, cell_size, reference_radius: lengths in spacings.
+    kernel_radius, cell_size, reference_radius: lengths in spacings (parameters.h, see below).
     plane: "xy", "xz" or "yz", for (N, 3) positions.
     slice: section plane for (N, 3) positions that fill space: ("z", 0.5), or a point of the plane
-        and its normal, ((x, y, z), (nx, ny, nz)). Requires spacing; `volumes` are then volumes.
+        and its normal, ((x, y, z), (nx, ny, nz)). Requires spacing.
         The outline has the coordinates (x, y) for ("z", c), (x, z) for ("y", c), (y, z) for
         ("x", c).
     isovalue: in [0.01, 10]: draws this isoline of the density instead of the body's outline. The
@@ -67,16 +67,16 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.
     simplify: for output "surface": fewer triangles, within this error in spacings, in [0, 1]; .05
-        leaves a third of those of large bodies. 0 by default.
-    thinning_distance: for output "surface": drops points on lattice edges that are at most this many
-        spacings from the triangles without them. 0.03 by default, 0 keeps all.
+        leaves a third of the triangles of large bodies. 0 by default.
+    thinning_distance: for output "surface": drops a point on a lattice edge if the triangles without it
+        pass within this many spacings of it. 0.03 by default, 0 keeps all.
     max_drop_particles: for output "surface": bodies of up to this many particles become ellipsoids. 30
         by default, 0: none.
     min_component_volume: for output "surface": drops bodies with less particle volume, in cubed
         spacings. 0 by default.
-    box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses the box is
-        one body, and results are unwrapped. An outline or a surface that reaches its own image is
-        cut at the faces (`rings.cuts`, `surface.cuts`).
+    box: periodic axes with their bounds, {"x": (0, 10), "y": (0, 10)}. A body that crosses a face is
+        one body, and its outline or surface continues beyond the face. A body that reaches its own
+        image is cut at the faces (`rings.cuts`, `surface.cuts`).
         A Reconstructor and a Stream take another box for each frame, with the same axes.
     wrap: with a box: every outline and surface is cut at the faces, so nothing lies beyond them.
     noise_filter: filters noise of positions from frame to frame (of a Reconstructor or a stream): the
@@ -111,7 +111,7 @@ def connect(address=None, *, latest=False, **options):
 
     address: if None, the value of PARTIEMC_SERVER, or 127.0.0.1:50051.
 
-    latest: send and map never wait to send; while the stream is busy, only the newest frame is kept.
+    latest: send and map never wait for a slot; while the stream is busy, only the newest frame is kept.
     name: name for watchers. labels: a dict of strings, shown in lists of streams.
     attributes: attributes given to send that results have at their vertices: names; "velocity" are
         the velocities.
@@ -138,7 +138,8 @@ def connect(address=None, *, latest=False, **options):
     part_timeout: seconds before a frame with a missing part raises Error (PARTS_MISSING); 10.
     Other options are the parameters of reconstruct. Raises Error.
 
-    Leaving `with` waits until sent frames have arrived, and drops results that were not received.
+    Leaving `with` waits until sent frames have arrived, and drops results that were not received. An
+    exception in `with` cancels the stream.
     """
     return Stream(address, latest, options)
 
@@ -146,22 +147,22 @@ def connect(address=None, *, latest=False, **options):
 def watch(address, name, **options):
     """Returns a Watch, an iterator over the results of another producer's stream `name`.
 
-    mode: "latest" receives the newest frame when a credit is free; "every" receives every frame from
-        now on, and a slow watcher is disconnected.
-    credits: number of frames on the way or waiting to be received.
-    from_sequence: begin with the frame of this number, or with the oldest held frame if 0. The
-        server sends its history without gaps, then live frames.
+    mode: "latest" receives the newest frame when a credit is free; "every" receives every frame, and
+        a slow watcher is disconnected.
+    credits: number of frames that may be on the way or waiting to be received; 2.
+    from_sequence: begin with the frame of this number, or with the oldest frame of the server's
+        history if that is newer. The history comes without gaps, then live frames.
     max_error: for streams of surfaces: receive surfaces with fewer triangles, within this root mean
         square distance to the exact surface, in spacings, in (0, 1].
     max_triangles: the same, by the smallest error up to 0.35 spacings that leaves at most this many
-        triangles. Results have `level_error`; their measures, `area`, `volume` and `surface_digest`
-        are those of the exact surface. A server without the capability "surface-levels" sends exact
+        triangles. Results have `level_error`. Their measures, `area`, `volume` and `surface_digest`
+        describe the exact surface. A server without the capability "surface-levels" sends exact
         surfaces.
     tls, ca_file, cert_file, key_file, token, token_file, fallback_addresses, connect_timeout,
         deadline: see connect. give_up_after: seconds to look for a lost stream; 30.
         Raises Error.
 
-    Iteration ends with the stream. `dropped` of each Result counts the frames that were left out.
+    Iteration ends with the stream. Result.dropped counts the frames dropped since the previous one.
     """
     return Watch(address, name, options)
 
@@ -199,7 +200,8 @@ def _map(self, frames, times=None):
     times: an iterable, for frames without a time; 0, 1, ... if None.
 
     Sends up to a window of frames ahead, in one thread. With latest=True it never waits to send:
-    skipped frames have no result, the last frame always has one. A refused frame raises Error.
+    skipped frames have no result, the last frame always has one. A refused frame raises Error, which
+    ends the iteration. Parts other than 0 yield None for each frame.
     """
     times = None if times is None else iter(times)
     for frame in frames:

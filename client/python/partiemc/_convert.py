@@ -43,7 +43,7 @@ def to_triangulation(mesh):
 def to_meshio(mesh, attributes=None):
     """A meshio Mesh with z = 0. meshio writes VTK, VTU, STL, Gmsh and other formats.
 
-    attributes: those of the result, at the vertices of its mesh.
+    attributes: Result.attributes, or a part of them.
     """
     import meshio
     import numpy
@@ -58,7 +58,7 @@ def to_meshio(mesh, attributes=None):
 def surface_to_meshio(surface, attributes=None):
     """A meshio Mesh. meshio writes VTK, VTU, PLY, OBJ, STL, Gmsh and other formats.
 
-    attributes: those of the result, at the points of its surface.
+    attributes: Result.attributes, or a part of them.
     """
     import meshio
     import numpy

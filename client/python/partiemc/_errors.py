@@ -7,7 +7,8 @@ class Error(Exception):
 
     code: gRPC status code: "INVALID_ARGUMENT", "UNAVAILABLE", ...
     reason: for programs: "NOT_FINITE", "COUNT", ...; "" if no rule was broken. proto/PROTOCOL.md
-        lists them. With a reason, a stream refuses one frame and continues; without, it has ended.
+        lists them. An error with a reason refuses one frame, and its stream continues. An error
+        without a reason has ended the stream.
     field, value, rule: for example "positions[17].x", "nan", "must be finite".
     sequence: number of the frame that a server has refused; otherwise 0.
     """

@@ -8,7 +8,7 @@ import zipfile
 
 from ._errors import Error
 
-# Maximum ratio at which deflate can compress. Larger arrays are refused, as are arrays without stored data.
+# Largest ratio of deflate. A file that claims more is refused before its arrays are allocated.
 _MOST_INFLATED = 1032
 _WANTED = ("x", "y", "z", "u", "v", "w", "m", "rho", "gid", "tag")
 
@@ -124,7 +124,7 @@ class _PlainUnpickler(pickle.Unpickler):
 
 
 def _unpickled(archive, name):
-    """Reads a dict that numpy.savez has pickled as an array of dimension 0."""
+    """Reads a dict that numpy.savez has pickled as an array of dimension 0. Raises for other types."""
     from numpy.lib import format as npy
 
     stream = io.BytesIO(archive.read(f"{name}.npy"))

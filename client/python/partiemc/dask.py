@@ -20,8 +20,8 @@ def bag(recordings, read, *, collect=None, **parameters):
     recordings: an iterable of arguments for `read`, such as paths that every worker can open.
     read, collect, parameters: see `reconstruct`. Functions are sent to the workers.
 
-    Lazy: .compute() and similar methods start the computation. Each recording is one task. compute
-    raises an Error of any recording.
+    Lazy: .compute() and similar methods start the computation. Each recording is one task. If a
+    recording raises Error, so does compute.
     """
     import dask.bag
 

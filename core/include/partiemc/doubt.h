@@ -13,15 +13,15 @@ enum class Doubt : std::uint8_t {
   /// No spacing is given, and the particles do not agree on a spacing yet. Spacing and lattice are
   /// estimates for this frame only, the state stays as it was, and rings have no identities.
   kSpacingProvisional,
-  /// The particles of this frame are about twice or half as far apart as the spacing in use says,
-  /// or
-  /// further from it (core/METHOD.md, "How the paper is read", 10; core/SURFACES.md, "Doubts").
+  /// The distances of particles contradict the spacing in use by about a factor of two or more
+  /// (core/METHOD.md, "How the paper is read", 10; core/SURFACES.md, "Doubts"). Not checked for
+  /// slices and grains.
   kSpacingContradicted,
   /// More than half of the volumes are above twice the squared spacing, or more than half are below
-  /// half of it. For a slice or a surface, the cubed spacing counts.
+  /// half of it. For a slice or a surface, the cubed spacing counts. Not checked for own sizes.
   kVolumesContradictSpacing,
   /// Positions are float32, and the step to the next float at these coordinates exceeds 1/16 of the
-  /// spacing.
+  /// spacing. Not checked for slices.
   kPositionsCoarse,
 };
 
@@ -35,7 +35,6 @@ std::string_view Name(Doubt doubt);
 /// One line for the user: what the doubt means, and how to resolve it.
 std::string_view Explanation(Doubt doubt);
 
-/// A set of doubts.
 class Doubts {
  public:
   void Add(Doubt doubt) { bits_ |= BitOf(doubt); }

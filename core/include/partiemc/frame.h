@@ -30,24 +30,26 @@ struct Frame {
   /// Interleaved coordinates in world units, `components` per particle. Finite.
   std::variant<std::span<const float>, std::span<const double>> positions;
 
-  /// 2 (x, y) or 3 (x, y, z). With 3, all particles lie in one plane parallel to
-  /// ReconstructionParameters::plane, except with a `slice`, which requires 3.
+  /// 2 (x, y) or 3 (x, y, z). Slices and surfaces require 3. Otherwise, with 3 all particles lie in
+  /// one plane parallel to ReconstructionParameters::plane.
   int components = 2;
 
-  /// Area of each particle in world units squared, positive and finite; with a `slice` its volume
-  /// in world units cubed. Empty: h^2, with a `slice` h^3. Sizes::kOwn requires volumes.
+  /// Area of each particle in world units squared; for slices and surfaces its volume in world
+  /// units cubed. Positive and finite. Empty: h^2, or h^3. Sizes::kOwn requires volumes.
   std::span<const float> volumes = {};
 
   /// Distinct numbers that particles keep from frame to frame. Empty if the particles have no
-  /// numbers.
+  /// numbers. They influence only identities and parents (core/IDENTITIES.md), and positions with
+  /// ReconstructionParameters::noise_filter, which requires them.
   std::span<const std::uint64_t> ids = {};
 
   /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty if the frame
-  /// has no velocities.
+  /// has no velocities. They influence only identities and parents.
   std::span<const float> velocities = {};
 
-  /// Quantities to interpolate to the vertices (Result::attributes), and the phases. Quantities
-  /// change only the mesh of Fill::kGreedy (ReconstructionParameters::attribute_tolerance).
+  /// Quantities to interpolate to the vertices (Result::attributes, Surface::attributes), and the
+  /// phases. Quantities change only the mesh of Fill::kGreedy
+  /// (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
   /// Simulation time. Velocities are used only if the time increases from frame to frame.
@@ -59,9 +61,6 @@ struct Frame {
   /// (core/PERIODIC.md, "Boxes that change").
   std::optional<PeriodicBox> box = std::nullopt;
 
-  // Ids, velocities and time influence only the identities and parents of rings
-  // (core/IDENTITIES.md).
-
   std::size_t ParticleCount() const {
     return std::visit([](auto view) { return view.size(); }, positions) /
            static_cast<std::size_t>(components);
@@ -71,21 +70,23 @@ struct Frame {
 /// The name that selects Frame::velocities as an attribute.
 inline constexpr std::string_view kVelocityAttribute = "velocity";
 
-/// Sets `chosen` to views of the attributes with these names, in the order of the names;
+/// Sets `chosen` to views of the attributes with these names, in the order of the names.
 /// kVelocityAttribute selects Frame::velocities if the frame has them. A frame without particles
 /// accepts every name.
 /// Errors: INVALID_ARGUMENT with reason NO_SUCH_ATTRIBUTE; `chosen` is then incomplete.
 absl::Status ChooseAttributes(const Frame& frame, std::span<const std::string> names,
                               std::vector<Attribute>& chosen);
 
-/// Limits of a frame. A frame above a limit is refused before memory is allocated for it.
+/// Limits of a frame. A frame with too many particles is refused before memory is allocated for it,
+/// a frame with too many tiles before memory is allocated for tiles.
 struct FrameLimits {
   /// Upper bounds of the limits, so that all counts fit into 32 bits.
   static constexpr std::size_t kMostParticles = 1'000'000'000, kMostTiles = 1'000'000;
 
   std::size_t max_particles = 16'000'000;
-  /// Limit of tiles. A tile is a square of 32 x 32 lattice nodes; tiles exist only near particles.
-  /// A tile costs about 10 kB of memory, and each of its cells that the outline crosses 1 kB more.
+  /// A tile is a square of 32 x 32 lattice nodes; tiles exist only near particles. A tile costs
+  /// about 10 kB of memory, and each of its cells that the outline crosses 1 kB more. For surfaces,
+  /// the limit of bricks of 8 x 8 x 8 nodes.
   std::size_t max_tiles = 131'072;
 };
 

@@ -44,10 +44,10 @@ enum class GaugeKind {
   kPacking,
 };
 
-/// A measurement to make. Lengths are in world units. Heights are measured along y; in a section,
-/// along the second axis of its plane.
+/// A measurement to make. Lengths are in world units. x and y are the coordinates of results, for a
+/// slice along the axes of its plane. Heights are measured along y.
 struct Gauge {
-  std::string name;  ///< Letters, digits and "_", at most 40.
+  std::string name;  ///< 1 to 40 ASCII letters, digits and "_".
   GaugeKind kind = GaugeKind::kHeight;
   std::vector<double> numbers;  ///< Arguments, in the order of GaugeTraits::numbers.
 };
@@ -78,9 +78,8 @@ absl::Status Check(const Gauge& gauge);
 absl::StatusOr<Gauge> ParseGauge(std::string_view text);
 
 /// The values of a gauge, in the order of GaugeTraits::values. A value is NaN if the outline has no
-/// such point, or if the gauge requires discs and `discs` is empty or has unequal numbers of
-/// centres and areas. Intersections are computed for each segment, so the only error is the error
-/// of the outline itself.
+/// such point, or if it requires discs and `discs` is empty or has unequal numbers of centres and
+/// areas. Only angles and contact points are fitted; all other values are exact for the polygons.
 /// Requires: Check(gauge).ok(). Cost: linear in the points of the rings. `height` and `wetted` also
 /// sort the crossings, `repose` visits the points 200 times, and `packing` visits every disc.
 std::vector<double> Measure(const Gauge& gauge, const Result& result, const Discs& discs = {});

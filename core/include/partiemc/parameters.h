@@ -14,7 +14,7 @@
 
 namespace partiemc {
 
-/// What a frame of particles becomes.
+/// The kind of a frame's result.
 enum class Output : std::uint8_t {
   kOutline,  ///< Rings and their mesh in a plane (core/METHOD.md).
   kSurface,  ///< Closed surfaces in space (core/SURFACES.md).
@@ -25,7 +25,8 @@ enum class Output : std::uint8_t {
 enum class Placement : std::uint8_t {
   kMarchingSquares,   ///< Linear interpolation of the level set on lattice edges; for surfaces,
                       ///< marching cubes.
-  kQef,               ///< Marching squares plus one vertex per cell that minimises Eq. 14.
+  kQef,               ///< Marching squares plus one vertex per segment that minimises Eq. 14; for
+                      ///< surfaces, dual contouring.
   kFarthestParticle,  ///< Section 3.5 to the letter: vertices are particles. For comparisons only:
                       ///< rings may cross, triangles may fold.
   kVirtualPlane,      ///< The default: vertices on planes that nearby particles support.
@@ -43,7 +44,8 @@ enum class Fill : std::uint8_t {
 /// How the particle spacing h is estimated if the caller does not give it.
 enum class SpacingRule : std::uint8_t {
   kFirstFrame,  ///< From the first frame whose particles agree on a spacing; later frames keep it.
-  kEveryFrame,  ///< From each frame whose particles agree on a spacing. The lattice stays as it is.
+  kEveryFrame,  ///< From each frame whose particles agree on a spacing; other frames keep the last
+                ///< one. The lattice of the first such frame stays.
 };
 
 /// The size h_i of a particle: the spacing that it needs between its neighbours and itself.
@@ -52,7 +54,7 @@ enum class Sizes : std::uint8_t {
   kOwn,    ///< h_i = sqrt(v_i), of a surface cbrt(v_i), with the volume v_i (core/SIZES.md).
 };
 
-/// What the outline runs around.
+/// The shape that the outline surrounds.
 enum class Boundary : std::uint8_t {
   kBulk,    ///< The body that the particles fill: the outline smooths over single particles.
   kGrains,  ///< Particles are discs of the diameter h_i, and the outline follows their surfaces
@@ -77,17 +79,18 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// A further outline of the same particles. All other parameters are those of the stream. At most
-/// one of its members is present, except that an isovalue may have a slice.
+/// A further outline of the same particles, with the other parameters of the stream. At most one
+/// member is present, except that a slice and an isovalue may be combined.
 struct Section {
   /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
   /// present only if the stream has a slice.
   std::optional<SlicePlane> slice = std::nullopt;
   std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
-  /// The outline of the particles of this phase (`phase_attribute`, core/PHASES.md). Sections with
-  /// phases divide the outline of the stream: two phases share the points of their interface.
-  /// Phases that no section has are one more phase. Requires Placement::kVirtualPlane; excludes
-  /// surfaces, a slice, an isovalue, Boundary::kGrains and `box`. Distinct.
+  /// The outline of the particles with this value of `phase_attribute` (core/PHASES.md), at most
+  /// 2^24 in magnitude. Sections with phases divide the outline of the stream: two phases share the
+  /// points of their interface. All other particles are one more phase, without a result. No two
+  /// sections have the same phase. Requires Placement::kVirtualPlane; excludes surfaces, slices,
+  /// Boundary::kGrains, `box`, and isovalues of this section or of the stream.
   std::optional<std::int32_t> phase = std::nullopt;
 
   friend bool operator==(const Section&, const Section&) = default;
@@ -109,7 +112,7 @@ struct PeriodicBox {
   /// beyond them. Requires a placement with KeepsGuarantees.
   bool wraps = false;
 
-  static constexpr double kMostSpacings = 1e8;  ///< Limit of a length, in spacings.
+  static constexpr double kMostSpacings = 1e8;  ///< Largest PeriodicAxis::length, in spacings.
 
   friend bool operator==(const PeriodicBox&, const PeriodicBox&) = default;
 };
@@ -158,10 +161,10 @@ struct SurfaceOptions {
   friend bool operator==(const SurfaceOptions&, const SurfaceOptions&) = default;
 };
 
-/// The parameters of a stream. Output::kSurface requires `spacing`, ignores `fill`,
-/// `spacing_rule`, `surface_offset`, `attribute_tolerance`, `normal_memory`, `min_component_area`
-/// and `plane`, and excludes `slice`, `isovalue` and Placement::kFarthestParticle. Its sections are
-/// slices of the same particles.
+/// The parameters of a stream. Output::kSurface requires `spacing`; it excludes `slice`, `isovalue`
+/// and Placement::kFarthestParticle. Surfaces ignore `fill`, `attribute_tolerance`,
+/// `normal_memory`, `min_component_area` and `plane`. The sections of a stream with a surface are
+/// slices of the same particles; they use these parameters, except `plane`.
 struct ReconstructionParameters {
   Output output = Output::kOutline;
   Placement placement = Placement::kVirtualPlane;
@@ -177,10 +180,10 @@ struct ReconstructionParameters {
   std::optional<double> spacing = std::nullopt;
   SpacingRule spacing_rule = SpacingRule::kFirstFrame;
 
-  /// With own sizes, a particle acts within kernel_radius h_i, and smoothing follows the local
-  /// size. Frames must have volumes. An absent spacing is the root mean square of the sizes; it
-  /// sets the lattice. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
-  /// kernel radius at most 32 cells. Excludes slices, `box`, `noise_filter` and
+  /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
+  /// local size. Frames must have volumes. An absent spacing is estimated as the root mean square
+  /// of the sizes. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
+  /// kernel radius at most 32 cells. Excludes slices, walls, `box`, `noise_filter` and
   /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
@@ -188,10 +191,10 @@ struct ReconstructionParameters {
   /// With grains, outlines follow discs, voids without room for another grain are inside, and a
   /// lone disc is a component (core/SIZES.md, "Grains"). Requires Sizes::kOwn; excludes isovalues
   /// and surfaces. `kernel_radius` and `reference_radius` are ignored, `cell_size` is in half
-  /// spacings. An absent spacing is the smallest diameter, or a tenth of the largest if this is
-  /// larger. A diameter must be at least `kSmallestGrain` cells, so that no grain falls between the
-  /// nodes of the lattice, and at most `kLargestGrain` cells, because kernels reach neighbouring
-  /// tiles only.
+  /// spacings. An absent spacing is the smallest diameter of the frame, raised if necessary until
+  /// the largest diameter is at most `kMostSizeRatio` spacings and `kLargestGrain` cells. A
+  /// diameter must be at least `kSmallestGrain` cells, so that no grain falls between the nodes of
+  /// the lattice, and at most `kLargestGrain` cells, because kernels reach neighbouring tiles only.
   static constexpr double kSmallestGrain = 1.42, kLargestGrain = 20;
   Boundary boundary = Boundary::kBulk;
 
@@ -223,8 +226,9 @@ struct ReconstructionParameters {
   /// alone. Used by `farthest-particle` and `qef` only.
   bool normal_memory = true;
 
-  /// Closes holes below 2 squared spacings (grains: half), with everything inside them, and drops
-  /// components without particles. Absent: on for `virtual-plane` without an isovalue, else off.
+  /// Closes holes below 2 squared spacings (grains: 0.5; surfaces: 2 cubed spacings), with
+  /// everything inside them, and drops components without particles. Absent: on for
+  /// `virtual-plane` without an isovalue, else off.
   std::optional<bool> clean = std::nullopt;
 
   /// Spray: drops components that enclose less area than `min_component_area`, in squared spacings
@@ -257,9 +261,9 @@ struct ReconstructionParameters {
   /// frame, except that the input is checked only once. Phases: see core/PHASES.md.
   std::vector<Section> sections = {};
 
-  /// The attribute (Frame::attributes) with the phases of the particles, such as a type: one whole
-  /// number each. At most 64 bytes. Frames of a stream with Section::phase or `wall_phases` must
-  /// have it. It is not interpolated.
+  /// Name, of at most 64 bytes, of the attribute (Frame::attributes) with the phase of each
+  /// particle, a whole number such as a type. Used only with Section::phase or `wall_phases`.
+  /// Frames must then have the attribute, and it is not interpolated.
   std::string phase_attribute = "phase";
 
   SurfaceOptions surface = {};
@@ -269,15 +273,15 @@ struct ReconstructionParameters {
   /// whole, and the centre of its bounding box lies in the box. A body that reaches its own image
   /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
   /// (PERCOLATES). A length must be at least four kernel radii and at most kMostSpacings
-  /// spacings. For outlines, the box may have the axes of the plane of the particles. Excludes
-  /// slices. A frame may have another box (Frame::box).
+  /// spacings. For outlines, only axes of the plane of the particles may be periodic. Excludes
+  /// slices, phases, walls and own sizes. A frame may have another box (Frame::box).
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md):
   /// the weight, in (0, 1], of the given position of a particle against the position that the last
   /// frame and the motion of its neighbours predict. 0.5 is a good value; 1 filters nothing. Frames
-  /// must have ids. A new particle has its given position. The given positions are filtered only
-  /// once the stream has a spacing.
+  /// must have ids. A new particle keeps its given position. Until the stream has a spacing, no
+  /// position is filtered.
   std::optional<double> noise_filter = std::nullopt;
 
   static constexpr std::size_t kMaxWallPoints = 1024;
@@ -292,15 +296,16 @@ struct ReconstructionParameters {
 
   /// The phases (`phase_attribute`) of wall particles, at most 16, distinct. The outline of these
   /// particles is a further wall in each frame, half a spacing outside of their outermost layers.
-  /// Walls need two layers or more. Excludes what `walls` exclude, and `noise_filter`.
+  /// Walls need two layers or more. Requires and excludes the same as `walls`; excludes
+  /// `noise_filter`, too.
   std::vector<std::int32_t> wall_phases = {};
 
   static constexpr std::size_t kMaxWallPlanes = 6;
 
-  /// Walls at which a surface is cut (core/WALLS.md, "Surfaces"): at most one for each side of each
-  /// axis. The fluid is where all walls have it. The triangles on walls are in Surface::cuts. Two
-  /// walls of one axis are at least a kernel radius apart. Requires Output::kSurface; excludes
-  /// sections, own sizes and `box`.
+  /// Walls at which a surface is cut (core/WALLS.md, "Surfaces"): for each axis at most one with
+  /// the fluid above and one with the fluid below, at least a kernel radius apart. The fluid is
+  /// where all walls have it. The triangles on walls are in Surface::cuts. Requires
+  /// Output::kSurface; excludes sections, own sizes and `box`.
   std::vector<WallPlane> wall_planes = {};
 
   friend bool operator==(const ReconstructionParameters&,
@@ -310,11 +315,12 @@ struct ReconstructionParameters {
 /// Checks every field. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status Validate(const ReconstructionParameters& parameters);
 
-/// Checks a box. `spacing`: 0 if it is not known yet. Errors: as above.
+/// Checks a box. `kernel_radius` is in spacings, `spacing` in world units. With spacing 0
+/// (unknown), lengths must only be positive. Errors: as above.
 absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spacing);
 
-/// Fills in `reference_radius` and `clean` if they are absent. With grains, sets `kernel_radius`
-/// and `reference_radius`. Requires: Validate(parameters).ok().
+/// Fills in `reference_radius` and `clean` if they are absent. With grains, replaces
+/// `kernel_radius` and `reference_radius`. Requires: Validate(parameters).ok().
 ReconstructionParameters Resolve(ReconstructionParameters parameters);
 
 /// Whether results of this placement have all guarantees of result.h: rings are simple and nested,

@@ -41,18 +41,19 @@ class MemoryGuard {
  public:
   virtual ~MemoryGuard() = default;
 
-  /// Returns whether workspace and result may grow to `bytes` in total. Reconstruct calls this on
-  /// its caller's thread at least once per outline, before it allocates the memory: first with a
-  /// lower bound from the number of tiles, then with what is known about the outline.
+  /// Returns whether workspace and result may grow to `bytes` in total; if not, Reconstruct returns
+  /// RESOURCE_EXHAUSTED. Reconstruct calls this on its caller's thread, about twice per outline.
+  /// The first call follows the sorting of particles, with a lower bound from the number of tiles;
+  /// memory for tiles is allocated afterwards. The second call includes the length of the outline.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 
-/// Observes, admits and cancels one frame. Each member is optional and must outlive the call.
+/// Observes, admits and cancels one frame. Members may be null; their objects outlive the call.
 struct FrameControl {
   StageObserver* observer = nullptr;
   MemoryGuard* memory = nullptr;
-  /// Any thread may set the flag, and nothing resets it. Tasks check it between tiles, rings and
-  /// particles.
+  /// Any thread may set the flag to cancel the frame. Reconstruct never resets it. Tasks check it
+  /// between tiles, rings and particles.
   const std::atomic<bool>* cancelled = nullptr;
 };
 
@@ -69,11 +70,10 @@ class Reconstructor {
   /// Reconstructs one frame and updates `state`. Runs its parallel parts in the caller's Arena; the
   /// result does not depend on the number of threads. Cost: linear in particles and tiles, n log n
   /// in the points of the rings.
-  /// Errors with a Violation:
-  ///   INVALID_ARGUMENT: a number that is not finite, a wrong count, a repeated id, no ids with a
-  ///   noise filter, no phases, particles outside one plane, a state of another kind of stream.
+  /// Errors with a Violation (reasons in proto/PROTOCOL.md):
+  ///   INVALID_ARGUMENT: the frame breaks a rule, or the state is of another kind of stream.
   ///   RESOURCE_EXHAUSTED: too many particles or tiles, or `control.memory` refused the memory.
-  ///   OUT_OF_RANGE: float32 too coarse for the spacing.
+  ///   OUT_OF_RANGE: float32 too coarse for the spacing of an outline; not checked for slices.
   /// Errors without a Violation: CANCELLED, if `control.cancelled` was set; INTERNAL, a bug.
   /// On an error or exception (std::bad_alloc) `state` is unchanged and `result` is empty. After
   /// CANCELLED or an exception `workspace` is empty, too.
@@ -95,7 +95,7 @@ class Reconstructor {
                                   Result& result, const FrameControl& control) const;
 
   ReconstructionParameters parameters_;
-  std::vector<ReconstructionParameters> sections_;  // Resolved.
+  std::vector<ReconstructionParameters> sections_;  // By section, resolved.
   FrameLimits limits_;
   std::shared_ptr<const VirtualPlaneVariant> variant_;
   std::shared_ptr<const SurfaceReconstructor> surface_;  // Null for Output::kOutline.

@@ -45,16 +45,16 @@ struct Rings {
   /// merge has several. After a split, several rings have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< Like `offsets`; {0} without identities.
-  /// Points, ascending, whose segment to the next point of the ring lies on a face of the periodic
-  /// box, where a body was cut (ReconstructionParameters::box).
+  /// Indices of points, ascending, whose segment to the next point of the ring lies on a face of
+  /// the periodic box, where a body was cut (ReconstructionParameters::box).
   std::vector<std::uint32_t> cuts;
-  /// Points, ascending, whose segment to the next point of the ring lies on a wall
-  /// (ReconstructionParameters::walls), except where the repair has moved an end of it off the
-  /// wall.
+  /// Indices of points, ascending, whose segment to the next point of the ring lies on a wall
+  /// (ReconstructionParameters::walls, wall_phases). Where rings crossed, their repair may have
+  /// moved an end of this segment off the wall.
   std::vector<std::uint32_t> wetted;
-  /// Points, ascending, where the outline of a body meets a wall, or where a phase meets two other
-  /// phases, or one and the outside (core/PHASES.md). `contact_angles` are the angles of the fluid,
-  /// or of the phase, at these points, in radians, at most 2 pi.
+  /// Indices of points, ascending, where the outline of a body meets a wall, or where a phase meets
+  /// two other phases, or one and the outside (core/PHASES.md). `contact_angles` has one angle per
+  /// contact, of the fluid or of the phase, in radians, in [0, 2 pi].
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 
@@ -107,10 +107,10 @@ struct FrameStatistics {
   std::uint64_t cut_bodies = 0;
   std::uint64_t triangles = 0;           ///< Triangles of the mesh or of the surface.
   std::uint64_t triangles_grid = 0;      ///< Triangles of a mesh by Fill::kGrid of the same rings.
-  std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross.
+  std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross or touch.
   std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
   double area = 0;  ///< Rings: sum of their signed areas. Surfaces: sum of the areas of shells.
-  double perimeter = 0;  ///< Sum over rings, world units.
+  double perimeter = 0;  ///< Sum over rings, world units; 0 for surfaces.
   double volume = 0;     ///< Sum over shells of their signed volumes; 0 for outlines.
   double spacing = 0;    ///< Spacing used in this frame, world units; 0: unknown.
   double cell_size = 0;  ///< Lattice spacing, world units; constant in a stream unless provisional.
@@ -119,8 +119,8 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-/// Output::kOutline leaves `surface` empty, Output::kSurface leaves `rings` and `mesh` empty. Its
-/// attributes are in `surface`.
+/// Output::kOutline leaves `surface` empty. Output::kSurface leaves `rings`, `mesh` and
+/// `attributes` empty; the attributes are in `surface`.
 struct Result {
   Rings rings;
   Mesh mesh;  ///< Empty for Fill::kNone.
@@ -131,7 +131,8 @@ struct Result {
   /// only one, except that phases divide the outline of the stream (Section::phase).
   std::vector<Result> sections;
 
-  /// Empties everything. The elements of `attributes` and `sections` remain, without contents.
+  /// Empties everything, except that `attributes` keep their names and components. The elements of
+  /// `sections` remain and are cleared in the same way.
   void Clear();
   friend bool operator==(const Result&, const Result&) = default;
 };
@@ -142,7 +143,6 @@ std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
 std::uint64_t DigestSurface(const Surface& surface);
 
-/// The digests of one outline.
 struct OutlineDigests {
   std::uint64_t rings = 0, mesh = 0;
 

@@ -28,8 +28,8 @@ constexpr std::string_view Name(Stage stage) {
   return kStageNames[static_cast<std::size_t>(stage)];
 }
 
-/// Receives the begin and the end of each stage, on the thread that calls Reconstruct. Only an
-/// observer can measure times, because the core reads no clock.
+/// Receives the begin and the end of each stage, on the thread that calls Reconstruct. A stage may
+/// run several times in a frame. The core reads no clock, so only an observer can measure times.
 class StageObserver {
  public:
   virtual ~StageObserver() = default;

@@ -27,17 +27,17 @@ struct CellNormal {
 struct KnownRing {
   std::uint64_t identity = 0;
   bool is_hole = false;
-  std::uint32_t outer = kNoRing;  ///< Of a hole: the index of its outer ring, if known.
-  double velocity_x = 0,
-         velocity_y = 0;  ///< Mean velocity of its particles, world units per time; 0: unknown.
+  std::uint32_t outer = kNoRing;  ///< For a hole: the index of its outer ring, if known.
+  /// Mean velocity of its particles, world units per time; 0: unknown.
+  double velocity_x = 0, velocity_y = 0;
 
   friend bool operator==(const KnownRing&, const KnownRing&) = default;
 };
 
-/// Consecutive lattice nodes of one row, `first` to `last`. In the last frame they were inside an
-/// outer ring, or in the void of a hole, next to the ring of the hole.
+/// Consecutive lattice nodes of one row, `first` to `last` inclusive. In the last frame they were
+/// inside an outer ring, or in the void of a hole, next to the ring of the hole.
 struct NodeRun {
-  std::int32_t row = 0, first = 0, last = 0;  ///< In cells from the origin.
+  std::int32_t row = 0, first = 0, last = 0;  ///< In cells from the world's origin.
   std::uint32_t ring = 0;                     ///< Index in RingHistory::rings.
 
   friend bool operator==(const NodeRun&, const NodeRun&) = default;
@@ -66,8 +66,8 @@ struct RingHistory {
   std::optional<PeriodicBox> box;
   std::vector<KnownRing> rings;  ///< Sorted by identity.
   std::vector<NodeRun> runs;     ///< Disjoint, by row, then column. Each ring has at least one run.
-  std::vector<ParticleSample>
-      samples;  ///< Sorted by hash. Of each outer ring, the particles with the lowest hashes.
+  /// The up to kMaxSamples particles of each outer ring with the lowest hashes; sorted by hash.
+  std::vector<ParticleSample> samples;
 
   friend bool operator==(const RingHistory&, const RingHistory&) = default;
 };
@@ -87,8 +87,8 @@ struct NoiseHistory {
 /// Reconstruction is a pure function of frame and state, so a stream that resumes from a restored
 /// State gives the same bits as without interruption.
 struct State {
-  /// Lattice spacing in world units, set by the given spacing, or by the first frame whose
-  /// particles agree on a spacing. It never changes; earlier frames leave no state.
+  /// Lattice spacing in world units. Set by the first frame with a given spacing or with particles
+  /// that agree on one, then constant. Earlier frames leave no state.
   std::optional<double> cell_size;
   /// Spacing in use, world units.
   std::optional<double> spacing;
@@ -100,7 +100,8 @@ struct State {
   RingHistory history;
   /// The state of the surface. With Output::kSurface the members above stay empty.
   SurfaceState surface;
-  /// Of all outlines and the surface; empty without a noise filter, and in sections.
+  /// One history for all outlines and the surface. Empty without a noise filter, and in the states
+  /// of sections.
   NoiseHistory noise;
   /// The states of the sections (ReconstructionParameters::sections).
   std::vector<State> sections;

@@ -16,7 +16,7 @@ namespace partiemc {
 struct ShellMeasures {
   double area = 0;    ///< World units squared, without the triangles of Surface::cuts.
   double volume = 0;  ///< Enclosed, world units cubed; negative for a cavity.
-  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the enclosed volume.
+  double centroid_x = 0, centroid_y = 0, centroid_z = 0;  ///< Centroid of the volume, world units.
   std::uint64_t particles = 0;  ///< Particles of the body; 0 for a cavity.
   /// The shell that continues this shell in the next frame has the same identity. Distinct within a
   /// frame, never reused in a stream (core/SURFACES.md, "Identities").
@@ -27,7 +27,7 @@ struct ShellMeasures {
 
 struct SurfaceStatistics {
   std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
-  std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
+  std::uint64_t dropped_components = 0;  ///< Removed bodies without a particle.
   std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
   std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
   Doubts doubts;                         ///< Reasons to distrust the surface.
@@ -43,9 +43,9 @@ struct SurfaceStatistics {
 ///   S4 triangles are counter-clockwise seen from outside the body; shells alternate: the next
 ///      shell around an outer shell, if any, is a cavity, and the next shell around a cavity is the
 ///      outer shell that `outer_of` gives;
-///   S5 offsets, normals and measures fit the triangles: normals have length 1, areas, volumes and
-///      centroids are those of the triangles. Each triangle of `cuts` has one coordinate that is
-///      the same at its three corners.
+///   S5 offsets, normals and measures fit the triangles: normals have length 1; areas, volumes and
+///      centroids are computed from the triangles. Each triangle of `cuts` has one coordinate that
+///      is the same at its three corners.
 struct Surface {
   std::vector<double> points;            ///< x0, y0, z0, x1, ... in world units, by shell.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each, by shell.
@@ -59,8 +59,8 @@ struct Surface {
   /// merge has several. After a split, several bodies have the same parent.
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
-  /// Triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the periodic
-  /// box, where a body was cut. They close the surface; areas do not count them.
+  /// Indices of triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the
+  /// periodic box, where a body was cut. They close the surface; areas do not count them.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.
@@ -75,13 +75,13 @@ struct Surface {
     return std::span(parents).subspan(parent_offsets[shell],
                                       parent_offsets[shell + 1] - parent_offsets[shell]);
   }
-  /// Empties everything. The elements of `attributes` remain, without contents.
+  /// Empties everything, except that `attributes` keep their names and components.
   void Clear();
   friend bool operator==(const Surface&, const Surface&) = default;
 };
 
-/// Checks S1 to S5 with exact arithmetic, independent of the construction. Measures are compared
-/// to 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
+/// Checks S1 to S5, independently of the construction: S1 to S4 with exact arithmetic, measures to
+/// 1e-6 of the shell's size. Errors: INTERNAL with the guarantee, the triangle or shell, and the
 /// values. Cost: n log n in the triangles if they are of similar size.
 absl::Status Validate(const Surface& surface);
 

@@ -16,12 +16,11 @@ namespace partiemc {
 
 /// The requested level of detail. Exactly one member is set.
 struct LevelOfDetail {
-  /// Limit of the root mean square distance to the exact surface, in spacings, in (0, 1]. No
-  /// removed point is farther than twice this from the level.
+  /// Limit of the root mean square distance of the level to the exact surface, in spacings, in
+  /// (0, 1]. No removed point is farther than twice this from the level.
   std::optional<double> max_error;
-  /// The smallest error of a fixed list up to 0.35 with which the surface has at most this many
-  /// triangles; at least 1. If no error of the list suffices, the level has error 0.35 and more
-  /// triangles.
+  /// Limit of triangles; at least 1. The level has the smallest error that meets the limit, of 0
+  /// and a fixed list up to 0.35. If none does, the level has error 0.35 and more triangles.
   std::optional<std::uint64_t> max_triangles;
 
   friend auto operator<=>(const LevelOfDetail&, const LevelOfDetail&) = default;
@@ -38,10 +37,10 @@ struct SurfaceLevel {
   friend bool operator==(const SurfaceLevel&, const SurfaceLevel&) = default;
 };
 
-/// Who made a surface.
+/// Whether MakeLevel can trust a surface.
 enum class SurfaceOrigin : std::uint8_t {
-  kCore,     ///< This library. The surface has its guarantees.
-  kUnknown,  ///< Anybody. MakeLevel checks the surface, and limits its own work.
+  kCore,     ///< Made by this library: the surface has its guarantees.
+  kUnknown,  ///< MakeLevel checks the surface, and limits its own work.
 };
 
 /// Estimate of the memory that MakeLevel allocates for a surface of this size, including the
@@ -49,11 +48,12 @@ enum class SurfaceOrigin : std::uint8_t {
 std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
                          std::uint64_t attribute_values);
 
-/// Simplifies `surface` to a level, and returns its error. The remaining points keep their bits,
-/// normals and attributes; measures stay those of the exact surface. S1 and S2 hold, S4 as in the
-/// exact surface, and S3 between all triangles that the simplification has changed.
+/// Simplifies `surface` to a level, and returns SurfaceLevel::error. `spacing` is in world units.
+/// The remaining points keep their bits, normals and attributes; shells keep the measures of the
+/// exact surface. S1 and S2 hold, S4 as in the exact surface, and S3 between all triangles that the
+/// simplification has changed.
 /// Requires: a valid level; indices, offsets and sizes of arrays as in a Surface; normals may be
-/// absent. Rounded coordinates may break S3; such triangles stay.
+/// absent. Coordinates may be rounded: triangles that break S3 stay.
 /// Runs in the caller's Arena. Deterministic for any number of threads. Errors: CANCELLED after
 /// `cancelled` was set. With SurfaceOrigin::kUnknown also DATA_LOSS for a surface that breaks S1 or
 /// S2, for coordinates that are not finite or too large, a `spacing` that is no length, and a

@@ -1,5 +1,5 @@
-// Turns frames of particles that fill space into closed surfaces. Reconstructor does the same for
-// streams; this is the interface for research.
+// Turns frames of particles that fill space into closed surfaces. An interface for research:
+// programs use Reconstructor with Output::kSurface, which calls this.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct SurfaceParameters {
 
   /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of h.
   double spacing = 1;
-  /// As in ReconstructionParameters, with the same ranges. Own sizes exclude `box`.
+  /// As in ReconstructionParameters, with the same ranges. Own sizes exclude `box` and walls.
   double kernel_radius = 3, cell_size = 1;
   Sizes sizes = Sizes::kEqual;
   /// Reference radius in spacings. Absent: calibrated (core/SURFACES.md).
@@ -39,28 +39,16 @@ struct SurfaceParameters {
   /// `kVirtualPlane`, off for the other placements.
   std::optional<bool> clean = std::nullopt;
 
-  /// Vertices on lattice edges are dropped where they are at most this far from the triangles that
-  /// replace them. At least 0; 0 keeps all. Not for `kMarchingCubes`.
+  /// As in SurfaceOptions.
   double thinning_distance = .03;
-
-  /// Bodies of up to this many particles become ellipsoids with the volume and the moments of their
-  /// particles, where nothing else is near. 0: none. Only for `kVirtualPlane`.
   std::uint64_t max_drop_particles = 30;
-
-  /// Removes points while the root mean square error stays below this many spacings. No removed
-  /// point is farther than twice this from the surface. In [0, 1]; 0 keeps all points. S1 to S5
-  /// hold: where they would not, triangles stay as they are. Shells lose some of their volume
-  /// (core/SURFACES.md, "Simplification"). meshoptimizer allocates memory by its own allocator
-  /// (meshopt_setAllocator), so frames allocate memory also with a warm workspace.
   double simplify = 0;
-
-  /// Spray: drops bodies whose particles have less volume than `min_component_volume`, in cubed
-  /// spacings, or number fewer than `min_component_particles`. At least 0; 0 keeps all.
   double min_component_volume = 0;
+
+  /// As ReconstructionParameters::min_component_particles.
   std::uint64_t min_component_particles = 0;
 
-  /// As ReconstructionParameters::box; Frame::box replaces it. `max_tiles` counts copies of bodies
-  /// that reach their image.
+  /// As ReconstructionParameters::box.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// As ReconstructionParameters::wall_planes.
@@ -92,12 +80,11 @@ class SurfaceReconstructor {
   static absl::StatusOr<SurfaceReconstructor> Create(const SurfaceParameters& parameters,
                                                      const FrameLimits& limits = {});
 
-  /// Reconstructs one frame and updates `state`; `frame.components` is 3, volumes are in world
-  /// units cubed. Runs in the caller's Arena. The bits of `surface` and `state` depend neither on
-  /// the number of threads nor on the order of the particles. Limits: `max_tiles` counts bricks of
-  /// 8 x 8 x 8 nodes. Reserves from
-  /// `control.memory` twice: the bricks, then the full estimate.
-  /// No stage is reported to `control.observer`.
+  /// Reconstructs one frame and updates `state`. Runs in the caller's Arena. The bits of `surface`
+  /// and `state` depend neither on the number of threads nor on the order of the particles.
+  /// FrameLimits::max_tiles counts bricks of 8 x 8 x 8 nodes, also of copies of bodies that reach
+  /// their image in a box. Reserves from `control.memory`, each time in total: copies of particles
+  /// (only with a box or walls), then the bricks, then the whole surface.
   /// Errors: as Reconstructor; INVALID_ARGUMENT (CORRUPT_STATE) for the state of a stream with
   /// another cell size. On an error or exception (std::bad_alloc) `state` is unchanged and
   /// `surface` is empty. After CANCELLED or an exception `workspace` is empty, too.

@@ -14,14 +14,14 @@
 
 namespace partiemc {
 
-/// Marks a shell that is not a cavity in Surface::outer_of.
+/// In Surface::outer_of, marks a shell that is no cavity.
 inline constexpr std::uint32_t kNoShell = std::numeric_limits<std::uint32_t>::max();
 
 /// A shell of the last frame.
 struct KnownShell {
   std::uint64_t identity = 0;
   bool is_cavity = false;
-  std::uint32_t outer = kNoShell;  ///< Index of a cavity's outer shell, if known.
+  std::uint32_t outer = kNoShell;  ///< For a cavity: the index of its outer shell, if known.
   /// Mean velocity of its particles, world units per time; 0: unknown.
   double velocity_x = 0, velocity_y = 0, velocity_z = 0;
 
@@ -29,10 +29,10 @@ struct KnownShell {
 };
 
 /// Consecutive lattice nodes along x. In the last frame they were inside a body, or in a cavity
-/// next to its shell. In cells from the origin.
+/// next to its shell. Coordinates are in cells from the world's origin.
 struct ShellRun {
   std::int32_t layer = 0, row = 0;   ///< z and y.
-  std::int32_t first = 0, last = 0;  ///< x.
+  std::int32_t first = 0, last = 0;  ///< x, inclusive.
   std::uint32_t shell = 0;           ///< Index in ShellHistory::shells.
 
   friend bool operator==(const ShellRun&, const ShellRun&) = default;
@@ -55,8 +55,8 @@ struct ShellHistory {
   std::optional<double> time;          ///< Time of the last frame, finite.
   std::optional<PeriodicBox> box;      ///< As RingHistory::box.
   std::vector<KnownShell> shells;      ///< Sorted by identity.
-  std::vector<ShellRun> runs;  ///< Disjoint, by layer, row, node. Each shell has at least one run.
-  /// Sorted by hash. Each outer shell has its kMaxSamples particles with the lowest hashes.
+  std::vector<ShellRun> runs;  ///< Disjoint; sorted by layer, row, node. At least one per shell.
+  /// The up to kMaxSamples particles of each outer shell with the lowest hashes; sorted by hash.
   std::vector<ShellSample> samples;
 
   friend bool operator==(const ShellHistory&, const ShellHistory&) = default;
@@ -66,7 +66,7 @@ struct ShellHistory {
 /// before the first frame. A surface is a pure function of frame and state, so a stream that
 /// resumes from a restored state gives the same bits as without interruption.
 struct SurfaceState {
-  std::optional<double> cell_size;  ///< World units; set by the first frame, then constant.
+  std::optional<double> cell_size;  ///< World units. Set by the first frame, then constant.
   ShellHistory history;
 
   friend bool operator==(const SurfaceState&, const SurfaceState&) = default;

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kVerticesAtOnce = 256;
 
-// Divides a tile into square buckets. Their side is a power of two of cells, at most the radius,
-// but at least one cell.
+// Divides a tile into square buckets. The side of a bucket is a power of two in cells: the largest
+// up to `radius`, but at least one cell.
 class Buckets {
  public:
   explicit Buckets(double radius) {

@@ -13,7 +13,7 @@
 
 namespace partiemc {
 
-/// A particle close enough to a vertex to influence its values.
+/// A particle of a tile near vertices.
 struct CarryingParticle {
   float x, y;            ///< Cells, relative to its tile.
   float height;          ///< Cells above the plane of a slice; 0 without a slice.
@@ -23,15 +23,15 @@ struct CarryingParticle {
 
 /// Warm buffers of InterpolateAttributes.
 struct AttributeScratch {
-  std::vector<std::uint32_t> tile_of;   ///< By vertex.
-  std::vector<float> inverse_size;      ///< By particle, of own sizes in spacings; else empty.
-  std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if it or a neighbour has a vertex.
+  std::vector<std::uint32_t> tile_of;   ///< By vertex: its tile, or kNoTile.
+  std::vector<float> inverse_size;      ///< By particle: 1 / own size in spacings; else empty.
+  std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if the tile or a neighbour has a vertex.
   std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.
   std::vector<CarryingParticle> particles;
 };
 
-/// Interpolates the attributes of the particles of a subset to `vertices`, interleaved, in world
+/// Interpolates the attributes of the particles in `subset` to `vertices`: x0, y0, x1, ... in world
 /// units. `values` receives one entry for each attribute of `frame`, in the same order, and reuses
 /// its buffers.
 ///

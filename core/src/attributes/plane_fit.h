@@ -19,8 +19,8 @@ namespace partiemc {
 // straight rim.
 inline constexpr double kSlopeRidge = 1e-3;
 
-/// Sums over particles for one component of an attribute: of the weighted value, and of the
-/// weighted value times D_x, D_y and D_z.
+/// Sums over particles for one component of an attribute: the weighted value, and the weighted
+/// value times D_x, D_y and D_z.
 using Carried = std::array<double, 4>;
 
 /// Fits a plane by least squares and evaluates it at a vertex x. D = (x_i - x) / kernel radius.
@@ -88,7 +88,7 @@ class CarriedSums {
     }
   }
 
-  /// Writes the values at a vertex.
+  /// Writes the value of each attribute at `vertex`; 0 without particles.
   void Evaluate(const PlaneFit& fit, std::size_t vertex,
                 std::vector<AttributeValues>& values) const {
     constexpr double kLargest = std::numeric_limits<float>::max();
@@ -108,8 +108,7 @@ class CarriedSums {
   std::array<Carried, kMostAttributeValues> sums_;
 };
 
-/// Gives `values` the names of the attributes and space for `vertices` vertices; reuses its
-/// buffers.
+/// Sets names and components of `values`, and resizes them to `vertices` vertices. Reuses buffers.
 inline void ResizeValues(std::span<const Attribute> attributes, std::size_t vertices,
                          std::vector<AttributeValues>& values) {
   values.resize(attributes.size());

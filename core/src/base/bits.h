@@ -1,4 +1,4 @@
-// Small functions of numbers that are inlined, and the invalid index.
+// Small functions of numbers that are inlined, and the invalid index kNoIndex.
 #pragma once
 
 #include <cmath>
@@ -6,12 +6,10 @@
 
 namespace partiemc {
 
-/// The invalid index.
 inline constexpr std::uint32_t kNoIndex = 0xffffffff;
 
-/// Counts the set bits, such as of a row of nodes or cells. Unlike std::popcount, the function is
-/// inlined also on processors without an instruction for it; the library call there costs more than
-/// this sum.
+/// Counts the set bits. Without a processor instruction for it, std::popcount is a library call
+/// that costs more than this sum.
 constexpr int CountBits(std::uint32_t bits) {
   bits -= bits >> 1 & 0x55555555u;
   bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
@@ -19,8 +17,8 @@ constexpr int CountBits(std::uint32_t bits) {
   return static_cast<int>(bits * 0x01010101u >> 24);
 }
 
-/// Equals std::floor, but -0 becomes 0. Unlike std::floor, the function is inlined also on
-/// processors without an instruction for it.
+/// Equals std::floor, but -0 becomes 0. Without a processor instruction for it, std::floor is a
+/// library call, while this function is inlined.
 inline double Floor(double value) {
   constexpr double kMostExact = 2147483648;  // 2^31, so that the conversion is defined.
   if (!(value >= -kMostExact && value < kMostExact)) return std::floor(value);

@@ -21,8 +21,7 @@ struct Box {
   double Extent() const { return std::max(right - left, top - bottom); }
 };
 
-/// Whether two closed boxes intersect. Branch-free: for nearby boxes the branches would be
-/// unpredictable.
+/// Whether two closed boxes intersect. Branch-free, because branches would be unpredictable.
 inline bool BoxesTouch(const Box& a, const Box& b) {
   return static_cast<bool>(
       static_cast<int>(a.right >= b.left) & static_cast<int>(b.right >= a.left) &

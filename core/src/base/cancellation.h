@@ -1,5 +1,4 @@
-// Cancels a frame: its tasks check the caller's flag and throw Cancelled, which Reconstruct
-// catches.
+// Cancels a frame: its tasks check the caller's flag and throw Cancelled. Reconstruct catches it.
 #pragma once
 
 #include <atomic>
@@ -34,7 +33,8 @@ inline void ThrowIfCancelled(const std::atomic<bool>* flag) {
   }
 }
 
-/// Checks the flag of the calling thread. For sequential loops with up to a million steps.
+/// Checks the flag of the calling thread. Sequential code calls it about once per million steps;
+/// parallel.h checks the flag by itself.
 inline void ThrowIfCancelled() { ThrowIfCancelled(CancellationScope::Current()); }
 
 }  // namespace partiemc

@@ -20,8 +20,7 @@ inline Rounded TwoSum(double a, double b) {
   return {value, (a - a_part) + (b - b_part)};
 }
 
-/// Veltkamp's split: a = high + low. Both halves have at most 26 significant bits, so products of
-/// halves are exact.
+/// Veltkamp's split: a = high + low. Halves have at most 26 bits, so products of halves are exact.
 struct Halves {
   double high, low;
 };

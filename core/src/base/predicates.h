@@ -32,8 +32,7 @@ int OrientationExact(const Point& a, const Point& b, const Point& c);
 
 /// Returns +1 if a, b, c turn counter-clockwise (c is left of the line from a to b), -1 if
 /// clockwise, 0 if they are collinear or two coincide. Exact in the domain above.
-/// Cost: about 3 ns if the filter decides, 10 ns for exactly collinear lattice points, always below
-/// 1 us.
+/// Cost: 3 ns if the filter decides, 10 ns for collinear lattice points, always below 1 us.
 inline int Orientation(const Point& a, const Point& b, const Point& c) {
   // Shewchuk's bound on the error of `determinant` relative to `magnitude`: (3 + 16 eps) eps with
   // eps = 2^-53.

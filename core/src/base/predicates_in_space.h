@@ -26,8 +26,8 @@ constexpr bool InSpaceDomain(double coordinate) {
 /// SideOfPlane without the filter, for the calls that the filter cannot decide.
 int SideOfPlaneExact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
-/// Number of calls of SideOfPlaneExact by this thread, which take most of the time if triangles lie
-/// in nearly one plane.
+/// Number of calls of SideOfPlaneExact by this thread so far. The calls take most of the time if
+/// triangles lie in nearly one plane.
 std::uint64_t ExactPredicates();
 
 /// The sign of (b - a) x (c - a) . (d - a): +1 if d is on the side of the plane from which a, b, c

@@ -1,5 +1,5 @@
-// The status structure of a plane sweep: the intervals on the sweep line, from left to right. A
-// sequence of identifiers; find, insert and erase cost about the square root of its length.
+// The status structure of a plane sweep: the intervals on the sweep line, from left to right, as a
+// sequence of identifiers.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@ namespace partiemc {
 
 /// A sequence of identifiers that the caller keeps sorted: the class does not compare identifiers,
 /// and searches with the caller's predicates. A directory lists the short blocks that contain the
-/// identifiers. Memory is allocated only when the length exceeds its earlier maximum. Not
-/// thread-safe.
+/// identifiers. Cost: find log n; insert and erase move at most one block, and sometimes the rest
+/// of the directory. Allocates only if there are more blocks than ever before. Not thread-safe.
 class SweepStatus {
  public:
   /// A position of an element, or the end. Valid until the next change.

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Tiles must exist within the kernel radius plus this margin of a particle, in cells. An inside
+// Tiles must exist within the kernel radius plus this margin of each particle, in cells. An inside
 // node is within the kernel radius of a particle, and the other corners of its active cells are at
 // most one cell farther. The nodes of a small hole are farther by at most the radius of a disk with
 // the area of the hole.

@@ -15,8 +15,7 @@
 
 namespace partiemc {
 
-/// Tiles extend so far that a hole with the area of this number of particles lies completely on
-/// them.
+/// Area, in squared spacings, of the largest hole that is sure to lie completely on tiles.
 inline constexpr double kHoleMarginParticles = 6;
 
 /// A particle in the list of its tile.
@@ -33,7 +32,7 @@ inline bool LiesIn(const BinnedParticle& particle, const BitRows& cells) {
 /// Consecutive particles that one task sorts.
 struct BinStretch {
   std::size_t first = 0, last = 0;    ///< Its particles are [first, last).
-  TileDirectory homes;                ///< Homes: the tiles of its particles, by first occurrence.
+  TileDirectory homes;                ///< The tiles of its particles, by first occurrence.
   std::vector<std::uint32_t> tiles;   ///< By home: index in BinScratch::homes; later the tile.
   std::vector<std::uint32_t> places;  ///< By home: the count; later the next particle's index.
 };
@@ -44,10 +43,10 @@ struct BinScratch {
   std::span<BinStretch> stretches;        ///< The first of all_stretches: those of this frame.
   std::vector<std::uint32_t> home;        ///< By particle: index in BinStretch::homes.
   std::vector<float> positions;           ///< By particle: x and y in its tile.
-  std::vector<TileCoordinate> homes;      ///< Tiles with particles, sorted.
+  std::vector<TileCoordinate> homes;      ///< The tiles with particles, sorted.
   std::vector<std::uint32_t> offsets;     ///< By home: its first particle.
   std::vector<std::uint32_t> next;        ///< By home: first index for the next stretch.
-  std::vector<std::uint32_t> reached;     ///< By home: the tiles around it that must exist.
+  std::vector<std::uint32_t> reached;     ///< By home: the tiles around it (TileHalo).
 };
 
 /// Particles by tile. Tiles without particles exist where a kernel reaches a node or a cell, and in
@@ -62,7 +61,7 @@ struct ParticleBins {
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
   std::vector<float> weight;              ///< By particle: its weight w; empty if all are equal.
   std::vector<float> height;              ///< By particle of a slice: height in cells; else empty.
-  std::vector<float> size;                ///< By particle: its size in spacings; empty if equal.
+  std::vector<float> size;                ///< By particle: size in spacings; empty for equal sizes.
   BinScratch scratch;
 
   std::uint32_t CountOf(std::size_t tile) const { return offsets[tile + 1] - offsets[tile]; }

@@ -1,4 +1,4 @@
-// Sets of cells in and around a tile as bits. Stages use them to select the particles they need.
+// Sets of cells in and around a tile, as bits that select particles (masked_particles.h).
 #pragma once
 
 #include <array>
@@ -23,8 +23,7 @@ inline bool IsEmpty(const BitRows& rows) {
   return any == 0;
 }
 
-/// The cells of a mask in the tile's neighbour at index `place` of the Neighbourhood, or in the
-/// tile itself.
+/// The cells of a mask that lie in the tile at index `place` of the Neighbourhood.
 inline BitRows CellsOfNeighbour(const CellMask& mask, int place) {
   const int dx = place % 3 - 1;
   const int dy = place / 3 - 1;
@@ -48,9 +47,9 @@ inline CellMask MaskOf(const BitRows& rows) {
   return mask;
 }
 
-/// A mask with the cells of a tile, and its neighbours' cells in rows up to `margin` from its
-/// sides. rows_of(index) returns the rows of an existing tile. Requires: 0 <= margin <=
-/// kMaskMargin.
+/// A mask with the cells of a tile and of its neighbours, up to `margin` rows below and above the
+/// tile and kMaskMargin columns beside it. rows_of(index) returns the rows of an existing tile.
+/// Requires: 0 <= margin <= kMaskMargin.
 template <typename RowsOf>
 CellMask CellsAround(const TileDirectory& directory, std::uint32_t tile, int margin,
                      RowsOf rows_of) {

@@ -38,15 +38,15 @@ class TileDirectory {
   /// Removes all tiles; keeps the memory.
   void Clear();
 
-  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant on
-  /// average.
+  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant unless
+  /// coordinates are chosen so that their hashes collide.
   std::uint32_t Insert(TileCoordinate tile);
 
   /// Sorts the tiles. The index of a tile is then its position in the sorted order. Insert appends
   /// further tiles unsorted.
   void Sort();
 
-  /// Sorts the tiles and links neighbours.
+  /// Sorts the tiles and sets `neighbours`. A later Insert or Sort makes `neighbours` invalid.
   void Seal();
 
   std::size_t size() const { return tiles_.size(); }

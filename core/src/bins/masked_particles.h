@@ -27,7 +27,8 @@ struct ParticleBlock {
 };
 
 /// Visits the particles in the cells of `mask`, or all particles of a tile and its neighbours if
-/// `mask` is null. Cost: linear in the particles of the tiles in which the mask has cells.
+/// `mask` is null. `bins` must outlive the visit. Cost: linear in the particles of the tiles in
+/// which the mask has cells.
 class MaskedParticles {
  public:
   /// The particles of one tile that are still to be visited: the indices, the selected cells, and

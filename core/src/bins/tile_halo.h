@@ -13,7 +13,7 @@ namespace partiemc {
 /// Sets of tiles around a home tile: bit 5 (dy + 2) + dx + 2 is the tile at (dx, dy).
 class TileHalo {
  public:
-  /// `reach`: tiles must exist within this distance of a particle, in cells; less than two tiles.
+  /// `reach`: a particle reaches the tiles within this distance, in cells; less than two tiles.
   explicit TileHalo(float reach) : reach_(reach) {}
 
   /// The tiles that the particles of a tile reach. Cost: linear.

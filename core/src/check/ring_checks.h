@@ -1,5 +1,4 @@
-// Checks the guarantees R1-R4 of rings (partiemc/result.h), and helpers shared with the mesh
-// checks.
+// Checks the guarantees R1-R4 of rings (partiemc/result.h). Has helpers of the other checks.
 #pragma once
 
 #include <cstddef>
@@ -19,12 +18,10 @@ absl::Status Broken(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-/// Checks that all coordinates are finite and in the domain of predicates.h. `guarantee` names the
-/// guarantee in the error.
+/// Checks that all coordinates are in the domain of predicates.h. `guarantee`: for errors, "R1".
 absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> points);
 
-/// Checks guarantees R1-R4.
-/// Cost: n log n in the points.
+/// Checks R1-R4, and Rings::contacts with their angles. Cost: n log n in the points.
 absl::Status CheckRings(const Rings& rings);
 
 }  // namespace partiemc

@@ -16,8 +16,8 @@
 namespace partiemc {
 namespace {
 
-// Units of WorkLimit: of a triangle above or below a point, and of a shell around another one,
-// whose number takes memory.
+// Work, in units of WorkLimit, for a triangle above or below a point, and for each shell around
+// another one. The second is large because the list of these shells takes memory.
 constexpr std::uint64_t kWorkOfTriangle = 8, kWorkOfContaining = 1 << 10;
 
 // --- Orientation --------------------------------------------------------------------------------
@@ -186,7 +186,7 @@ class Columns {
   std::vector<std::vector<std::uint32_t>> triangles_;
 };
 
-/// The other shells that have a winding number other than 0 around the first point of `shell`.
+/// The other shells around `shell`: the winding number around its first point is not 0.
 std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& columns,
                                       const std::vector<std::uint32_t>& shell_of,
                                       std::uint32_t shell) {
@@ -239,8 +239,7 @@ std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit
   }
   work.Finish();
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
-    // Of the shells around `shell`, the innermost is contained in the most shells, because it lies
-    // in all others.
+    // The innermost of these shells lies in all others, so more shells contain it than any other.
     for (const std::uint32_t other : containing[shell]) {
       if (around[shell] == kNoShell ||
           containing[other].size() > containing[around[shell]].size()) {

@@ -14,7 +14,8 @@ namespace partiemc {
 std::vector<int> OrientationsOf(const Surface& surface);
 
 /// By shell: the innermost shell around it, or kNoShell. Exact. Requires: S1 to S3. Cost: for each
-/// shell, the triangles above and below one of its points; counts in `limit`, if it is given.
+/// shell, the triangles above and below one of its points. Throws TooMuchWork if the cost exceeds
+/// `limit`; null: no limit.
 std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit = nullptr);
 
 }  // namespace partiemc

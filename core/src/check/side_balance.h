@@ -27,10 +27,10 @@ class SideBalance {
   struct Finding {
     /// A point where the sides are not balanced, if there is one.
     std::optional<Point> imbalance;
-    /// Number of ends of sides that lie inside another side; set only if the sides are balanced. If
-    /// the number is 0, each side belongs to two triangles, or to one triangle and the boundary.
+    /// Number of points where a side ends inside another side, if the sides are balanced. If it is
+    /// 0, each side belongs to two triangles, or to one triangle and the boundary.
     std::size_t t_junctions = 0;
-    Point t_junction;  ///< One of these ends.
+    Point t_junction;  ///< One of these points.
 
     friend bool operator==(const Finding&, const Finding&) = default;
   };

@@ -86,7 +86,6 @@ absl::Status CheckIndices(const Surface& surface) {
 
 // --- S1, S2 -------------------------------------------------------------------------------------
 
-/// A side of a triangle.
 struct Side {
   std::uint32_t from, to;
   std::uint32_t triangle;
@@ -122,8 +121,8 @@ absl::Status LinkSides(const Surface& surface, std::vector<Side>& sides) {
   return absl::OkStatus();
 }
 
-/// Checks that the triangles around each point form one cycle: turning about the point visits all
-/// of them. Requires: S1.
+/// Checks that the triangles around each point form one cycle: steps from triangle to neighbour
+/// around the point visit all of them. Requires: S1.
 absl::Status CheckLinks(const Surface& surface, const std::vector<Side>& sides) {
   const auto side_of = [&](std::uint32_t from, std::uint32_t to) {
     return std::lower_bound(sides.begin(), sides.end(), Side{from, to, 0});

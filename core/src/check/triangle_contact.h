@@ -11,7 +11,6 @@ namespace partiemc {
 
 using Triangle = std::array<std::uint32_t, 3>;  ///< Indices of points.
 
-/// Whether the corners lie on one line.
 bool AreCollinear(const Vec3& a, const Vec3& b, const Vec3& c);
 
 /// Whether the closed segment pq and the closed triangle abc intersect. Exact in the domain of

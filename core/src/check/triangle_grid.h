@@ -19,7 +19,6 @@ namespace partiemc {
 class TriangleGrid {
  public:
   TriangleGrid() = default;
-  /// Builds.
   TriangleGrid(std::span<const double> points, std::span<const std::uint32_t> triangles) {
     Build(points, triangles);
   }
@@ -27,7 +26,7 @@ class TriangleGrid {
   /// Replaces the triangles, and keeps the buffers. Requires: finite coordinates.
   void Build(std::span<const double> points, std::span<const std::uint32_t> triangles);
 
-  /// The number of pairs of triangles in the same cell, which ForEachPair looks at.
+  /// The number of pairs of triangles that ForEachPair examines: those with a common cell.
   std::uint64_t PairsOfCells() const;
 
   /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until `visit`
@@ -52,8 +51,8 @@ class TriangleGrid {
   }
   /// The number of cells of size edge_ that boxes reach, summed over the boxes.
   double Reached() const;
-  /// Whether `cell` is the lowest cell of the intersection of two boxes. Only this cell reports
-  /// them.
+  /// Whether `cell` is the lowest cell of the intersection of two boxes. ForEachPair visits the
+  /// pair only in this cell, so once.
   bool IsFirstOf(std::uint64_t cell, const Box& a, const Box& b) const;
 
   std::vector<Box> boxes_;

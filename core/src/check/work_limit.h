@@ -11,8 +11,8 @@ namespace partiemc {
 /// Thrown when the work exceeds the limit.
 struct TooMuchWork {};
 
-/// Work in units of about two nanoseconds. Thread-safe. Whether a computation exceeds the limit
-/// does not depend on the number of threads if its work does not.
+/// A limit of the work of a computation, in units of about two nanoseconds. Thread-safe. The work
+/// is counted, not timed, so the number of threads does not decide whether it exceeds the limit.
 class WorkLimit {
  public:
   explicit WorkLimit(std::uint64_t most) : left_(static_cast<std::int64_t>(most)) {}
@@ -31,7 +31,8 @@ class WorkLimit {
   std::atomic<std::int64_t> left_;
 };
 
-/// Takes work in portions, so that inner loops need no atomic operation. Null: no limit.
+/// Takes work from a WorkLimit in portions, so that inner loops need no atomic operation. One for
+/// each thread. With a null limit, nothing is counted.
 class WorkCounter {
  public:
   explicit WorkCounter(WorkLimit* limit) : limit_(limit) {}
@@ -41,7 +42,7 @@ class WorkCounter {
     limit_->Take(taken_);
     taken_ = 0;
   }
-  /// Takes the rest.
+  /// Takes the rest of the work. Call it at the end.
   void Finish() {
     if (limit_ != nullptr) limit_->Take(taken_);
     taken_ = 0;

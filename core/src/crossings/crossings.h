@@ -45,7 +45,6 @@ struct TileBits {
   std::array<std::uint16_t, kTileSize> row_cells{};  ///< By row: active cells in the rows below.
 };
 
-/// Numbers of cells and segments.
 struct CrossingCounts {
   std::uint32_t cells = 0, segments = 0;
 };
@@ -56,7 +55,7 @@ struct Crossings {
   std::vector<ActiveCell> cells;  ///< Sorted by tile, row, column.
   std::vector<Segment> segments;  ///< Sorted by cell.
 
-  std::vector<CrossingCounts> counts;  ///< Scratch: counts in all earlier tiles; last, the total.
+  std::vector<CrossingCounts> counts;  ///< Scratch, by tile: sum of earlier tiles; last: the total.
 };
 
 /// Finds the active cells of a level set and their segments. Deterministic, parallel over tiles:
@@ -91,7 +90,7 @@ std::uint32_t CellAt(const Crossings& crossings, const TilePlace& place);
 std::uint32_t NextSegment(const TileDirectory& directory, const Crossings& crossings,
                           std::uint32_t segment);
 
-/// Lower left node of a cell.
+/// Lower left node of a cell, in cells from the world's origin.
 inline Point CellOrigin(const TileDirectory& directory, const ActiveCell& cell) {
   const TileCoordinate& tile = directory[cell.tile];
   return {static_cast<double>((std::int64_t{tile.x} << kTileShift) + cell.i),
@@ -101,10 +100,10 @@ inline Point CellOrigin(const TileDirectory& directory, const ActiveCell& cell) 
 /// Least distance of a crossing from the ends of its edge, in cells.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
 
-/// The crossing of the outline with `edge` of `cell`, by linear interpolation of F. Both cells of
-/// an edge get the same bits. The crossing stays 2^-12 cells away from the nodes, so that rounding
-/// to world coordinates cannot move it to a node. The function is inline and has no branch on
-/// `edge`, so that the memory accesses of many cells overlap.
+/// The crossing of the outline with `edge` of `cell`, by linear interpolation of F, in cells from
+/// the world's origin. The crossing stays kEdgeMargin away from the nodes, so that rounding to
+/// world coordinates cannot move it to a node. The function is inline and has no branch on `edge`,
+/// so that the memory accesses of many cells overlap.
 inline Point EdgeCrossing(const TileDirectory& directory, const LevelSet& level_set,
                           const ActiveCell& cell, int edge) {
   // Both cells of the edge interpolate from its lower or left node, so they get the same bits.

@@ -42,8 +42,8 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
     while (tile < directory.size() && directory[tile].y == y) ++tile;
     const std::uint32_t last = tile < directory.size() ? crossings.tiles[tile].first_cell
                                                        : static_cast<std::uint32_t>(cells.size());
-    std::array<std::uint32_t, kTileSize>
-        next{};  // By row of cells: the count, then the next index.
+    // By row of cells: the count, then the next index.
+    std::array<std::uint32_t, kTileSize> next{};
     std::uint32_t count = 0;
     for (std::uint32_t cell = first; cell < last; ++cell) {
       const std::uint32_t wanted = is_wanted(cells[cell]) ? 1 : 0;
@@ -62,8 +62,8 @@ std::span<const std::uint32_t> CellsByRow::List(const TileDirectory& directory,
   return std::span(cells_).first(listed);
 }
 
-/// A horizontal lattice edge that a ring crosses. Along a row of the lattice, edges at the
-/// beginning and edges at the end of an inside stretch alternate.
+/// A horizontal lattice edge that a ring crosses. Along a row of the lattice, each edge begins or
+/// ends an inside stretch; the two kinds alternate.
 struct CrossedEdge {
   std::int32_t row = 0, column = 0;  ///< Its left node, in cells from the world's origin.
   std::uint32_t ring = kNoRing;

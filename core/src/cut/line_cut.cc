@@ -16,8 +16,8 @@ bool IsKept(const AxisLine& line, const Point& point) {
   return (Across(line, point) > line.at) == line.keeps_above;
 }
 
-// The point where the segment from a to b crosses the line. It begins a segment that is cut if that
-// from a to b is.
+// The point where the segment from a to b crosses the line. Has `is_cut` of a, because the rest of
+// the segment begins here.
 LoopPoint CrossingOf(const AxisLine& line, const LoopPoint& a, const LoopPoint& b) {
   const double t = (line.at - Across(line, a.at)) / (Across(line, b.at) - Across(line, a.at));
   const auto between = [&](double from, double to) {
@@ -38,8 +38,8 @@ LoopPoint CrossingOf(const AxisLine& line, const LoopPoint& a, const LoopPoint& 
   return point;
 }
 
-// Divides a loop that crosses the line into chains: from the point where it enters the kept side to
-// the point where it leaves.
+// Divides a loop that crosses the line into chains, each from a crossing where the loop enters the
+// kept side to the next crossing.
 void AddChains(const AxisLine& line, std::span<const LoopPoint> loop, std::uint32_t outer,
                LineCutScratch& s) {
   const std::size_t count = loop.size();
@@ -66,7 +66,7 @@ void AddChains(const AxisLine& line, std::span<const LoopPoint> loop, std::uint3
   }
 }
 
-// Finds the chain that follows each chain. Returns false if the order of the crossings is unknown.
+// Sets Chain::next of all chains. Returns false if the order of the crossings is unknown.
 bool LinkChains(const AxisLine& line, LineCutScratch& s) {
   std::ranges::sort(s.crossings, [](const auto& a, const auto& b) {
     return a.along != b.along ? a.along < b.along : a.chain < b.chain;

@@ -9,20 +9,19 @@
 
 namespace partiemc {
 
-/// A ring that is continued nowhere, or whose ring is unknown.
+/// Marks that there is no ring, or no next chain.
 inline constexpr std::uint32_t kNoSource = 0xffffffff;
 
 /// A line parallel to an axis, and the side of it that is kept.
 struct AxisLine {
   int axis = 0;  ///< The coordinate that is constant on the line: 0, 1 for x, y.
   double at = 0;
-  bool keeps_above = true;  ///< The kept points have larger coordinates than the line.
+  bool keeps_above = true;  ///< Whether the kept points have larger coordinates than the line.
 };
 
-/// A point of a loop.
 struct LoopPoint {
   Point at;
-  Point root;  ///< PlacedVertices::roots.
+  Point root;  ///< Its root (PlacedVertices::roots), or `at`.
   float normal_x = 0, normal_y = 0;
   bool is_cut = false;  ///< The segment to the next point lies on a line at which a ring was cut.
 };
@@ -31,8 +30,8 @@ struct LoopPoint {
 struct Loops {
   struct Loop {
     std::uint32_t first = 0, last = 0;  ///< Its points, [first, last).
-    std::uint32_t ring = kNoSource;     ///< The ring that it still is, uncut; kNoSource: a piece.
-    std::uint32_t outer = kNoSource;    ///< The outer ring of its component.
+    std::uint32_t ring = kNoSource;     ///< The ring, if it is uncut; kNoSource: a piece of rings.
+    std::uint32_t outer = kNoSource;    ///< The outer ring of its component before the cut.
   };
   std::vector<LoopPoint> points;
   std::vector<Loop> loops;
@@ -53,7 +52,7 @@ struct LineCutScratch {
   struct Chain {
     std::uint32_t first, last;  // Its points in `points`, [first, last).
     std::uint32_t outer;
-    std::uint32_t next;  // The chain that follows on the loop; kNoSource once it is used.
+    std::uint32_t next;  // The chain that follows on the new loop; kNoSource once it is used.
   };
   std::vector<LoopPoint> points;
   std::vector<Chain> chains;

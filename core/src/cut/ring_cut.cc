@@ -14,8 +14,8 @@ namespace {
 
 // Sides move by at most this number of steps.
 constexpr int kMostShifts = 16;
-// Sides closer to an axis than this, in spacings, lie on it: predicates are not exact for tiny
-// coordinates (vertices.cc).
+// Sides with a smaller coordinate than this, in spacings, move to 0: predicates are not exact for
+// tiny coordinates (vertices.cc).
 constexpr double kAxisReach = 0x1p-96;
 // A step, in spacings and in last bits of the coordinate.
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 8;
@@ -68,8 +68,8 @@ bool CutAtSides(const RingCutInput& input, int steps, RingCutScratch& s) {
   return true;
 }
 
-// Writes the new rings: rings that are not cut, and in the place of each outer ring that is cut its
-// loops.
+// Writes the new rings: the rings that are not cut, and the loops of each cut outer ring in its
+// place.
 class Assembly {
  public:
   Assembly(const RingCutInput& input, const Rings& from, const PlacedVertices& placed,
@@ -109,7 +109,7 @@ class Assembly {
     return input_.percolation.bodies[input_.topology.component_of_ring[s_.topology_ring[ring]]];
   }
 
-  // Ends a ring that continues the ring `continues`, or none.
+  // Ends a new ring. `continues`: the ring whose parents it takes, or kNoRing.
   void EndRing(std::uint32_t outer, bool is_hole, std::uint32_t continues) {
     to_.offsets.push_back(static_cast<std::uint32_t>(to_.PointCount()));
     s_.group.push_back(s_.topology_ring[outer]);
@@ -198,7 +198,6 @@ class Assembly {
   Rings& to_;
 };
 
-// The number of bodies with pieces.
 std::uint64_t CountCutBodies(const RingCutInput& input, const RingCutScratch& s,
                              std::vector<std::uint8_t>& seen) {
   seen.assign(input.topology.components.size(), 0);

@@ -18,12 +18,12 @@ struct RingCutScratch {
   Loops loops, kept;
   LineCutScratch line;
   std::vector<std::uint32_t> topology_ring;  // By ring: its ring of the topology.
-  std::vector<std::uint32_t> group;          // By new ring.
+  std::vector<std::uint32_t> group;          // By new ring: PlacedVertices::group_of_ring.
   std::vector<double> roots;
   std::vector<std::uint8_t> is_hole;     // By new ring.
   std::vector<std::uint32_t> continues;  // By new ring: the ring whose parents it has, or kNoRing.
-  std::vector<std::uint32_t> largest;    // By body: its largest piece.
-  std::vector<std::uint8_t> seen;        // By body.
+  std::vector<std::uint32_t> largest;    // By body: its largest piece, a new ring.
+  std::vector<std::uint8_t> seen;        // By body: 1 if it has pieces.
   Rings rings;
   TouchingPairsBuffers pairs;
   RingDepths depths;
@@ -45,9 +45,9 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
 /// `placed.group_of_ring`, keeps `placed.roots` parallel to the points, and counts the bodies that
 /// have pieces.
 ///
-/// Where a ring has a vertex on a side, or pieces would touch, both opposite sides move by up to
-/// some billionths of the spacing (kMostShifts in ring_cut.cc). Returns false if this does not
-/// help, which is a bug.
+/// If a ring has a vertex on a side, or pieces would touch, all sides move by up to some billionths
+/// of the spacing (kMostShifts in ring_cut.cc), opposite sides in the same direction. Returns false
+/// if this does not help, which is a bug.
 /// Cost: as CutAtLine, CountTouchingPairs and RingDepths.
 [[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
                             PlacedVertices& placed, Rings& rings, std::uint64_t& cut_bodies);

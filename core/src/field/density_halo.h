@@ -1,4 +1,4 @@
-// Passes on the density that the particles of a tile add at the nodes of neighbouring tiles.
+// Adds the density of a tile's particles at the nodes of neighbouring tiles.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace partiemc {
 
-/// The margins of the sums of all tiles with particles, kept until the neighbours add them.
+/// The margins of the NodeSums of all tiles with particles, kept until the neighbours add them.
 ///
 ///   uuuuuuuuuuuuuu
 ///   llll      rrrr     u: rows within reach of the kernel; l and r: kSumMargin columns

@@ -45,8 +45,7 @@ TileParticles ParticlesOf(const ParticleBins& bins, std::uint32_t tile) {
           bins.CountOf(tile)};
 }
 
-// Factor from kernel sums to density; 1 if particles have weights, because the sums are then
-// weighted.
+// Factor from kernel sums to density; 1 if the sums are weighted.
 float WeightOf(const ParticleBins& bins, const Scale& scale) {
   return HasUniformWeights(bins) ? static_cast<float>(scale.uniform_weight) : 1.0f;
 }
@@ -65,7 +64,7 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     values.fill(0);
     return;
   }
-  // Fetches the memory that is written at the end: the sums take longer than this fetch.
+  // Prefetches the values that are written at the end: the sums take longer than this fetch.
   PrefetchLines(std::span<const float>(values));
   alignas(64) NodeSums sums;
   sums.fill(0);
@@ -86,7 +85,8 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
   }
 }
 
-// First part of the second pass: sums the density at every node and sets the sides that it decides.
+// First part of the second pass: adds the density from neighbouring tiles, and sets the sides that
+// the density decides.
 void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                        LevelSet& level_set) {
   float* const values = level_set.tiles[tile].data();
@@ -139,8 +139,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   return scale.has_grains ? JoinGrains(blocks, distances, inside, values) : inside;
 }
 
-// Second pass. Computes F at the nodes whose side the density does not decide at once, while the
-// sums are in the nearest cache.
+// Second pass. Computes F immediately at the nodes whose side the density does not decide, while
+// the sums are in the nearest cache.
 void ClassifyTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
                   LevelSet& level_set) {
   ClassifyByDensity(bins, scale, tile, level_set);

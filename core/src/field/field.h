@@ -11,8 +11,8 @@
 
 namespace partiemc {
 
-/// The level set F in cells, negative inside (level_set_formula.h). Node (i, j) of a tile has index
-/// j * 32 + i.
+/// The level set F in cells, negative inside (level_set_formula.h); with own sizes, F times the
+/// local size. Node (i, j) of a tile has index j * 32 + i.
 ///
 /// Values are exact at both ends of every lattice edge that the outline crosses. At other nodes
 /// only the sign is right: the value may be the density term that decides the side.

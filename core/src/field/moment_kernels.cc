@@ -23,8 +23,8 @@ using Lanes = hn::CappedTag<float, NodeBlock::kNodes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// Selected particles: their coordinates along the axis of selection, and along the other axis;
-// their sizes if sizes differ.
+// Selected particles: coordinates along the axis of selection and along the other axis; sizes if
+// sizes differ.
 struct Chosen {
   alignas(64) ParticleBlock::PerParticle<float> along, across, size;
   int count;

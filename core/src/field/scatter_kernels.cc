@@ -76,8 +76,8 @@ HWY_INLINE void AddKernel(float x, float y, int columns, int rows, float inverse
 // Particles per block.
 constexpr int kBlock = 64;
 
-// For particles of a tile: their position relative to the first column and row that the kernel
-// reaches, and the index of that node's sum.
+// By particle: its position relative to the first node that its kernel reaches (column and row),
+// and the index of the sum of this node.
 struct KernelCorners {
   alignas(64) std::array<float, kBlock> x, y;
   alignas(64) std::array<std::int32_t, kBlock> at;
@@ -188,7 +188,7 @@ void ScatterKernelsOf(const TileParticles& tile, float radius, NodeSums& sums) {
   });
 }
 
-// The nodes that the kernel of a particle at (x, y) reaches, those of columns and rows [low, high).
+// The nodes in columns and rows [low, high) that the kernel of a particle at (x, y) reaches.
 struct KernelNodes {
   int column, row, columns, rows;
 

@@ -14,7 +14,7 @@ namespace partiemc {
 /// Position of a particle relative to a point of the plane, in cells.
 struct SpaceOffset {
   double x, y;    ///< Along the plane.
-  double height;  ///< Above it.
+  double height;  ///< Above the plane.
 };
 
 /// Sums over the particles around a point of the plane; D = x_i - x in space.
@@ -64,8 +64,8 @@ struct SliceSums {
   }
 };
 
-/// Sums for the gradients of SliceSums along the plane, to be added for the same particles. With t
-/// = 1 - s^2: grad k = 6 t^2 D / R^2.
+/// Sums for the gradients of SliceSums along the plane. Add the same particles. With t = 1 - s^2:
+/// grad k = 6 t^2 D / R^2.
 struct SliceSlopes {
   double x = 0, y = 0;            ///< sum t^2 D
   double xx = 0, xy = 0, yy = 0;  ///< sum t^2 D D^T

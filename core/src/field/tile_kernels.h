@@ -29,10 +29,10 @@ inline constexpr int SumIndex(int i, int j) {
 /// pairs of rows, which may exceed their reach by one row.
 using NodeSums = std::array<float, (kTileSize + 2 * kSumMargin + 2) * kSumColumns>;
 
-/// A square of nodes of a tile, some of which need moments.
+/// A square of 4 x 4 nodes of a tile. The nodes in `asked` need moments.
 ///
 ///   12 13 14 15
-///    8  9 10 11   Bit k of `asked` is node k; node 0 is (column, row) of the tile.
+///    8  9 10 11   Bit k of `asked` is node k. Node 0 is node (column, row) of the tile.
 ///    4  5  6  7
 ///    0  1  2  3
 struct NodeBlock {
@@ -42,7 +42,7 @@ struct NodeBlock {
   std::uint16_t asked = 0;
 };
 
-/// Blocks that contain each requested node of a tile once, row by row.
+/// Blocks, by row, that together contain each requested node of a tile once.
 struct NodeBlocks {
   static constexpr int kMost = kTileNodes / NodeBlock::kNodes;
   std::array<NodeBlock, kMost> blocks;
@@ -51,8 +51,7 @@ struct NodeBlocks {
   const NodeBlock& operator[](int block) const { return blocks[block]; }
 };
 
-/// Finds the blocks. Greedy: each block begins at the first requested node that no earlier block
-/// contains.
+/// Finds the blocks for the requested nodes `asked`. Greedy, not minimal.
 NodeBlocks BlocksOf(const BitRows& asked);
 
 /// Kernel sums at the nodes of one block. Moments are relative to the node, so that the mean loses
@@ -74,15 +73,15 @@ struct alignas(64) GrainDistances {
   std::array<BlockSums::Channel, NodeBlocks::kMost> blocks;
 };
 
-/// The nodes of a tile that need moments.
+/// The requested nodes of a tile: those that need moments.
 struct AskedNodes {
   BitRows rows;
-  bool is_open;          ///< The density does not decide their sides.
-  bool has_kernel_sums;  ///< Their values are sum k (ClassifyNodes).
+  bool is_open;          ///< The density does not decide the sides of these nodes.
+  bool has_kernel_sums;  ///< The values of these nodes are sum k (ClassifyNodes).
 };
 
-/// The particles of one tile. `weight` is null if weights are uniform, `size` if sizes are equal.
-/// Sizes exclude weights.
+/// The particles of one tile. `weight` is null if weights are uniform or sizes differ, `size` if
+/// sizes are equal.
 struct TileParticles {
   const BinnedParticle* particles;
   const float* weight;
@@ -103,13 +102,13 @@ void ScatterNearKernels(const ParticleBlock& near, const float* weight, float ra
 void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
                              NodeSums& sums);
 
-/// Adds particles to the moments of blocks, one after another. `size`: by particle of the bins,
-/// null if sizes are equal. `has_kernel_sums`: sum k is known, so it is not added.
+/// Adds particles, in their order, to the moments of blocks. `size`: by particle of the bins, null
+/// if sizes are equal. `has_kernel_sums`: sum k is known, so it is not added.
 void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums);
 
-/// Lowers `distances` to the distances from grains. Grains whose kernels do not reach a node may be
-/// left out.
+/// Lowers `distances` to the distances from these grains, if they are nearer. Grains whose kernels
+/// do not reach a node may be left out. `size`: by particle of the bins.
 void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
                    const NodeBlocks& blocks, GrainDistances& distances);
 

@@ -14,7 +14,7 @@ constexpr double kMostCells = 1 << 30;
 
 constexpr int kAcross = 2 * kMotionReach + 1;
 
-// Adds weight * a x b.
+// Adds weight * a b^T.
 void AddProduct(double weight, const Vec3& a, const Vec3& b, std::array<Vec3, 3>& sum) {
   const Vec3 weighted = weight * a;
   sum[0] = sum[0] + weighted.x * b;
@@ -54,7 +54,7 @@ double Likeness(const MotionCell& a, const MotionCell& b) {
   return left * left;
 }
 
-// Adds the cells of one row, for all images of the box that are near.
+// Adds the cells of one row, including their near images in a periodic box.
 void AddRow(const MotionGrid& grid, std::span<const MotionCell> cells, const MotionCell& centre,
             int layer, int row, Contributions& found) {
   const std::int32_t periods = grid.periods[0];

@@ -15,21 +15,22 @@
 
 namespace partiemc {
 
-/// Side of a cell, in spacings.
+/// Side of a cell, in spacings; more in a periodic box, so that whole cells fit.
 inline constexpr double kMotionCell = 3;
 
-/// Cells up to this far away contribute, with weights that fall linearly to 0 one cell farther.
+/// Cells up to this number of cells away contribute to a fit, with weights that fall linearly to 0
+/// one cell farther.
 inline constexpr int kMotionReach = 2;
 
-/// Difference of the mean displacements of two cells, in spacings, from which on they count as
-/// cells of different bodies and do not contribute to each other.
+/// If the mean displacements of two cells differ by this or more, in spacings, the cells belong to
+/// different bodies and do not contribute to each other.
 inline constexpr double kMotionDifference = .7;
 
 /// Added to the variance of positions along each axis, in squared spacings. Few particles thus
 /// have nearly their mean displacement, and particles on a line have a solution.
 inline constexpr double kMotionRidge = .25;
 
-/// The grid of cells. Lengths in spacings. Axes that do not count have the coordinate 0.
+/// The grid of cells. Lengths in spacings. With two axes, the third coordinate is 0.
 struct MotionGrid {
   int axes = 2;                           ///< 2 or 3.
   std::array<double, 3> origin{};         ///< Lower end of the box; 0 without a period.
@@ -38,8 +39,8 @@ struct MotionGrid {
   std::array<std::int32_t, 3> periods{};  ///< Cells along a period; 0: not periodic.
 };
 
-/// `axes` are the coordinates of the particles that count. Requires: Validate has passed the box
-/// for this spacing.
+/// `axes`: the coordinates that are filtered; 0, 1, 2 for x, y, z. `spacing` is in world units.
+/// Requires: Validate has passed the box for this spacing.
 MotionGrid MakeMotionGrid(std::span<const int> axes, const std::optional<PeriodicBox>& box,
                           double spacing);
 
@@ -54,7 +55,8 @@ struct MotionCell {
   GridCell at{};                      ///< z, y, x, so that cells are sorted by layer, row, column.
   std::uint32_t first = 0, last = 0;  ///< Its movers, [first, last).
   Vec3 mean_at, mean_moved;
-  std::array<Vec3, 3> square{}, product{};  ///< Sums of at x at and at x moved about the means.
+  /// Sums of the outer products at at^T and at moved^T, about the means.
+  std::array<Vec3, 3> square{}, product{};
 };
 
 /// Returns the cell of a position (MotionCell::at), and sets `at` to the position relative to the

@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t kNew = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kGrain = 1 << 12;
 
-// Reads and writes the coordinates that are filtered.
+// Finds the filtered coordinates in the positions of a frame.
 class Coordinates {
  public:
   explicit Coordinates(const NoiseFilterInput& input)
@@ -25,7 +25,7 @@ class Coordinates {
 
   std::size_t AxisCount() const { return axes_.size(); }
 
-  // The place of a coordinate in the positions of the frame.
+  // The index of a coordinate in the positions of the frame.
   std::size_t PlaceOf(std::size_t particle, std::size_t axis) const {
     return particle * components_ + static_cast<std::size_t>(axes_[axis]);
   }
@@ -73,7 +73,7 @@ void SortById(const Frame& frame, NoiseFilterScratch& s) {
   }
 }
 
-// Finds each particle in the last history.
+// Sets `last` to the index of each particle in the last history, or kNew.
 void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScratch& s) {
   const std::span<const std::uint64_t> ids = previous.ids;
   ParallelForRanges(s.last.size(), kGrain, [&](std::size_t first, std::size_t last) {
@@ -87,8 +87,8 @@ void FindLast(const Frame& frame, const NoiseHistory& previous, NoiseFilterScrat
   });
 }
 
-// The displacement since the last frame in spacings, to the nearest image in a periodic box. The
-// motion with the box does not count.
+// The displacement since the last frame in spacings, relative to the motion of the box, to the
+// nearest image.
 Vec3 DisplacementOf(const NoiseFilterInput& input, const MotionGrid& grid,
                     const NoiseFilterScratch& s, std::size_t rank) {
   const std::size_t axes = input.axes.size();
@@ -219,7 +219,7 @@ void WritePositions(std::span<const Real> given, double cell_size, const Coordin
 
 absl::Status FilterNoise(const NoiseFilterInput& input, NoiseFilterScratch& s, Frame& filtered) {
   filtered = input.frame;
-  // The last history stays in the buffers.
+  // The last history keeps its buffers, which may be larger.
   const std::uint64_t bytes =
       kBytesPerFilteredParticle * std::max(input.frame.ParticleCount(), input.previous.ids.size());
   absl::Status status = input.reserve(bytes);

@@ -17,8 +17,8 @@
 
 namespace partiemc {
 
-/// Largest displacement of a known particle between two frames, in spacings. After a larger
-/// displacement a particle counts as new: its filtered position is its given position.
+/// Largest displacement of a known particle between two frames, in spacings. A particle that moved
+/// farther counts as new: its filtered position is its given position.
 inline constexpr double kMostDisplacement = 5;
 
 /// Largest distance, in spacings, of the given position from the prediction by the last frame and
@@ -39,7 +39,7 @@ struct NoiseFilterScratch {
   NoiseHistory next;              // The history for the next frame.
 };
 
-/// Bytes of a NoiseFilterScratch and of the history of a state, at most.
+/// Upper bounds of the bytes of a NoiseFilterScratch and of the history of a state.
 inline constexpr std::uint64_t kBytesPerFilteredParticle = 216;
 inline constexpr std::uint64_t kBytesPerMotionCell = 248;
 
@@ -54,8 +54,8 @@ struct NoiseFilterInput {
   const BoxMotion& motion;  ///< Motion of the box since the last frame. World units.
   std::optional<PeriodicBox> box_to_store;  ///< For NoiseHistory::box.
   const NoiseHistory& previous;
-  /// Called twice with the bytes that the filter requires, before they are allocated: a lower bound
-  /// by particles, then the sum. Its error ends the filter.
+  /// The filter calls this twice with the bytes that it requires, before it allocates them: first
+  /// the bytes for particles, then the sum with those for cells. An error ends the filter.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
 };
 

@@ -10,10 +10,9 @@ namespace partiemc {
 double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 
 /// The kernel radius and the reference radius for Boundary::kGrains, in diameters (core/SIZES.md,
-/// "Grains"). With the largest kernel radius that lets a lattice of half the smallest diameter
-/// reach grains of ten times this diameter. phi decides only between grains, whose surfaces have
-/// their own term: with a larger reference radius, the outline has shallower dimples and smaller
-/// voids.
+/// "Grains"). With this kernel radius, the largest grain, ten times the smallest, reaches 32 cells
+/// of half the smallest diameter: exactly one tile. The reference radius matters only between
+/// grains. If it is larger, the outline has shallower dimples and smaller voids.
 inline constexpr double kGrainKernelRadius = 1.6, kGrainReferenceRadius = 0.3;
 
 /// The reference radius of slices, for every placement. The lattice value needs no factor, as tests

@@ -23,8 +23,7 @@ struct DistinctIdsScratch {
 /// Returns the first id that equals an earlier one; empty if all are different. Ids are marked in a
 /// bitmap of at most 32 bits per id: by number if they are dense, as simulators number particles,
 /// else by hash. Ids that share a bit are compared.
-/// Cost: linear in ids; n log n in the ids that share a bit, which is all of them for malicious
-/// ids.
+/// Cost: linear in ids; n log n in the ids that share a bit, at worst all of them.
 std::optional<RepeatedId> FindRepeated(std::span<const std::uint64_t> ids,
                                        DistinctIdsScratch& scratch);
 

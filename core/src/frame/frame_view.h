@@ -79,7 +79,6 @@ auto VisitPositions(const Frame& frame, Plane plane, Visit visit) {
       frame.positions);
 }
 
-/// Position of one particle.
 Point PositionOf(const Frame& frame, Plane plane, std::size_t particle);
 
 /// A velocity in the plane. Requires: the frame has velocities.
@@ -100,14 +99,16 @@ absl::Status CheckAttributes(const Frame& frame);
 
 /// Checks that every number of the frame is usable: coordinates finite and, without a slice, in one
 /// plane; volumes positive; ids distinct; velocities and attributes finite.
-/// Errors: INVALID_ARGUMENT, RESOURCE_EXHAUSTED for too many particles; the Violation gives the
-/// first particle at fault.
+/// `parameters.slice` must be set if particles fill space, also for a surface. Errors:
+/// INVALID_ARGUMENT, RESOURCE_EXHAUSTED for too many particles. The Violation names the first
+/// particle at fault; outside a plane, the particle with the largest coordinate.
 absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
                         const FrameLimits& limits, DistinctIdsScratch& scratch);
 
 /// Sets `phases` to the values of the attribute `name`, one whole number for each particle, and
 /// `others` to the other attributes. Errors: INVALID_ARGUMENT if a frame with particles lacks the
-/// attribute, or if its values are others. Requires: CheckFrame has passed the frame.
+/// attribute, or if its values are not one whole number each. Requires: CheckFrame has passed the
+/// frame.
 absl::Status TakePhaseValues(const Frame& frame, const std::string& name,
                              std::span<const float>& phases, std::vector<Attribute>& others);
 

@@ -6,8 +6,8 @@
 
 namespace partiemc {
 
-/// Runs a stage between its reports to `observer`, which may be null. Throws if the frame is
-/// cancelled.
+/// Runs a stage between its reports to `observer`, which may be null. Throws Cancelled instead if
+/// the frame is cancelled.
 template <typename Run>
 auto InStage(StageObserver* observer, Stage stage, Run run) {
   ThrowIfCancelled();

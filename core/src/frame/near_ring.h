@@ -72,18 +72,18 @@ inline bool NearRing::IsAround() const {
   });
 }
 
-/// Whether enough of the sampled points are surrounded to trust their distances: at least 12, and
-/// at least 30 %. A strip of four layers of particles has enough; ten drops do not.
+/// Whether enough of `asked` samples are surrounded to trust their distances: at least 12, and at
+/// least 30 %. A strip of four layers of particles has enough; ten drops do not.
 constexpr bool AreEnough(std::size_t surrounded, std::size_t asked) {
   return surrounded >= 12 && 10 * surrounded >= 3 * asked;
 }
 
-/// Number of samples of SamplesContradict, and of those that it examines first. It ends if fewer
-/// than kCauseToAsk of these contradict the spacing.
+/// SamplesContradict examines at most kAsked samples. It stops after kAskedFirst if fewer than
+/// kCauseToAsk of them contradict the spacing.
 inline constexpr std::size_t kAsked = 64, kAskedFirst = 16, kCauseToAsk = 3;
 
-/// Whether enough of the sampled particles contradict the spacing. `probe` has
-/// Contradicts(particle) and IsExhausted, after which no further sample is examined.
+/// Whether enough of the sampled particles contradict the spacing. `count`: all particles.
+/// probe.Contradicts(particle) examines one; if probe.IsExhausted(), no further one is examined.
 template <typename Probe>
 bool SamplesContradict(std::size_t count, Probe& probe) {
   const std::size_t most = count < kAsked ? count : kAsked;

@@ -43,9 +43,9 @@ void BuildTree(std::span<Place> positions, int axis = 0) {
   }
 }
 
-/// Calls near.Add(offset) for positions near `query`, and skips branches of the tree beyond
-/// near.reach_square(), which shrinks with each position. If distances are equal, the order of the
-/// tree decides.
+/// Calls near.Add(offset) for positions near `query`, also for `query` itself. The tree and `query`
+/// determine the order. Skips branches farther than the square root of near.reach_square(), which
+/// must not grow.
 template <typename Place, typename Near>
 void GatherNearest(std::span<const Place> tree, const Place& query, Near& near, int axis = 0) {
   if (tree.empty()) return;

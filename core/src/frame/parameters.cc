@@ -22,7 +22,6 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
-// Limit of the names of attributes.
 constexpr std::size_t kMostNameBytes = 64;
 // Limits of slice planes: squares and products stay finite.
 constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
@@ -81,7 +80,7 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
                     "must be in [0.01, 10]: the density is about 1 inside of bodies");
 }
 
-// Checks that nothing excludes the phase of a section.
+// Checks the phase of a section, and that no other parameter excludes it.
 absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) {
   const Section& of = p.sections[section];
   const auto refused = [&](const std::string& rule) {
@@ -159,11 +158,11 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
-// Lengths of boxes, in kernel radii. Particles of one body are at most two kernel radii apart; a
-// box of four has one nearest image of each particle.
+// Least length of a box, in kernel radii. Neighbours in a body are at most two kernel radii apart;
+// in a box of four, each particle has only one image that near.
 constexpr double kMinBoxLength = 4;
 
-// Checks the box, and that nothing excludes it.
+// Checks the box, and that slices and the placement do not exclude it.
 absl::Status CheckBox(const ReconstructionParameters& p) {
   if (!p.box) return absl::OkStatus();
   if (auto status = Validate(*p.box, p.kernel_radius, p.spacing.value_or(0)); !status.ok()) {
@@ -183,7 +182,7 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
-// Checks that nothing excludes own sizes.
+// Checks that no other parameter excludes own sizes. CheckWalls does so for walls.
 absl::Status CheckSizes(const ReconstructionParameters& p) {
   if (p.sizes == Sizes::kEqual) return absl::OkStatus();
   const auto refused = [&](const std::string& with) {
@@ -201,7 +200,7 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
-// Checks what only grains require.
+// Checks the parameters that grains require and exclude.
 absl::Status CheckBoundary(const ReconstructionParameters& p) {
   if (p.boundary == Boundary::kBulk) return absl::OkStatus();
   const bool is_isoline = p.isovalue || std::ranges::any_of(p.sections, [](const Section& s) {
@@ -211,7 +210,7 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
     return Refused("boundary", std::string(Name(p.boundary)), "must be bulk for a surface");
   }
   if (p.sizes == Sizes::kOwn && !is_isoline) {
-    // An absent spacing is the smallest diameter.
+    // Without a spacing, the smallest grain is the spacing, 2 / cell_size cells wide.
     if (p.spacing || p.cell_size * p.kSmallestGrain <= 2) return absl::OkStatus();
     return OutOfRange("cell_size", p.cell_size,
                       "must be at most 1.408 half spacings for grains without a spacing");
@@ -221,7 +220,7 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
       is_isoline ? "must be bulk with an isovalue" : "must be bulk unless sizes are own");
 }
 
-// Checks what only surfaces require.
+// Checks SurfaceOptions, and the parameters that surfaces require and exclude.
 absl::Status CheckSurface(const ReconstructionParameters& p) {
   const auto check = [](const char* field, double value, const char* rule) {
     if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
@@ -237,7 +236,7 @@ absl::Status CheckSurface(const ReconstructionParameters& p) {
       !status.ok()) {
     return status;
   }
-  // A larger error removes what the particles show.
+  // A larger error would remove details as large as particles.
   if (!Within(p.surface.simplify, 0, 1)) {
     return OutOfRange("surface.simplify", p.surface.simplify, "must be in [0, 1] spacings");
   }

@@ -9,7 +9,8 @@
 
 namespace partiemc {
 
-/// The volumes, ids and attributes of chosen particles. The next copy reuses the memory.
+/// The volumes, ids and attributes of chosen particles. The names of attributes are views of the
+/// frame. The next copy reuses the memory.
 class ParticleCopy {
  public:
   /// Copies from `frame` the particles `sources`, in this order. Cost: linear.

@@ -20,7 +20,7 @@ struct PlacementTraits {
   /// cells plus this number of kernel radii.
   double reach_cells, reach_kernels;
   bool on_edges;  ///< One vertex on each crossed lattice edge.
-  bool in_cells;  ///< One vertex for each segment in its cell.
+  bool in_cells;  ///< One vertex for each segment, in the segment's cell.
   /// Vertices are particles, and planes go through the weighted means of the cells
   /// (farthest_particle.h). Rings may cross; the mesh connects the middles of the segments.
   bool takes_particles;

@@ -14,7 +14,7 @@ struct SizeRange {
 /// spacings) unless noted otherwise.
 struct Scale {
   double cell_size = 0;          ///< World units.
-  bool is_slice = false;         ///< Particles fill space; volumes are cubic.
+  bool is_slice = false;         ///< Slice or surface: particles fill space; volumes are cubic.
   bool has_own_sizes = false;    ///< Sizes::kOwn: particle i has the kernel radius beta h_i.
   bool has_grains = false;       ///< Boundary::kGrains: particles are discs.
   SizeRange sizes;               ///< Both 1 for equal sizes.
@@ -35,9 +35,9 @@ struct Scale {
 /// The unit of ReconstructionParameters::cell_size, in spacings.
 double CellUnit(const ReconstructionParameters& parameters);
 
-/// Arguments in world units. `lightest_volume`: the smallest volume of a particle; an area (h^2
-/// without volumes), but for a slice a volume in space. Requires: resolved parameters; for
-/// Sizes::kOwn, `lightest_volume` is h^2, because weights do not contain volumes.
+/// Arguments in world units. `lightest_volume`: the smallest area of a particle (h^2 without
+/// volumes); with parameters.slice, the smallest volume (h^3). Requires: resolved parameters; for
+/// Sizes::kOwn, `lightest_volume` is h^2 or h^3, because weights do not contain volumes.
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
                 double lightest_volume, const SizeRange& sizes = {});
 

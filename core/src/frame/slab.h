@@ -22,7 +22,7 @@ struct PlaneBasis {
 /// The basis of a plane, as SlicePlane::normal defines it. Requires: Validate has passed the plane.
 PlaneBasis BasisOf(const SlicePlane& plane);
 
-/// The particles within some distance of a plane, in the order of their frame.
+/// The particles within some distance of a plane, in the order of their frame, as a copy.
 class Slab {
  public:
   /// Selects the particles of `frame` within `reach` (world units) of the plane and copies them.

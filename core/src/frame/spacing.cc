@@ -31,25 +31,25 @@ constexpr double kLonelyRatio = 4;
 
 // Each round uses the spacing that the round before found; thinned particles need the third round.
 constexpr int kDensityRounds = 3;
-// With fewer such points, bodies are too thin or too small for a density, and the spacing is the
-// median distance.
+// With fewer surrounded test points, bodies are too thin or too small for a density, and the
+// spacing is the median distance.
 constexpr std::size_t kMinFilledPoints = 32;
 // Relative error of the kernel sums in small or thin bodies. If the spacing by density is closer to
 // the median distance than this error, the median distance is the better estimate; on lattices it
 // is exact.
 constexpr double kSumTolerance = 0.05;
 
-// What depends on the dimension.
-// - kRadius: of the kernel sums, in spacings. kWider: factor of the radius if the first round finds
-//   too few points, because nearest neighbours of random points are much closer than a spacing.
+// The constants and functions of each dimension.
+// - kRadius: radius of the kernel sums, in spacings.
+// - kWider: factor of the radius if the first round finds too few test points, because nearest
+//   neighbours of random points are much closer than a spacing.
 // - A test point counts if particles surround it: if the weighted mean of the particles lies within
 //   kMaxImbalance radii of the point, and their weighted mean square distance, in squared radii,
 //   lies between kMinSpread and kMaxSpread. A filled disk has 1/5, a filled ball 3/11.
 // - kDirections: offsets of the test points from the sampled particles, in kernel radii. At
-// distance
-//   1 the particle itself adds nothing to the kernel sum, so the mean of the sums is unbiased for
-//   any arrangement.
-// - kIntegral: of the kernel, over the plane or space.
+//   the distance 1 the particle itself adds nothing to the kernel sum, so the mean of the sums is
+//   unbiased for any arrangement.
+// - kIntegral: integral of the kernel with radius 1 over the plane or space.
 template <typename Place>
 struct InDimension;
 template <>
@@ -87,7 +87,7 @@ struct InDimension<Vec3> {
   }
 };
 
-// Collects offsets and keeps the squared distance of the nearest other position.
+// The squared distance of the nearest other position.
 struct Nearest {
   double square = std::numeric_limits<double>::infinity();
 
@@ -204,9 +204,9 @@ double RefineSpacing(double distance, std::span<const Place> tree, std::span<con
   return std::abs(spacing - distance) <= kSumTolerance * distance ? distance : spacing;
 }
 
-// Makes a tree of the positions, and samples them. Positions are sorted and made unique, so that
-// the tree does not depend on the order of the particles, and no query visits a million copies of
-// one position.
+// Makes a tree of the positions, and sets `asked` to a sample. Positions are sorted and made
+// unique, so that the tree does not depend on the order of the particles, and no query visits a
+// million copies of one position.
 template <typename Place>
 void Sample(std::vector<Place>& positions, std::vector<Place>& asked) {
   ParallelSort(std::span(positions), InDimension<Place>::IsBefore);

@@ -13,13 +13,13 @@ namespace partiemc {
 /// Warm buffers of EstimateSpacing.
 struct SpacingScratch {
   std::vector<Point> positions;  ///< Distinct positions, as a k-d tree.
-  std::vector<Point> asked;      ///< The sampled positions.
+  std::vector<Point> asked;      ///< The sample of `positions`.
   std::vector<double> distances, weights;
 };
 
 struct SpacingEstimate {
   double spacing;  ///< World units.
-  bool is_agreed;  ///< Enough particles are surrounded at similar distances.
+  bool is_agreed;  ///< Particles agree on the spacing (EstimateSpacing).
 };
 
 /// Estimates the spacing of a frame in world units: 1 / sqrt(number density) inside filled bodies.

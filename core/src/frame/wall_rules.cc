@@ -67,7 +67,7 @@ absl::Status CheckPoints(const std::string& field, std::span<const double> point
   return count == 2 ? absl::OkStatus() : CheckPolygon(field, points);
 }
 
-// Checks that nothing excludes walls. `field`: the parameter that asks for them.
+// Checks that no other parameter excludes walls. `field`: the parameter with the `count` walls.
 absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& field,
                          std::size_t count) {
   const auto refused = [&](std::string_view rule) {
@@ -111,7 +111,7 @@ absl::Status CheckWallPhases(const ReconstructionParameters& p) {
   return CheckPhaseAttribute(p.phase_attribute, "particles of some phases are walls");
 }
 
-// Checks that nothing excludes the walls of a surface.
+// Checks that no other parameter excludes the walls of a surface.
 absl::Status CheckOthersOfPlanes(const ReconstructionParameters& p) {
   const auto refused = [&](std::string_view rule) {
     return Refused("wall_planes", absl::StrCat(p.wall_planes.size()), rule);
@@ -123,7 +123,7 @@ absl::Status CheckOthersOfPlanes(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
-// Whether a coordinate can be one of a wall.
+// Whether a wall may have this coordinate.
 bool IsCoordinate(double value) {
   const double magnitude = std::abs(value);
   return magnitude == 0 || (magnitude >= kLeast && magnitude <= kMost);

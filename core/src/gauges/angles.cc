@@ -15,8 +15,8 @@ namespace {
 // An outline is rounded within this distance of a wall, in spacings.
 constexpr double kRoundedSpacings = 1;
 
-// Number of samples of the upper surface. A flank lies between these fractions of the peak's
-// height.
+// The upper surface is sampled at this number of x. A flank lies between these fractions of the
+// peak's height.
 constexpr int kSurfaceSamples = 200;
 constexpr double kFlankFrom = 0.2, kFlankTo = 0.8;
 
@@ -47,7 +47,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
     if (p.y >= rounded) arc.push_back(p);
   }
   if (arc.empty()) return {};
-  // Of the points next to the wall, finds the outermost point on this side.
+  // Finds the outermost point on this side, among the points next to the wall.
   const double lowest = std::ranges::min(arc, {}, &Point::y).y;
   Point side{static_cast<float>(first) * INFINITY, 0};
   for (const Point& p : arc) {

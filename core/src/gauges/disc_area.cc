@@ -22,7 +22,7 @@ double TriangleInDisc(const Point& a, const Point& b, double radius) {
   const Point d{b.x - a.x, b.y - a.y};
   const double length_squared = d.x * d.x + d.y * d.y;
   if (length_squared == 0) return 0;
-  // The points a + t d on the circle.
+  // Solves |a + t d| = radius: t is middle +- half.
   const double middle = -(a.x * d.x + a.y * d.y) / length_squared;
   const double distance = Cross(a, d) / std::sqrt(length_squared);
   const double half_squared = (radius * radius - distance * distance) / length_squared;

@@ -22,7 +22,7 @@ namespace {
 constexpr double kPi = 3.141592653589793;
 
 constexpr std::size_t kMaxName = 40;
-// Limits of numbers, so that products of four coordinates stay finite.
+// Limits of numbers and lengths, so that products of four coordinates stay finite.
 constexpr double kMaxNumber = 1e69, kMinLength = 1e-60;
 
 using Traits = std::array<GaugeTraits, 7>;

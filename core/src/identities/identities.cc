@@ -26,7 +26,6 @@ std::uint32_t StandInOf(const IdentityInput& input, std::uint32_t ring) {
   return input.percolation->OuterOf(input.topology, input.topology.component_of_ring[ring]);
 }
 
-// The nodes of a window.
 struct NodeWindow {
   std::array<std::int64_t, 2> first{}, last{};
 
@@ -52,8 +51,8 @@ NodeWindow NodesOf(const Window& window, double cell_size) {
   return nodes;
 }
 
-// Calls visit(run, ring) for each run of this frame. Each run lies between two crossed edges of a
-// row.
+// Calls visit(run, ring) for each run of this frame that belongs to a kept ring of the topology.
+// Each run lies between two crossed edges of a row. `run.ring` is 0.
 template <typename Visit>
 void ForEachRun(const IdentityInput& input, IdentityScratch& s, const Visit& visit) {
   const RingTopology& topology = input.topology;
@@ -75,7 +74,7 @@ void ForEachRun(const IdentityInput& input, IdentityScratch& s, const Visit& vis
   });
 }
 
-// Adds the runs of bodies that will be cut and have no nodes in the window, with all their nodes.
+// Adds all runs of each body that will be cut but has no node in the window.
 void AddBodiesBesideNodes(const IdentityInput& input, IdentityScratch& s,
                           std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;
@@ -101,8 +100,8 @@ void AddBodiesBesideNodes(const IdentityInput& input, IdentityScratch& s,
 }
 
 // Collects the runs of this frame and numbers the rings. Every ring has a run: it encloses a node,
-// so it crosses the row of that node. Of a body that will be cut, only the nodes in the window
-// count; its holes without such nodes get no number.
+// so it crosses the row of that node. Only the nodes in the window count for a body that will be
+// cut. Its holes without such nodes get no number.
 void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;
   const NodeWindow window = input.percolation != nullptr
@@ -124,7 +123,7 @@ void CollectRuns(const IdentityInput& input, IdentityScratch& s, std::vector<Nod
   if (input.percolation != nullptr) AddBodiesBesideNodes(input, s, runs);
 }
 
-// Gives the rings of all images of a body the number of the body.
+// Gives the outer rings of all images of a body that will be cut the number of the body.
 void ShareNumbers(const IdentityInput& input, IdentityScratch& s) {
   if (input.percolation == nullptr) return;
   const RingTopology& topology = input.topology;
@@ -169,7 +168,6 @@ void AssignIdentities(const RingHistory& previous, IdentityScratch& s, RingHisto
   }
 }
 
-// Writes identities and parents to the result.
 void WriteResult(const RingHistory& previous, std::span<const std::uint32_t> kept_as,
                  IdentityScratch& s, Rings& rings) {
   for (std::size_t ring = 0; ring < kept_as.size(); ++ring) {

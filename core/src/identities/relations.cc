@@ -34,8 +34,8 @@ std::uint64_t NodesBySamples(const Relation& relation, const Evidence& s) {
   return std::min(carried, s.nodes_now[relation.now]);
 }
 
-// Whether the samples of a piece agree with its nodes, within the statistical error. False for an
-// incomplete set: such a set has all particles of the piece, so it is exact and decides alone.
+// Whether the samples of a piece agree with its nodes, within the statistical error. False for
+// fewer than kMaxSamples: they are all particles of the piece, so they are exact and decide alone.
 bool SamplesAgree(std::span<const Relation> of_one, const Evidence& s) {
   const std::uint32_t piece = of_one.front().before;
   if (s.sample_count[piece] < kMaxSamples) return false;

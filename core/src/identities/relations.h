@@ -10,17 +10,17 @@
 
 namespace partiemc {
 
-/// Largest movement of a piece within a frame, in cells, because lattice coordinates have 32 bits.
+/// In cells. Lattice coordinates have 32 bits, so a piece that would move farther within a frame is
+/// not moved.
 inline constexpr double kMaxShift = 1u << 31;
 
-/// The lower median: a few stray particles do not change it much. Sorts `values` in part. Requires:
-/// not empty.
+/// The lower median, which stray particles hardly change. Reorders `values`. Requires: not empty.
 std::int64_t MedianOf(std::vector<std::int64_t>& values);
 
-/// A piece of the last frame and a piece of this frame that may continue it. Either both are outer
-/// or both are holes (cavities).
+/// A piece of the last frame, and a piece of this frame that may continue it. Both are outer rings
+/// (shells), or both are holes (cavities).
 struct Relation {
-  std::uint32_t before = 0, now = 0;  ///< Index in the last frame's history; number now.
+  std::uint32_t before = 0, now = 0;  ///< Index in the history; number in this frame.
   std::uint64_t nodes = 0;            ///< Shared nodes, counted or estimated from samples.
   std::uint32_t samples = 0;          ///< Samples of `before` that are in `now`.
   bool counts = false;                ///< Shares at least a quarter of the smaller piece's nodes.
@@ -28,16 +28,17 @@ struct Relation {
 
 /// The nodes and samples of all pieces, and which of them are related.
 struct Evidence {
-  std::vector<std::uint64_t> nodes_before, nodes_now;
-  std::vector<std::uint32_t> sample_count;  ///< By piece of the last frame.
-  std::vector<std::uint64_t> accounted;     ///< By number: nodes that the samples account for.
-  std::vector<std::uint8_t> linked_before, linked_now;  ///< Whether a relation counts.
+  std::vector<std::uint64_t> nodes_before, nodes_now;  ///< By piece; by number.
+  std::vector<std::uint32_t> sample_count;             ///< By piece of the last frame.
+  std::vector<std::uint64_t> accounted;  ///< By number: nodes that the samples account for.
+  std::vector<std::uint8_t> linked_before, linked_now;  ///< A relation of the piece counts.
 };
 
 /// Merges the relations of each pair into one, with the maximum of each count.
 void Unite(std::vector<Relation>& relations);
 
-/// Adds the pairs of `found`, with the number of samples. Requires: sorted by `before`, then `now`.
+/// Adds the pairs of `found` to `relations`, each with its number of samples, and unites them.
+/// Requires: `found` is sorted by `before`, then `now`.
 template <typename Found>
 void AddFoundSamples(std::span<const Found> found, std::vector<Relation>& relations) {
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
@@ -52,20 +53,20 @@ void AddFoundSamples(std::span<const Found> found, std::vector<Relation>& relati
   Unite(relations);
 }
 
-/// Corrects the shared nodes of all relations by the samples (core/IDENTITIES.md, "Ids"). Removes
-/// relations without nodes. Requires: `relations` are united; holes have no samples; every piece
-/// has a node.
+/// Corrects the shared nodes of all relations by the samples (core/IDENTITIES.md, "Ids"). Then
+/// removes relations without nodes. Requires: `relations` are united; holes have no samples; every
+/// piece has a node.
 void ApplySamples(Evidence& evidence, std::vector<Relation>& relations);
 
-/// Sets `counts` of the relations that count, and marks the pieces that these link.
+/// Sets Relation::counts, and marks both pieces of each relation that counts as linked.
 void MarkCounting(Evidence& evidence, std::vector<Relation>& relations);
 
-/// Removes the relations that do not count if one of their pieces has another that does.
+/// Removes each relation that does not count if one of its pieces has a relation that counts.
 void DropNeighbours(const Evidence& evidence, std::vector<Relation>& relations);
 
-/// Passes on identities along the largest relations first: sets `continues`, by number, to the
-/// piece of the last frame whose identity a piece continues, or to kNoIndex. Sorts `relations` by
-/// `now`, then `before`. Ties: the piece that comes first before, then now. `is_continued` is
+/// Passes on identities, first along the relations with most nodes. Sets `continues`, by number, to
+/// the piece of the last frame whose identity the piece gets, or to kNoIndex. Ties: the lower
+/// `before`, then the lower `now`. Sorts `relations` by `now`, then `before`. `is_continued` is
 /// scratch.
 void FindContinued(std::size_t pieces_before, std::size_t pieces_now,
                    std::vector<std::uint8_t>& is_continued, std::vector<Relation>& relations,

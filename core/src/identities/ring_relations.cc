@@ -43,8 +43,8 @@ CellShift ShiftOf(double cells_x, double cells_y) {
           static_cast<std::int64_t>(std::floor(cells_y + 0.5))};
 }
 
-// Moves the rings of the last frame forward by their velocities, unless samples move them, and the
-// rings of this frame backward by their velocities.
+// Moves the rings of the last frame forward, unless samples move them, and the rings of this frame
+// backward.
 void ShiftByVelocities(const RingHistory& previous, const RingsNow& now, bool by_samples,
                        RelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
@@ -69,7 +69,7 @@ bool AreOfOneKind(const RingHistory& previous, const RingsNow& now, std::uint32_
   return previous.rings[before].is_hole == now.rings[number].is_hole;
 }
 
-// Moves runs, and wraps them if the box is periodic.
+// Moves runs, then wraps them into the box if there is one.
 std::span<const NodeRun> Moved(std::span<const NodeRun> runs, std::span<const CellShift> shifts,
                                const LatticePeriods& periods, RelationScratch& s) {
   MoveRuns(runs, shifts, s.moved);
@@ -78,7 +78,7 @@ std::span<const NodeRun> Moved(std::span<const NodeRun> runs, std::span<const Ce
   return s.wrapped;
 }
 
-// The runs of both frames, comparable.
+// The runs of both frames, unmoved, wrapped into the box if there is one.
 struct ComparedRuns {
   std::span<const NodeRun> before, now;
 };
@@ -111,7 +111,7 @@ void CountSamples(const RingHistory& previous, Evidence& evidence) {
   for (const ParticleSample& sample : previous.samples) ++evidence.sample_count[sample.ring];
 }
 
-// Relates two rings by their nodes at the original positions, if moving found no relation for
+// Relates two rings by their nodes where they are, if moving found no relation that counts for
 // either ring: a hole may not follow the body around it, and velocities may be wrong. Skips outer
 // rings with samples.
 void AddUnmoved(const RingHistory& previous, const RingsNow& now, const ComparedRuns& runs,

@@ -16,14 +16,14 @@ namespace partiemc {
 struct RingsNow {
   std::span<const NodeRun> runs;       ///< `ring` is a number.
   std::span<const KnownRing> rings;    ///< `outer` is a number.
-  std::span<const FoundSample> found;  ///< By `before`, then `now`.
+  std::span<const FoundSample> found;  ///< Sorted by `before`, then `now`.
   bool has_ids = false;
   double time = 0;
   double cell_size = 1;  ///< World units.
   LatticePeriods periods = {};
 };
 
-/// Warm buffers of RelateRings.
+/// Scratch of RelateRings.
 struct RelationScratch {
   std::vector<CellShift> shift_before, shift_now;
   std::vector<std::int64_t> displacements;
@@ -35,12 +35,12 @@ struct RelationScratch {
 };
 
 /// Finds the related rings (core/IDENTITIES.md) by the nodes that they share after a movement.
-/// Rings of the last frame move by the displacements of their samples, or by their velocities if
-/// there are no samples; rings of this frame move back by their velocities. Rings without a
-/// relation that counts are compared where they are. If samples contradict the nodes, the samples
-/// decide. In a periodic box, nodes are wrapped first, because a ring may change its image.
-/// `relations` has each pair once, in no particular order. Cost: n log n in runs, rings and
-/// samples.
+/// Rings of the last frame move forward: by their samples if both frames have ids, else by their
+/// velocities. In a second comparison, rings of this frame move backward by their velocities. Rings
+/// without a relation that counts are compared once more where they are, except sampled rings. If
+/// samples contradict the nodes, the samples decide. In a periodic box, nodes are wrapped first,
+/// because a ring may change its image. `relations` has each pair once, in no particular order.
+/// Cost: n log n in runs, rings and samples.
 void RelateRings(const RingHistory& previous, const RingsNow& now, RelationScratch& scratch,
                  std::vector<Relation>& relations);
 

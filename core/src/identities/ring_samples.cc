@@ -14,9 +14,8 @@ namespace {
 
 constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
-// Average number of particles below the limit of a ring, divided by the number of samples. With 2,
-// a ring expects 32 such particles. One ring of 1,500 finds fewer than 16 and needs the second
-// pass. A larger value would cost time for every ring.
+// Expected number of particles below the limit of a ring, divided by kMaxSamples. With 2, one ring
+// in 1,500 finds too few and needs the second pass. A larger value would cost time for every ring.
 constexpr std::uint64_t kSurplus = 2;
 
 ParticleSample SampleAt(const TileCoordinate& tile, float x, float y, std::uint64_t id,
@@ -39,7 +38,6 @@ void ReserveSamples(std::span<const std::uint64_t> particle_count, RingSamples& 
   s.sample_count.assign(particle_count.size(), 0);
 }
 
-// Adds a sample to its ring.
 void TakeSample(const ParticleSample& sample, RingSamples& s) {
   AddToHeap(sample, s.samples.data() + s.first_sample[sample.ring], s.sample_count[sample.ring]);
 }
@@ -50,7 +48,7 @@ std::uint64_t LimitOf(std::uint64_t particles) {
   return particles <= kWanted ? kNoLimit : kNoLimit / particles * kWanted;
 }
 
-// Sets the limit of each tile: the largest limit of the rings that its particles may belong to.
+// Sets the limit of each tile: the largest limit of the rings to which its particles may belong.
 void SetTileLimits(const SampleInput& input, RingSamples& s) {
   const auto tiles = static_cast<std::uint32_t>(input.bins.tiles.size());
   s.tile_limit.assign(tiles, 0);
@@ -106,8 +104,7 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
   }
 }
 
-// The second pass: where samples of a ring are missing, samples the ring again from all its
-// particles.
+// The second pass: samples each ring with too few samples again, from all its particles.
 void FillShortRings(const SampleInput& input, RingSamples& s) {
   bool any = false;
   for (std::size_t ring = 0; ring < s.ring_limit.size(); ++ring) {

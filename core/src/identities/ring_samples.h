@@ -17,22 +17,22 @@ namespace partiemc {
 
 /// A sample of the last frame that is in a ring of this frame.
 struct FoundSample {
-  std::uint32_t before = 0, now = 0;  ///< Its rings: index in the history; number.
-  CellShift displacement;             ///< Since the last frame.
+  std::uint32_t before = 0, now = 0;  ///< Its ring: index in the history; number.
+  CellShift displacement;             ///< From the last frame to this one.
 };
 
-/// Samples of a frame and their warm buffers.
+/// Samples of a frame, and scratch of SampleRings.
 struct RingSamples {
-  std::vector<ParticleSample> samples;  ///< In any order; `ring` is a number.
-  std::vector<FoundSample> found;       ///< By `before`, then `now`.
+  std::vector<ParticleSample> samples;  ///< By ring, then in any order; `ring` is a number.
+  std::vector<FoundSample> found;       ///< Sorted by `before`, then `now`.
 
   // Scratch.
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.
-  std::vector<std::uint32_t> bucket;                      // HashIndex of the last samples.
+  std::vector<std::uint32_t> bucket;                      // Of the HashIndex of the last samples.
   std::vector<std::uint64_t> known;                       // Bits of KnownHashes.
-  std::vector<std::uint64_t> ring_limit, tile_limit;      // By number, by tile.
+  std::vector<std::uint64_t> ring_limit, tile_limit;  // Largest accepted hash by number, by tile.
   struct Stretch {
-    std::vector<std::uint64_t> home_limit;  // By home (BinScratch): limit of its tile.
+    std::vector<std::uint64_t> home_limit;  // By home of the stretch: limit of its tile.
     std::vector<std::uint32_t> chosen;      // Particles.
   };
   std::vector<Stretch> stretches;  // By stretch of the bins.
@@ -43,13 +43,13 @@ struct SampleInput {
   const ParticleBins& bins;
   const Crossings& crossings;
   const Components& components;
-  std::span<const std::uint32_t> ring_of_component;  ///< By component: its outer ring, or kNoRing.
-  std::span<const std::uint64_t> particle_count;     ///< By number (Components::CountParticles).
-  const Percolation* percolation = nullptr;          ///< Null unless bodies will be cut.
+  std::span<const std::uint32_t> ring_of_component;  ///< By component: number of its outer ring.
+  std::span<const std::uint64_t> particle_count;     ///< By number: particles that count.
+  const Percolation* percolation = nullptr;          ///< Null: the frame has no copies.
   ParticleSubset subset = {};
 
-  /// Whether a particle counts: copies of particles of bodies that will be cut do not, nor do
-  /// particles of other phases. `source`: its index in the frame.
+  /// False for copies of particles of bodies that will be cut, and for particles outside of
+  /// `subset`. `source`: the particle's index in the frame.
   bool Counts(std::uint32_t source, std::uint32_t component) const {
     if (!subset.Contains(source)) return false;
     return percolation == nullptr || percolation->Counts(source, component);
@@ -59,15 +59,13 @@ struct SampleInput {
 /// Selects the samples of each outer ring, and finds the samples of the last frame.
 ///
 /// The samples of a ring are its kMaxSamples particles with the smallest hashes of their ids: a
-/// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). The samples are
-/// a random choice, independent of the order of the particles, and mostly the same in the next
-/// frame.
+/// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). They are a
+/// random choice, independent of the order of the particles, and mostly the same in the next frame.
 ///
-/// On average, 2 kMaxSamples of the n particles of a ring have hashes below 2 kMaxSamples / n of
-/// the largest hash. This is the limit of the ring. One pass over the ids skips each particle whose
-/// hash exceeds the limits of all rings near its tile, unless the particle is a sample of the last
-/// frame. If a ring gets too few samples, a second pass selects them from all particles of the
-/// tiles near it. The samples are therefore exact.
+/// The limit of a ring is the hash below which 2 kMaxSamples of its particles are expected. A first
+/// pass over the ids skips each particle whose hash exceeds the limits of all rings near its tile,
+/// unless the particle is a sample of the last frame. If a ring gets too few samples, a second pass
+/// selects them from all particles of the tiles near it. The samples are therefore exact.
 /// Cost: a hash and a comparison for each particle; log kMaxSamples for each particle that passes.
 void SampleRings(const SampleInput& input, std::span<const ParticleSample> previous,
                  RingSamples& samples);

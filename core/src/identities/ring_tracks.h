@@ -12,7 +12,7 @@
 
 namespace partiemc {
 
-/// Samples of the rings, and warm buffers of FollowParticles.
+/// Samples of the rings, and scratch of FollowParticles.
 struct RingTracks {
   RingSamples by_id;
   std::vector<std::int64_t> sum_x, sum_y;  // Scratch, by number.

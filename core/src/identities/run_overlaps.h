@@ -22,7 +22,7 @@ inline std::int32_t RowOf(const NodeRun& run) { return run.row; }
 inline std::uint32_t PieceOf(const NodeRun& run) { return run.ring; }
 
 /// Writes `runs`, moved by the shifts of their rings, to `moved`, sorted by row, then column. Moved
-/// runs may overlap. Drops runs that leave the range of rows and columns.
+/// runs may overlap. Drops runs whose coordinates exceed 32 bits.
 void MoveRuns(std::span<const NodeRun> runs, std::span<const CellShift> shift_of_ring,
               std::vector<NodeRun>& moved);
 
@@ -35,13 +35,14 @@ void WrapRuns(std::span<const NodeRun> runs, const LatticePeriods& periods,
 /// sample to the nearest node. Moved runs may overlap.
 void MoveWithBox(const BoxMotion& motion, const RingHistory& history, RingHistory& moved);
 
-/// Writes to `shared` the pairs of rings that share nodes, each once, sorted by a, then b. `newest`
-/// is scratch: by ring of `a_runs`, the index in `shared` of the ring's newest pair.
-/// Requires: both sets of runs sorted by row, then column. `b_runs` should be disjoint: each
-/// overlap among them costs a comparison. After MoveRuns, rings may lie on each other, and the
-/// number of overlaps of their runs has no limit. If there are more than 16 overlaps for each run
-/// of both sets, `shared` is left empty. Cost: linear in runs, rings and overlaps, n log n in pairs
-/// of rings.
+/// Writes to `shared` the pairs of rings that share nodes: each pair once, sorted by `a`, the ring
+/// in `a_runs`, then `b`. `newest` is scratch. Requires: both sets of runs are sorted by row, then
+/// column.
+///
+/// Runs of `b_runs` should not overlap each other: each such overlap costs a comparison. Moved
+/// rings may overlap without limit. If there are more than kMaxOverlapsPerRun overlaps per run of
+/// both sets, `shared` is therefore left empty.
+/// Cost: linear in runs, rings and overlaps, n log n in pairs of rings.
 void FindSharedNodes(std::span<const NodeRun> a_runs, std::span<const NodeRun> b_runs,
                      std::vector<std::uint32_t>& newest, std::vector<SharedNodes>& shared);
 

@@ -1,7 +1,7 @@
 // Sweeps over the runs of two frames and sums the nodes that their pieces share.
 //
-// For runs of lattice nodes in the plane and in space: RowOf(run) is the row of a run, PieceOf(run)
-// its ring or shell, and `first` and `last` are its nodes.
+// For runs of lattice nodes in the plane and in space. RowOf(run) is the row of a run, PieceOf(run)
+// its ring or shell, and `first` and `last` are its end nodes.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +21,11 @@ struct SharedNodes {
   std::uint64_t nodes = 0;
 };
 
-/// Nodes of a run.
 inline std::uint64_t NodeCount(std::int32_t first, std::int32_t last) {
   return static_cast<std::uint64_t>(std::int64_t{last} - first + 1);
 }
 
-// Limits the cost if many runs lie on each other.
+// Bounds the cost if many runs overlap each other.
 inline constexpr std::size_t kMaxOverlapsPerRun = 16;
 
 // Sorts the pairs and adds up the nodes of equal pairs.
@@ -68,7 +67,7 @@ void SweepSharedNodes(std::span<const Run> a_runs, std::span<const Run> b_runs,
         return;
       }
       const Run& b = b_runs[k];
-      if (b.last < a.first) continue;  // Behind a longer run: wrapped runs may overlap.
+      if (b.last < a.first) continue;  // Follows a longer run: runs of b may overlap.
       const std::uint64_t nodes = NodeCount(std::max(a.first, b.first), std::min(a.last, b.last));
       // Usually a ring overlaps the same ring as in the previous row, so only its newest pair is
       // tried. Pairs that are added repeatedly are summed at the end.

@@ -12,8 +12,8 @@
 
 namespace partiemc {
 
-/// Adds a sample to the `count` samples from `first` on, which have space for kMaxSamples. They are
-/// a heap with the largest hash on top; a full heap drops its top.
+/// Adds a sample to the `count` samples from `first` on: a heap with the largest hash on top. A
+/// heap of kMaxSamples drops its top. Requires: space for one more sample if there are fewer.
 template <typename Sample>
 void AddToHeap(const Sample& sample, Sample* first, std::uint32_t& count) {
   const auto has_less_hash = [](const Sample& a, const Sample& b) { return a.hash < b.hash; };
@@ -26,8 +26,8 @@ void AddToHeap(const Sample& sample, Sample* first, std::uint32_t& count) {
   std::push_heap(first, first + count, has_less_hash);
 }
 
-/// A filter for the hashes of samples: one bit for each value of their leading bits. Of all other
-/// hashes, at most one in 32 passes, and one in thousands if there are few samples.
+/// A filter for the hashes of samples: one bit for each value of their leading bits. At most one in
+/// 32 other hashes passes, and one in thousands if there are few samples.
 class KnownHashes {
  public:
   template <typename Sample>

@@ -1,4 +1,4 @@
-// Sums velocities exactly.
+// Sums velocities independently of their order.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace partiemc {
 
-/// Converts velocities to integers. The unit is a power of two, chosen such that the sum over all
-/// particles fits into 62 bits. Sums are therefore exact and do not depend on the order.
+/// Converts velocities to integers, whose sums are exact. The unit is a power of two, such that the
+/// sum over all particles fits into 62 bits.
 class VelocityUnits {
  public:
   explicit VelocityUnits(const Frame& frame) {

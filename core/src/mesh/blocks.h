@@ -30,12 +30,12 @@ struct AttributeSource {
   double tolerance;  ///< Largest error, a fraction of the attribute's range over the particles.
 };
 
-/// The blocks that cover the interior cells. Keeps its memory warm from frame to frame.
+/// The blocks that cover the interior cells. Reuses its memory.
 struct Blocks {
   using Levels = std::array<BitRows, kBlockLevels>;
-  std::vector<Levels> at_least;  ///< By tile and level: the cells in blocks of at least this level.
+  std::vector<Levels> at_least;  ///< By tile and level: the cells in blocks of this level or more.
   // Scratch:
-  std::vector<Levels> linear;            ///< Cells of blocks in which all attributes are linear.
+  std::vector<Levels> linear;            ///< By tile, level: cells in blocks that meet rule 1.
   std::vector<std::uint32_t> window_of;  ///< By tile: its first window, if it has windows.
   std::vector<double> windows;           ///< Sums over the particles of each window.
   std::vector<double> tolerances;        ///< By part of an attribute.

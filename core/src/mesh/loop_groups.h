@@ -15,7 +15,7 @@ namespace partiemc {
 /// Loops in groups. Each loop meets the requirements of Triangulator. The loops of a group are the
 /// whole boundary of a region; regions of different groups have no inner point in common. If a
 /// group has two loops, a ring and its staircase, LoopStrip (loop_strip.h) is tried first, because
-/// it is faster. Keeps its memory warm from frame to frame.
+/// it is faster. Reuses its memory.
 class LoopGroups {
  public:
   void Clear();
@@ -64,7 +64,7 @@ class LoopGroups {
   std::vector<std::uint32_t> groups_;            // By loop.
   std::vector<std::uint32_t> loops_;             // Sorted by group.
   std::vector<std::uint32_t> loop_offsets_;      // By group: its range of loops_.
-  std::vector<Batch> batches_;                   // Kept warm; a frame uses the first ones.
+  std::vector<Batch> batches_;                   // Reused; a frame uses the first ones.
 };
 
 }  // namespace partiemc

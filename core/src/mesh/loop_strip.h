@@ -25,7 +25,7 @@ namespace partiemc {
 /// loops: 1 inside the region, 0 elsewhere. Any choice of walker is therefore correct; a bad choice
 /// only leaves a longer front, and Triangulate returns false.
 ///
-/// Keeps its buffers warm. Use one object per thread.
+/// Reuses its buffers. Use one object per thread.
 class LoopStrip {
  public:
   /// Appends one triangle for each point of the loops, all strictly counter-clockwise by

@@ -20,7 +20,7 @@
 
 namespace partiemc {
 
-/// Warm buffers of BuildMesh.
+/// Scratch of BuildMesh.
 struct MeshScratch {
   std::vector<BitRows> interior;  // By tile: interior cells that no ring touches.
   Staircases staircases;

@@ -49,8 +49,7 @@ class MonotonePieces {
     return piece;
   }
 
-  /// The vertex added last.
-  /// Requires, as all methods below: the piece is not empty.
+  /// The vertex added last. Requires, as all methods below: the piece is not empty.
   Vertex LastVertex(const Piece& piece) const { return nodes_[piece.top].vertex; }
 
   void AddToLeftChain(Piece& piece, const Vertex& vertex) { Add(piece, vertex, true); }

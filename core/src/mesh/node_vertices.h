@@ -14,12 +14,10 @@
 
 namespace partiemc {
 
-/// A set of nodes, stored as bits by tile. The number of a node is the number of bits before its
-/// bit. Keeps its memory warm from frame to frame.
+/// A set of nodes, stored as bits by tile. After Number, their numbers are consecutive.
 class NodeVertices {
  public:
-  /// Removes all nodes.
-  /// Cost: linear in tiles.
+  /// Removes all nodes. Cost: linear in tiles.
   void Clear(std::size_t tile_count) { tiles_.assign(tile_count, {}); }
 
   /// Adds a node. Adding it again has no effect.
@@ -37,8 +35,7 @@ class NodeVertices {
     return (tiles_[node.tile].nodes[node.j] >> node.i & 1) != 0;
   }
 
-  /// The number of a node.
-  /// Requires: the node was added before Number.
+  /// The number of a node. Requires: the node was added before Number.
   std::uint32_t At(const TilePlace& node) const {
     const Tile& tile = tiles_[node.tile];
     const std::uint32_t before = (std::uint32_t{1} << node.i) - 1;

@@ -24,9 +24,9 @@ std::array<TilePlace, 4> CornersOf(const TileDirectory& directory, const CellRec
 /// Number of cells; `cells` has one bit for each cell, by tile.
 std::uint64_t CountCells(std::span<const BitRows> cells);
 
-/// Warm buffers of MergeCells.
+/// Scratch of MergeCells.
 struct MergeScratch {
-  std::vector<BitRows> free;
+  std::vector<BitRows> free;                                  // By tile: cells in no rectangle yet.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> span;  // A row of cells: tiles and bits.
 };
 

@@ -17,8 +17,8 @@ struct Staircases {
   std::vector<TilePlace> corners;      ///< Corners, and requested nodes on straight parts.
   std::uint64_t straight_nodes = 0;    ///< Number of requested nodes in `corners`.
   std::vector<std::uint32_t> offsets;  ///< Loop k has corners [offsets[k], offsets[k + 1]).
-  std::uint64_t pinches = 0;           ///< Number of pinches.
-  std::vector<BitRows> visited;        ///< Scratch: bottom edges that a loop has passed.
+  std::uint64_t pinches = 0;
+  std::vector<BitRows> visited;  ///< Scratch: bottom edges that a loop has passed.
 };
 
 /// Traces all loops. `interior` has one bit for each cell, by tile. `nodes`: the requested nodes,
@@ -27,8 +27,7 @@ void TraceStaircases(const TileDirectory& directory, std::span<const BitRows> in
                      const NodeVertices* nodes, Staircases& staircases);
 
 /// Euler characteristic of the region inside the loops: outlines - voids - pinches, since a pinch
-/// joins two cells.
-/// Cost: linear in corners.
+/// joins two cells. Cost: linear in corners.
 std::int64_t EulerCharacteristic(const TileDirectory& directory, const Staircases& staircases);
 
 }  // namespace partiemc

@@ -79,7 +79,7 @@ void SweepEvents::Sort() {
   for (const SweepEvent& event : events_) ++ends_[buckets.Of(event) + 1];
   for (std::size_t k = 1; k < ends_.size(); ++k) ends_[k] += ends_[k - 1];
   dealt_.resize(events_.size());
-  // Before, ends_ has the start of each bucket. Placing the events of a bucket moves it to the end.
+  // ends_[k] is first the start of bucket k. Placing the events of the bucket moves it to the end.
   for (const SweepEvent& event : events_) dealt_[ends_[buckets.Of(event)]++] = event;
   std::size_t begin = 0;
   for (const std::uint32_t end : ends_) {

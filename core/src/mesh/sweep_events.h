@@ -10,16 +10,16 @@
 
 namespace partiemc {
 
-/// A corner of a loop.
+/// A point of a loop, which may turn there or not.
 struct SweepEvent {
   Point point;
   std::uint32_t index, previous, next;  // Indices of this point and its neighbours on the loop.
 };
 
-/// The sorted corners; keeps its memory warm from one use to the next.
+/// The sorted points of loops. Reuses its memory.
 class SweepEvents {
  public:
-  /// Lists the corners of the loops in the order of SweepsBefore; corners at the same position are
+  /// Lists the points of the loops in the order of SweepsBefore; points at the same position are
   /// ordered by index. Parameters as for Triangulator::Triangulate. Returns false, without events,
   /// if the parameters break the first requirement of Triangulate, except that neighbours may have
   /// equal positions.

@@ -29,7 +29,7 @@ namespace partiemc {
 /// Processing Letters 7 (1978). Hertel and Mehlhorn, "Fast triangulation of the plane with respect
 /// to simple polygons", Information and Control 64 (1985).
 ///
-/// Deterministic, bit for bit. Keeps its buffers warm: an input no larger than an earlier one
+/// Deterministic, bit for bit. Reuses its buffers: an input no larger than an earlier one
 /// allocates nothing. Use one object per thread.
 class Triangulator {
  public:

@@ -1,6 +1,6 @@
 // The placement `farthest-particle`: the paper's rule to the letter (sections 3.3 and 3.5).
 // Everything that only this placement does is here, in MoveVertices of mesh.cc and in AppendRing of
-// vertices.cc. What it requires of the other stages is in its row of placement_traits.h.
+// vertices.cc. placement_traits.h has its requirements of the other stages.
 #pragma once
 
 #include "normals/normals.h"
@@ -15,13 +15,14 @@ class FarthestParticle {
   FarthestParticle(const TileDirectory& directory, const LevelSetSampler& field)
       : directory_(directory), field_(field) {}
 
-  /// Sets the point of a plane to the weighted mean at the centre of its cell (Eq. 4), and its
-  /// gradient to grad phi at this mean (Eq. 9). If no particle reaches the mean, the gradient is 0.
+  /// Sets the point of a plane to the weighted mean at the centre of its cell (Eq. 4), its gradient
+  /// to grad phi at this mean (Eq. 9), and its value to F at the centre. If no particle reaches the
+  /// mean, the gradient is 0.
   void SampleAtMean(CellPlane& plane) const;
 
-  /// The vertex of a plane, in world units: the position of the particle farthest along its normal.
-  /// Candidates are not below the plane, and lie within one cell and within the kernel radius of
-  /// its point. Without a candidate, returns the middle of the segment. Adds the surface offset.
+  /// The vertex of a plane, in world units: the position of the particle farthest along its normal,
+  /// plus the surface offset. Candidates are not below the plane, and lie within one cell and
+  /// within the kernel radius of its point. Without one, the middle of the segment is used.
   Point Vertex(const CellPlane& plane, const Frame& frame,
                const ReconstructionParameters& parameters, const Scale& scale) const;
 

@@ -241,7 +241,6 @@ void EstimateNormals(const NormalInput& input, std::span<const CellNormal> previ
                      std::vector<CellNormal>& next) {
   if (!input.parameters.normal_memory) previous = {};
   const Crossings& crossings = input.crossings;
-  // A saddle has two planes and stores no normal.
   const std::span<const std::uint32_t> order = scratch.cells_by_row.List(
       input.bins.tiles, crossings, [](const ActiveCell& cell) { return !cell.IsSaddle(); });
   MatchPrevious(previous, order, input.bins.tiles, crossings, scratch, next);

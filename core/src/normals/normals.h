@@ -16,15 +16,15 @@
 
 namespace partiemc {
 
-/// The level set at the point that represents a segment: the middle of the segment, or the weighted
-/// mean at the cell's centre where vertices are particles (placement_traits.h). Results of float
-/// sums are stored as floats, because the planes of a frame do not fit into a cache.
+/// The level set at the point that represents a segment: its middle, or the weighted mean at the
+/// cell's centre if vertices are particles (placement_traits.h). Results of float sums are floats,
+/// because the planes of a frame do not fit into a cache.
 struct CellPlane {
   ActiveCell cell;       ///< The cell of the segment; a copy, because a ring's cells are scattered.
   bool is_weak = false;  ///< The gradient was too small; the normal is a fallback.
   Point point;           ///< In cells from the origin of the world.
-  Point entry, exit;     ///< The segment's ends: linear crossings of lattice edges.
-  float value = 0;       ///< F at the point.
+  Point entry, exit;     ///< Ends of the segment, on lattice edges.
+  float value = 0;       ///< F at the point; if vertices are particles, at the cell's centre.
   float gradient_x = 0, gradient_y = 0;  ///< Of F, or of phi if vertices are particles.
   float size = 1;                        ///< The local size at the point, in spacings.
   double normal_x = 0, normal_y = 0;     ///< Unit normal, oriented (Eq. 11).
@@ -44,7 +44,7 @@ inline constexpr std::size_t kSegmentsAtOnce = 64;
 /// A gradient of F or phi with a smaller squared length is weak: its direction is unreliable.
 inline constexpr double kWeakGradientSquare = 1e-3;
 
-/// Warm buffers of EstimateNormals.
+/// Scratch of EstimateNormals.
 struct NormalScratch {
   CellsByRow cells_by_row;
   std::vector<std::uint32_t> previous;       ///< By active cell: index of its previous normal.

@@ -1,4 +1,4 @@
-// Groups items by the cells of a grid of which only few cells are occupied.
+// Groups items by cell, in a grid with few occupied cells.
 #pragma once
 
 #include <array>
@@ -10,13 +10,12 @@
 
 namespace partiemc {
 
-/// Coordinates of a cell.
 using GridCell = std::array<std::int32_t, 3>;
 
 /// Bytes of CellGroups, at most: for each item, and for each occupied cell.
 inline constexpr std::uint64_t kBytesPerGroupedItem = 24, kBytesPerCellGroup = 24;
 
-/// The items of each occupied cell. Keeps its buffers from frame to frame.
+/// The items of each occupied cell. Reuses its memory.
 class CellGroups {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -49,7 +48,7 @@ class CellGroups {
   // Hash table of the occupied cells, at most half full: after Find the first item of the cell,
   // after Sort the index of its group.
   std::vector<std::uint32_t> slots_;
-  std::vector<std::uint32_t> number_of_;  // By item: the number of its cell, by first items.
+  std::vector<std::uint32_t> number_of_;  // By item: number of its cell, by first item.
   std::vector<std::uint32_t> place_of_;   // By number: index in `groups_`.
   std::vector<Group> groups_;
   std::vector<std::uint32_t> items_;

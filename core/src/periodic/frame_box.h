@@ -17,8 +17,9 @@
 namespace partiemc {
 
 /// Sets Frame::box to the box that the stages use: the given one with `wraps` of the stream, or the
-/// box of the stream. Errors: INVALID_ARGUMENT (OUT_OF_RANGE) if the given box has other periodic
-/// axes than the box of the stream, if the stream has none, and for axes that Validate refuses.
+/// box of the stream if the frame has none. Errors: INVALID_ARGUMENT (OUT_OF_RANGE) if the given
+/// box has other periodic axes than the box of the stream, if the stream has no box, or if Validate
+/// refuses an axis.
 absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& frame);
 
 /// Checks the lengths of the box of a frame after ResolveBox. Errors: as Validate. They name
@@ -33,26 +34,26 @@ std::optional<PeriodicBox> BoxToStore(const std::optional<PeriodicBox>& of_strea
 /// The affine motion of positions with the box, from the last frame to this one.
 struct BoxMotion {
   struct Axis {
-    double before = 0, now = 0;  ///< Origin of the box.
+    double before = 0, now = 0;  ///< Origin of the box, in the unit of MotionOf.
     double stretch = 1;          ///< Length of the box now, divided by its former length.
   };
   std::array<Axis, 3> axes;
   bool any = false;  ///< The box has changed.
 
-  /// The position now of what was at `position`, along one axis.
+  /// Moves a position along one axis.
   double At(std::size_t axis, double position) const {
     const auto& [before, now, stretch] = axes[axis];
     return now + (position - before) * stretch;
   }
 
-  /// The nearest node to the position now of a node, in cells. Clamped to the range of nodes.
+  /// Moves a node, rounds to the nearest node and clamps to 32 bits. Requires: the unit is a cell.
   std::int32_t NodeAt(std::size_t axis, double node) const {
     constexpr double kMost = std::numeric_limits<std::int32_t>::max();
     const double at = std::floor(At(axis, node) + .5);
     return static_cast<std::int32_t>(at > -kMost ? std::min(at, kMost) : -kMost);
   }
 
-  /// Moves the run of nodes [first, last] with its middle node.
+  /// Moves the run of nodes [first, last] with its middle node; its length stays. The same unit.
   void MoveRun(std::size_t axis, std::int32_t& first, std::int32_t& last) const {
     constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
     const std::int64_t nodes = std::int64_t{last} - first;

@@ -9,7 +9,7 @@
 
 namespace partiemc {
 
-/// An image of a box: the number of lengths along x, y, z.
+/// An image of a periodic box: its offset along x, y, z, in lengths of the box.
 using Image = std::array<std::int64_t, 3>;
 
 inline Image operator+(const Image& a, const Image& b) {
@@ -35,7 +35,7 @@ class ImageSets {
     Image image;  ///< The image of the node if the root is in image 0.
   };
 
-  /// Halves the path to the root. Cost: almost constant on average.
+  /// Finds the root of a node, and halves the path to it. Cost: almost constant on average.
   Found Find(std::uint32_t node) {
     Image image{};
     while (parent_[node] != node) {
@@ -50,8 +50,8 @@ class ImageSets {
     return {node, image};
   }
 
-  /// Joins two sets so that the second node is `offset` beyond the first. Requires: different
-  /// roots. The smaller root remains, so the roots depend only on the sets.
+  /// Joins the sets of two nodes, so that node `b` lies `offset` beyond node `a`. Requires:
+  /// different roots. The smaller root remains, so the roots depend only on the sets.
   void Join(const Found& a, const Found& b, const Image& offset) {
     const Image of_root = a.image + offset - b.image;  // Of b's root, seen from a's root.
     if (a.root < b.root) {

@@ -90,7 +90,7 @@ GridCell CellOf(const Grid& grid, const std::array<double, 3>& wrapped) {
   for (std::size_t k = 0; k < 3; ++k) {
     if (!grid.counts[k]) continue;
     const double at = (wrapped[k] - grid.origin[k]) / grid.side[k];
-    // Rounding may put a wrapped coordinate onto the upper face of the box, or below the lower.
+    // Rounding may put a wrapped coordinate onto the upper face of the box, or below the box.
     cell[k] = grid.length[k] > 0
                   ? std::clamp(static_cast<std::int32_t>(at), 0, grid.cells[k] - 1)
                   : static_cast<std::int32_t>(Floor(std::clamp(at, -kMostCells, kMostCells)));
@@ -203,7 +203,7 @@ std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
   const auto [most_x, most_y, most_z] = grid.reach;
   for (std::uint32_t cell = 0; cell < s.cells.size(); ++cell) {
     if (cell % kGrain == 0) ThrowIfCancelled();
-    // Half of the neighbours; the cell is a neighbour of the others.
+    // Half of the neighbours; the other half visit this cell.
     for (std::int32_t x = 0; x <= most_x; ++x) {
       for (std::int32_t y = x == 0 ? 0 : -most_y; y <= most_y; ++y) {
         for (std::int32_t z = x == 0 && y == 0 ? 1 : -most_z; z <= most_z; ++z) {
@@ -371,7 +371,7 @@ std::uint64_t BytesOfCopy(const Frame& frame) {
   return bytes;
 }
 
-// Appends copies of the particles of percolating clusters. `bytes`: what has been reserved.
+// Appends copies of the particles of percolating clusters. `bytes`: reserved so far.
 absl::Status AddCopies(const LiftInput& input, const Grid& grid, std::uint64_t bytes,
                        LiftScratch& s, LiftedFrame& lifted) {
   const Frame& given = input.frame;

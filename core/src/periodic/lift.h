@@ -28,7 +28,7 @@ struct LiftCell {
   std::uint8_t percolates = 0;
 };
 
-/// Warm buffers of Lift.
+/// Scratch of Lift.
 struct LiftScratch {
   std::vector<GridCell> cell_of;  // By particle.
   CellGroups groups;              // The particles of each cell.
@@ -62,10 +62,11 @@ struct LiftInput {
   /// Copies of percolating clusters reach this far beyond the faces, along each axis at most one
   /// length. World units. 0: such clusters are refused.
   double margin;
-  /// Treats all clusters as percolating along all periodic axes: none is lifted, all get copies.
+  /// Treats all particles as percolating along all periodic axes: none is lifted, and particles
+  /// near a face get copies.
   bool wraps = false;
-  /// Called twice with the bytes that the scratch requires, before they are allocated: a lower
-  /// bound by particles, then the sum. Its error ends Lift.
+  /// Called two or three times with the bytes that the scratch requires, before they are allocated:
+  /// for particles, with cells, and with copies if there are any. Its error ends Lift.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
 };
 
@@ -89,8 +90,9 @@ struct LiftedFrame {
 ///
 /// A cluster percolates along an axis if it reaches its own image along this axis. Along such axes,
 /// its particles are wrapped into the box, and those within `margin` of a face get copies beyond
-/// the opposite face. If clusters percolate along different axes, which they can in space, this is
-/// so along all these axes. A copy has the id, volume, velocity and attributes of its particle.
+/// the opposite face. If clusters percolate along different axes, as they can in space, each of
+/// them counts as percolating along all these axes. A copy has the id, volume, velocity and
+/// attributes of its particle.
 ///
 /// Two cells of the grid with very many particles may be joined although their particles are up to
 /// two ranges apart, so that the cost is bounded (kMostPairs in lift.cc).

@@ -1,7 +1,7 @@
 // Wraps runs of lattice nodes into a periodic box.
 //
-// A period need not be a whole number of cells, so a node moves by the nearest whole number. Bodies
-// are farther apart than a cell, so this never moves a node into another body.
+// A period need not be a whole number of cells, so a node moves by the nearest whole number. The
+// error of half a cell hardly changes the number of nodes that two rings share.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +21,15 @@ struct LatticePeriods {
   bool Any() const { return cells != std::array<double, 3>{}; }
 };
 
-/// The number of cells by which the node at coordinate `at` moves back into its box.
+/// The number of cells by which a node at `at` moves back into the box [0, period). The true origin
+/// of the box does not matter, because both frames are wrapped alike.
 inline std::int64_t WrapOf(double period, std::int64_t at) {
   if (period == 0) return 0;
   const double image = std::floor(static_cast<double>(at) / period);
   return static_cast<std::int64_t>(std::floor(image * period + 0.5));
 }
 
-/// Calls visit(first, last) for the parts of the run [first, last] in each box, wrapped.
+/// Splits the run [first, last] at faces of boxes. Calls visit(first, last) for each wrapped part.
 template <typename Visit>
 void ForEachWrapped(double period, std::int64_t first, std::int64_t last, const Visit& visit) {
   if (period == 0) {

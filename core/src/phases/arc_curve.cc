@@ -6,7 +6,7 @@
 namespace partiemc {
 namespace {
 
-// A bend needs this number of points.
+// A bend is fitted only to at least this number of points.
 constexpr int kFewestBent = 5;
 // The direction of the larger eigenvalue of a covariance.
 Point MainDirection(double xx, double xy, double yy) {

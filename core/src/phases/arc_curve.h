@@ -11,15 +11,15 @@
 
 namespace partiemc {
 
-/// The points of an interface that determine its curve, by their distances along it from the
-/// junction, in spacings. Nearer points lie on rounded corners.
+/// Distances from the junction along the interface, in spacings. Points from kCurveNearest on
+/// determine the curve of an interface; nearer points lie on a rounded corner.
 inline constexpr double kCurveNearest = 1.5;
-/// The farthest points that determine the place and the direction, and those that determine the
+/// Points up to kCurveFarthest determine the place and the direction, up to kCurvatureFarthest the
 /// curvature.
 inline constexpr double kCurveFarthest = 5, kCurvatureFarthest = 9;
 
-/// A bend counts as noise up to the square root of this number times its standard error, where the
-/// curve determines a place. The standard error is too small by far: smoothing makes the deviations
+/// Where a curve determines a place, a bend below ten standard errors, the square root of this
+/// number, counts as noise. The standard error is too small by far: smoothing makes the deviations
 /// of neighbours alike, and a place is extrapolated.
 inline constexpr double kPlaceNoise = 100;
 
@@ -28,8 +28,8 @@ struct Line {
   Point along;  ///< Unit.
 };
 
-/// The points near which n = offset + slope t + bend (t^2 + n^2), a circle, or a line if bend is 0.
-/// t and n are the coordinates along `along` and to the left of it.
+/// A circle, or a line if `bend` is 0: n = offset + slope t + bend (t^2 + n^2). t and n are the
+/// coordinates along `along` and to the left of it, from an origin near the junction.
 struct ArcCurve {
   Point along;  ///< Unit. From the origin towards the points.
   double offset = 0, slope = 0, bend = 0;
@@ -45,12 +45,12 @@ struct ArcCurve {
 /// Fits an ArcCurve by least squares. Points are relative to one origin near the junction.
 class ArcCurveFit {
  public:
-  /// `distance`: from the junction along the interface, in spacings. Points that do not determine
-  /// the curve are ignored.
+  /// `distance`: from the junction along the interface, in spacings. Ignores points that do not
+  /// determine the curve.
   void Add(const Point& at, double distance);
-  /// Adds the end itself, if its place is known.
+  /// Adds the junction itself.
   void AddEnd(const Point& at);
-  /// Absent with fewer than two points up to kCurveFarthest. The bend is that of the points up to
+  /// Absent with fewer than two points up to kCurveFarthest. The bend is fitted to the points up to
   /// kCurvatureFarthest, times 1 - noise variance / bend^2, or 0 if this is negative.
   std::optional<ArcCurve> Fit(double noise) const;
 

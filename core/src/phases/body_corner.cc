@@ -8,7 +8,7 @@ namespace {
 
 // The sine of the smallest turn of a corner. With noise, smaller turns may be chance.
 constexpr double kSmallestTurn = .4;
-// A side is no curve if the root of the mean squared deviation of its points from it is larger, in
+// A side has no curve if the root mean square distance of its points from the curve is larger, in
 // spacings. Another corner of the body may be near.
 constexpr double kLargestMisfit = .05;
 

@@ -14,11 +14,11 @@
 
 namespace partiemc {
 
-/// Elements of has_moved.
+/// Values of JunctionScratch::has_moved.
 inline constexpr std::uint8_t kMoved = 1, kMovedCorner = 2;
 
-/// The vertices of a ring of the body after or before one of them, up to kCurvatureFarthest or the
-/// next contact.
+/// The vertices of a ring of the body after a vertex (`is_ahead`) or before it, up to
+/// kCurvatureFarthest or the next contact.
 class RingPath {
  public:
   /// Lengths are in cells. `is_contact`: by vertex, whether interfaces end there.
@@ -38,17 +38,17 @@ struct BodyCorner {
   ArcCurve ahead, back;
 };
 
-/// Absent if a side is too short for a curve or deviates from it, or if the outline turns by less
-/// than 24 degrees.
+/// The corner of the body's outline at a vertex. Absent if a side is too short for a curve or
+/// deviates from it, or if the outline turns by less than 24 degrees.
 std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
                                    double spacing, std::span<const Point> positions);
 
 /// The signed area of each ring of the body, holes negative.
 void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas);
 
-/// Moves all vertices of rings with corners along their normals, by at most `limit`, until the
-/// rings have these areas again, up to the second order. `has_moved`: by vertex, kMovedCorner at
-/// corners; set for each vertex that moves.
+/// Moves all vertices of each ring with corners along their normals by one offset, at most `limit`
+/// cells, that restores the given area to first order. `has_moved`: by vertex, kMovedCorner at
+/// corners; the other vertices of such a ring are set to kMoved.
 void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
                       std::span<std::uint8_t> has_moved, SharedPoints& points);
 

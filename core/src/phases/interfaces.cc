@@ -110,7 +110,7 @@ class ArcCollector {
     const auto first =
         std::ranges::find_if(points, [&](std::uint32_t point) { return IsEnd(point); });
     if (first == points.end()) {
-      // The whole ring is one arc, if any.
+      // The whole ring is one arc, which the phase with the smaller label adds.
       const PhaseLabel other = *std::ranges::max_element(across);
       if (other < label) return;
       Begin(label, other, rings.topology.component_of_ring[ring]);
@@ -171,19 +171,19 @@ class ArcCollector {
   bool is_open_ = false, has_right_ = false;
 };
 
-// The points of the ring that runs along an open arc and back; the points of a closed arc.
+// The number of points of an arc's ring: the arc itself if closed, else along the arc and back.
 std::size_t RingCountOf(const PhaseArc& arc) {
   const std::size_t count = arc.last - arc.first;
   return arc.IsClosed() ? count : 2 * count - 2;
 }
 
-// The index of a point of that ring in the arc.
+// The index in the arc of point k of its ring.
 std::size_t IndexInArc(const PhaseArc& arc, std::size_t k) {
   const std::size_t count = arc.last - arc.first;
   return k < count ? k : 2 * count - 2 - k;
 }
 
-// The points of that ring.
+// Sets `ring` to the positions of the points of an arc's ring.
 void CopyRing(const PhaseArc& arc, const Interfaces& interfaces, const SharedPoints& points,
               std::vector<Point>& ring) {
   const std::span<const std::uint32_t> inner = interfaces.InnerPoints(arc);
@@ -243,15 +243,14 @@ std::optional<Mirror> MirrorOf(const PhaseArc& arc, bool is_start, double h,
   return Mirror{Plus(end, tangent.through), tangent.along};
 }
 
-// An arc as a ring: a closed one, or an open one along it and back. Beyond the ends of an open arc
-// the ring may hold mirror images.
+// The ring of an arc. Beyond the ends of an open arc it may hold mirror images instead.
 class ArcRing {
  public:
   ArcRing(const PhaseArc& arc, std::span<const std::uint32_t> inner, PeriodicRing& ring,
           const std::optional<Mirror>& before, const std::optional<Mirror>& after)
       : arc_(arc), inner_(inner), ring_(ring), before_(before), after_(after) {}
 
-  // The vertices that are no images.
+  // The number of vertices of the arc; the others repeat or mirror them.
   std::ptrdiff_t count() const { return static_cast<std::ptrdiff_t>(inner_.size()); }
 
   void SetPositions(const SharedPoints& points) {
@@ -267,7 +266,7 @@ class ArcRing {
       set(k, mirror.OfPosition(at(of)));
     });
   }
-  // Continues the normals of count() vertices.
+  // Continues the normals of the first count() vertices to the others.
   void ContinueNormals() {
     for (float* values : {ring_.normal_x, ring_.normal_y}) Continue(values);
     ForEachImage([&](const Mirror& mirror, std::ptrdiff_t k, std::ptrdiff_t of) {
@@ -285,7 +284,7 @@ class ArcRing {
   std::ptrdiff_t Index(std::ptrdiff_t k) const {
     return static_cast<std::ptrdiff_t>(IndexInArc(arc_, static_cast<std::size_t>(k)));
   }
-  // Calls visit(mirror, image, vertex).
+  // Calls visit(mirror, image, vertex) for each vertex that is an image of another.
   template <typename Visit>
   void ForEachImage(Visit visit) {
     const std::ptrdiff_t last = count() - 1;

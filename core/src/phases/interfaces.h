@@ -15,13 +15,12 @@
 
 namespace partiemc {
 
-/// A piece of an interface, with one phase on its left and another, of a larger label, on its
-/// right.
+/// A piece of an interface, with one phase on its left and a phase of a larger label on its right.
 struct PhaseArc {
   static constexpr std::uint32_t kNoEnd = 0xffffffff;
 
   std::uint32_t first = 0, last = 0;  ///< Its inner points are Interfaces::points[first, last).
-  std::uint32_t start = kNoEnd, end = kNoEnd;  ///< Junctions; kNoEnd for a closed arc.
+  std::uint32_t start = kNoEnd, end = kNoEnd;  ///< Shared points; kNoEnd: a closed arc.
   PhaseLabel left = 0, right = 0;
   std::uint32_t left_component = 0, right_component = 0;  ///< Of their phases' topologies.
 
@@ -32,8 +31,8 @@ struct PhaseArc {
 struct SharedPoints {
   std::vector<Point> position;
   std::vector<Point> anchor;  ///< With all points at their anchors, the outlines are valid.
-  /// Unit; of the body's points outward, of the interface from the lower to the higher label. Not
-  /// known for cells.
+  /// Unit. Of the body's points: outward; of the interface: from the lower to the higher label. 0
+  /// for a cell, until SmoothInterfaces copies a neighbour's; junctions stay at 0.
   std::vector<VertexNormal> normal;
 };
 
@@ -41,15 +40,17 @@ struct Interfaces {
   std::vector<PhaseArc> arcs;
   std::vector<std::uint32_t> points;  ///< Numbers of shared points.
   PeriodicRings rings;                ///< Scratch of SmoothInterfaces.
-  std::vector<Point> ring;            ///< Scratch of the same.
+  std::vector<Point> ring;            ///< The same.
 
   std::span<const std::uint32_t> InnerPoints(const PhaseArc& arc) const {
     return std::span(points).subspan(arc.first, arc.last - arc.first);
   }
 };
 
-/// Sets the points of edges and cells: on the boundary of the phases on each edge, and in the
-/// middle of each cell. Parallel over edges. Cost: six kernel sums for each edge.
+/// Sets the points of edges and cells. The point of an edge is where its phases are equal. The
+/// point of a junction's cell is the middle, of another cell halfway from the vertex of the body to
+/// PhaseCell::corner. Requires: the body's points are set. Parallel over edges. Cost: six kernel
+/// sums for each edge.
 void FindInterfacePoints(const TileDirectory& directory, const PhaseMap& map,
                          const PhaseField& field, const PointNumbers& numbers,
                          const BodyVertices& vertices, SharedPoints& points);
@@ -59,10 +60,10 @@ void CollectArcs(const TileDirectory& directory, const PhaseMap& map, const Poin
                  std::span<const PhaseRings> phases, Interfaces& interfaces);
 
 /// Smooths the arcs as steps 2 and 3 of the default placement smooth rings (core/METHOD.md),
-/// without supports. An open arc is smoothed as the ring that runs along it and back. A bent end
-/// continues as its mirror image across a normal of its curve (arc_curve.h) instead, as a circle
-/// does; otherwise the smoothing would move bent ends towards the middle of their circles. Arcs
-/// whose ring is shorter than VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
+/// without supports. An open arc is smoothed as the ring that runs along it and back. Such a ring
+/// would move a bent end towards the middle of its circle, so a bent end continues as its mirror
+/// image across a normal of its curve (arc_curve.h). Arcs whose ring is shorter than
+/// VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
 void SmoothInterfaces(const Scale& scale, const VirtualPlaneConstants& constants,
                       Interfaces& interfaces, SharedPoints& points);
 

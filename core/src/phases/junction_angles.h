@@ -8,8 +8,8 @@
 
 namespace partiemc {
 
-/// A ring of a phase: `points` are numbers of shared points, `world` has their positions in world
-/// units, and `is_junction` tells which of them are ends of interfaces.
+/// A ring of a phase. `points`: numbers of shared points. By shared point: `world` has its
+/// position, interleaved, in world units, `is_junction` whether interfaces end there.
 struct PhaseRing {
   std::span<const std::uint32_t> points;
   std::span<const double> world;
@@ -18,8 +18,9 @@ struct PhaseRing {
 
 /// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in [0, 2
 /// pi]. Each side of the ring has a curve (arc_curve.h), fitted to its points before the next
-/// junction, and to the junction itself if it lies inside of the body (`is_inside`). Absent if a
-/// side has fewer than four points from 1.5 to 9 spacings away. Cost: linear in these points.
+/// junction. The junction counts as a point if it lies inside of the body (`is_inside`). Absent if
+/// a side has fewer than four points from 1.5 to 9 spacings away. `spacing`: world units. Cost:
+/// linear in these points.
 std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, bool is_inside,
                                    double spacing);
 

@@ -16,21 +16,21 @@ namespace {
 constexpr std::size_t kMostArcs = 4, kMostCurves = 6;
 // Steps of the search for the point nearest to curves.
 constexpr int kSteps = 3;
-// Weight of a junction's place against lines that hardly determine it.
+// Weight of a junction's present place, for lines that hardly determine a new one.
 constexpr double kOwnWeight = 1e-3;
 // A junction moves by at most this number of spacings.
 constexpr double kLongestMove = 1.5;
-// Shares of the ring's segments by which a vertex may move: if the next vertex stays, or may move,
-// too.
+// A vertex of the body moves at most by this share of the segment to its neighbour: kShare if the
+// neighbour stays, kSharedShare if it may move, too.
 constexpr double kShare = .9, kSharedShare = .45;
-// Lines that meet at a smaller angle, by its sine, do not determine a point.
+// A line that meets the ring at a smaller angle, given by its sine, does not determine a place.
 constexpr double kSmallestSine = .3;
 
 Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
-// Puts the points of a path before kCurveNearest onto a parabola from the junction to the first
-// point behind it, with the bend of its curve. Calls on_move with their numbers. A short path
-// stays, because its other end may move the same points.
+// Puts the points of a path that are nearer than kCurveNearest onto a parabola from the junction to
+// the first farther point, with the bend of the curve. Calls on_move(number, direction) for each. A
+// short path stays, because its other end may move the same points.
 template <typename Path, typename OnMove>
 void Reshape(const Path& path, const Point& before, const Point& junction, double h,
              const std::optional<ArcCurve>& curve, SharedPoints& points, OnMove on_move) {
@@ -109,8 +109,8 @@ Point PlaceOnRing(std::span<const Line> lines, std::uint32_t vertex, const Rings
 
 using Curves = std::array<std::optional<ArcCurve>, kMostCurves>;
 
-// Where the curves of a junction meet; they are relative to it. `is_on_ring`: a vertex of the body
-// that stays on its ring.
+// Where the curves of a junction meet. The curves are relative to the junction. `is_on_ring`: a
+// vertex of the body that stays on its ring.
 Point PlaceOf(const Curves& curves, std::uint32_t junction, bool is_on_ring, const Rings& body,
               double h, const JunctionScratch& scratch, const SharedPoints& points) {
   const Point before = points.position[junction];
@@ -135,7 +135,7 @@ Point PlaceOf(const Curves& curves, std::uint32_t junction, bool is_on_ring, con
   return now;
 }
 
-// The normal of a point whose outline has this direction now.
+// Turns a normal to be perpendicular to `along`, on the same side as before.
 void TurnNormal(const Point& along, VertexNormal& normal) {
   const double length = Length(along);
   if (!(length > 0)) return;

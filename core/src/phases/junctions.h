@@ -11,7 +11,7 @@
 
 namespace partiemc {
 
-/// Warm buffers of MoveJunctions.
+/// Scratch of MoveJunctions.
 struct JunctionScratch {
   struct ArcEnd {
     std::uint32_t junction;  // Number of a shared point.
@@ -23,14 +23,15 @@ struct JunctionScratch {
   std::vector<std::uint8_t> has_moved;   // By point of the body: 0, kMoved or kMovedCorner.
 };
 
-/// Near a junction, the field of each phase sees a corner and rounds it. Each arc therefore has a
-/// curve, fitted to its points from 1.5 to 9 spacings away (arc_curve.h). The junction moves to the
-/// point nearest to these curves. The points before 1.5 spacings go onto an arc to it. A vertex of
-/// the body's rings moves along its ring, at most to the next vertices. At a corner of the body it
-/// moves as other junctions, with the curves of both sides of the ring, and so do the points beside
-/// it; their normals turn. Sets has_moved of these points. Requires: has_moved has an element for
-/// each point of the body.
-/// Cost: linear in the points near junctions.
+/// Moves each junction, by at most 1.5 spacings, to the point nearest to the curves of its arcs.
+/// The field of each phase rounds its corner near a junction, so a curve is fitted to points 1.5 to
+/// 9 spacings away (arc_curve.h). Nearer points of an arc go onto a parabola to the new place.
+/// - A junction that is a vertex of the body moves along its ring, at most to the next vertices.
+/// - If the body has a corner there (body_corner.h), the curves of both sides of the ring count,
+///   too. The junction then moves freely, and the ring's vertices before 1.5 spacings follow, with
+///   turned normals.
+/// Sets has_moved of the body's points that move. Requires: has_moved has an element for each point
+/// of the body. Cost: linear in the points near junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
                    JunctionScratch& scratch, SharedPoints& points);
 

@@ -154,8 +154,8 @@ struct RegionOfTile {
   std::uint32_t component;
 };
 
-// The region of all particles of a tile, if all of its nodes are in one. Only then is it found
-// without a look at each particle.
+// The region of all particles of a tile, if they have one phase and all nodes of the tile are in
+// it. Absent if particles may be in several regions.
 std::optional<RegionOfTile> OnlyRegion(const PhaseField& field, std::span<const PhaseRings> phases,
                                        std::uint32_t tile) {
   const std::uint32_t bits = field.PhasesIn(tile);

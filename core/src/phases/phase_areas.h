@@ -11,12 +11,12 @@
 
 namespace partiemc {
 
-/// Warm buffers of MatchPhaseAreas. Regions are the components of all phases.
+/// Scratch of MatchPhaseAreas. A region is a component of a phase.
 struct PhaseAreaScratch {
   std::vector<std::uint32_t> first_region;           // By phase: its first region.
   std::vector<std::uint64_t> count;                  // By region: particles with its phase.
   std::vector<double> volume, area;                  // By region, in squared cells.
-  std::vector<double> wanted, offset;                // By region.
+  std::vector<double> wanted, offset;                // By region; `offset`: the height P.
   std::vector<double> residual, direction, product;  // By region: of the solver.
   std::vector<std::uint32_t> body;           // By region: a lower region of its body, or itself.
   std::vector<double> missing, body_volume;  // By lowest region of a body.
@@ -24,8 +24,8 @@ struct PhaseAreaScratch {
 };
 
 /// Sums the particles of each region: their number and, in squared cells, their volumes. A particle
-/// in a region of another phase counts for that one's volume only. `labels`: by particle of the
-/// frame. Cost: linear in particles.
+/// that lies only in a region of another phase adds its volume to that region, but is not counted.
+/// `labels`: by particle of the frame. Cost: linear in particles.
 void SumRegions(const ParticleBins& bins, const Scale& scale, const PhaseField& field,
                 std::span<const PhaseLabel> labels, const PhaseMap& map,
                 std::span<const PhaseRings> phases, PhaseAreaScratch& scratch);

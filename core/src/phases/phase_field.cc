@@ -23,7 +23,7 @@ void PhaseField::Build(const ParticleBins& bins, const Scale& scale,
                        std::span<const PhaseLabel> labels) {
   tiles_ = &bins.tiles;
   kernel_radius_ = scale.kernel_radius;
-  // Rounding may exceed the limit of a kernel.
+  // Rounding may make the reach of a kernel larger than a tile.
   reach_ = std::min<double>(scale.reach, kTileSize);
   spacing_ = scale.spacing;
   beta_ = scale.kernel_radius / scale.spacing;

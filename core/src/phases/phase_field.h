@@ -18,14 +18,14 @@ using PhaseLabel = std::uint8_t;
 inline constexpr PhaseLabel kNoPhase = 0;
 inline constexpr std::size_t kMostPhases = ReconstructionParameters::kMaxSections + 2;
 
-/// A phase at a point (core/PHASES.md): its density, and the distance to its mean position.
+/// Kernel sums over the particles of one phase, for g at a point (core/PHASES.md).
 struct PhaseSums {
-  double density = 0;   ///< f, of the particles of this phase.
-  double sum = 0;       ///< Of kernel values.
-  double x = 0, y = 0;  ///< Of kernel values times displacements in sizes.
+  double density = 0;   ///< f: kernel values times weights.
+  double sum = 0;       ///< Kernel values.
+  double x = 0, y = 0;  ///< Kernel values times displacements, in the particles' sizes.
 };
 
-/// The difference of two phases at a point, in spacings: positive in the first one.
+/// g of one phase less g of another at a point, in spacings: positive in the first one.
 struct PhaseDifference {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;  ///< Per cell.
@@ -34,8 +34,8 @@ struct PhaseDifference {
 /// The particles near phase boundaries, by cell.
 class PhaseField {
  public:
-  /// Sorts the particles of tiles near which there are two phases. `labels`: by particle of the
-  /// frame. Cost: linear in the particles.
+  /// Sorts the particles of tiles near which there are two phases. Keeps a reference to the tiles
+  /// of `bins`. `labels`: by particle of the frame. Cost: linear in the particles.
   void Build(const ParticleBins& bins, const Scale& scale, std::span<const PhaseLabel> labels);
 
   /// The phases that have particles in a tile, as bits.
@@ -44,8 +44,8 @@ class PhaseField {
   /// The phases that have particles in a tile and around it, as bits.
   std::uint32_t PhasesAround(std::uint32_t tile) const { return around_[tile]; }
 
-  /// By cell of a tile: the phases, as bits, with particles at most one reach from it along x and
-  /// y. Requires: several phases are around the tile.
+  /// By cell of a tile: the phases, as bits, with particles at most one reach (the largest kernel
+  /// radius) from it along x and y. Requires: several phases are around the tile.
   void PhasesAroundCells(std::uint32_t tile, std::array<std::uint32_t, kTileNodes>& phases) const;
 
   /// The phase with the largest g at (x, y), in cells relative to a tile; kNoPhase without

@@ -27,11 +27,11 @@ struct PhaseEdge {
   }
 };
 
-/// A cell that has a point.
+/// A cell that has a shared point of its own.
 struct PhaseCell {
   std::uint32_t tile = 0;
   std::uint8_t i = 0, j = 0;
-  /// The corner around which an interface runs, opposite the one outside node of the cell;
+  /// The corner around which an interface runs, opposite the only outside corner of the cell;
   /// kNoCorner for a junction.
   std::uint8_t corner = 0;
 
@@ -43,13 +43,13 @@ struct PhaseMap {
   std::vector<std::array<PhaseLabel, kTileNodes>> labels;  ///< By tile; kNoPhase: outside.
   std::vector<PhaseEdge> edges;                            ///< In the order of their keys.
   std::vector<PhaseCell> cells;                            ///< In the order of their keys.
-  /// Cells, ascending by key, whose corners are two phases across: the phase that is joined.
+  /// Saddles between two phases, ascending by key, with the phase whose corners are joined.
   std::vector<std::pair<std::uint64_t, PhaseLabel>> joined;
 
   PhaseLabel At(const TilePlace& node) const {
     return node.tile == kNoTile ? kNoPhase : labels[node.tile][node.j * kTileSize + node.i];
   }
-  /// Index of an edge or cell. Requires: it exists.
+  /// Index in `edges` of the edge up or to the right from a node. Requires: it exists.
   std::uint32_t EdgeAt(const TilePlace& node, bool is_up) const;
   /// Index of a cell in `cells`, or kNoIndex.
   std::uint32_t CellAt(const TilePlace& cell) const;
@@ -63,8 +63,8 @@ struct PhaseMap {
   /// edge and cell.
   void Build(const TileDirectory& directory, const Crossings& body, const PhaseField& field);
 
-  /// Whether the corners of phase `label` of a saddle of its outline are joined. `body_joined`:
-  /// whether inside corners of the body's saddle in this cell are joined.
+  /// Whether the two corners of phase `label` are joined in a saddle of its outline. `key`: of the
+  /// cell. `body_joined`: whether the inside corners of the body's saddle in this cell are joined.
   bool IsJoined(const std::array<PhaseLabel, 4>& corners, PhaseLabel label, std::uint64_t key,
                 bool body_joined) const;
 

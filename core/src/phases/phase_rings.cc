@@ -28,7 +28,7 @@ struct Tracing {
         Normalise(directory, cell.tile, cell.i + kCornerX[corner], cell.j + kCornerY[corner]));
   }
 
-  // The number of the interface's point on an edge of a cell.
+  // The number of the shared point on an edge of a cell. Requires: two phases meet on the edge.
   std::uint32_t PointOn(const ActiveCell& cell, int edge) const {
     const TilePlace node =
         Normalise(directory, cell.tile, cell.i + (edge == 1), cell.j + (edge == 2));
@@ -92,7 +92,7 @@ void MarkInside(const PhaseMap& map, PhaseLabel label, LevelSet& level_set) {
   });
 }
 
-// Decides the saddles of a phase as for its neighbours.
+// Decides the saddles of a phase so that they agree with those of its neighbours.
 void JoinSaddles(const TileDirectory& directory, const PhaseMap& map, const BodyOutline& body,
                  PhaseLabel label, Crossings& crossings) {
   for (std::uint32_t k = 0; k < crossings.cells.size(); ++k) {

@@ -31,17 +31,17 @@ class BodyVertices {
 
   static constexpr std::uint32_t kNone = 0xffffffff;
 
-  /// The place in RingTopology::segments of the segment that enters, or leaves, a cell through an
-  /// edge. Requires: there is one.
+  /// The place in RingTopology::segments of the segment that enters, or leaves, a cell through its
+  /// edge 0 to 3 (crossings.h). Requires: there is one.
   std::uint32_t Entering(const TilePlace& cell, int edge) const;
   std::uint32_t Leaving(const TilePlace& cell, int edge) const;
   /// The edge through which a segment leaves its cell.
   int ExitOf(std::uint32_t at) const;
-  /// The only segment of a cell.
+  /// The segment of a cell that has only one in the topology.
   std::uint32_t In(const TilePlace& cell) const;
 
-  /// Index in Rings::points of a segment's vertices: in the cell, and on its entry edge, or kNone
-  /// if thinning has dropped that one.
+  /// Index in Rings::points of a segment's vertex in its cell, and of its vertex on its entry edge:
+  /// kNone if thinning has dropped it.
   std::uint32_t CellVertex(std::uint32_t at) const { return body_->placed.point_of_segment[at]; }
   std::uint32_t EdgeVertex(std::uint32_t at) const {
     return body_->vertices.is_kept[2 * std::size_t{at}] ? CellVertex(at) - 1 : kNone;
@@ -70,10 +70,10 @@ struct PhaseRings {
   Crossings crossings;
   RingTopology topology;
   std::vector<std::uint32_t> points;  ///< Numbers of shared points, ring by ring.
-  std::vector<PhaseLabel> across;  ///< By point: the phase across from the edge on which it lies;
-                                   ///< kNoPhase for other points.
+  /// By point: on a lattice edge, the phase of its other node; kNoPhase for other points.
+  std::vector<PhaseLabel> across;
   std::vector<std::uint32_t> offsets;  ///< Ring k has points [offsets[k], offsets[k + 1]).
-  /// By segment of the topology: index in `points` of its last point.
+  /// By element of RingTopology::segments: index in `points` of its last point.
   std::vector<std::uint32_t> point_of_segment;
 
   std::size_t RingCount() const { return topology.RingCount(); }
@@ -82,7 +82,7 @@ struct PhaseRings {
   }
 };
 
-/// Warm buffers of TracePhase.
+/// Scratch of TracePhase.
 struct PhaseTraceScratch {
   LevelSet level_set;
   RingScratch rings;

@@ -34,7 +34,8 @@ void TakeBody(const PlacedVertices& placed, const Rings& body, double cell_size,
   }
 }
 
-// Points in world units. Vertices of the body that have not moved keep their bits.
+// Converts the shared points to world units. Vertices of the body that have not moved keep their
+// bits.
 void ToWorld(const PlacedVertices& placed, const Rings& body, double cell_size, Phases& p) {
   const auto convert = [&](const std::vector<Point>& from, std::span<const double> of_body,
                            std::vector<double>& to) {

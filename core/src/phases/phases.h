@@ -20,7 +20,7 @@
 
 namespace partiemc {
 
-/// The phases of a frame, kept warm from frame to frame.
+/// The phases of a frame. Reuses its memory.
 struct Phases {
   std::vector<float> known;        ///< By label less one: the phase of the section.
   std::vector<PhaseLabel> labels;  ///< By particle of the frame.
@@ -53,7 +53,7 @@ struct PhaseInput {
   const RingVertices& vertices;
 };
 
-/// The sections of a stream that have a phase. The first one has the label 1, and so on.
+/// The number of sections that have a phase. The first one has the label 1, and so on.
 std::uint64_t CountPhases(const ReconstructionParameters& parameters);
 inline bool HasPhases(const ReconstructionParameters& parameters) {
   return CountPhases(parameters) > 0;
@@ -68,21 +68,21 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
 /// Labels the nodes of the body by phase. Requires: TakePhases.
 void MapPhases(const PhaseInput& input, Phases& phases);
 
-/// Points of all interfaces.
+/// Number of points of all interfaces.
 inline std::uint64_t InterfacePointsOf(const Phases& phases) {
   return phases.map.edges.size() + phases.map.cells.size();
 }
 
-/// Divides the body among the phases. Vertices of `body` where interfaces end move (MoveJunctions);
-/// rings with corners there move to keep their areas. Those vertices that the repair needs return
-/// to their roots. The rings are then measured again. Returns false if the repair failed, which is
-/// a bug. Requires: MapPhases; the default placement. Deterministic. Cost: for each phase, linear
-/// in tiles; the rest linear in the points and particles near interfaces.
+/// Divides the body among the phases. Vertices of `body` where interfaces end move (MoveJunctions),
+/// and rings with corners there move to keep their areas. The repair returns vertices to their
+/// roots where needed. The rings of `body` are then measured again. Returns false if the repair
+/// failed, which is a bug. Requires: MapPhases; the default placement. Deterministic. Cost: for
+/// each phase, linear in tiles; the rest linear in the points and particles near interfaces.
 [[nodiscard]] bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed,
                                Phases& phases, Rings& body);
 
 /// Writes the rings of a phase, in world units, without identities, and their placement for the
-/// stages identities and mesh. Junctions are contacts of the rings.
+/// stages identities and mesh. Junctions with an angle become contacts of the rings.
 void WritePhaseRings(const Phases& phases, const Scale& scale, PhaseLabel label,
                      PlacedVertices& placed, Rings& rings);
 

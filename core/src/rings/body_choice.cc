@@ -39,7 +39,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
     c.has_copies[of_copy] = 1;
     std::uint32_t& of_given = c.component_of[input.lifted.originals[copy]];
     if (of_given == kNoComponent) {
-      of_given = of_copy;  // Further copies join this one.
+      of_given = of_copy;  // Further copies join this component.
       ++c.total[of_copy];
     }
     const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
@@ -80,7 +80,7 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   }
 }
 
-// The component of each body that remains whole: one that has all its particles.
+// Finds the image of each body that stays whole: it is complete and has all particles of the body.
 void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.best.assign(components, kNoComponent);
@@ -94,7 +94,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   for (std::uint32_t root = 0; root < components; ++root) {
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent) continue;
-    // An image with a particle and its copy has more.
+    // An image that has both a particle and its copy has more particles.
     if (topology.particle_count[topology.outer_ring[best]] != c.total[root]) best = kNoComponent;
   }
 }
@@ -102,7 +102,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
 bool IsSpray(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t root) {
   const ReconstructionParameters& parameters = input.parameters;
   const double square = input.spacing * input.spacing / (input.cell_size * input.cell_size);
-  // An image of a long body ends where its copies end.
+  // An image of a long body ends where its copies end, so its area may be too small.
   const double area = std::max(c.largest[root], static_cast<double>(c.total[root]) * square);
   return c.total[root] < parameters.min_component_particles ||
          area < parameters.min_component_area * square;

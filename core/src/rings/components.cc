@@ -95,7 +95,7 @@ void Components::Label(const TileDirectory& directory, const Crossings& crossing
     const int di = cell.corners == 5 ? 0 : 1;
     const TilePlace a = Normalise(directory, cell.tile, cell.i + di, cell.j);
     const TilePlace b = Normalise(directory, cell.tile, cell.i + 1 - di, cell.j + 1);
-    if (!IsInside(crossings, a) || !IsInside(crossings, b)) continue;  // Cleaning cleared them.
+    if (!IsInside(crossings, a) || !IsInside(crossings, b)) continue;  // Cleaning cleared one.
     Unite(RunAt(crossings, a), RunAt(crossings, b));
   }
   // Roots precede their runs, so one pass turns parents into component numbers.

@@ -11,7 +11,7 @@
 
 namespace partiemc {
 
-/// A particle without a component.
+/// The component of a particle that has none.
 inline constexpr std::uint32_t kNoComponent = 0xffffffff;
 
 /// Components of inside nodes, connected along lattice edges and through saddles with joined inside
@@ -24,11 +24,10 @@ class Components {
 
   std::uint32_t size() const { return count_; }
 
-  /// The component of an inside node.
   std::uint32_t At(const Crossings& crossings, const TilePlace& node) const;
 
-  /// The component of a particle at (x, y) of a tile: the component of the nearest inside corner of
-  /// its cell; kNoComponent if no corner is inside.
+  /// The component of a particle at (x, y), in cells from the first node of its tile: the component
+  /// of the nearest inside corner of its cell, or kNoComponent if no corner is inside.
   std::uint32_t ComponentOf(const TileDirectory& directory, const Crossings& crossings,
                             std::uint32_t tile, float x, float y) const;
 
@@ -39,7 +38,7 @@ class Components {
   void ForEachSeenFrom(const TileDirectory& directory, const Crossings& crossings,
                        std::uint32_t tile, Visit visit) const;
 
-  /// Calls visit(tile, j, mask, component) for each run of inside nodes.
+  /// Calls visit(tile, j, mask, component) for each run of inside nodes: the bits `mask` of row j.
   template <typename Visit>
   void ForEachRun(const Crossings& crossings, Visit visit) const;
 
@@ -51,16 +50,16 @@ class Components {
   void ForEachParticleOf(const ParticleBins& bins, const Crossings& crossings, std::uint32_t tile,
                          Visit visit) const;
 
-  /// Adds the number of particles of each component to `counts`, and the sum of their weights,
-  /// unless weights are uniform, to `weights`; both have size() elements. Parallel over tiles.
-  /// Particles are examined one by one only in tiles with several components.
+  /// Adds the number of particles of each component to `counts`, and the sum of their weights to
+  /// `weights`, unless weights are uniform. Both have size() elements. Parallel over tiles.
+  /// Components of single particles are searched only in tiles with several components.
   void CountParticles(const ParticleBins& bins, const Crossings& crossings,
                       std::span<std::uint64_t> counts, std::span<double> weights);
 
  private:
-  // The particles of one tile, if they all belong to one component.
+  // The particles of one tile that belong to its component.
   struct TileShare {
-    std::uint32_t component;  // With kNoComponent, kSeveralComponents nothing is counted.
+    std::uint32_t component;  // kNoComponent, kSeveralComponents: the rest is 0.
     std::uint32_t count;
     double weight;
   };
@@ -76,8 +75,8 @@ class Components {
   void Unite(std::uint32_t a, std::uint32_t b);
   void UniteRuns(const TileDirectory& directory, const Crossings& crossings, std::uint32_t tile);
 
-  // The first run of each row, by tile * 32 + row; last, the number of runs. A full tile is one
-  // run.
+  // By tile * 32 + row: index of the row's first run; the last element is the number of runs. A
+  // full tile is one run.
   std::vector<std::uint32_t> first_run_;
   std::vector<std::uint32_t> label_;  // By run: its parent in the union, then its component.
   std::vector<TileShare> shares_;     // By tile.

@@ -1,4 +1,4 @@
-// Bodies that percolate through a periodic box: what the stages after the rings need to know.
+// The bodies of a periodic box after ChooseBodies: whole, cut or gone.
 #pragma once
 
 #include <array>
@@ -16,22 +16,22 @@ namespace partiemc {
 enum class Fate : std::uint8_t {
   kWhole,  ///< It remains as it is.
   kCut,    ///< Its part in the box remains.
-  kGone,   ///< Another copy of the body remains.
+  kGone,   ///< It is spray, or another image of the body remains.
 };
 
-/// The part of the plane in which percolating bodies remain.
+/// The part of the plane in which cut bodies remain. World units.
 struct Window {
-  std::array<std::optional<PeriodicAxis>, 2> axes;  ///< Absent: without ends.
+  std::array<std::optional<PeriodicAxis>, 2> axes;  ///< Absent: no ends along this axis.
 };
 
 /// A frame with copies of particles (periodic/lift.h).
 struct Percolation {
   Window window;
-  std::uint32_t particles;                ///< Given particles; copies follow.
+  std::uint32_t particles;                ///< Number of given particles; copies follow them.
   std::span<const Fate> fates;            ///< By component.
-  std::span<const std::uint32_t> bodies;  ///< By component: the first component of the same body.
+  std::span<const std::uint32_t> bodies;  ///< By component: BodyChoice::bodies.
 
-  /// The outer ring of the first component of the same body.
+  /// The outer ring that represents the body of a component.
   std::uint32_t OuterOf(const RingTopology& topology, std::uint32_t component) const {
     return topology.outer_ring[bodies[component]];
   }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kMinHoleParticles = 2;
 static_assert(kMinHoleParticles <= kHoleMarginParticles, "tiles must reach into such a hole");
 
-// The same with grains: the void of six equal grains has a smaller hole, that of seven a larger one
+// The same around grains: the void between six equal grains is smaller, between seven it is larger
 // (core/SIZES.md, "Grains").
 constexpr double kMinGrainHole = 0.5;
 
@@ -128,8 +128,8 @@ void DropEmptyComponents(RingScratch& scratch, Crossings& crossings, RingTopolog
   if (rings.dropped_components > 0) ClearDropped(rings, scratch, crossings);
 }
 
-// Makes every node inside that a ring encloses. The ring crosses a row of the lattice in pairs of
-// horizontal edges, and the enclosed nodes lie between the two edges of a pair.
+// Makes all nodes inside that a ring encloses. The ring crosses a row of the lattice in pairs of
+// horizontal edges, and the enclosed nodes lie between the edges of a pair.
 void FillRing(const TileDirectory& directory, const RingTopology& rings, std::size_t ring,
               Crossings& crossings, std::vector<std::pair<std::int64_t, std::int64_t>>& edges) {
   edges.clear();
@@ -233,9 +233,9 @@ void Nest(const ParticleBins& bins, const Crossings& crossings, RingScratch& scr
   }
 }
 
-// Finds the outer ring around each outer ring. At the first edge of an outer ring, the edge on its
-// left in the row belongs to a hole, which the ring around both contains, or to an outer ring in
-// the same void, which was visited before.
+// Finds the outer ring around each outer ring. Edges are visited by row, so the first visited edge
+// of an outer ring is in its lowest row. The edge on the left of it belongs to a hole, whose outer
+// ring contains both, or to an outer ring in the same void, which was visited before.
 void FindContainers(const TileDirectory& directory, const Crossings& crossings,
                     const RingTopology& rings, RingScratch& scratch) {
   scratch.outer_rings.clear();

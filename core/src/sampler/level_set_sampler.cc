@@ -15,15 +15,15 @@ namespace {
 // A tile without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
-// Number of tiles after which positions along x repeat.
+// The number of tiles after which positions along x repeat.
 constexpr std::int32_t kPeriodTiles = static_cast<std::int32_t>(kColumnPeriod) / kTileSize;
 
-// Step of the central differences of the spread, in kernel radii.
+// The step of the central differences of the spread, in kernel radii.
 constexpr double kGapStep = 1.0 / 1024;
 
 }  // namespace
 
-// Marks the cells in which points may lie, and the cells that kernels reach from them.
+// Marks the cells in which points may lie, and the cells within reach of these cells.
 void LevelSetSampler::MarkTiles(const ParticleBins& bins, const Crossings& crossings,
                                 double wander) {
   const auto tiles = static_cast<std::uint32_t>(bins.tiles.size());
@@ -92,7 +92,7 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
     }
     runs_.back().last_tile = tile;
     run_of_[tile] = static_cast<std::uint32_t>(runs_.size() - 1);
-    // Reserves space for all particles of the tile, because counting the needed ones takes longer.
+    // Reserves memory for all particles of the tile, because counting the needed ones takes longer.
     particle_count += bins.CountOf(tile);
   }
   std::uint32_t bucket_count = 0;
@@ -114,7 +114,7 @@ void LevelSetSampler::FindRuns(const ParticleBins& bins, bool tells_sources) {
   size_.resize(bins.size.empty() ? 0 : particle_count + kRowPadding);
 }
 
-// Finds the buckets around a tile.
+// Finds the runs around a tile.
 void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t tile) {
   const Neighbourhood& neighbours = directory.neighbours(tile);
   for (int y = 0; y < 3; ++y) {
@@ -135,9 +135,9 @@ void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t til
   }
 }
 
-// Sorts the needed particles of a run by bucket, by a counting sort. At first offsets[b + 2] is the
-// count of bucket b, then offsets[b + 1] is its next index, and at the end offsets[b] is its first
-// index.
+// Sorts the needed particles of a run by bucket, by a counting sort. At first offsets[b + 2] counts
+// the particles of bucket b. Then offsets[b + 1] is the index of its next particle, and at the end
+// offsets[b] that of its first particle.
 void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);
@@ -147,7 +147,7 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
     }
   };
   std::uint32_t chosen = run.first_particle;
-  // Where the output of a tile would begin if all particles were needed. This range is prefetched
+  // Where the output of a tile would begin if all particles were needed. This memory is prefetched
   // while the particles are selected.
   std::uint32_t room = run.first_particle;
   for_each_tile([&](std::uint32_t tile) {
@@ -189,7 +189,7 @@ void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
   });
 }
 
-// Calls visit(offset, 1 - s^2, weight) for the particles of a slice within R of a point.
+// Calls visit(offset, 1 - d^2 / R^2, weight) for the particles of a slice at distances d < R.
 template <typename Visit>
 void LevelSetSampler::ForEachInSpace(std::uint32_t tile, double x, double y, Visit visit) const {
   const double inverse_square = 1 / (scale_.kernel_radius * scale_.kernel_radius);

@@ -19,27 +19,28 @@
 
 namespace partiemc {
 
-/// F, phi and their gradients at a point. Lengths in cells, gradients without unit.
+/// F, phi and their gradients at a point x. Lengths are in cells, gradients have no unit.
 struct FieldSample {
   double density = 0;             ///< f
-  double mean_x = 0, mean_y = 0;  ///< xbar - x, the weighted mean relative to the point.
+  double mean_x = 0, mean_y = 0;  ///< xbar - x: the weighted mean of positions, from the point.
   double phi = 0;                 ///< |x - xbar| - r
   double phi_x = 0, phi_y = 0;    ///< grad phi; 0 if x = xbar.
   double spread = 0;              ///< sigma
   double value = 0;               ///< F (level_set_formula.h)
-  /// grad F, of the term that F equals; of different sizes without the gradient of the local size.
+  /// grad F: the gradient of the term that decides F. If sizes differ, the local size counts as
+  /// constant.
   double gradient_x = 0, gradient_y = 0;
   double size = 1;           ///< The local size, in spacings.
   bool has_support = false;  ///< A particle is within the kernel radius.
 };
 
-/// A point in cells relative to a tile; kNoTile if no particle is near.
+/// A point in cells relative to a tile; kNoTile if no sample is possible there.
 struct FieldPoint {
   std::uint32_t tile = kNoTile;
   double x = 0, y = 0;
 };
 
-/// F, grad F and the local size at a point (FieldSample).
+/// The members of FieldSample that vertices need.
 struct LevelSetSample {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;
@@ -52,48 +53,49 @@ using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 /// (NeighbourGrid) that span adjacent tiles; a query visits the buckets around its points.
 class LevelSetSampler {
  public:
-  /// Indexes the particles for points in active cells, and in cells that are up to `wander` cells
-  /// away from an active cell along each axis. `tells_sources`: whether SourceOf may be called.
-  /// Cost: linear in the particles of the tiles around these cells; linear in all particles if
-  /// kernel radius and `wander` together exceed kMaskMargin.
+  /// Indexes the particles for samples at points in active cells, and in cells at most `wander`
+  /// cells away from an active cell along each axis. `tells_sources`: whether SourceOf may be
+  /// called. Cost: linear in the particles of the tiles around these cells; in all particles if
+  /// Scale::reach and `wander` together exceed kMaskMargin.
   void Build(const ParticleBins& bins, const Crossings& crossings, const Scale& scale,
              double wander, bool tells_sources);
 
   /// The sample at a point of a tile, in cells relative to the tile, 0 <= x, y <= 32. Requires:
   /// IsIndexed(tile). If Covers is false for the point, particles may be missing. Particles are
-  /// summed in the order of buckets, then of the bins (SampleAtPoints). Cost: the particles in the
-  /// rows of buckets within R.
+  /// summed in the order of buckets, then of the bins (SampleAtPoints). Cost: linear in the
+  /// particles of the rows of buckets that the kernel radius reaches.
   FieldSample Sample(std::uint32_t tile, double x, double y) const;
 
-  /// Samples the points of at most kQueriesAtOnce groups, faster than one by one. The points of a
-  /// group share their particles, so they should be neighbours.
+  /// Sets samples[q][k] to the sample at point k of groups[q], for 1 to kQueriesAtOnce groups. This
+  /// is faster than one by one, if the points of a group are near each other. A sample's last bits
+  /// depend on its group.
   void Sample(std::span<const FieldPoints> groups, std::span<FieldSamples> samples) const;
 
-  /// Calls visit(x, y, particle) for the particles within `radius` of a point, in cells relative to
-  /// `tile`, and for some particles farther away. Requires: radius <= Scale::reach.
+  /// Calls visit(x, y, particle) for the particles within `radius` of a point, and for some farther
+  /// away. All coordinates are in cells relative to `tile`. Requires: radius <= Scale::reach.
   template <typename Visit>
   void ForEachNear(std::uint32_t tile, double x, double y, double radius, Visit visit) const;
 
-  /// Distances at which particles count, in cells: `radius`, and if sizes differ, additionally
-  /// `per_size` times the particle's size.
+  /// The distance within which a particle counts, in cells: `radius`, plus `per_size` times the
+  /// particle's size if sizes differ.
   struct Range {
     double radius, per_size;
   };
 
-  /// Sets `near` to the particles within `range` of any of `points`, and some particles farther
-  /// away. Points have members x and y, in cells relative to the tile. Requires: no distance in the
-  /// range exceeds Scale::reach.
+  /// Sets `near` to the particles within `range` of any of `points`, and some farther away. It is
+  /// valid until the next Build. Points have members x and y, in cells relative to the tile.
+  /// Particles beyond Scale::reach may be missing. Requires: at least one point.
   template <typename Member>
   void FindNear(std::uint32_t tile, std::span<const Member> points, const Range& range,
                 NeighbourRows& near) const;
 
-  /// The index in the frame of a particle of ForEachNear. Requires: Build with `tells_sources`.
+  /// The index in the frame of a `particle` of ForEachNear. Requires: Build with `tells_sources`.
   std::uint32_t SourceOf(std::uint32_t particle) const { return source_[particle]; }
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
 
-  /// Whether samples at a point of a tile, 0 <= x, y < 32, are complete: an active cell is near
-  /// enough.
+  /// Whether a sample at a point of a tile, 0 <= x, y < 32, misses no particle: an active cell is
+  /// near enough.
   bool Covers(std::uint32_t tile, double x, double y) const {
     return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
   }
@@ -110,33 +112,32 @@ class LevelSetSampler {
     std::uint32_t first_particle = 0;
   };
 
-  // The run in the row of tiles above, beside or below a tile. Positions are relative to the tile.
+  // The run in the row of tiles above, beside or below a tile; without columns if there is none.
   struct RunBeside {
     std::uint32_t bucket = 0;  // At the tile's first column in the first row, modulo 2^32.
     std::uint32_t row_stride = 0;
-    int first = 0, end = 0;  // Its columns, relative to the tile.
+    int first = 0, end = 0;  // Columns [first, end) of buckets, relative to the tile.
   };
 
-  // sqrt(2) - 1, rounded up: a diagonal is at most the longer side of its box plus this times the
-  // shorter.
+  // sqrt(2) - 1, rounded up. A diagonal of a box is at most the longer side plus this times the
+  // shorter one.
   static constexpr double kDiagonal = 0.41422;
 
-  // Added to the radius of the disc that selects particles, in cells: more than the rounding error
-  // of floats. The additional particles contribute nothing.
+  // In cells; added to the radius of the disc that selects particles, because floats are rounded.
+  // The additional particles contribute nothing.
   static constexpr double kDiscMargin = 1e-3;
 
   struct Tile {
     std::array<RunBeside, 3> runs;  // Below, beside, above.
-    float column;                   // Of its first node, modulo kColumnPeriod.
+    float column;                   // The column of its first node, modulo kColumnPeriod.
     bool is_asked;                  // Points may lie in its cells.
   };
 
-  // The range of kernels.
   Range KernelRange() const {
     return scale_.has_own_sizes ? Range{0, scale_.kernel_radius} : Range{scale_.kernel_radius, 0};
   }
   void MarkTiles(const ParticleBins& bins, const Crossings& crossings, double wander);
-  // Number of offsets of a run: its buckets and two more.
+  // The number of offsets of a run: one for each bucket, and two more.
   std::uint32_t OffsetCount(const Run& run) const {
     return run.row_stride * static_cast<std::uint32_t>(grid_.rows.size()) + 2;
   }
@@ -153,13 +154,13 @@ class LevelSetSampler {
   NeighbourGrid grid_;
   std::vector<Tile> tiles_;
   std::vector<BitRows> asked_;   // By tile: cells in which points may lie.
-  std::vector<BitRows> wanted_;  // By tile: cells whose particles such points need.
+  std::vector<BitRows> wanted_;  // By tile: cells with particles that such points need.
   std::vector<Run> runs_;
   std::vector<std::uint32_t> run_of_;  // By tile, or kNoRun.
   std::vector<std::uint32_t> bucket_offsets_;
   // The selected particles of each run, tile by tile. The particles of a tile end at chosen_end_.
   struct Chosen {
-    std::uint32_t bucket, particle;
+    std::uint32_t bucket, particle;  // In the run; in the bins.
   };
   std::vector<Chosen> chosen_;
   std::vector<std::uint32_t> chosen_end_;

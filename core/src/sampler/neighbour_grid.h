@@ -20,8 +20,8 @@ class GridAxis {
   /// Buckets per tile.
   int size() const { return kTileSize >> shift_; }
 
-  /// The bucket of a coordinate in cells relative to the tile, counted from the start of the
-  /// neighbour before the tile, clamped to the three tiles.
+  /// The bucket of a coordinate in cells relative to a tile, clamped to this tile and its two
+  /// neighbours. Buckets count from the start of the neighbour before the tile.
   int Along(double coordinate) const {
     const int cell = static_cast<int>(coordinate + kTileSize);
     return std::clamp(cell, 0, 3 * kTileSize - 1) >> shift_;
@@ -39,13 +39,13 @@ class GridAxis {
 };
 
 /// Buckets are much wider than high. Queries therefore read few offsets, but more particles outside
-/// their disk. Vectors skip such particles at less cost than more offsets would have.
+/// of their disc. Vectors skip these particles at less cost than more offsets would have.
 struct NeighbourGrid {
-  /// Resolution of positions.
+  /// Resolution of positions, in cells.
   static constexpr double kStep = 1.0 / (1 << kFractionBits);
 
   NeighbourGrid() = default;
-  /// For queries within `radius` cells. Requires: `radius` is at most the side of a tile.
+  /// For queries within `radius` cells, at most the side of a tile.
   explicit NeighbourGrid(double radius) : columns(radius * 8 / 3), rows(radius / 4) {}
 
   GridAxis columns, rows;

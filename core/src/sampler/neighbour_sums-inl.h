@@ -1,7 +1,7 @@
-// Sums over the particles near a point in vectors of floats. The particles within reach are first
-// copied to a short array, which serves all points of a query. Particle k of the array goes to
-// partial sum k modulo sixteen, and the sixteen sums are added in one fixed tree, so the bits do
-// not depend on the width of vectors. Compiled once for each instruction set, so the include guard
+// Sums over the particles near a point, in SIMD vectors of floats. The particles within reach are
+// first copied to a short array, which serves all points of a query. Particle k of the array goes
+// to partial sum k modulo sixteen. The sixteen sums are added in one fixed tree, so the bits do not
+// depend on the width of vectors. Compiled once for each instruction set, so the include guard
 // toggles.
 #if defined(PARTIEMC_NEIGHBOUR_SUMS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_NEIGHBOUR_SUMS_INL_H
@@ -34,11 +34,11 @@ using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 constexpr int kParts = kPartialSums / kLanes;
 
-// A factor of each particle, which some sums need.
+// The factor of each particle that some sums need.
 enum class Factor { kNone, kWeight, kSize };
 
-// Packed particles in coordinates relative to the origin of NeighbourRows. At least kPartialSums
-// distant dummies follow, whose kernels are 0.
+// Packed particles in coordinates relative to the origin of NeighbourRows. After Close,
+// kPartialSums distant dummies with kernels of 0 follow.
 struct NeighbourChunk {
   static constexpr int kCapacity = 128;
   static constexpr float kFar = 1e6f;
@@ -64,9 +64,8 @@ class NeighbourDisc {
         reach_(hn::Set(Lanes(), near.reach)),
         reach_per_size_(hn::Set(Lanes(), near.reach_per_size)) {}
 
-  // Reads the first kPartialSums particles of [first, last) and appends the ones in the disc to a
-  // chunk, which has `to` particles. Requires: space for kPartialSums. Returns the new number of
-  // particles.
+  // Of the first kPartialSums particles of [first, last), appends those in the disc to a chunk,
+  // which has `to` particles and space for kPartialSums more. Returns the new number of particles.
   template <Factor kFactor>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
                         NeighbourChunk& chunk) const {
@@ -107,7 +106,7 @@ class NeighbourDisc {
   Vector column_, centre_x_, centre_y_, reach_square_, reach_, reach_per_size_;
 };
 
-// Appends distant dummies, which fill the last vector.
+// Appends the dummies, which fill the last vector.
 template <Factor kFactor>
 HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
@@ -119,8 +118,9 @@ HWY_INLINE void Close(NeighbourChunk& chunk) {
   }
 }
 
-// Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(), which
-// consumes it, or returns false to stop. Returns false if stopped.
+// Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(). It
+// uses the chunk's particles and returns true, or returns false: then Collect stops and returns
+// false.
 template <Factor kFactor, typename MakeRoom>
 HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);
@@ -147,7 +147,7 @@ HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRo
   return true;
 }
 
-// Calls visit(chunk) for the particles of `near`, one full chunk at a time.
+// Calls visit(chunk) for the particles of `near`, one chunk after another.
 template <Factor kFactor, typename Visit>
 HWY_INLINE void ForEachChunk(const NeighbourRows& near, NeighbourChunk& chunk, Visit visit) {
   const auto empty = [&]() HWY_ATTR {
@@ -167,9 +167,9 @@ HWY_INLINE bool Gather(const NeighbourRows& near, NeighbourChunk& chunk) {
   return fits;
 }
 
-// Calls visit(query, chunk, is_all) for the particles of each query, one full chunk at a time.
-// `is_all`: the chunk has all particles of the query. The particles of all queries are copied
-// first, so that the sums of a query do not wait for memory.
+// Calls visit(query, chunk, is_all) for the particles of each query, one chunk after another.
+// `query` is an index. `is_all`: the chunk has all particles of the query. The particles of all
+// queries are copied first, so that the sums of a query do not wait for memory.
 template <Factor kFactor, typename Query, typename Visit>
 HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
   NeighbourChunk chunks[kQueriesAtOnce];
@@ -191,8 +191,8 @@ HWY_INLINE void ForEachQuery(std::span<const Query> queries, Visit visit) {
 template <int kChannels>
 class PartialSums {
  public:
-  // Calls add(k, sums) for each vector of a chunk: k is its first particle, `sums` has one vector
-  // per channel.
+  // Calls add(k, sums) for each vector of a chunk, to add its terms. k is its first particle;
+  // `sums` has one vector for each channel.
   template <typename Add>
   HWY_INLINE PartialSums(const NeighbourChunk& chunk, Add add) {
     for (int part = 0; part < kParts; ++part) {
@@ -225,7 +225,7 @@ class PartialSums {
   static constexpr int kGroups = (kChannels + kGroup - 1) / kGroup;
   using Group = hn::CappedTag<float, kGroup>;
 
-  // Adds partial sums i and i + 8, then i and i + 4.
+  // Adds partial sums i and i + 8, then i and i + 4; four remain.
   HWY_INLINE hn::Vec<Group> Fold(int channel) {
     if (channel >= kChannels) return hn::Zero(Group());
     for (int count = kParts / 2; count > 0; count /= 2) {
@@ -246,7 +246,8 @@ class PartialSums {
       return sums;
   }
 
-  // The totals of four channels: adds partial sums i and i + 2, then the last two.
+  // The totals of the four channels from `channel` on: adds partial sums i and i + 2, then the
+  // rest.
   HWY_INLINE void Total(int channel, float* totals) {
     const Group d;
     hn::Vec<Group> sums[kGroup];

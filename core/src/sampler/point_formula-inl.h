@@ -1,6 +1,6 @@
-// The level set and its gradient at points as a function of sums over particles
-// (level_set_formula.h), in vectors of doubles with one lane per point. Compiled once for each
-// instruction set, so the include guard toggles.
+// The level set and its gradient at points as functions of sums over particles
+// (level_set_formula.h), in SIMD vectors of doubles with one lane for each point. Compiled once for
+// each instruction set, so the include guard toggles.
 #if defined(PARTIEMC_POINT_FORMULA_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef PARTIEMC_POINT_FORMULA_INL_H
 #undef PARTIEMC_POINT_FORMULA_INL_H
@@ -24,9 +24,10 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// With t = 1 - d^2 / R^2: k = t^3 and dk / da = 6 t^2 d_a / R^2, where the factor 6 / R^2 is
-// applied last. d = x_i - x; a and b are x or y. With uniform weights, the weighted sums follow
-// from the others. With sizes q, d = (x_i - x) / q, and each dk / da has a factor 1 / q.
+// Sums over particles i. With d = x_i - x and t = 1 - d^2 / R^2, the kernel is k = t^3, and
+// dk / da = 6 t^2 d_a / R^2. The sums leave out the factor 6 / R^2. a and b are x or y. With
+// uniform weights, the weighted sums follow from the others. With sizes q, d = (x_i - x) / q, and
+// each dk / da has a factor 1 / q.
 enum Channel {
   kKernel,  // k
   kMomentX,
@@ -44,8 +45,7 @@ enum Channel {
 enum WeightedChannel { kDensity = kSums, kDensityX, kDensityY, kWeightedSums };
 // k q and k / q.
 enum SizedChannel { kSize = kSums, kPerSize, kSizedSums };
-// (dk / da) d_b d_c, symmetric in a, b, c, and k d_a / q. Only points where the gap term determines
-// F need them.
+// (dk / da) d_b d_c, symmetric in a, b, c, and k d_a / q. Needed only where the gap term decides F.
 enum ThirdChannel { kXxx, kXxy, kXyy, kYyy, kPerSizeX, kPerSizeY, kThirdSums };
 
 // The number of channels for particles with a factor.
@@ -65,9 +65,9 @@ class PointFormula {
   HWY_INLINE explicit PointFormula(const Scale& scale)
       : scale_(scale), inverse_square_(1 / (scale.kernel_radius * scale.kernel_radius)) {}
 
-  // Sets the samples at the first `count` points, and at some more to fill vectors. Returns bit k
-  // for point k if the gap term determines F there. The gradient of such a point is not set
-  // (GapGradient).
+  // Sets the samples at the first `count` points, and at some more to fill vectors. Returns a mask:
+  // bit k is set if the gap term decides F at point k. The gradient there is wrong; GapGradient
+  // computes it.
   HWY_INLINE std::uint64_t operator()(const Totals& totals, std::size_t count,
                                       PointSamples& samples) const {
     std::uint64_t gaps = 0;
@@ -85,8 +85,8 @@ class PointFormula {
     const double share = inverse_square_ / sum(kKernel);
     const double xx = sum(kKxx) * share, xy = sum(kKxy) * share, yy = sum(kKyy) * share;
     const double spread = LargerEigenvalue(xx, xy, yy);
-    // The eigenvector as e e^T = (M - s' I) / (s - s'), s' the smaller eigenvalue. If both
-    // eigenvalues are equal, any direction is an eigenvector.
+    // M = (xx, xy; xy, yy) has the eigenvalues s > s', and e e^T = (M - s' I) / (s - s') for the
+    // eigenvector e of s. If both are equal, any direction is an eigenvector.
     const double gap = 2 * spread - (xx + yy);
     const double exx = gap > 0 ? (spread - yy) / gap : 0.5;
     const double exy = gap > 0 ? xy / gap : 0;
@@ -119,14 +119,14 @@ class PointFormula {
     return hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y)));
   }
 
-  // The local sizes at the points from `at` on, where a kernel reaches. `share`: 1 / sum k.
+  // The local sizes at the points from `at` on; not defined without support. `share`: 1 / sum k.
   static HWY_INLINE Vector SizeAt([[maybe_unused]] const Totals& totals,
                                   [[maybe_unused]] std::size_t at, [[maybe_unused]] Vector share) {
     if constexpr (kSized) return hn::Mul(hn::Load(Doubles(), totals[kSize] + at), share);
     return Constant(1);
   }
 
-  // Sets the samples at the points from `at` on. Returns bit k if the gap term determines F at
+  // Sets the samples at kLanes points from `at` on. Bit k of the result: the gap term decides F at
   // point at + k.
   HWY_INLINE std::uint8_t Sample(const Totals& totals, std::size_t at,
                                  PointSamples& samples) const {
@@ -188,7 +188,7 @@ class PointFormula {
     };
 
     const Vector size = SizeAt(totals, at, share);
-    // Lengths and their gradients of a place of size 1 become those of the local size.
+    // Scales lengths and gradients from size 1 to the local size.
     const auto sized = [&](Vector length) HWY_ATTR {
       if constexpr (kSized) return hn::Mul(length, size);
       return length;

@@ -19,12 +19,12 @@ namespace partiemc {
 namespace HWY_NAMESPACE {
 
 // Terms of one SIMD vector of particles: d = particle - point, divided by the particle's size if
-// sizes differ; t = max(0, 1 - |d|^2 / radius^2); t^2; 1 / size, not set if sizes are equal.
+// sizes differ; t = max(0, 1 - |d|^2 / R^2); t^2; 1 / size, or 0 if sizes are equal.
 struct Terms {
   Vector dx, dy, t, t2, per_size;
 };
 
-// The derivative of a kernel, whose other factors are `term`, by a coordinate of the point.
+// A derivative of kernels by a coordinate of the point. `term`: without the factor 1 / size.
 template <Factor kFactor>
 HWY_INLINE Vector Derivative(Vector term, const Terms& terms) {
   if constexpr (kFactor == Factor::kSize) return hn::Mul(term, terms.per_size);
@@ -130,8 +130,8 @@ void SumThird(double inverse_square, const NeighbourRows& near, const Point& poi
   });
 }
 
-// Sums at the points of some queries. The totals of all points are computed at once. If a query has
-// several chunks, the totals of each chunk are added in doubles, point by point.
+// Sums at the points of some queries. The totals of all points are computed at once, except those
+// of queries with several chunks. There the totals of chunks are added in doubles, point by point.
 template <Factor kFactor>
 class SumsAtPoints {
  public:
@@ -170,7 +170,7 @@ class SumsAtPoints {
 
  private:
   static constexpr int kChannels = AddSums<kFactor>::kChannels;
-  // Up to this number of points, computing the totals one by one is faster.
+  // Up to this number of points, computing the totals point by point is faster.
   static constexpr std::size_t kFewPoints = 2;
   static_assert(PointSamples::kCapacity % kPartialSums == 0 && PointSamples::kCapacity < 64);
 

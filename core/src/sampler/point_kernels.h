@@ -1,4 +1,4 @@
-// The kernels of LevelSetSampler::Sample, in vectors.
+// The sums and formulas of LevelSetSampler::Sample, in SIMD vectors with run-time dispatch.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +12,13 @@
 
 namespace partiemc {
 
-/// Up to kPointsAtOnce points, in cells relative to the tile, and at least the particles within R
-/// of each.
+/// Up to kPointsAtOnce points, in cells relative to a tile, and the particles within R of them.
 struct PointQuery {
   NeighbourRows near;
   std::span<const Point> points;
 };
 
-/// Samples (FieldSample) at the points of the queries, in order.
+/// Samples at the points of all queries, in order. Names as in FieldSample.
 struct PointSamples {
   /// A multiple of the vector size.
   static constexpr std::size_t kCapacity =
@@ -31,11 +30,10 @@ struct PointSamples {
   PerPoint size;  ///< The local size, in spacings.
 };
 
-/// Samples the points of at most kQueriesAtOnce queries. Requires: all queries have weights, or no
-/// query has; the same of sizes. Terms, and their sums over up to 128 particles, are floats with an
-/// error of a few 1e-7 of the sum of their magnitudes; all else is computed in doubles. The bits
-/// depend neither on the processor nor on the other queries. The particles of a query go to sixteen
-/// partial sums by their index, and these sums are added in one order (neighbour_sums-inl.h).
+/// Samples the points of 1 to kQueriesAtOnce queries. Requires: all queries have weights, or none
+/// has; all have sizes, or none has. Terms, and their sums over up to 128 particles, are floats
+/// with an error of a few 1e-7 of the sum of their magnitudes. All else is computed in doubles. The
+/// bits depend neither on the processor nor on the other queries (neighbour_sums-inl.h).
 void SampleAtPoints(const Scale& scale, std::span<const PointQuery> queries, PointSamples& samples);
 
 }  // namespace partiemc

@@ -1,4 +1,4 @@
-// Batches nearby points, so that their particles are looked up once.
+// Groups nearby points, so that their particles are looked up once.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace partiemc {
 
-/// Neighbouring points of a tile, in cells relative to it, which share their particles.
+/// Neighbouring points of a tile, in cells relative to the tile. They share their particles.
 template <typename Member>
 struct PointGroup {
   std::uint32_t tile = kNoTile;
@@ -20,9 +20,9 @@ struct PointGroup {
   std::array<std::size_t, kPointsAtOnce> vertices;  ///< By point: its vertex.
 };
 
-/// Collects points of consecutive vertices in groups. Passes kQueriesAtOnce groups at a time to a
-/// sink, a function of std::span<const PointGroup<Member>>. The points between two calls of Part
-/// alone determine the groups, so the results do not depend on the batches.
+/// Collects points of consecutive vertices in groups. Passes up to kQueriesAtOnce groups at a time
+/// to a sink, a function of std::span<const PointGroup<Member>>. Only the points between two calls
+/// of Part determine the groups there, so samples do not depend on how groups are passed on.
 template <typename Member, typename Sink>
 class QueryBatch {
  public:
@@ -68,12 +68,12 @@ QueryBatch<Member, Sink> CollectPoints(Sink sink) {
   return QueryBatch<Member, Sink>(sink);
 }
 
-/// Number of consecutive segments whose points share a group. With more segments, each point would
-/// visit too many particles that only the other points need.
+/// Most consecutive segments whose points share a group. With more segments, each point would visit
+/// too many particles that only the other points need.
 inline constexpr std::size_t kSegmentsOfGroup = 4;
 static_assert(2 * kSegmentsOfGroup <= kPointsAtOnce, "a segment has two points");
 
-/// The first segment of the group of a segment; both are indices in the ring.
+/// The first segment of a segment's group. Both are indices in the ring.
 constexpr std::size_t BeginOfGroup(std::size_t segment) {
   return segment - segment % kSegmentsOfGroup;
 }

@@ -17,11 +17,11 @@
 namespace partiemc::simplify {
 namespace {
 
-// Side of a block in errors. meshoptimizer sums squared errors as floats in units of the extent,
-// whose rounding exceeds smaller errors. A side of 8,000 errors left three times as many triangles.
+// Side of a block, as a multiple of the error. meshoptimizer sums squared errors as floats in units
+// of the extent, and 8,000 left three times as many triangles, because rounding exceeds the error.
 constexpr double kBlock = 1000;
 
-// In extents. A larger error has the same effect.
+// Largest error, in extents of the block. A larger one has the same effect.
 constexpr double kMostError = 1e30;
 
 double ExtentOf(const Box& box) {
@@ -29,9 +29,9 @@ double ExtentOf(const Box& box) {
   return std::max({size.x, size.y, size.z});
 }
 
-/// Whether meshoptimizer 0.18 would compare too many points with each other. Its hash table of
-/// positions is searched linearly, and a hostile result can have positions with the same hash.
-/// Surfaces have up to 9 pairs per point.
+/// Whether meshoptimizer 0.18 would compare too many points with each other. It searches its hash
+/// table of positions linearly, and a hostile surface can have many positions with one hash. Usual
+/// surfaces have up to 9 pairs per point.
 bool HasManyCollisions(std::span<const float> positions) {
   constexpr std::uint64_t kMostPairs = 256;
   const std::size_t points = positions.size() / 3;
@@ -49,14 +49,14 @@ bool HasManyCollisions(std::span<const float> positions) {
   return pairs > kMostPairs * points;
 }
 
-/// Simplifies triangles of one block. Keeps them if all points coincide, or have the same hash.
-/// Coordinates are relative to its box, so that a block far from the origin loses nothing. Their
-/// rounding influences the choice of points only.
+/// Simplifies the triangles of one block. Keeps them if all points coincide, or if too many have
+/// the same hash. Floats are relative to the block's box, so that a block far from the origin loses
+/// nothing. Their rounding influences the choice of points only.
 void SimplifyBlock(std::span<const double> points, double error,
                    std::vector<std::uint32_t>& triangles) {
   const Box box = BoxOf(points, triangles);
   const double extent = ExtentOf(box);
-  if (extent == 0) return;  // Rounded coordinates.
+  if (extent == 0) return;  // Possible if coordinates are rounded.
   std::vector<std::uint32_t> used = triangles;
   std::sort(used.begin(), used.end());
   used.erase(std::unique(used.begin(), used.end()), used.end());

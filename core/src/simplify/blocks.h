@@ -13,9 +13,9 @@ struct BlockLimits {
 };
 
 /// Collapses edges of `triangles`, triples of indices into `points`. Points on the border of the
-/// triangles stay. Guarantees neither manifold triangles nor their error.
-/// meshoptimizer sums floats relative to the extent of its input. So larger extents are cut into
-/// blocks with fixed borders, and then into other blocks, which hold the borders of the first.
+/// triangles stay. Guarantees neither manifold triangles nor the error.
+/// meshoptimizer sums floats relative to the extent of its input, so a larger input is cut into
+/// blocks. Their borders stay. Then other blocks, moved by half a side, simplify these borders.
 /// Deterministic for any number of threads.
 void SimplifyInBlocks(std::span<const double> points, const BlockLimits& limits,
                       std::vector<std::uint32_t>& triangles);

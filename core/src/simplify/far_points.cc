@@ -11,7 +11,7 @@
 namespace partiemc::simplify {
 namespace {
 
-// Units of WorkLimit.
+// In units of WorkLimit.
 constexpr std::uint64_t kWorkOfPoint = 8;
 
 double SquareToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -21,7 +21,7 @@ double SquareToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return Dot(from, from);
 }
 
-/// The squared distance. Triangles without area have the distance of their sides.
+/// The squared distance of p from a triangle; from the triangle's sides if it has no area.
 double SquareToTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 normal = Cross(b - a, c - a);
   const double square = Dot(normal, normal);
@@ -33,7 +33,7 @@ double SquareToTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3&
   return std::min({SquareToSegment(p, a, b), SquareToSegment(p, b, c), SquareToSegment(p, c, a)});
 }
 
-/// A removed point and its cell. Sorted, the cells of a row are consecutive.
+/// A removed point, and its cell. Sorted, the cells of a row are consecutive.
 struct Removed {
   std::int64_t z, y, x;
   std::uint32_t point;

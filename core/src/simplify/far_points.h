@@ -13,10 +13,10 @@ struct PointRange {
   std::uint32_t first, last;  ///< [first, last).
 };
 
-/// Finds the points of `range` that are farther than `distance` from all triangles. `cell` is a
-/// length about as long as the edges of the surface. Corners of triangles are not far.
-/// Cost: for each triangle, the points near its box; n log n in the points. Counts in `limit`, if
-/// it is given.
+/// Sets `far` to the indices of the points of `range` that are farther than `distance` from all
+/// triangles. `triangles` are triples of indices in `range`. `cell` is about the length of edges
+/// before the simplification. Cost: for each triangle, the points near its box; n log n in the
+/// points. Takes the work from `limit` if there is one, and may throw TooMuchWork.
 void FindFarPoints(std::span<const double> points, PointRange range,
                    std::span<const std::uint32_t> triangles, double distance, double cell,
                    std::vector<std::uint32_t>& far, WorkLimit* limit = nullptr);

@@ -21,13 +21,13 @@
 namespace partiemc {
 namespace {
 
-// The errors from which a number of triangles selects, in spacings. The number of triangles falls
-// about as the error grows, so steps of about 1.4 leave at most a third of the limit unused. With
+// The errors that SimplifyToCount tries, in spacings. The number of triangles is about inversely
+// proportional to the error, so steps of about 1.4 leave at most a third of the limit unused. With
 // larger errors more shells break a guarantee and keep their triangles.
 constexpr std::array kErrors = {.015, .02, .03, .04, .06, .08, .12, .17, .25, .35};
 
-// Bytes of the exact surface, the best level so far and the next level. A point has coordinates, a
-// normal and new indices. Simplification copies the triangles of its surface.
+// Bytes for the exact surface, the best level so far and the next level. A point has coordinates, a
+// normal and new indices. The simplification copies triangles.
 constexpr std::uint64_t kBytesPerPoint = 3 * (24 + 12) + 8, kBytesPerTriangle = 5 * 12 + 16;
 
 absl::Status OutOfRange(std::string field, std::string value, std::string rule) {
@@ -36,11 +36,12 @@ absl::Status OutOfRange(std::string field, std::string value, std::string rule) 
       {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
 }
 
-// Limits for surfaces of unknown origin, for each triangle: the work of the simplification, and the
-// squares of the numbers of triangles at the points.
+// Limits for surfaces of unknown origin, for each triangle: the work of one simplification, and the
+// sum over points of the squared number of their triangles. A surface with fewer than kFewTriangles
+// has the limits of that number.
 constexpr std::uint64_t kMostWork = 1 << 16, kMostDegrees = 1 << 10;
 constexpr std::uint64_t kFewTriangles = 1 << 12;
-// Largest coordinate in spacings.
+// Largest coordinate, in spacings.
 constexpr double kFarthestCoordinate = 0x1p40;
 
 template <typename... Parts>
@@ -52,8 +53,8 @@ std::uint64_t AtLeastFew(const Surface& surface) {
   return std::max<std::uint64_t>(surface.TriangleCount(), kFewTriangles);
 }
 
-// Checks what Simplify requires of a surface with the right indices and sizes: the domain of the
-// exact arithmetic, S1 and S2.
+// Checks coordinates (the domain of exact arithmetic), the numbers of triangles at points, S1, S2
+// and that shells are connected. Requires: indices and sizes as in a Surface.
 absl::Status Check(const Surface& surface, double spacing) {
   if (!(spacing > 0) || !InSpaceDomain(spacing)) {
     return Unfit("the spacing ", ShortestNumber(spacing), " is no length");
@@ -86,7 +87,7 @@ absl::Status Check(const Surface& surface, double spacing) {
   return absl::OkStatus();
 }
 
-// Keeps the measures of the exact surface.
+// Simplifies `surface`, but leaves the measures of the exact surface. `error`: in spacings.
 void SimplifyBy(double error, double spacing, SurfaceOrigin origin, Surface& surface) {
   std::vector<ShellMeasures> exact = surface.measures;
   WorkLimit work(kMostWork * AtLeastFew(surface));
@@ -97,7 +98,8 @@ void SimplifyBy(double error, double spacing, SurfaceOrigin origin, Surface& sur
   surface.measures = std::move(exact);
 }
 
-// Finds the smallest error of kErrors that suffices, by bisection. Returns the error.
+// Simplifies by the smallest error of kErrors that meets the limit, found by bisection; by the
+// largest one if none does. Returns the error.
 double SimplifyToCount(std::uint64_t max_triangles, double spacing, SurfaceOrigin origin,
                        Surface& surface) {
   std::size_t first = 0, last = kErrors.size() - 1;

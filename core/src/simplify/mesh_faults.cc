@@ -11,7 +11,7 @@
 namespace partiemc::simplify {
 namespace {
 
-// Units of WorkLimit. A contact also takes memory, so that its number must be far smaller.
+// In units of WorkLimit. A contact costs more, because it also takes memory.
 constexpr std::uint64_t kWorkOfPair = 32, kWorkOfExact = 1 << 10, kWorkOfContact = 1 << 16;
 
 Triangle TriangleAt(std::span<const std::uint32_t> triangles, std::size_t triangle) {
@@ -24,7 +24,7 @@ Box Intersection(const Box& a, const Box& b) {
       {std::min(a.high.x, b.high.x), std::min(a.high.y, b.high.y), std::min(a.high.z, b.high.z)}};
 }
 
-/// A side of a triangle, and the third corner.
+/// A side of a triangle, and the triangle's third corner.
 struct Side {
   std::uint32_t from, to, third;
 
@@ -33,7 +33,7 @@ struct Side {
   }
 };
 
-/// The sides, sorted.
+/// The sides of all triangles, sorted.
 std::vector<Side> SidesOf(std::span<const std::uint32_t> triangles) {
   std::vector<Side> sides;
   sides.reserve(triangles.size());
@@ -77,7 +77,7 @@ void FindManifoldFaults(std::span<const double> points, std::span<const std::uin
   for (std::size_t first = 0, last = 0; first < sides.size(); first = last) {
     const std::uint32_t point = sides[first].from;
     while (last < sides.size() && sides[last].from == point) ++last;
-    // Turning about the point visits each of its triangles once.
+    // If S2 holds, turning about the point visits each of its triangles once.
     std::size_t visited = 0, side = first;
     do {
       side = find(point, sides[side].third) - sides.begin();
@@ -112,7 +112,7 @@ void FindContacts(std::span<const double> points, std::span<const std::uint32_t>
                   std::span<const std::uint8_t> kinds, TriangleGrid& grid,
                   std::vector<Contact>& contacts, WorkLimit* limit) {
   contacts.clear();
-  std::vector<std::uint32_t> flat;  // Degenerate triangles that are not new. Rare.
+  std::vector<std::uint32_t> flat;  // Degenerate triangles that are not kNew; rare.
   for (std::uint32_t t = 0; t < triangles.size() / 3; ++t) {
     const Triangle corners = TriangleAt(triangles, t);
     if (!AreCollinear(Vec3At(points, corners[0]), Vec3At(points, corners[1]),

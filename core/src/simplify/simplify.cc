@@ -21,20 +21,20 @@
 namespace partiemc::simplify {
 namespace {
 
-// A shell is simplified at most this many times; then it keeps its certified triangles. Each time,
-// the certified triangles near the faults of the last time stay.
+// A shell is simplified at most this many times; then it keeps its certified (given) triangles.
+// Each time, the certified triangles near earlier faults stay.
 constexpr int kMostAttempts = 6;
-// Sizes in spacings: of the cells that mark where triangles stay, and of the margin around a fault,
-// which grows by this much with each attempt.
+// In spacings: the size of the cells that mark where triangles stay, and the margin around a fault,
+// which grows by this with each attempt.
 constexpr double kCell = 2, kMargin = 1;
-// Cells farther from the origin are one.
+// Cell coordinates are clamped to this.
 constexpr double kFarthestCell = 1 << 30;
-// A shell with a fault that reaches more cells keeps its certified triangles.
+// A shell keeps its certified triangles if one of its faults reaches more cells.
 constexpr double kMostCells = 1 << 12;
 // Least side of the blocks in which a shell is simplified, in spacings.
 constexpr double kLeastBlock = 16;
-// Units of WorkLimit: of a triangle in each round, and of a cell where triangles stay. A cell also
-// takes memory, so that the number of cells must be far smaller.
+// In units of WorkLimit: a triangle in each round, and a cell where triangles stay. A cell costs
+// more, because it also takes memory.
 constexpr std::uint64_t kWorkOfTriangle = 64, kWorkOfCell = 1 << 12;
 // A closed surface has at least four triangles.
 constexpr std::size_t kLeastIndices = 12;
@@ -45,9 +45,9 @@ enum class Progress : std::uint8_t {
   kCompared,
 };
 
-/// Simplifies shells, and repeats what breaks a guarantee. Each attempt to simplify a shell is
-/// counted, and a shell without attempts left keeps its certified triangles, which do not touch
-/// each other. So the rounds end.
+/// Simplifies shells, and simplifies those again that break a guarantee. A shell without attempts
+/// left keeps its certified triangles. Certified triangles do not touch each other, so the rounds
+/// end.
 class Simplifier {
  public:
   Simplifier(const SimplifyLimits& limits, const Surface& certified)
@@ -61,7 +61,8 @@ class Simplifier {
         progress_(shells_, Progress::kToSimplify),
         faults_(shells_) {}
 
-  /// Finds triangles that keep the guarantees. Sets points, triangles and offsets of `simplified`.
+  /// Sets points, triangles, offsets and outer_of of `simplified`, so that they keep the
+  /// guarantees.
   SimplifyReport Run(Surface& simplified);
   /// By point of the certified surface: its index among the remaining points, or kNoIndex.
   std::span<const std::uint32_t> NewIndices() const { return new_index_; }
@@ -95,15 +96,15 @@ class Simplifier {
     if (limits_.work != nullptr) limits_.work->Take(work);
   }
 
-  /// Marks the cells near a fault of the shell, which is simplified again.
+  /// Marks the cells near a fault of a shell, and has the next round simplify the shell again.
   void Repeat(std::uint32_t shell, const Box& fault);
-  /// The shell takes its certified triangles.
+  /// Has the next round copy the shell's certified triangles.
   void GiveUp(std::uint32_t shell) {
     attempts_[shell] = kMostAttempts;
     progress_[shell] = Progress::kToSimplify;
   }
 
-  // These return whether they found faults, so that shells are to be simplified again.
+  // These return whether they found faults: then another round follows.
   bool RepeatFaultyShells();
   bool RepeatTouchingShells(const Surface& simplified);
   bool GiveUpMovedShells(const Surface& simplified);
@@ -111,16 +112,16 @@ class Simplifier {
   const SimplifyLimits limits_;
   const Surface& certified_;
   const std::uint32_t shells_;
-  /// Indices of points of the certified surface. The triangles of a shell begin where its certified
-  /// triangles do.
+  /// The current triangles, with indices of the certified surface's points. The triangles of a
+  /// shell begin where its certified triangles do.
   std::vector<std::uint32_t> triangles_;
   std::vector<std::size_t> triangle_count_;  // By shell, as all below.
-  /// The number of triangles that may differ from the certified ones. They are the first ones.
+  /// The number of triangles that may differ from the certified ones. They come first.
   std::vector<std::size_t> changed_count_;
-  std::vector<int> attempts_;
+  std::vector<int> attempts_;  // Above kMostAttempts: the shell has its certified triangles.
   std::vector<Progress> progress_;
   std::vector<std::vector<Box>> faults_;
-  space::BrickDirectory kept_cells_;   // Here the certified triangles stay.
+  space::BrickDirectory kept_cells_;   // Certified triangles with a point in these stay.
   std::vector<std::uint32_t> around_;  // By shell: the certified shell around it.
   std::vector<std::uint32_t> new_index_;
 };
@@ -177,7 +178,7 @@ void Simplifier::FindFaults(std::uint32_t shell) {
     faults.push_back({at, at});
   }
   if (!faults.empty()) return;
-  // The shell must keep its handles, so a removed point takes two triangles with it.
+  // If the shell keeps its handles, each removed point takes two triangles with it.
   const std::size_t removed = (CertifiedOf(shell).size() - triangles.size()) / 3;
   const std::size_t points = range.last - range.first - removed / 2;
   if (removed % 2 != 0 || !IsConnected(triangles, points)) {
@@ -250,7 +251,6 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
     const std::size_t last = simplified.triangle_offsets[shell + 1];
     const bool is_new = progress_[shell] == Progress::kSimplified;
     shell_of.resize(last, shell);
-    // Certified triangles do not touch each other, unless rounding has broken S3. Then they stay.
     kinds.resize(kinds.size() + changed_count_[shell], is_new ? kNew : kChanged);
     kinds.resize(last, is_new ? kKept : kOld);
   }
@@ -265,14 +265,15 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
   for (const Contact& contact : contacts) {
     for (const std::uint32_t triangle : {contact.a, contact.b}) {
       const std::uint32_t shell = shell_of[triangle];
-      // Certified triangles stay as they are: the other triangle is at fault.
+      // A certified shell stays as it is, because the other triangle is at fault.
       if (attempts_[shell] <= kMostAttempts) Repeat(shell, contact.box);
     }
   }
   return !contacts.empty();
 }
 
-/// A shell may have passed another shell without touching it afterwards.
+/// Gives up shells that were turned inside out or have passed another shell, and the shells around
+/// them. A shell that passed another one may not touch it now.
 bool Simplifier::GiveUpMovedShells(const Surface& simplified) {
   if (around_.empty()) around_ = ShellsAround(certified_, limits_.work);
   const std::vector<int> turns = OrientationsOf(simplified);
@@ -315,7 +316,7 @@ SimplifyReport Simplifier::Run(Surface& simplified) {
   return report;
 }
 
-// Keeps the `components` values of each remaining point. `values` may be empty.
+// Removes the values of removed points. Each point has `components` values, or `values` is empty.
 void KeepValues(std::span<const std::uint32_t> new_index, std::size_t components,
                 std::vector<float>& values) {
   if (values.empty()) return;

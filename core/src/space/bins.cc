@@ -31,8 +31,7 @@ std::int64_t Quantised(double cells) {
   return whole - static_cast<std::int64_t>(static_cast<double>(whole) > value);
 }
 
-/// A position in its brick as a number: first the cell, then the fractions, so that keys sort by
-/// cell.
+/// A position in its brick as a number that sorts by cell: first the cell, then the fractions.
 std::uint64_t KeyOf(const std::array<std::int64_t, 3>& at) {
   std::uint64_t key = 0;
   for (int axis = 2; axis >= 0; --axis) {
@@ -55,7 +54,7 @@ float Coordinate(std::uint64_t key, int axis) {
   return static_cast<float>(cell << kFractionBits | fraction) * (1.0f / (1 << kFractionBits));
 }
 
-/// The key by which particles are sorted: the class, its cell, the place in this cell.
+/// The key by which particles are sorted: the class, the cell of the class, the place in this cell.
 std::uint64_t SortKey(std::uint64_t key, std::uint32_t of_class, int shift) {
   constexpr std::uint64_t kInBrick = kBrickSize - 1;
   const std::uint64_t within = (std::uint64_t{1} << shift) - 1;
@@ -116,7 +115,7 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
   return absl::OkStatus();
 }
 
-/// Finds the sizes and the size classes of the particles. Keys receive the class.
+/// Finds the sizes and the size classes of the particles. Adds the class to each key.
 void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   const double world = scale.spacing * scale.cell_size;
   std::vector<float>& size = bins.given_size;
@@ -143,7 +142,7 @@ void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   for (int k = 0; k < kMostClasses; ++k) {
     if (classes[k].most == 0) continue;
     place[k] = bins.classes.size();
-    // Cells that are about as wide as the particles.
+    // Cells are about as wide as the largest particle of the class.
     const double cells = std::log2(double{classes[k].most} * scale.spacing);
     classes[k].shift = std::clamp(static_cast<int>(std::lround(cells)), 0, kBrickShift);
     bins.classes.push_back(classes[k]);
@@ -154,7 +153,7 @@ void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   }
 }
 
-/// Adds the bricks within `reach` of the box around the particles of each brick; with own sizes,
+/// Adds the bricks within `reach` of the box around the particles of each brick. With own sizes,
 /// particles reach farther by (size - 1) kernel radii. Returns false if there are more than `most`.
 bool AddReachedBricks(double reach, float kernel_radius, std::size_t most, SpaceBins& bins) {
   const std::size_t homes = bins.bricks.size();
@@ -189,8 +188,8 @@ bool AddReachedBricks(double reach, float kernel_radius, std::size_t most, Space
   return true;
 }
 
-/// Compares the attributes of two particles at one position, so that sums over their values do not
-/// depend on the order of the frame.
+/// Compares the attributes of two particles at one position. Their order then decides the order of
+/// sums, which does not depend on the order of the frame.
 bool HasLessAttributes(const Frame& frame, std::size_t a, std::size_t b) {
   for (const Attribute& attribute : frame.attributes) {
     const auto count = static_cast<std::size_t>(attribute.components);
@@ -211,7 +210,7 @@ class BrickCells {
     }
   }
 
-  /// The first cell of a class, and the number of cells for the index after the last class.
+  /// The first cell of a class. For the number of classes: the number of all cells.
   int FirstOf(std::size_t of_class) const { return first_[of_class]; }
 
   /// The cell of a particle, by the key by which particles are sorted.
@@ -228,7 +227,7 @@ class BrickCells {
 };
 
 /// Sorts the particles of a brick, [first, last) of `sorted`, and finds the first particle of each
-/// cell: counts the particles of each cell, moves them there, and sorts each cell.
+/// cell. Counts the particles of each cell, moves them there, and sorts each cell.
 void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBins& bins,
                std::uint32_t brick) {
   const auto before = [&](const SpaceBins::Keyed& a, const SpaceBins::Keyed& b) {
@@ -247,7 +246,7 @@ void SortBrick(const Frame& frame, std::size_t first, std::size_t last, SpaceBin
   const BrickCells cells(bins.classes);
   const int count = cells.FirstOf(bins.classes.size());
   std::vector<SpaceBins::Keyed>& sorted = bins.sorted;
-  // By cell: the first particle that is not in its place, and the end.
+  // By cell: its first particle that is not in its place yet, and its end.
   std::array<std::uint32_t, kMostClasses * kBrickNodes> next, end;
   std::fill_n(end.begin(), count, 0u);
   for (std::size_t p = first; p < last; ++p) ++end[cells.CellOf(sorted[p].key)];
@@ -303,8 +302,8 @@ absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimit
       [&](auto positions) { return FindHomes(positions, scale, limits.max_tiles, bins); },
       frame.positions);
   if (!status.ok()) return status;
-  // Inside nodes are within the kernel radius of a particle, and the other corners of their cells
-  // at most one cell farther. 1/64 of a cell is for the rounding of positions.
+  // Inside nodes are within the kernel radius of a particle. The other corners of their cells are
+  // at most one cell farther along each axis. 1/64 of a cell is for the rounding of positions.
   constexpr double kMargin = 1 + 1.0 / 64;
   if (scale.has_own_sizes) FindClasses(frame, scale, bins);
   if (!AddReachedBricks(scale.kernel_radius + kMargin, static_cast<float>(scale.kernel_radius),

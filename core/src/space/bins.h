@@ -1,7 +1,7 @@
 // Stage 1: sorts the particles of a frame in space into cells.
 //
-// The order of the particles is a function of their positions and weights only, so that results
-// have the same bits for any order of the frame.
+// The order of the particles in the bins follows from their positions, volumes and attributes. So
+// results have the same bits for any order of the particles in the frame.
 #pragma once
 
 #include <array>
@@ -18,44 +18,46 @@ namespace partiemc::space {
 
 inline constexpr std::size_t kBinPadding = 8;
 
-/// Particles of similar sizes. They are sorted into cells of 2^shift lattice cells.
+/// Particles of similar sizes. They are sorted into cells with a side of 2^shift lattice cells.
 struct SizeClass {
   float most = 1;  ///< The largest size of its particles, in spacings.
   int shift = 0;   ///< At most kBrickShift.
 };
 
-/// Own sizes are divided into classes of this ratio. A walk over the particles near a point has the
-/// reach of the largest particle of a class, so smaller ratios find fewer particles in vain, but
-/// more classes have more rows of cells.
+/// Ratio of the largest and the smallest size in a class. A search near a point uses the reach of
+/// the largest particle of each class. With a smaller ratio it finds fewer particles that do not
+/// reach the point, but visits more rows of cells.
 inline constexpr float kClassRatio = 2;
-/// Most classes: sizes differ at most by the square of ReconstructionParameters::kMostSizeRatio.
+/// Enough, because sizes differ at most by the square of ReconstructionParameters::kMostSizeRatio.
 inline constexpr int kMostClasses = 8;
 
 /// Particles by brick, size class, cell (layer, row, column), position and weight. Positions are in
 /// cells relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
-  /// Of the particles of this frame, largest first; one for equal sizes.
+  /// Classes with particles in this frame, largest sizes first; one class for equal sizes.
   std::vector<SizeClass> classes{SizeClass{}};
-  /// Per brick and class: the first particle of each cell, then the end of the last cell.
+  /// By brick and class: the first particle of each cell, then the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   /// kBinPadding values follow the last particle, so that vectors may read beyond it.
   std::vector<float> x, y, z;
-  std::vector<float> weight;          ///< Empty if uniform; else padded, too.
+  std::vector<float> weight;          ///< Padded; empty if the frame has no volumes, or own sizes.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
-  /// Particles of the frame from this index on are mirror images behind walls, or copies beyond the
-  /// faces of a periodic box. They count for F, but are not particles of a body.
+  /// Images: particles of the frame from this index on, which are mirror images behind walls or
+  /// copies beyond the faces of a periodic box. They count for F, but not as particles of a body.
+  /// kNoIndex: no images.
   std::uint32_t first_image = kNoIndex;
-  bool are_images_mirrored = true;  ///< False for copies: their attributes count.
+  bool are_images_mirrored = true;  ///< Attributes of mirror images are ignored, of copies used.
 
   bool IsImage(std::uint32_t particle) const { return source[particle] >= first_image; }
 
   struct Keyed {
-    std::uint64_t key;  // Cell and fractions: the whole position.
+    std::uint64_t key;  // Class, cell and place in the cell.
     std::uint32_t source;
   };
-  /// The bounding box of the particles of a home brick, a brick with particles.
+  /// A box around the particles of a home brick, which is a brick with particles. In cells from the
+  /// brick. With own sizes, it is wider by (size - 1) kernel radii around each particle.
   struct Box {
     std::array<float, 3> low{8, 8, 8}, high{0, 0, 0};
   };
@@ -69,22 +71,21 @@ struct SpaceBins {
 
   void Clear();
 
-  /// The particles of a brick are [FirstOf, EndOf).
+  /// The indices of the particles of a brick are [FirstOf, EndOf).
   std::uint32_t FirstOf(std::size_t brick) const { return cells[brick * classes.size()].front(); }
   std::uint32_t EndOf(std::size_t brick) const {
     return cells[(brick + 1) * classes.size() - 1].back();
   }
 };
 
-/// Finds the bricks of a frame: they exist where a node is at most the kernel radius plus one cell
-/// away from a particle. Sorts no particle yet, but finds their size classes. Requires: CheckFrame
-/// has passed the frame as for a slice, with three components.
-/// Errors with a Violation: INVALID_ARGUMENT for positions beyond 2^30 cells from the origin;
-/// RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
+/// Finds the bricks and the size classes of a frame. A brick exists if one of its nodes may be
+/// within the kernel radius plus one cell of a particle. Requires: CheckFrame has passed the frame
+/// as for a slice, with three components. Errors with a Violation: INVALID_ARGUMENT for coordinates
+/// beyond 2^30 cells; RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
 absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
                         SpaceBins& bins);
 
-/// Sorts the particles. Requires: FindBricks.
+/// Sorts the particles into cells. Requires: FindBricks for the same frame.
 void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);
 
 /// Calls FindBricks, then SortParticles.

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
 
-/// The nodes of `inside` that are connected to `seed`.
+/// The nodes of `inside`, the inside nodes of a brick, that are connected to `seed` in this brick.
 BrickBits Connected(const BrickBits& inside, const BrickBits& seed) {
   BrickBits found = seed;
   for (bool has_grown = true; has_grown;) {
@@ -47,7 +47,7 @@ void SplitBrick(const BrickBits& inside, std::uint32_t brick, std::vector<Bodies
   }
 }
 
-/// Whether parts of a brick and of the next brick along an axis are connected.
+/// Whether part `low` of a brick and part `high` of the next brick along `axis` are connected.
 bool AreJoined(const BrickBits& low, const BrickBits& high, int axis) {
   if (axis == 2) return (low[kBrickSize - 1] & high[0]) != 0;
   for (int k = 0; k < kBrickSize; ++k) {
@@ -139,8 +139,7 @@ BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::ui
   return nearest;
 }
 
-/// The body of all parts of a brick and of the bricks around it; kNoIndex if they have several or
-/// none.
+/// The only body in a brick and the bricks around it; kNoIndex if there are several or none.
 std::uint32_t OnlyBodyAround(const BrickDirectory& bricks, const Bodies& bodies,
                              std::uint32_t brick) {
   std::uint32_t only = kNoIndex;
@@ -155,8 +154,8 @@ std::uint32_t OnlyBodyAround(const BrickDirectory& bricks, const Bodies& bodies,
   return only;
 }
 
-/// The body of the inside node nearest to a particle; kNoIndex if no inside node is near. `only`:
-/// OnlyBodyAround of the brick.
+/// The body of a particle (FindBodies); kNoIndex if no inside node is near. `only`: OnlyBodyAround
+/// of the brick.
 std::uint32_t BodyOfParticle(const SpaceBins& bins, const SpaceField& field, const Bodies& bodies,
                              std::uint32_t brick, std::uint32_t only, std::uint32_t particle) {
   if (only != kNoIndex) {

@@ -1,4 +1,5 @@
-// Visits the nodes or cells of a brick in small blocks, which share the particles around them.
+// Visits the nodes or cells of a brick in small blocks. The particles around a block can then be
+// collected once.
 #pragma once
 
 #include <bit>
@@ -8,8 +9,9 @@
 
 namespace partiemc::space {
 
-/// Calls visit(i, j, k) for each marked node or cell of a brick, in blocks of 2 x 2 x 2, part by
-/// part of 4 x 4 x 4. Before each block, calls move_to(i, j, k) with the lowest place of the block.
+/// Calls visit(i, j, k) for each marked node or cell of a brick, in blocks of 2 x 2 x 2. Finishes
+/// each part of 4 x 4 x 4 before the next part. Before each block with marks, calls move_to(i, j,
+/// k) with the lowest place of the block.
 template <typename MoveTo, typename Visit>
 void ForEachInBlocks(const BrickBits& marked, MoveTo move_to, Visit visit) {
   constexpr int kBlocks = 64;

@@ -1,4 +1,4 @@
-// Layers of the bits of a brick, with the bits directly around the brick.
+// Reads layers of the bits of a brick and of the nodes or cells directly around it.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ namespace partiemc::space {
 inline constexpr std::uint64_t kFirstColumnOfLayer = 0x0101010101010101;
 inline constexpr std::uint64_t kLastColumnOfLayer = 0x8080808080808080;
 
-/// The bits of a brick and directly around it. Bits of bricks that do not exist are 0.
+/// Keeps references to its arguments. Bits of bricks that do not exist are 0.
 class BrickLayers {
  public:
   /// `bits` by brick.
   BrickLayers(const BrickDirectory& bricks, const std::vector<BrickBits>& bits, std::uint32_t brick)
       : bricks_(bricks), bits_(bits), brick_(brick) {}
 
-  /// Layer k, -1 <= k <= 8, shifted: bit 8 j + i of the result is the bit of (i + dx, j + dy), -1
-  /// <= dx, dy <= 1.
+  /// Layer k, shifted: bit 8 j + i of the result is the bit of (i + dx, j + dy, k). Requires: k in
+  /// [-1, 8], dx and dy in [-1, 1].
   std::uint64_t operator()(int k, int dx, int dy) const {
     if (dx == 0) return Rows(k, 0, dy);
     const std::uint64_t here = Rows(k, 0, dy), beside = Rows(k, dx, dy);
@@ -28,7 +28,7 @@ class BrickLayers {
   }
 
  private:
-  /// Layer k of the bricks in column `bx`, with rows shifted by dy.
+  /// Layer k of the bricks at `bx` bricks along x, with rows shifted by dy.
   std::uint64_t Rows(int k, int bx, int dy) const {
     const std::uint64_t here = Word(bx, 0, k);
     if (dy == 0) return here;

@@ -6,7 +6,7 @@ namespace partiemc::space {
 namespace {
 
 constexpr CellLoops Trace(unsigned corners) {
-  // By crossing: the crossing at the end of the curve that starts here, and the face of this curve.
+  // By edge of a crossing where a curve starts: the edge where the curve ends, and its face.
   constexpr int kNone = -1;
   std::array<int, kMostCrossings> next{}, face_of{};
   next.fill(kNone);
@@ -55,7 +55,7 @@ bool ShareFace(int a, int b) {
   return false;
 }
 
-/// Triangulates the polygon of the steps [first, last] of a loop, which has a side from last to
+/// Triangulates the polygon of the steps [first, last] of a loop, closed by a side from last to
 /// first. Returns false if every triangulation has a diagonal on a face.
 bool Triangulate(const CellLoops& loops, int base, int size, int first, int last,
                  LoopTriangles& triangles) {
@@ -99,7 +99,7 @@ const std::array<CaseTriangles, 256>& TheTriangles() {
 
 }  // namespace
 
-// Known when the program starts, so that no call has to check whether the table exists.
+// Initialised at compile time, so that no call has to check whether the table exists.
 constinit const std::array<CellLoops, 256> kCellLoops = [] {
   std::array<CellLoops, 256> table;
   for (unsigned corners = 0; corners < 256; ++corners) table[corners] = Trace(corners);

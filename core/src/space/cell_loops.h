@@ -1,4 +1,4 @@
-// The loops of crossings in a cell, by the sides of its corners.
+// The loops of crossings in a cell, for each of the 256 cases of inside and outside corners.
 //
 // Corner c lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge 4 a + u + 2 v runs along axis a; u and v
 // are its coordinates along the axes a + 1 and a + 2. Face 2 a + s is perpendicular to axis a at
@@ -17,8 +17,8 @@ namespace partiemc::space {
 inline constexpr int kMostCrossings = 12;
 inline constexpr int kMostLoops = 4;
 
-/// The loops of one case. Steps are listed loop by loop: step n runs from crossing `edge[n]` on the
-/// face `face[n]` to the crossing of the next step of the loop.
+/// The loops of one case, as steps, loop by loop. Step n is the curve on the face `face[n]` from
+/// the crossing of `edge[n]` to the crossing of the next step of its loop.
 struct CellLoops {
   std::uint8_t loops = 0;
   std::array<std::uint8_t, kMostLoops + 1> first{};  ///< Loop m has steps [first[m], first[m + 1]).
@@ -41,17 +41,17 @@ extern const std::array<CellLoops, 256> kCellLoops;
 /// The loops of the case whose bit c is set if corner c is inside.
 inline const CellLoops& LoopsOf(unsigned corners) { return kCellLoops[corners]; }
 
-/// Triangles between the crossings of one loop, without a diagonal on a face of the cell. Corners
-/// are indices of steps, relative to the first step of the loop.
+/// Triangles between the crossings of one loop. No diagonal lies on a face of the cell. Corners are
+/// indices of steps, relative to the first step of the loop.
 struct LoopTriangles {
   std::uint8_t count = 0;
   std::array<std::array<std::uint8_t, 3>, kMostCrossings - 2> corners{};
 };
 
-/// The triangles of marching cubes for a loop of a case.
+/// The triangles of marching cubes for a loop of up to six crossings of a case.
 const LoopTriangles& TrianglesOf(unsigned corners, int loop);
 
-/// The lower corner of an edge, and its axis.
+/// The axis of an edge and its lower corner; EdgeAt returns the edge that has both.
 constexpr int AxisOfEdge(int edge) { return edge / 4; }
 constexpr int LowCornerOfEdge(int edge) {
   const int axis = edge / 4;

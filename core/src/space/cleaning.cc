@@ -23,7 +23,7 @@ constexpr std::array<std::array<int, 3>, 9> kBefore = {{{-1, 0, 0},
                                                         {0, -1, -1},
                                                         {0, 1, -1}}};
 
-/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has at least one.
+/// Finds the outside nodes whose earlier neighbours are all inside. Each cavity has one at least.
 void FindFirstNodes(const BrickDirectory& bricks, const SpaceField& field,
                     std::vector<BrickBits>& first_nodes) {
   first_nodes.resize(bricks.size());
@@ -37,8 +37,8 @@ void FindFirstNodes(const BrickDirectory& bricks, const SpaceField& field,
   });
 }
 
-/// Whether the outside nodes connected to `first` are an enclosed cavity of at most `most` nodes.
-/// Lists its nodes.
+/// Whether the outside nodes connected to `first` are a cavity of at most `most` nodes. Lists the
+/// nodes in `cavity`, not all of them if the result is false.
 bool FindCavity(const BrickDirectory& bricks, const SpaceField& field, const BrickPlace& first,
                 std::size_t most, std::vector<BrickPlace>& cavity) {
   cavity.assign(1, first);

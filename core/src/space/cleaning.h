@@ -1,9 +1,9 @@
-// Cleaning: changes the sides of nodes before the surface is made.
+// Cleaning: makes nodes inside or outside before the crossings are found.
 //
 // Outside nodes are connected along lattice edges and diagonals of faces, because the surface
 // separates the inside corners of an ambiguous face (cell_loops.h). A cavity is a connected set of
-// outside nodes that inside nodes enclose. Values of F stay as they are, because no edge of a
-// changed node is crossed afterwards.
+// outside nodes that inside nodes enclose. Only `SpaceField::inside` changes. Values of F stay,
+// because no edge of a changed node is crossed afterwards.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +21,15 @@ struct CleaningScratch {
   std::vector<std::uint32_t> new_index;  ///< By body: its new index, or kNoIndex.
 };
 
-/// Fills the cavities of at most `most_nodes` nodes: makes their nodes inside. Returns the number
-/// of filled cavities. Cost: linear in bricks, with words of 64 nodes.
+/// Makes the nodes of all cavities of at most `most_nodes` nodes inside. Returns the number of
+/// these cavities. Cost: linear in bricks, plus the square of `most_nodes` for each outside node
+/// whose neighbours earlier by layer, row and column are all inside.
 std::uint64_t FillCavities(const BrickDirectory& bricks, std::size_t most_nodes,
                            CleaningScratch& scratch, SpaceField& field);
 
 struct BodyLimits {
   bool drops_empty = false;  ///< Drops bodies without particles.
-  double least_volume = 0;   ///< Least volume of its particles, world units cubed.
+  double least_volume = 0;   ///< Least Body::volume of a body that stays.
   std::uint64_t least_particles = 0;
 };
 
@@ -36,10 +37,10 @@ struct DroppedBodies {
   std::uint64_t empty = 0, spray = 0;
 };
 
-/// Removes the bodies below the limits, images with the fate kGone, and bodies that have mirror
-/// images only, and makes their nodes outside. Only the bodies below the limits count, several
-/// images of a body as one. The other bodies keep their order and their particles. For a body, the
-/// particles of bodies in its cavities do not count.
+/// Removes the bodies below the limits, bodies with the fate kGone, and bodies of images only, and
+/// makes their nodes outside. The result counts the bodies below the limits, several images of a
+/// body as one. The other bodies keep their order and particles. Particles of a body in a cavity do
+/// not count for the body around it.
 DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bodies& bodies,
                          SpaceField& field);
 

@@ -55,7 +55,8 @@ std::uint32_t SumUp(std::size_t count, CountOf count_of) {
   return total;
 }
 
-/// Writes the cells of a brick; sets `loops` to the number of their loops.
+/// Writes the active cells of a brick; sets `loops` to the number of their loops. Each `first_loop`
+/// counts from the first loop of the brick.
 void FillCells(const BrickDirectory& bricks, const SpaceField& field, std::uint32_t brick,
                SpaceCrossings& crossings, std::uint32_t& loops) {
   const SpaceCrossings::Brick& at = crossings.bricks[brick];

@@ -1,7 +1,7 @@
-// Stage 3: finds the crossed edges and the active cells, and the loops of crossings in them.
+// Stage 3: finds the crossed edges, the active cells (with crossed edges) and their loops.
 //
-// Vertices: one on each crossed edge, numbered by brick, axis, layer, row, column; after them one
-// for each loop of a cell, by cell and loop.
+// Each crossed edge has a vertex. These vertices are numbered by brick, axis, layer, row, column.
+// After them come the vertices in cells, one for each loop, by cell and loop.
 #pragma once
 
 #include <array>
@@ -19,12 +19,12 @@ namespace partiemc::space {
 struct ActiveCell {
   std::uint32_t brick = 0;
   std::uint8_t i = 0, j = 0, k = 0;
-  std::uint8_t corners = 0;      ///< The case.
+  std::uint8_t corners = 0;      ///< Bit c is set if corner c is inside.
   std::uint32_t first_loop = 0;  ///< The vertex of its first loop.
 };
 
 struct SpaceCrossings {
-  /// A brick's crossed edges by axis and layer, each at its lower node, and active cells.
+  /// Crossed edges of a brick, by axis and layer, as bits at their lower nodes; active cells.
   struct Brick {
     std::array<BrickBits, 3> crossed{};
     BrickBits active{};
@@ -40,12 +40,12 @@ struct SpaceCrossings {
   std::vector<std::uint32_t> first_step;  ///< By loop: its first step; then the number of steps.
   std::vector<std::uint32_t> step_edges;  ///< By step: the vertex on its crossed edge.
 
-  std::vector<BrickBits> near;            ///< Nodes of crossed edges.
+  std::vector<BrickBits> near;            ///< By brick: the nodes at the ends of crossed edges.
   std::vector<std::uint32_t> loop_first;  ///< Scratch: by brick.
 
   std::uint32_t VertexCount() const { return edge_count + loop_count; }
 
-  /// The first step of a cell; the others follow in the order of CellLoops.
+  /// The first step of a cell. Its other steps follow in the order of CellLoops.
   std::uint32_t FirstStepOf(const ActiveCell& cell) const {
     return first_step[cell.first_loop - edge_count];
   }
@@ -70,17 +70,15 @@ struct SpaceCrossings {
   }
 };
 
-/// Finds the crossed edges, the active cells and their loops. Deterministic, parallel over bricks:
-/// count, sum, fill. Cost: linear in nodes.
+/// Finds all but the steps. Deterministic, parallel over bricks. Cost: linear in nodes.
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings);
 
-/// Lists the steps of all loops. Requires: FindCrossings has found the loops. The stages after the
-/// field require it. Apart from FindCrossings, so that its memory is reserved first. Cost: linear
-/// in cells.
+/// Lists the steps of all loops. Requires: FindCrossings. A separate function, so that the memory
+/// of the counted loops can be reserved first. Cost: linear in cells.
 void ListSteps(const BrickDirectory& bricks, SpaceCrossings& crossings);
 
-/// The vertex on an edge of a cell.
+/// The vertex on an edge of a cell. Requires: the edge is crossed.
 inline std::uint32_t EdgeVertexOf(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                   const ActiveCell& cell, int edge) {
   const int corner = LowCornerOfEdge(edge);

@@ -14,10 +14,10 @@
 namespace partiemc::space {
 namespace {
 
-/// Rows for the boxes of blocks.
+/// Rows near BoxOfBlock.
 NearRows RowsOf(const Scale& scale) { return {1, static_cast<float>(scale.kernel_radius)}; }
 
-/// Rows for blocks, and for all nodes of a brick.
+/// Rows near BoxOfBlock, and near the box of all nodes of a brick.
 struct FieldRows {
   NearRows block, brick;
 
@@ -42,7 +42,7 @@ void EvaluateBrick(const SpaceBins& bins, const Scale& scale, std::uint32_t bric
       });
 }
 
-/// Sums the density at the nodes of a brick.
+/// Sums the density at the nodes of a brick, without the uniform weight.
 void SumDensity(const SpaceBins& bins, const Scale& scale, const NearRows& rows,
                 std::uint32_t brick, std::array<float, kBrickNodes>& density) {
   const auto radius = static_cast<float>(scale.kernel_radius);
@@ -113,8 +113,8 @@ void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<
     }
     if (any == 0) return;
     EvaluateBrick(bins, scale, brick, rows, missing, field);
-    // The density sum of SampleBrick decided the side. At f_0 and f_1, the sums here may differ
-    // from it by rounding, so values are adapted to the sides.
+    // The density of SampleBrick decided whether a node is inside. At f_0 and f_1, rounding may
+    // give F another sign here. F is then set to 0 outside, and to just below 0 inside.
     for (int layer = 0; layer < kBrickSize; ++layer) {
       for (std::uint64_t bits = missing[layer]; bits != 0; bits &= bits - 1) {
         const int bit = std::countr_zero(bits);

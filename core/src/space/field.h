@@ -11,10 +11,10 @@
 namespace partiemc::space {
 
 struct SpaceField {
-  /// F by brick, layer, row, column. Where `exact` is not set, only the sign of F is right.
+  /// F in cells, by brick, layer, row, column. Only the sign is right unless `exact` is set.
   std::vector<std::array<float, kBrickNodes>> values;
-  std::vector<BrickBits> inside;  ///< The nodes with F < 0.
-  std::vector<BrickBits> exact;
+  std::vector<BrickBits> inside;  ///< The nodes with F < 0; then changed by cleaning.
+  std::vector<BrickBits> exact;   ///< The nodes where `values` is F.
 
   /// F at a node that exists.
   float At(const BrickPlace& node) const { return values[node.brick][node.Index()]; }
@@ -23,12 +23,12 @@ struct SpaceField {
   }
 };
 
-/// Finds the sides of all nodes, by F where the density does not decide the side. Parallel over
+/// Finds which nodes are inside: by the density where it decides this, else by F. Parallel over
 /// bricks. Cost: linear in particles and nodes, and in the kernels of the nodes near the surface.
 void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field);
 
-/// Evaluates F at `nodes` of each brick, unless F is exact there. Nodes stay inside or outside as
-/// before.
+/// Evaluates F at the nodes among `nodes`, by brick, where F is not exact yet. Nodes stay inside or
+/// outside as before.
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field);
 

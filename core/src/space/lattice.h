@@ -1,8 +1,8 @@
 // The lattice in space: fixed in world coordinates, sparse, in bricks of 8 x 8 x 8 nodes.
 //
-// Node (i, j, k) lies at (i, j, k) * cell_size in world coordinates. Brick (x, y, z) owns the nodes
-// from (8 x, 8 y, 8 z) on and the cells whose lowest node it owns. A layer of a brick is a 64-bit
-// word: bit 8 j + i is node or cell (i, j) of that layer.
+// Node (i, j, k) lies at (i, j, k) * cell_size in world coordinates. Brick (x, y, z) owns the 8 x 8
+// x 8 nodes from (8 x, 8 y, 8 z) on and the cells whose lowest node it owns. Layer k of a brick is
+// a 64-bit word: bit 8 j + i is node or cell (i, j, k) of the brick.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ struct BrickCoordinate {
   friend auto operator<=>(const BrickCoordinate&, const BrickCoordinate&) = default;
 };
 
-/// Neighbours of a brick at index ((dz + 1) * 3 + dy + 1) * 3 + dx + 1; kNoIndex if there is none.
-/// Nodes of bricks that do not exist are outside.
+/// The neighbour of a brick at distance (dx, dy, dz) has index ((dz + 1) * 3 + dy + 1) * 3 + dx +
+/// 1; kNoIndex if it does not exist. Nodes of bricks that do not exist are outside.
 using BrickNeighbours = std::array<std::uint32_t, 27>;
 
 /// The bricks of a frame, sorted, with their neighbours.
@@ -49,7 +49,7 @@ class BrickDirectory {
   const BrickCoordinate& operator[](std::size_t brick) const { return bricks_[brick]; }
   const BrickNeighbours& neighbours(std::size_t brick) const { return neighbours_[brick]; }
 
-  /// Index of a brick, or kNoIndex.
+  /// The index of a brick, or kNoIndex.
   std::uint32_t Find(BrickCoordinate brick) const;
 
   /// The brick at a distance of (dx, dy, dz) bricks from `brick`, or kNoIndex.
@@ -74,8 +74,8 @@ struct BrickPlace {
   int Bit() const { return j * kBrickSize + i; }
 };
 
-/// Finds the brick that owns the node or cell (i, j, k), given relative to `brick`, -8 <= i, j, k <
-/// 16, and its place there. The owner is kNoIndex if that brick does not exist.
+/// The place of the node or cell (i, j, k), which is relative to `brick`, in the brick that owns
+/// it; kNoIndex if that brick does not exist. Requires: -8 <= i, j, k < 16.
 inline BrickPlace Normalise(const BrickDirectory& directory, std::uint32_t brick, int i, int j,
                             int k) {
   const int dx = i >> kBrickShift, dy = j >> kBrickShift, dz = k >> kBrickShift;
@@ -85,7 +85,7 @@ inline BrickPlace Normalise(const BrickDirectory& directory, std::uint32_t brick
   return {owner, i & (kBrickSize - 1), j & (kBrickSize - 1), k & (kBrickSize - 1)};
 }
 
-/// As partiemc::CountBits.
+/// As partiemc::CountBits, for 64 bits.
 constexpr int CountBits(std::uint64_t bits) {
   bits -= bits >> 1 & 0x5555555555555555;
   bits = (bits & 0x3333333333333333) + (bits >> 2 & 0x3333333333333333);

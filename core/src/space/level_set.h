@@ -43,8 +43,9 @@ inline double LargestEigenvalue(const Symmetric& a) {
   return q + p * (1 + s);
 }
 
-/// A unit eigenvector of an eigenvalue: the longest product of two rows of A - value I. 0 if the
-/// eigenvalue is triple or nearly double.
+/// A unit eigenvector of the eigenvalue `value`: the longest cross product of two rows of A - value
+/// I. 0 if all products are 0, as for a triple eigenvalue. Inaccurate if another eigenvalue is
+/// nearly the same.
 inline Vec3 Eigenvector(const Symmetric& a, double value) {
   const Vec3 rows[3] = {
       {a.xx - value, a.xy, a.xz}, {a.xy, a.yy - value, a.yz}, {a.xz, a.yz, a.zz - value}};
@@ -56,28 +57,27 @@ inline Vec3 Eigenvector(const Symmetric& a, double value) {
   return Normalised(longest);
 }
 
-/// Sums over the particles around a point x, with D = (x_i - x) / s_i. s_i is the own size of a
-/// particle in spacings, 1 for equal sizes.
+/// Sums over the particles i around a point x, with D = (x_i - x) / s, k = max(0, 1 - |D|^2 /
+/// R^2)^3 and the weight w. s is the own size of a particle in spacings, 1 for equal sizes.
 struct Sums {
   double kernel = 0;   ///< sum k
   double density = 0;  ///< f = sum w k
   Vec3 first;          ///< sum k D
   Symmetric second;    ///< sum k D D^T
-  double size = 1;     ///< The local size sum k s / sum k.
+  double size = 1;     ///< The local size (sum k s) / (sum k).
 };
 
-/// Sums for the gradients of Sums, for the same particles. With t = 1 - |D|^2 / R^2: grad k = 6 t^2
-/// D / (R^2 s).
+/// Sums for the gradients of Sums. With t = max(0, 1 - |D|^2 / R^2), grad k = 6 t^2 D / (R^2 s).
 struct Slopes {
   Vec3 first;           ///< sum t^2 D / s
   Symmetric second;     ///< sum t^2 D D^T / s
   Vec3 density;         ///< sum w t^2 D / s
-  double per_size = 1;  ///< sum k / s / sum k
+  double per_size = 1;  ///< (sum k / s) / (sum k)
 };
 
 enum class Term { kPhi, kGuard, kGap, kSaturation };
 
-/// F at a point, in cells, and the term that determines F there.
+/// F at a point, in cells, and the term of F that has this value.
 struct LevelSetAt {
   double value;
   Term term;
@@ -87,7 +87,7 @@ inline double SpreadOf(const Sums& sums, const Scale& scale) {
   return LargestEigenvalue(sums.second) / (scale.kernel_radius * scale.kernel_radius * sums.kernel);
 }
 
-/// Whether the gap term of F is surely below `value`. Saves most eigenvalues near surfaces: with
+/// True only if the gap term of F is below `value`. Saves most eigenvalues near surfaces: in
 /// the notation of LargestEigenvalue, the eigenvalue is at most q + 2 p.
 inline bool IsGapBelow(const Sums& sums, const Scale& scale, double value) {
   // Above the error of LargestEigenvalue and all rounding.
@@ -117,8 +117,8 @@ inline LevelSetAt LevelSetOf(const Sums& sums, const Scale& scale) {
   return at;
 }
 
-/// grad phi = grad m n - n sum k / s / sum k with m = sum k D / sum k, n = m / |m|; without the
-/// local size.
+/// The gradient of phi = |m| - r_0, m = (sum k D) / (sum k), without the factor of the local size;
+/// 0 if m is 0. With n = m / |m|: (sum (D . n) grad k - |m| sum grad k) / (sum k) - per_size n.
 inline Vec3 GradientOfPhi(const Sums& sums, const Slopes& slopes, const Scale& scale) {
   const double length = Length(sums.first);
   if (length == 0) return {};

@@ -5,8 +5,8 @@
 namespace partiemc::space {
 namespace {
 
-// Longer loops of marching cubes get a vertex in their middle, because their triangles could
-// intersect without it.
+// Triangles between the crossings of a longer loop could intersect, so marching cubes uses the
+// vertex in its middle.
 constexpr int kLongestFlatLoop = 6;
 
 std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t vertex) {
@@ -83,8 +83,7 @@ void CopyTriangles(std::uint32_t shells, MeshScratch& scratch, Surface& surface)
   }
 }
 
-/// Sets outer_of. The shell below the lowest node of a body is its outer shell; the other shells of
-/// the body are cavities.
+/// Sets `surface.outer_of`, the particles of outer shells and `scratch.body_of_shell`.
 void NestShells(const MeshInput& input, std::uint32_t shells, MeshScratch& scratch,
                 Surface& surface) {
   const SpaceCrossings& crossings = input.crossings;

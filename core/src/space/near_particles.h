@@ -1,4 +1,4 @@
-// Walks over the particles near a box.
+// Finds the particles near a box.
 #pragma once
 
 #include <algorithm>
@@ -17,15 +17,15 @@ struct NearBox {
   std::array<float, 3> low, high;
 };
 
-/// The particles that lie in a row of cells: indices [first, last) of the bins, and the shift to
-/// add to their coordinates.
+/// Particles [first, last) of the bins, which lie in a row of cells. The shift added to their
+/// coordinates makes them relative to the brick of the box.
 struct NearRun {
   std::uint32_t first, last;
   float shift_x, shift_y, shift_z;
 };
 
-/// A block of particles, in cells relative to a brick. Dummies that are too far away to count fill
-/// the block up to a multiple of kLanes.
+/// A block of particles, in cells relative to a brick. Pad adds dummies up to a multiple of kLanes;
+/// they are too far away to count.
 struct NearBlock {
   static constexpr int kCapacity = 1024;
   static constexpr int kLanes = 8;
@@ -35,14 +35,14 @@ struct NearBlock {
   static_assert(kLanes <= kBinPadding);
 
   alignas(64) PerParticle<float> x, y, z;
-  alignas(64) PerParticle<float> weight;    ///< Unset if uniform; the size with own sizes.
+  alignas(64) PerParticle<float> weight;    ///< With own sizes the size. Unset if uniform.
   alignas(64) PerParticle<float> per_size;  ///< 1 / size; unset without own sizes.
-  int count = 0;
+  int count = 0;                            ///< Without dummies.
   bool has_sizes = false;
-  bool has_weights = true;  ///< Not uniform.
+  bool has_weights = true;  ///< Ignored with own sizes.
 
-  /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Vectors
-  /// also copy what follows them in the bins, which counts for nothing.
+  /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Always
+  /// copies kLanes values; the next Append or Pad overwrites those beyond `count`.
   std::uint32_t Append(const SpaceBins& bins, const NearRun& run, std::uint32_t first) {
     const auto most = static_cast<std::uint32_t>(std::min(kLanes, kCapacity - count));
     const std::uint32_t added = std::min(run.last - first, most);
@@ -78,7 +78,7 @@ struct NearBlock {
 
 /// Calls visit(NearRun) for runs that contain all particles of a size class within `radius` of the
 /// box, in the order of the bins: brick by brick, row by row. Runs may also contain other particles
-/// of the class. Lengths are in cells of the class.
+/// of the class. `box` and `radius` are in cells of the class.
 template <bool kHasCoarseCells, typename Visit>
 void ForEachNearRunOf(const SpaceBins& bins, std::size_t of_class, std::uint32_t brick,
                       const NearBox& box, float radius, Visit visit) {
@@ -132,11 +132,11 @@ void ForEachNearRunOf(const SpaceBins& bins, std::size_t of_class, std::uint32_t
   }
 }
 
-/// The rows of cells within a radius of a cube whose corners are nodes: ForEachNearRunOf without
-/// square roots, for bins of one size class.
+/// The rows of cells within a radius of a cube whose corners are nodes. Finds the same runs as
+/// ForEachNearRunOf without square roots. For bins with equal sizes.
 class NearRows {
  public:
-  /// The rows near a cube of `side` cells.
+  /// `side`: of the cube, in cells.
   NearRows(int side, float radius) : side_(side), low_(static_cast<int>(std::floor(-radius))) {
     count_ = static_cast<int>(std::floor(static_cast<float>(side) + radius)) - low_ + 1;
     is_exact_ = count_ <= kMost && IsExact(radius);
@@ -156,8 +156,8 @@ class NearRows {
   }
 
   int side() const { return side_; }
-  /// False if there are too many rows, or if a row ends so close to a cell that rounding decides,
-  /// which differs from place to place.
+  /// Whether ForEachRun may be called. False if there are too many rows, or if rounding, which
+  /// differs from place to place, could decide whether a row reaches a cell.
   bool is_exact() const { return is_exact_; }
 
   /// Calls visit(NearRun) for the rows near the cube with its lowest corner at node `at` of a
@@ -249,8 +249,7 @@ void ForEachNearRun(const SpaceBins& bins, std::uint32_t brick, const NearBox& b
   }
 }
 
-/// The particles near a box, from which those near smaller boxes are selected. Particles have own
-/// sizes.
+/// The particles near a box, from which SelectReaching selects. For bins with own sizes.
 template <int kMost>
 struct NearRegionOf {
   static constexpr int kCapacity = kMost;
@@ -259,21 +258,21 @@ struct NearRegionOf {
   alignas(64) PerParticle x, y, z, size;
   int count = 0;
 
-  /// Collects the particles within `radius`, times their own sizes, of the box, and others. Returns
-  /// false if there are more than fit.
+  /// Collects the particles within `radius`, times their own sizes, of the box, and some others.
+  /// Returns false if not all of them fit.
   bool Collect(const SpaceBins& bins, std::uint32_t brick, const NearBox& box, float radius);
 };
 
-using NearBrick = NearRegionOf<8192>;  ///< Holds what is near a brick.
-using NearPart = NearRegionOf<4096>;   ///< Holds what is near a part of it.
+using NearBrick = NearRegionOf<8192>;  ///< For a brick.
+using NearPart = NearRegionOf<4096>;   ///< For a part of a brick.
 
-/// Replaces a part or a block by the particles of a region whose kernels reach the box. `radius`:
-/// the kernel radius of size 1. Returns false if there are more than fit.
+/// Sets `part` or `block` to the particles of `region` whose kernels reach the box. `radius`:
+/// the kernel radius of size 1. Returns false if not all of them fit.
 bool SelectReaching(const NearBrick& region, const NearBox& box, float radius, NearPart& part);
 bool SelectReaching(const NearPart& region, const NearBox& box, float radius, NearBlock& block);
 
-/// Calls visit(const NearBlock&) for blocks with the particles of all runs that for_each_run(visit)
-/// visits.
+/// Calls visit(const NearBlock&) for blocks with all particles of the runs that for_each_run(visit)
+/// visits. `block` is a buffer.
 template <typename ForEachRun, typename Visit>
 void ForEachBlockOf(const SpaceBins& bins, ForEachRun for_each_run, NearBlock& block, Visit visit) {
   block.count = 0;

@@ -34,9 +34,9 @@ void PointSampler::MoveTo(std::uint32_t brick, const NearBox& box) {
   is_whole_ = blocks <= 1;
 }
 
-// Selects the particles whose kernels reach the box. Walks with the reaches of all size classes are
-// slow, so one walk serves the whole brick, unless its particles are too many. A selection for each
-// part of 4 x 4 x 4 cells comes between.
+// With own sizes: selects the particles whose kernels reach the box. Returns false if not all fit
+// in `block_`. A search with the reaches of all size classes is slow. So one search serves the
+// brick if its particles fit, then one selection serves each part of 4 x 4 x 4 cells.
 bool PointSampler::Select() {
   const auto radius = static_cast<float>(scale_.kernel_radius);
   if (!is_in_brick_) {
@@ -139,7 +139,7 @@ Vec3 PointSampler::GradientOf(Term term, const Sums& sums, const Slopes& slopes,
   return (-six * scale_.guard_slope) * slopes.density;
 }
 
-// With the unit eigenvector v of M = sum k D D^T and its eigenvalue m:
+// With the largest eigenvalue m of M = sum k D D^T and its unit eigenvector v:
 //   grad m = 6 / R^2 sum t^2 D (v . D)^2 / s - 2 (v . sum k D / s) v,
 //   sigma = m / (R^2 sum k).
 Vec3 PointSampler::GradientOfGap(const Sums& sums, const Slopes& slopes, const QueryPoint& point) {

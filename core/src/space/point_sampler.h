@@ -12,8 +12,8 @@
 
 namespace partiemc::space {
 
-/// F at a point and its gradient. Lengths in cells. With own sizes, the gradient leaves out the
-/// gradient of the local size, which does not move roots.
+/// F at a point and its gradient. Lengths are in cells. With own sizes F has the local size as a
+/// factor. The gradient leaves out the derivative of this factor, which has no effect where F = 0.
 struct PointSample {
   double value = 0;
   Vec3 gradient;
@@ -23,19 +23,19 @@ struct PointSample {
 /// Collects the particles around a box once for all points in it. Not thread-safe; about 220 kB.
 class PointSampler {
  public:
-  /// `rows`: rows for cubes of cells, which speed up moves to them, or none. Refers to its
-  /// arguments.
+  /// `rows` may be null. With equal sizes, it speeds up MoveTo for cubes of `rows->side()` cells.
+  /// Keeps references to its arguments.
   PointSampler(const SpaceBins& bins, const Scale& scale, const NearRows* rows = nullptr)
       : bins_(bins), scale_(scale), rows_(rows) {}
 
   /// Sets the box that contains the points of later calls, in cells relative to `brick`.
   void MoveTo(std::uint32_t brick, const NearBox& box);
 
-  /// F at a point of the box, relative to the brick.
+  /// F at a point of the box. The point is in cells relative to the brick.
   double Value(const Vec3& point);
 
-  /// F at a point, and the gradient of the term that determines F there. Gradients are analytic;
-  /// the gradient of the gap term uses the derivative of the eigenvalue.
+  /// F at a point of the box, and the analytic gradient of the term that has this value. The
+  /// gradient is 0 if no kernel reaches the point.
   PointSample Sample(const Vec3& point);
 
  private:
@@ -59,11 +59,11 @@ class PointSampler {
   bool is_on_rows_ = false;      // The box is a cube of `rows_`.
   bool is_whole_ = false;        // All particles around the box are in block_.
 
-  // With own sizes, the particles around the brick, and around the part of it that has the box.
+  // With own sizes: the particles around the brick, and around the part of it with the box.
   NearBrick whole_;
   NearPart part_;
   NearBox part_box_;
-  bool is_in_brick_ = false;  // `whole_` is of `brick_`, or `part_` is if `whole_` has no room.
+  bool is_in_brick_ = false;  // `has_whole_` and `has_part_` describe `brick_`.
   bool has_whole_ = false, has_part_ = false;
 };
 

@@ -21,11 +21,10 @@ using Lanes = hn::CappedTag<float, NearBlock::kLanes>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
 
-// A particle has nothing besides its position, or its own weight, or its own size.
+// The property of each particle that sums use, besides its position.
 enum class Own { kNothing, kWeight, kSize };
 
-// The offsets D of some particles of a block from a point, with own sizes divided by them, and t =
-// max(0, 1 - |D|^2 / R^2).
+// D and t (level_set.h) of a vector of particles of a block.
 template <bool kSized>
 struct Offsets {
   Vector x, y, z, t, per_size;
@@ -48,8 +47,8 @@ struct Offsets {
   }
 };
 
-// A vector of particles is added to the partial sums [lane, lane + kLanes). Calls add(offsets, k)
-// for each vector of these sums, where k is the index of its first particle.
+// Calls add(offsets, k) for each vector of particles whose terms belong to the partial sums [lane,
+// lane + kLanes). k is the index of its first particle.
 template <bool kSized, class Add>
 HWY_INLINE void ForEachOffset(const NearBlock& block, const QueryPoint& point, float inverse_square,
                               int lane, Add add) {
@@ -163,8 +162,8 @@ void AddMomentsOf(const NearBlock& block, const QueryPoint& point, float inverse
   }
 }
 
-// Many particles around a box are beyond the kernel of a point in it. Their vectors would add
-// zeros, so they are left out.
+// Many particles around a box do not reach a given point in it. Vectors with such particles only
+// would add zeros, so they are left out.
 template <Own kOwn>
 void AddMomentsAndSlopesOf(const NearBlock& block, const QueryPoint& point, float inverse_square,
                            PartialMoments& moments, PartialSlopes& slopes) {
@@ -285,7 +284,7 @@ HWY_INLINE bool SelectReachingOf(const Region& region, const NearBox& box, float
                                hn::FirstN(d, static_cast<std::size_t>(region.count - p)));
     const auto chosen = static_cast<int>(hn::CountTrue(d, is_in));
     if (chosen == 0) continue;
-    // Vectors write beyond the count, but not beyond the padding.
+    // Stores write whole vectors. The padding of `found` has room for values beyond the count.
     if (found.count + chosen > Found::kCapacity) return false;
     const auto store = [&](auto& to, Vector values) HWY_ATTR {
       hn::StoreU(hn::Compress(values, is_in), d, to.data() + found.count);
@@ -323,7 +322,7 @@ struct NodeRange {
   }
 };
 
-// Vectors of a row of nodes, of a part of it, or of two rows.
+// A vector has a row of nodes, a part of a row, or two rows.
 using RowLanes = hn::CappedTag<float, 2 * kBrickSize>;
 constexpr int kRowLanes = static_cast<int>(hn::MaxLanes(RowLanes()));
 constexpr int kRowsAtOnce = std::max(1, kRowLanes / kBrickSize);

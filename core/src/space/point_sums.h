@@ -1,5 +1,5 @@
-// Kernel sums at nodes and points, in vectors. Every instruction set gives the same bits: terms go
-// to eight partial sums by their index, and the partial sums are added by halves.
+// Kernel sums at nodes and points, in vectors. Every instruction set gives the same bits, because
+// the order of each sum is fixed. Symbols are as in Sums and Slopes (level_set.h).
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace partiemc::space {
 
-/// Partial sums of floats: by quantity, by lane.
+/// Partial sums by quantity and lane. A term goes to the lane of its index modulo kLanes.
 template <int kQuantities>
 struct PartialSums {
   alignas(32) std::array<std::array<float, NearBlock::kLanes>, kQuantities> lanes{};
@@ -22,11 +22,11 @@ struct PartialSums {
   }
 };
 
-/// With own sizes s, D is divided by s, and s takes the place of the weight w.
-using PartialMoments = PartialSums<11>;  ///< k, w k, k D, k D D^T.
-/// t^2 D, t^2 D D^T, w t^2 D; with own sizes t^2 D / s, t^2 D D^T / s, k / s.
+/// Sums of k, w k, k D, k D D^T; with own sizes of k, s k, k D, k D D^T.
+using PartialMoments = PartialSums<11>;
+/// Sums of t^2 D, t^2 D D^T, w t^2 D; with own sizes of t^2 D / s, t^2 D D^T / s, k / s.
 using PartialSlopes = PartialSums<12>;
-/// t^2 D (v . D)^2; with own sizes t^2 D (v . D)^2 / s, k (v . D) / s.
+/// Sums of t^2 D (v . D)^2; with own sizes of t^2 D (v . D)^2 / s, k (v . D) / s.
 using PartialThirds = PartialSums<4>;
 
 /// A point in cells relative to the brick of a block.
@@ -34,7 +34,8 @@ struct QueryPoint {
   float x, y, z;
 };
 
-/// Each function adds the terms of the particles of a block to partial sums.
+/// Each function adds the terms of the particles of a block to partial sums. `inverse_square`: 1 /
+/// R^2 for the kernel radius R of size 1.
 void AddMoments(const NearBlock& block, const QueryPoint& point, float inverse_square,
                 PartialMoments& sums);
 void AddMomentsAndSlopes(const NearBlock& block, const QueryPoint& point, float inverse_square,
@@ -51,8 +52,9 @@ Slopes TotalOf(const PartialSlopes& sums, double weight);
 Sums SizedTotalOf(const PartialMoments& sums, double weight);
 Slopes SizedTotalOf(const PartialSlopes& sums, double weight, double kernel);
 
-/// Adds the kernels of a run of particles, times their weights, to the nodes of a brick, by layer,
-/// row, column. `radius`: the kernel radius of size 1.
+/// Adds the kernels of a run of particles, times the weights of the bins if they have weights, to
+/// the 512 `nodes` of a brick, by layer, row, column. `radius`: the kernel radius of size 1.
+/// Requires: `nodes` is aligned to 64 bytes.
 void AddDensity(const SpaceBins& bins, const NearRun& run, float radius, float* nodes);
 
 }  // namespace partiemc::space

@@ -13,18 +13,18 @@
 namespace partiemc::space {
 namespace {
 
-// Limit of the particles and bricks that the check visits.
+// The check ends when it has visited more particles and bricks than this.
 constexpr std::size_t kMostLooks = std::size_t{1} << 20;
 
-// Distances in spacings that contradict the spacing. The sixth nearest position is 1 spacing away
-// on the cubic lattice, 1.2 in disorder.
+// Limits of the distance of the sixth nearest position, in spacings. It is 1 on the cubic
+// lattice, 1.2 in disorder, up to 1.4 at a free surface.
 constexpr double kMaxDistance = 1.7;
 constexpr double kMinDistance = 0.7;
 
 // The ten positions nearest to a point, as offsets.
 class NearShell {
  public:
-  // The point itself and repeated positions are ignored.
+  // Ignores the point itself and repeated positions.
   void Add(const Vec3& offset) {
     const double square = Dot(offset, offset);
     if (square >= reach_square() || square == 0) return;
@@ -39,8 +39,8 @@ class NearShell {
   // Offsets beyond this squared distance are ignored; infinite until ten offsets are known.
   double reach_square() const { return nearest_[kCount - 1].square; }
 
-  // Whether the positions lie all around at similar distances: a lone particle, a thread or a film
-  // does not show the spacing.
+  // Whether the positions lie all around at similar distances. Around a lone particle, in a thread
+  // or in a film they do not, and their distances say nothing about the spacing.
   bool IsAround() const {
     if (!(reach_square() <= kMaxRatio * kMaxRatio * nearest_[1].square)) return false;
     Vec3 sum;
@@ -102,7 +102,7 @@ class Probe {
   bool IsExhausted() const { return looks_ > kMostLooks; }
 
  private:
-  // A sampled particle: its position in its brick, in cells, and its size in spacings.
+  // A sampled particle. `place` is in cells from its brick, `size` in spacings.
   struct Sample {
     std::uint32_t brick;
     Vec3 place;
@@ -120,10 +120,10 @@ class Probe {
   double SizeOf(std::uint32_t particle) const {
     return bins_.size.empty() ? 1.0 : double{bins_.size[particle]};
   }
-  // The largest mean size of the sample and another particle.
+  // The largest possible mean size of the sample and another particle.
   double WidestPair(const Sample& at) const { return (at.size + largest_) / 2; }
 
-  // Adds the particles of a brick, unless the whole brick lies farther than the ten nearest so far.
+  // Adds the particles of a brick to `near`, unless all of them are farther than the ten nearest.
   void Gather(std::uint32_t other, const Sample& at, NearShell& near) {
     const std::uint32_t first = bins_.FirstOf(other), end = bins_.EndOf(other);
     if (first == end) return;

@@ -1,4 +1,4 @@
-// Judges the spacing of a surface by the distances of its particles.
+// Checks the given spacing of a surface by the distances of its particles.
 #pragma once
 
 #include "frame/scale.h"
@@ -6,12 +6,11 @@
 
 namespace partiemc::space {
 
-/// Whether enough of 64 sampled particles, with others all around, are farther apart than 1.7 or
-/// closer than .7 spacings. With own sizes, distances count in mean sizes of both particles. The
-/// sixth of the nearest other positions decides: it is 1 to 1.2 spacings away in lattices and
-/// random points, up to 1.4 at a free surface (core/SURFACES.md, "Doubts"). Requires: sorted
-/// particles. Cost: at most about a million distances; in a frame whose spacing is right, some ten
-/// thousand.
+/// Whether enough of at most 64 sampled particles contradict the spacing (core/SURFACES.md,
+/// "Doubts"). A particle contradicts it if other positions lie all around, and the sixth nearest is
+/// farther than 1.7 or closer than .7 spacings. With own sizes, a distance is divided by the mean
+/// size of the two particles. Requires: SortParticles. Cost: at most about a million distances;
+/// some ten thousand if the spacing is right.
 bool ContradictsSpacing(const SpaceBins& bins, const Scale& scale);
 
 }  // namespace partiemc::space

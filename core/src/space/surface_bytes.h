@@ -1,4 +1,4 @@
-// Estimates the memory of a surface.
+// An upper bound of the memory of a surface.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +13,32 @@ struct SurfaceSize {
   std::uint64_t edges = 0;             ///< Crossed edges.
   std::uint64_t loops = 0;             ///< Loops of cells, if vertices leave their anchors; else 0.
   bool has_windows = false;            ///< True for `kVirtualPlane`.
-  std::uint64_t bodies = 0;            ///< Bodies, and particles that may become one.
-  std::uint64_t attribute_values = 0;  ///< Values of attributes per particle or point.
-  bool has_state = false;              ///< Of a stream.
+  std::uint64_t bodies = 0;            ///< Bodies, and lone particles that may become ellipsoids.
+  std::uint64_t attribute_values = 0;  ///< Components of all attributes.
+  bool has_state = false;              ///< The frame belongs to a stream.
   bool is_simplified = false;
   std::uint64_t wall_axes = 0;  ///< Axes that have walls.
   std::uint64_t box_axes = 0;   ///< Axes along which bodies are cut at a periodic box.
-  std::uint64_t lift_bytes =
-      0;  ///< Of a periodic box (periodic/lift.h), or of walls (walls/wall_images.h).
+  /// Bytes of the scratch of a periodic box (periodic/lift.h) or of walls (walls/wall_images.h).
+  std::uint64_t lift_bytes = 0;
   std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
 };
 
-/// Bytes per item, with a margin for vectors that grow by doubling. LoopWindows::kMostNear
-/// bounds the windows.
+/// Bytes per item of SurfaceSize, with a margin for vectors that grow by doubling.
+/// LoopWindows::kMostNear bounds the windows.
 inline constexpr std::uint64_t kBytesPerParticle = 60;
 inline constexpr std::uint64_t kBytesPerBrick = 6'000;
 inline constexpr std::uint64_t kBytesPerEdge = 300;
 inline constexpr std::uint64_t kBytesPerLoop = 450;
 inline constexpr std::uint64_t kBytesPerWindow = 870;
 
-/// Bytes of own sizes, on top. Windows in local sizes reach more loops.
+/// Further bytes with own sizes. Windows in local sizes reach more loops.
 inline constexpr std::uint64_t kBytesPerSizedParticle = 16;
 inline constexpr std::uint64_t kBytesPerCellsOfClass = 2'060;  ///< Per brick and further class.
 inline constexpr std::uint64_t kBytesPerSizedVertex = 4;
 inline constexpr std::uint64_t kBytesPerSizedWindow = 500;
 
-/// Bytes of identities: runs of nodes, of which two edges along x make one or two; histories of two
+/// Bytes of identities: runs of nodes, one or two for two crossed edges along x; histories of two
 /// frames and their relations.
 inline constexpr std::uint64_t kBytesPerTrackedEdge = 120;
 inline constexpr std::uint64_t kBytesPerTrackedBody = 500;
@@ -52,21 +52,20 @@ inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
 inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 
-/// Bytes of the cut at walls, per point: with walls of one axis, and for each
-/// further axis. Lone particles at edges require the most.
+/// Bytes of the cut at walls, per point: for the first axis with walls, and for each further axis.
+/// Lone particles at edges of walls require the most.
 inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
 
 /// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and the
-/// cuts along each axis. Bodies that percolate have copies far beyond the faces, so few points are
-/// cut. Wrapped spray has more (core_allocation_test).
+/// cuts along each axis. Bodies that percolate reach far beyond the faces, so few of their points
+/// are near a cut. Wrapped spray has more (space_allocation_test.cc).
 inline constexpr std::uint64_t kBytesPerBoxPoint = 450, kBytesPerBoxAxis = 50;
 
-/// For any frame.
+/// Bytes of any frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
-/// Upper bound of the memory of a new SurfaceWorkspace, Surface and SurfaceState after frames of
-/// this size
-/// (tests/core/allocation_test.cc).
+/// Upper bound of the bytes of a new SurfaceWorkspace, Surface and SurfaceState after a frame of
+/// this size (tests/core/space_allocation_test.cc).
 inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   const std::uint64_t per_loop = kBytesPerLoop + (size.has_windows ? kBytesPerWindow : 0);
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +

@@ -17,7 +17,7 @@ bool IsEmpty(const BrickBits& bits) {
   return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return word == 0; });
 }
 
-/// Marks a cell relative to a brick. Thread-safe.
+/// Marks a cell, given relative to a brick, if its brick exists. Thread-safe.
 void Mark(const BrickDirectory& bricks, std::uint32_t brick, const std::array<int, 3>& cell,
           std::vector<BrickBits>& cells) {
   const BrickPlace place = Normalise(bricks, brick, cell[0], cell[1], cell[2]);
@@ -26,7 +26,7 @@ void Mark(const BrickDirectory& bricks, std::uint32_t brick, const std::array<in
       .fetch_or(std::uint64_t{1} << place.Bit(), std::memory_order_relaxed);
 }
 
-/// Marks the four cells around an edge.
+/// Marks the four cells around an edge. `node`: its lower end, relative to the brick.
 void MarkAround(const BrickDirectory& bricks, std::uint32_t brick, const std::array<int, 3>& node,
                 int axis, std::vector<BrickBits>& cells) {
   for (int k = 0; k < 4; ++k) {
@@ -37,8 +37,8 @@ void MarkAround(const BrickDirectory& bricks, std::uint32_t brick, const std::ar
   }
 }
 
-/// Calls visit(cell, side) once for each face between a near cell of a brick and another cell, if
-/// one of the two is among `cells`.
+/// Calls visit(cell, side) once for each face of a near cell (MovedNodes::Brick) of a brick, if the
+/// cell or the cell across the face is among `cells`.
 template <typename Visit>
 void ForEachFace(const BrickDirectory& bricks, const MovedNodes& nodes,
                  const std::vector<BrickBits>& cells, std::uint32_t brick, Visit visit) {
@@ -73,7 +73,7 @@ void ForEachFace(const BrickDirectory& bricks, const MovedNodes& nodes,
   }
 }
 
-/// Finds the bricks with moved cells.
+/// Sets `has_moved`.
 void FindMovedBricks(Certificate& certificate) {
   ParallelFor(static_cast<std::uint32_t>(certificate.moved.size()), [&](std::uint32_t brick) {
     certificate.has_moved[brick] = !IsEmpty(certificate.moved[brick]);
@@ -90,7 +90,7 @@ bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
   });
 }
 
-/// Moves the vertices and nodes of refused faces back. Returns whether any of them could move.
+/// Sets the vertices and nodes of refused faces back. Returns whether any of them could move.
 bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
               const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
               Certificate& certificate) {
@@ -155,7 +155,7 @@ bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return has_any;
 }
 
-/// Moves the nodes of moved cells. Finds the changed cells, and unmarks the moved ones.
+/// Moves the nodes of moved cells. Sets `changed` and clears `moved`.
 void MoveNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
                Certificate& certificate) {
@@ -187,7 +187,7 @@ void MoveNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings, do
   });
 }
 
-/// Certifies the faces of moved cells, and of cells with a node that moves with them.
+/// Certifies the faces of changed cells, in rounds until none is refused.
 bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate) {
@@ -224,7 +224,7 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
   return true;
 }
 
-/// Makes room for the marks of `count` bricks.
+/// Resizes all marks to `count` bricks and clears them.
 void ClearMarks(std::size_t count, Certificate& certificate) {
   certificate.moved.assign(count, {});
   certificate.moved_nodes.assign(count, {});

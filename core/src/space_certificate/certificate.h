@@ -1,18 +1,18 @@
 // Proves that a surface with moved vertices does not intersect itself, without a search for pairs.
 //
-// The two cells of a lattice face have vertices C_i and C_j. The cones of both vertices over the
-// face, whose crossed edges are split at their vertices E, form a bipyramid. While all vertices are
-// at their anchors, the bipyramids of all faces tile space. If each bipyramid has a decomposition
-// into tetrahedra that are positively oriented with the moved vertices, the piecewise linear map
-// from the anchors is injective (Lipman, arXiv 1310.0955). Triangles that are faces of these
-// tetrahedra then intersect nowhere. Vertices may leave their cells. Lattice nodes are auxiliary
-// points that follow the vertices (moved_nodes.h).
+// The two cells beside a lattice face have vertices C_i and C_j. The crossed edges of the face are
+// split at their vertices E. The cones of C_i and C_j over the face form a bipyramid. While all
+// vertices are at their anchors, the bipyramids of all faces tile space. If each bipyramid has a
+// decomposition into tetrahedra that are positively oriented with the moved vertices, the piecewise
+// linear map from the anchors is injective (Lipman, arXiv 1310.0955). Triangles that are faces of
+// these tetrahedra then intersect nowhere. Vertices may leave their cells. Lattice nodes are
+// auxiliary points that follow the vertices (moved_nodes.h).
 //
 // A curve on a face joins E and E'; its quad (C_i, E, C_j, E') is cut in one of two modes:
 //   kAcrossCells  along C_i C_j: valid if the tetrahedra (A, B, C_i, C_j) over the sides A B of the
 //                 split face are positive;
 //   kAlongFace    along E E': valid if a triangulation of the split face with the edge E E' has
-//                 positive tetrahedra with C_i and with C_j. At the anchors it is always valid.
+//                 positive tetrahedra with C_i and with C_j. Always valid at the anchors.
 // The vertices of cells with several loops stay at their anchors, and the faces of these cells stay
 // flat. A cell without a vertex has a virtual vertex, the mean of its corners.
 #pragma once
@@ -31,56 +31,56 @@ namespace partiemc::space {
 enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 
 struct Certificate {
-  std::vector<std::array<QuadMode, 3>> modes;  ///< By cell: of its upper face along each axis.
-  std::uint32_t rounds = 0;                    ///< Rounds of repair.
-  std::uint32_t returned = 0;                  ///< Vertices that were moved back at least once.
+  /// By active cell: the mode of the quad on its upper face along each axis.
+  std::vector<std::array<QuadMode, 3>> modes;
+  std::uint32_t rounds = 0;    ///< Rounds with refused faces since Certify.
+  std::uint32_t returned = 0;  ///< First setbacks of vertices since Certify.
 
   MovedNodes nodes;
-  std::vector<std::uint8_t> setbacks;  ///< By vertex.
-  std::vector<std::uint8_t> is_bad;    ///< By vertex, then by node: on a refused face.
-  /// Cells by brick. Moved: with a vertex or node that moved, or with a refused face. Changed:
-  /// moved cells, and cells with a node that followed them. Their faces are tested.
+  std::vector<std::uint8_t> setbacks;  ///< By vertex: how often it was set back (moved_nodes.h).
+  std::vector<std::uint8_t> is_bad;    ///< By vertex, then by node: it is part of a refused face.
+  /// Cells by brick. `moved`: with a vertex or node that moved, or with a refused face. `changed`:
+  /// also cells with a node that followed vertices. A round tests the faces of changed cells.
   std::vector<BrickBits> moved, changed;
-  std::vector<BrickBits> moved_nodes;        ///< Nodes by brick, in the last round.
+  std::vector<BrickBits> moved_nodes;        ///< By brick: nodes that moved in the last round.
   std::vector<std::uint8_t> has_moved;       ///< By brick: has moved cells.
-  std::vector<Vec3> certified;               ///< Positions of the vertices, once certified.
+  std::vector<Vec3> certified;               ///< By vertex: the position last certified.
   std::vector<std::uint32_t> body_of_node;   ///< By node.
   std::vector<std::uint8_t> saved_setbacks;  ///< By vertex, then by node.
 };
 
-/// Marks the vertices of cells with several loops, which have to stay at their anchors.
+/// Marks the vertices in cells with several loops and on their edges. They stay at their anchors.
 void MarkFixedVertices(const SpaceCrossings& crossings, std::vector<std::uint8_t>& is_fixed);
 
-/// Finds a mode for each face. If no mode is valid, the vertices and nodes of the face move back
-/// towards their anchors (setbacks, moved_nodes.h). `positions` and `anchors` are the final
-/// coordinates of the surface, in world units. Returns false if a face is refused although its
-/// vertices are at their anchors, which is a bug. Requires: fixed vertices are at their anchors.
+/// Finds a mode for each face. While a face has no valid mode, its vertices and nodes are set back
+/// (moved_nodes.h), which changes `positions`. `positions` and `anchors` are in world units,
+/// exactly as in the result. Returns false if a face is refused although its vertices are at their
+/// anchors, which is a bug. Requires: marked vertices (MarkFixedVertices) are at their anchors.
 bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
              const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
              Certificate& certificate);
 
-/// Certifies again after vertices have moved from their certified positions. The setbacks that
-/// vertices and nodes have count on. Cost: linear in vertices and bricks, and in the faces of cells
-/// in which something has moved.
+/// Certifies again after vertices have moved from their certified positions. Setbacks keep their
+/// counts. Cost: linear in vertices and bricks, and in the faces of changed cells.
 bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// The step of a body between two certifications, for its vertices and nodes.
+/// The change of a body before CertifyAgain: none; its positions are saved as the best; it returns
+/// to the saved positions.
 enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
 
 /// Finds the body of each node that may move. Requires: Certify.
 void FindBodyOfNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                      std::span<const std::uint32_t> body_of_vertex, Certificate& certificate);
 
-/// Stores the setbacks of the bodies that are saved, which then have none, so that the next
-/// certification has all its means. Takes back those of the bodies that return, all of whose
-/// vertices then count as moved: positions that were certified with these setbacks are certified
-/// again. Requires: FindBodyOfNodes.
+/// Saves the setbacks of the bodies that are saved and sets them to 0, so that CertifyAgain can set
+/// back as often as Certify. Restores the saved setbacks of the bodies that return, and marks all
+/// their vertices as moved, so that CertifyAgain tests all faces. Requires: FindBodyOfNodes.
 void SaveOrReturnSetbacks(std::span<const std::uint32_t> body_of_vertex,
                           std::span<const BodyStep> steps, Certificate& certificate);
 
-/// The number of faces that are refused in their modes: 0 once certified. For tests.
+/// The number of faces without a valid mode or with another mode than in `modes`; 0 after Certify.
 std::uint32_t CountRefusedFaces(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                                 double cell_size, const std::vector<Vec3>& positions,
                                 const Certificate& certificate);

@@ -28,8 +28,7 @@ Triangulations TriangulationsOf(int first, int last) {
   return all;
 }
 
-/// All triangulations of a polygon with 3 to 6 corners. The part between the curves of an ambiguous
-/// face has six.
+/// All triangulations of a polygon with 3 to 6 corners.
 const Triangulations& TriangulationsOf(int corners) {
   static const std::array<Triangulations, 7> all = [] {
     std::array<Triangulations, 7> table;
@@ -115,7 +114,7 @@ Face FaceChecker::FaceOf(const std::array<int, 3>& cell, int face) {
   beside[of.axis] += (face & 1) != 0 ? 1 : -1;
   of.low = SideAt((face & 1) != 0 ? cell : beside);
   of.high = SideAt((face & 1) != 0 ? beside : cell);
-  // The corners as seen from above: they are the corners of the upper face of the cell below.
+  // Counter-clockwise as seen from the high side: the corners of the upper face of the low cell.
   const std::array<int, 4> corners = CornersOfFace(2 * of.axis + 1);
   const bool has_crossings = of.low.active != kNoIndex && of.high.active != kNoIndex;
   for (int k = 0; k < 4; ++k) {
@@ -151,7 +150,8 @@ bool FaceChecker::IsValidAcross(const Face& face, const Vec3& below, const Vec3&
   return true;
 }
 
-/// Whether a triangulation of a part of the face has positive tetrahedra on both sides.
+/// Whether a triangulation of a part of the face has positive tetrahedra with both apexes.
+/// `polygon`: indices of `face.around`.
 bool FaceChecker::CanTriangulate(const Face& face, std::span<const std::uint8_t> polygon,
                                  const Vec3& below, const Vec3& above) const {
   for (const auto& triangulation : TriangulationsOf(static_cast<int>(polygon.size()))) {
@@ -168,14 +168,13 @@ bool FaceChecker::CanTriangulate(const Face& face, std::span<const std::uint8_t>
   return false;
 }
 
-/// Whether kAlongFace is valid. The curves cut the face into parts; each part is triangulated
-/// alone.
+/// Whether kAlongFace is valid. The curves cut the face into parts, which are independent.
 bool FaceChecker::IsValidAlong(const Face& face, const Vec3& below, const Vec3& above) const {
   if (face.crossed == 0) {
     return CanTriangulate(face, std::array<std::uint8_t, 4>{0, 1, 2, 3}, below, above);
   }
   std::array<std::uint8_t, 8> part;
-  const auto check = [&](int first, int last) {  // The part from one vertex to the next.
+  const auto check = [&](int first, int last) {  // The part from a vertex to the next one.
     int size = 0;
     for (int k = first;; k = k + 1 < face.count ? k + 1 : 0) {
       part[size++] = static_cast<std::uint8_t>(k);
@@ -204,8 +203,8 @@ bool FaceChecker::FindMode(const Face& face, QuadMode& mode) const {
   const bool is_low_fixed = IsFixed(face.low), is_high_fixed = IsFixed(face.high);
   if (is_low_fixed && is_high_fixed) return true;
   const Vec3 &below = face.low.apex, &above = face.high.apex;
-  // A face of a fixed cell is flat. The vertex of the other cell must be on its own side of the
-  // face.
+  // A face of a cell with several loops is flat. The apex of the other cell must be on its own side
+  // of the face.
   const double level = Along(face.around[0], face.axis);
   if (is_low_fixed) return Along(above, face.axis) > level;
   if (is_high_fixed) return Along(below, face.axis) < level;

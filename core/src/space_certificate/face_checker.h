@@ -28,23 +28,22 @@ struct Side {
   Vec3 apex;
 };
 
-/// A face between two cells, with its split sides.
+/// A face between two cells. Its crossed sides are split at their vertices.
 struct Face {
   int axis = 0;
   Side low, high;
-  /// Corners and vertices on crossed sides, counter-clockwise as seen from above.
+  /// Corners and vertices on crossed sides, counter-clockwise as seen from the high side.
   std::array<Vec3, 8> around;
-  /// For each point of `around`: its vertex, or the vertex count plus its moved node; kNoIndex for
-  /// a node that does not move.
+  /// For each point of `around`: its vertex, or the vertex count plus its index in MovedNodes;
+  /// kNoIndex for a node that stays.
   std::array<std::uint32_t, 8> item;
   std::array<bool, 8> is_vertex;
-  int count = 0;
-  int crossed = 0;
+  int count = 0;    ///< Of points of `around`.
+  int crossed = 0;  ///< Number of crossed sides: 0, 2 or 4.
 };
 
-/// Checks the faces of the cells of a brick. Finds nodes and cells when a face first needs them,
-/// and keeps them for its other faces: while it exists, nothing may move. Refers to its arguments;
-/// about 90 kB.
+/// Checks the faces of the cells of a brick. Caches the nodes and cells that it has read, so no
+/// vertex or node may move while it exists. Keeps references to its arguments. About 75 kB.
 class FaceChecker {
  public:
   FaceChecker(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
@@ -58,20 +57,20 @@ class FaceChecker {
         centre_(cell_size * (OriginOf(bricks[brick]) + Vec3{kHalf, kHalf, kHalf})),
         bound_(BoundOf(cell_size)) {}
 
-  /// Takes every sign from the exact predicates.
+  /// Makes FindMode take every sign from exact predicates.
   void UseExactSigns() { bound_ = std::numeric_limits<double>::infinity(); }
 
-  /// A face of the cell (i, j, k).
+  /// A face of a cell, which is relative to the brick. Faces are numbered as in cell_loops.h.
   Face FaceOf(const std::array<int, 3>& cell, int face);
 
   /// Returns true for most valid faces without crossings, and false for all other faces. Cheaper
   /// than FaceOf and FindMode.
   bool IsPlainlyValid(const std::array<int, 3>& cell, int face);
 
-  /// Returns whether any mode is valid, and sets `mode`.
+  /// Returns whether a mode is valid, and sets `mode` to it. A face without crossings has no mode.
   bool FindMode(const Face& face, QuadMode& mode) const;
 
-  /// Calls visit(item) for the vertices and nodes of a face that may move.
+  /// Calls visit(item) for the vertices and nodes of a bipyramid that may move.
   template <typename Visit>
   void ForEachItem(const Face& face, Visit visit) {
     for (int k = 0; k < face.count; ++k) {
@@ -93,29 +92,29 @@ class FaceChecker {
   bool IsFixed(const Side& side) const {
     return side.active != kNoIndex && LoopsOf(crossings_.cells[side.active].corners).loops > 1;
   }
-  /// A node, moved, and its item as in Face. Not initialised, because bricks have many.
+  /// The moved position of a node, and its item as in Face. Not initialised: there are many.
   struct Node {
     double x, y, z;
     std::uint32_t item;
 
     Vec3 At() const { return {x, y, z}; }
   };
-  /// A cell: as Side.
+  /// The apex of a cell, and its index as in Side.
   struct Cell {
     double x, y, z;
     std::uint32_t active;
   };
   static constexpr double kHalf = .5 * kBrickSize;
-  /// Points up to this distance from the centre of the brick, in cells along each axis, are near.
+  /// Points are near up to this distance from the centre of the brick, in cells along each axis.
   static constexpr double kNear = 16;
 
-  /// The largest error of the determinant of three differences of near points, each product of
-  /// which has eight roundings: 6 (2 kNear)^3 8 eps with eps = 2^-53, and a margin.
+  /// The largest error of the determinant of three differences of near points, and a margin. Each
+  /// of its six products has eight roundings: 6 (2 kNear)^3 8 eps with eps = 2^-53.
   static double BoundOf(double cell_size) {
     const double longest = 2 * kNear * cell_size;
     return 0x1p-53 * 100 * (longest * longest * longest);
   }
-  /// Takes note of a point. If it is not near, all predicates are exact from now on.
+  /// Makes all later predicates exact if the point is not near, because `bound_` does not hold.
   void Include(const Vec3& point) {
     const Vec3 from = point - centre_;
     const double farthest = std::max({std::abs(from.x), std::abs(from.y), std::abs(from.z)});
@@ -158,7 +157,7 @@ class FaceChecker {
   const MovedNodes& nodes_;
   const std::uint32_t brick_;
   const Vec3 centre_;
-  double bound_;  // Largest error of determinants.
+  double bound_;  // Largest error of determinants; infinite: exact predicates only.
   std::bitset<kNodesAlong * kNodesAlong * kNodesAlong> has_node_;
   std::bitset<kCellsAlong * kCellsAlong * kCellsAlong> has_cell_;
   std::array<Node, kNodesAlong * kNodesAlong * kNodesAlong> node_;

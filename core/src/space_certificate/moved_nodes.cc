@@ -5,7 +5,7 @@
 namespace partiemc::space {
 namespace {
 
-/// The nodes of a layer next to bricks that do not exist.
+/// The nodes of a layer with a cell in a brick that does not exist.
 std::uint64_t AtTheEnd(const BrickDirectory& bricks, std::uint32_t brick, int k) {
   std::uint64_t nodes = 0;
   for (int side = 1; side < 8; ++side) {
@@ -17,7 +17,7 @@ std::uint64_t AtTheEnd(const BrickDirectory& bricks, std::uint32_t brick, int k)
   return nodes;
 }
 
-// Added to squared distances, in squared cells, to keep the weight of a vertex at the node finite.
+// Added to squared distances, in squared cells. Keeps weights finite near anchors.
 constexpr double kLeastSquare = 1e-3;
 
 bool HasOneLoop(const ActiveCell& cell) { return LoopsOf(cell.corners).loops == 1; }

@@ -1,9 +1,9 @@
 // Lattice nodes that follow the vertices around them: auxiliary points of the certificate.
 //
-// A node of a cell with a vertex moves by the weighted mean displacement of the vertices in the
-// cells around it and on its edges, with weights 1 / distance^2. Smooth displacements then keep the
-// cells in shape. Nodes of cells with several loops stay, as do nodes next to bricks that do not
-// exist.
+// A node of an active cell moves by the weighted mean displacement of the vertices in the
+// eight cells around it and on its edges. Weights are 1 / distance^2 from the anchors. Smooth
+// displacements then keep the cells in shape. Nodes of cells with several loops stay, as do nodes
+// with a cell in a brick that does not exist.
 #pragma once
 
 #include <array>
@@ -21,14 +21,14 @@ namespace partiemc::space {
 struct MovedNodes {
   struct Brick {
     BrickBits nodes{};  ///< Nodes that may move.
-    BrickBits near{};   ///< Active cells, and cells with such nodes.
+    BrickBits near{};   ///< Near cells: active cells, and cells with a node that may move.
     std::uint32_t first = 0;
     std::array<std::uint16_t, kBrickSize> before{};
   };
   std::vector<Brick> bricks;
   std::uint32_t count = 0;
-  std::vector<Vec3> moves;                        ///< By node, in the unit of the positions.
-  std::vector<std::uint8_t> setbacks;             ///< By node.
+  std::vector<Vec3> moves;                        ///< By node that may move. World units.
+  std::vector<std::uint8_t> setbacks;             ///< By node that may move.
   std::vector<BrickBits> active, fixed, movable;  ///< Scratch: by brick.
 
   /// The index of a node, or kNoIndex if it stays.
@@ -42,10 +42,11 @@ struct MovedNodes {
   }
 };
 
-/// Setbacks of a vertex on a refused face. The first kSmoothings setbacks replace its displacement
-/// by the mean move of the nodes around it. This makes the uneven face even, but keeps the common
-/// displacement. Each later setback keeps kKeptOfMove of the displacement, and setback number
-/// kMostSetbacks keeps nothing. The first kSmoothings setbacks of a node change nothing.
+/// Each round sets the vertices and nodes of refused faces back. The first kSmoothings setbacks of
+/// a vertex replace its displacement by the mean move of the nodes around it. This makes an uneven
+/// face even, but keeps the common displacement. Each later setback keeps kKeptOfMove of the
+/// displacement, and setback number kMostSetbacks keeps nothing. The first kSmoothings setbacks of
+/// a node change nothing; later ones are as for vertices.
 inline constexpr int kSmoothings = 4;
 inline constexpr int kMostSetbacks = 12;
 inline constexpr double kKeptOfMove = .7;
@@ -57,15 +58,14 @@ void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossing
 /// The nodes of a layer that are corners of cells among `cells`.
 std::uint64_t CornersOf(const BrickLayers& cells, int k);
 
-/// Sets the moves of those nodes of a brick that are in `which` and may move. Returns the nodes
-/// whose moves changed. Anchors and positions in world units.
+/// Sets the moves of the nodes of a brick that are in `which` and may move. Returns the nodes
+/// whose moves changed. Anchors and positions are in world units.
 BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDirectory& bricks,
                       const SpaceCrossings& crossings, double cell_size,
                       const std::vector<Vec3>& anchors, const std::vector<Vec3>& positions,
                       MovedNodes& nodes);
 
-/// The position of the node (i, j, k) relative to a brick, in the unit of `cell_size` and the
-/// moves.
+/// The moved position, in world units, of the node `at`, which is relative to a brick.
 inline Vec3 NodeAt(const BrickDirectory& bricks, const MovedNodes& nodes, double cell_size,
                    std::uint32_t brick, const std::array<int, 3>& at) {
   const Vec3 origin = OriginOf(bricks[brick]);

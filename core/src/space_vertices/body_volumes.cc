@@ -19,8 +19,7 @@ void ForEachCurve(const SpaceCrossings& crossings, const ActiveCell& cell, int l
   }
 }
 
-/// The origin of the sums of a body, in cells: a node of the body, so that the sums lose no digits
-/// far from the origin of the world.
+/// The origin of the sums of a body, in cells. It is near the body, so that sums lose no digits.
 Vec3 LowestNodeOf(const BrickDirectory& bricks, const Body& body) {
   const BrickPlace& at = body.lowest;
   return OriginOf(bricks[at.brick]) + Vec3{1.0 * at.i, 1.0 * at.j, 1.0 * at.k};
@@ -31,7 +30,7 @@ ClipBox Relative(const ClipBox& box, double units, const Vec3& origin) {
   return {units * box.low - origin, units * box.high - origin};
 }
 
-/// Whether the measures of a body are those of its part in the box.
+/// Whether the measures of a body count only its part in `volumes.clip`.
 bool IsClipped(const BodyVolumes& volumes, const Bodies& bodies, std::uint32_t body) {
   return volumes.clip && (!volumes.clips_images || bodies.IsCut(body));
 }

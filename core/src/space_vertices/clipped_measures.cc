@@ -7,7 +7,7 @@
 namespace partiemc::space {
 namespace {
 
-/// A convex polygon. Each of six sides adds at most one corner to a triangle.
+/// A triangle clipped at the six sides of a box. Each side adds at most one corner.
 struct Polygon {
   std::array<Vec3, 9> corners;
   std::size_t count = 0;
@@ -15,7 +15,7 @@ struct Polygon {
   void Add(const Vec3& corner) { corners[count++] = corner; }
 };
 
-/// The part with sign * (coordinate - at) >= 0.
+/// The part of a convex polygon with sign * (coordinate - at) >= 0.
 template <typename Coordinate>
 Polygon Clipped(const Polygon& from, Coordinate of, double at, double sign) {
   Polygon part;
@@ -29,7 +29,7 @@ Polygon Clipped(const Polygon& from, Coordinate of, double at, double sign) {
   return part;
 }
 
-/// Adds the flux through a polygon whose x is clamped to [low, high].
+/// Adds the flux of (clamp(x, low, high), 0, 0) through a polygon that crosses neither limit.
 void AddFlux(const Polygon& polygon, double low, double high, ClippedMeasure& sum) {
   const auto x = [&](const Vec3& at) { return std::clamp(at.x, low, high); };
   for (std::size_t k = 2; k < polygon.count; ++k) {

@@ -11,25 +11,23 @@
 namespace partiemc::space {
 namespace {
 
-// If a brick has more drops, all of them keep their surfaces. This limits the pairs of drops that
-// are compared.
+// If more drops reach a brick, all of them keep their surfaces. This limits the compared pairs.
 constexpr std::uint32_t kMostDropsOfBrick = 256;
-// A drop that reaches more bricks keeps its surface.
+// A drop that reaches more bricks along an axis keeps its surface.
 constexpr double kMostBricksAlong = 4;
-// Radius in spacings. Smaller drops become icosahedra: their edges are about as long as a cell of
+// Radius in spacings. Smaller drops become icosahedra, whose edges are about as long as a cell of
 // the default size.
 constexpr double kSmallRadius = .75;
 
-// Bent or hollow drops, and those that have come apart, fill less of the ellipsoid with their
-// moments.
+// Drops that are bent, hollow or in pieces fill less of the ellipsoid with their moments.
 constexpr double kLeastFilling = .5;
-// Least length of the half axes of an ellipsoid, in cells, and its part that grows with the
-// distance from the origin.
+// Least half axis of an ellipsoid, in cells: kLeastAxis, plus kLeastAxisByDistance times the
+// distance from the origin of the world.
 constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// The radius of a ball.
+/// The radius of a ball with a volume.
 double RadiusOf(double volume) { return std::cbrt(3 / (4 * kPi) * volume); }
 
 /// A polyhedron with its corners on the unit sphere.
@@ -56,7 +54,7 @@ Polyhedron Icosahedron() {
       all.corners.push_back(Normalised(corner));
     }
   }
-  // Three corners that are next to each other have a triangle.
+  // Each three corners that are near each other form a triangle.
   const auto are_near = [&](std::uint32_t a, std::uint32_t b) {
     return Dot(all.corners[a], all.corners[b]) > .4;
   };
@@ -73,7 +71,7 @@ Polyhedron Icosahedron() {
   return all;
 }
 
-/// Each triangle cut into four.
+/// Cuts each triangle into four, with the new corners on the sphere.
 Polyhedron Divided(const Polyhedron& from) {
   Polyhedron all{from.corners, {}, 0};
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
@@ -109,7 +107,7 @@ bool Touch(const Drops::Box& a, const Drops::Box& b) {
          a.low.z <= b.high.z && b.low.z <= a.high.z;
 }
 
-/// Adds a particle at a place in cells.
+/// Adds a particle to the moments. `at` and `volume` are in cells.
 void AddParticle(const Vec3& at, double volume, Drops::Drop& drop) {
   if (!(drop.volume > 0)) drop.origin = at;
   const Vec3 from = at - drop.origin;
@@ -166,15 +164,15 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       drop.particle = p;
       AddParticle(at, volume, drop);
       drop.particles = 1;
-      // An outside node that no surface has passed.
+      // This node is outside and has not moved, so it is still outside of all bodies.
       const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
       drop.box = {corner, corner};
     }
   }
 }
 
-/// Sets the points and normals of an ellipsoid with the moments of the drop, and its volume.
-/// Returns false if the moments have none.
+/// Adds the points and normals of an ellipsoid with the volume and the moments of the drop. Returns
+/// false if there is no such ellipsoid, or it is too thin, or the drop fills too little of it.
 bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
   if (!(drop.volume > 0)) return false;
   const double inverse = 1 / drop.volume;
@@ -194,7 +192,7 @@ bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
   const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / scale.spacing);
   const double factor = std::cbrt(drop.volume / (determinant * of.volume));
   if (!(drop.volume > kLeastFilling * (4 * kPi / 3) * determinant)) return false;
-  // Its shortest half axis at least, in cells: rounding must not fold the triangles.
+  // A lower bound of its shortest half axis, in cells. Rounding must not fold the triangles.
   const double shortest = factor * determinant / (xx + yy + zz);
   const double farthest =
       std::max({std::abs(drop.origin.x), std::abs(drop.origin.y), std::abs(drop.origin.z)});
@@ -216,7 +214,8 @@ bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
   return true;
 }
 
-/// Calls visit(coordinate) for the bricks that a box reaches. Returns false if they are many.
+/// Calls visit(coordinate) for the bricks that a box reaches. Visits none and returns false if they
+/// are more than kMostBricksAlong along an axis.
 template <typename Visit>
 bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit) {
   const double unit = 1 / (kBrickSize * cell_size);
@@ -235,7 +234,7 @@ bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit)
   return true;
 }
 
-/// Lists the drops by brick.
+/// Lists the taken drops by brick. Drops that reach too many bricks are no longer taken.
 void ListDrops(double cell_size, Drops& drops) {
   drops.bricks.Clear();
   drops.reaches.clear();
@@ -270,7 +269,7 @@ void CompareDrops(Drops& drops) {
   }
 }
 
-/// Drops whose boxes touch triangles of others keep their surfaces.
+/// Drops whose boxes touch the box of a triangle of another body keep their surfaces.
 void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
                       std::span<const VertexTriangle> triangles, Drops& drops) {
   for (const VertexTriangle& triangle : triangles) {
@@ -293,7 +292,7 @@ void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
   }
 }
 
-/// Exchanges the surfaces of the drops that are taken.
+/// Replaces the surfaces of the drops that are taken.
 void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positions,
                std::vector<Vec3>& normals, std::vector<VertexTriangle>& triangles) {
   std::erase_if(triangles, [&](const VertexTriangle& triangle) {

@@ -1,9 +1,9 @@
 // Replaces the surfaces of drops by ellipsoids, which keep their volume and follow their particles.
 //
 // The level set of a few particles encloses few nodes or none. The surface of such a drop depends
-// on its place in the lattice. Its volume is wrong, and it trembles as it moves. An ellipsoid with
-// the moments of its particles does not. A drop keeps its surface where others are near: the box of
-// the ellipsoid and of the former surface must touch no other triangle (core/SURFACES.md, "Drops").
+// on its place in the lattice, so its volume is wrong and it trembles as it moves. An ellipsoid
+// with the moments of the particles avoids both. A drop keeps its surface if the box of the
+// ellipsoid and of the former surface touches another triangle or drop (core/SURFACES.md, "Drops").
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@
 namespace partiemc::space {
 
 struct DropLimits {
-  std::uint64_t most_particles = 0;  ///< Larger bodies keep their surfaces.
-  /// A particle without a body stays without a surface if these exclude bodies of one particle.
+  std::uint64_t most_particles = 0;  ///< Bodies with more particles keep their surfaces.
+  /// Limits of cleaning (BodyLimits). A particle without a body below them gets no ellipsoid.
   std::uint64_t least_particles = 0;
   double least_volume = 0;  ///< World units cubed.
 };
@@ -36,7 +36,7 @@ struct DropsInput {
   const Bodies& bodies;
   const MovedNodes& nodes;
   std::span<const std::uint32_t> body_of;  ///< By vertex of SpaceCrossings.
-  bool takes_copies = false;  ///< Copies without a body become drops, too: the box wraps.
+  bool takes_copies = false;  ///< Copies without a body become drops, too. For boxes that wrap.
 };
 
 struct Drops {
@@ -47,14 +47,16 @@ struct Drops {
     std::uint32_t body = kNoIndex;      ///< kNoIndex: a particle without a body.
     std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
-    double volume = 0;   ///< Cells cubed; as its moments.
-    Vec3 origin, first;  ///< First moment relative to the origin.
-    /// Second moments xx, xy, xz, yy, yz, zz. They include those of each particle as a ball.
+    double volume = 0;   ///< Cells cubed; of its particles, images included.
+    Vec3 origin, first;  ///< A place in the drop; the first moment relative to it.
+    /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls.
     std::array<double, 6> second{};
-    Box box;  ///< Holds the ellipsoid and the former surface. World units.
-    bool is_taken = false;
-    std::uint32_t first_point = 0;   ///< In `points`.
-    std::uint32_t first_vertex = 0;  ///< The first vertex of the surface, if it is taken.
+    /// Holds the ellipsoid, and the former surface or a fixed outside node of the cell of a
+    /// particle without a body. World units.
+    Box box;
+    bool is_taken = false;           ///< The ellipsoid replaces the surface.
+    std::uint32_t first_point = 0;   ///< First index in `points`.
+    std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
   std::vector<Drop> drops;
 
@@ -64,13 +66,13 @@ struct Drops {
     std::uint32_t brick, drop;
     friend auto operator<=>(const Reach&, const Reach&) = default;
   };
-  BrickDirectory bricks;             ///< Scratch: which boxes reach.
-  std::vector<Reach> reaches;        ///< Scratch.
-  std::vector<std::uint32_t> first;  ///< Scratch: by brick, into `reaches`.
+  BrickDirectory bricks;             ///< Scratch: the bricks that boxes of drops reach.
+  std::vector<Reach> reaches;        ///< Scratch: sorted by brick.
+  std::vector<std::uint32_t> first;  ///< Scratch: by brick, its first index in `reaches`.
 };
 
-/// Removes the triangles of drops, and adds ellipsoids behind the vertices of SpaceCrossings.
-/// Cost: linear in particles and triangles.
+/// Removes the triangles of drops, and appends ellipsoids to positions, normals and triangles.
+/// World units. Cost: linear in particles and triangles.
 void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
                   std::vector<Vec3>& positions, std::vector<Vec3>& normals,
                   std::vector<VertexTriangle>& triangles);

@@ -8,10 +8,10 @@
 namespace partiemc::space {
 namespace {
 
-// Added to squared distances, in squared cells, to keep the weight of a loop at the edge finite.
+// Added to squared distances, in squared cells. Keeps weights finite near the edge.
 constexpr double kLeastSquare = .01;
 
-/// The loops around a crossed edge: vertices of the four cells that share it.
+/// The vertices of the loops around a crossed edge, one in each of the four cells that share it.
 std::array<std::uint32_t, 4> LoopsAround(const BrickDirectory& bricks,
                                          const SpaceCrossings& crossings, const BrickPlace& node,
                                          int axis) {

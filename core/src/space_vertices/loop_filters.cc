@@ -10,8 +10,8 @@
 namespace partiemc::space {
 namespace {
 
-/// Copies the loops near a chunk. Loops that fill the last vector have no area. Without bases,
-/// these stay as they are.
+/// Copies the loops near a chunk, and fills the last vector with loops without an area. If `bases`
+/// is empty, `loops.base` is not set.
 void LoadNear(const LoopSurface& surface, std::span<const Vec3> normals,
               std::span<const double> bases, const std::vector<std::uint32_t>& near,
               NearLoops& loops) {

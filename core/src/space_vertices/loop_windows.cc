@@ -63,7 +63,7 @@ struct Box {
   }
 };
 
-/// Exchanges the rows and the columns of a matrix of bits.
+/// Transposes a matrix of bits.
 void Transpose(std::array<std::uint64_t, 64>& rows) {
   std::uint64_t mask = 0xffffffff;
   for (std::size_t by = 32; by != 0; by >>= 1, mask ^= mask << by) {
@@ -75,8 +75,8 @@ void Transpose(std::array<std::uint64_t, 64>& rows) {
   }
 }
 
-/// Finds the windows of the loops of a chunk: those within reach to which links lead. All windows
-/// grow at once: each near loop has a set of windows, with one bit for each loop of the chunk.
+/// Finds the windows of the loops of a chunk. All windows grow at once: each near loop has a set of
+/// windows that it belongs to, as a word with one bit for each loop of the chunk.
 class ChunkSearch {
  public:
   ChunkSearch(std::span<const std::uint32_t> first_step, std::span<const std::uint32_t> links,
@@ -116,8 +116,8 @@ class ChunkSearch {
     return sizes_.empty() ? square_ : square_ * double{sizes_[loop]} * double{sizes_[loop]};
   }
 
-  /// Finds the loops within reach of the box around the chunk, first the loops of the chunk, and
-  /// the links between them.
+  /// Finds the near loops, which are the loops of the chunk and then connected loops within reach
+  /// of the box around it, and the links between near loops.
   void FindNear() {
     count_ = 0;
     slots_.fill(kFree);
@@ -167,8 +167,8 @@ class ChunkSearch {
   void GrowWindows() {
     std::fill_n(found_.begin(), count_, std::uint64_t{0});
     for (std::size_t k = 0; k < ends_.count; ++k) found_[k] = std::uint64_t{1} << k;
-    // Near loops are in the order of their steps from the chunk. Alternate directions reach all in
-    // few passes.
+    // Near loops are in the order of their links from the chunk, so that few passes in alternating
+    // directions reach all of them.
     for (bool is_up = true, has_grown = true; has_grown; is_up = !is_up) {
       has_grown = false;
       for (std::size_t n = 0; n < count_; ++n) {
@@ -227,7 +227,7 @@ class ChunkSearch {
   LoopWindows::Chunk& chunk_;
 
   std::array<std::uint16_t, kSlots> slots_;
-  std::size_t count_ = 0;  // Near loops, in the order in which links lead to them.
+  std::size_t count_ = 0;  // Of near loops.
   PerNear<std::uint32_t> near_;
   // The links of near loop k are [first_[k], first_[k + 1]).
   std::array<std::uint16_t, LoopWindows::kMostNear + 1> first_;
@@ -235,7 +235,7 @@ class ChunkSearch {
   NearPlaces places_;
   WindowEnds ends_;
   PerNear<std::uint64_t> within_, found_;
-  PerNear<std::uint64_t> sorted_;  // Near loops and their indices.
+  PerNear<std::uint64_t> sorted_;  // Near loops (high half) and their indices in `near_`, sorted.
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The window of a loop: the loops within a distance that are connected with it through loops within
-// the same distance.
+// The window of a loop: the loops within a distance of it that links connect with it through loops
+// within this distance.
 //
 // A loop is the index of a vertex in a cell, minus `edge_count`. Two loops are linked if a curve on
 // a face belongs to both.
@@ -17,18 +17,16 @@
 namespace partiemc::space {
 
 struct LoopWindows {
-  /// Most loops per chunk.
   static constexpr std::uint32_t kMostLoopsOfChunk = 64;
-  /// Most loops near a chunk: those with the fewest steps from its loops. This bounds the memory if
-  /// cells are small.
+  /// Most loops near a chunk: those the fewest links away. Bounds the memory if cells are small.
   static constexpr std::size_t kMostNear = 2048;
 
   static constexpr std::size_t kWordBits = 32;
 
-  /// The windows of consecutive loops of a brick, as bits for the loops near them.
+  /// The windows of consecutive loops of a brick, as bits for the loops near the chunk.
   struct Chunk {
     std::uint32_t begin = 0, end = 0;  ///< The loops.
-    std::vector<std::uint32_t> near;   ///< The union of the windows and more; sorted.
+    std::vector<std::uint32_t> near;   ///< All loops in the windows, and some others; sorted.
     std::vector<std::uint32_t> bits;   ///< By loop: bit k % 32 of word k / 32 is loop near[k].
     std::vector<std::uint16_t> self;   ///< By loop: its index in `near`.
 
@@ -44,9 +42,9 @@ struct LoopWindows {
   std::vector<std::uint32_t> links;  ///< By step of SpaceCrossings: the loop across its face.
 };
 
-/// Finds the window of each loop, the loops within `reach` cells, times its local size. `centres`
-/// by loop, `sizes` also or empty. Deterministic, parallel over loops. Cost: linear in the sizes of
-/// the windows.
+/// Finds the window of each loop for the distance `reach`, in cells, times its local size.
+/// `centres` and `sizes` are by loop; no sizes: all are 1. Deterministic, parallel over chunks.
+/// Cost: linear in the sizes of the windows.
 void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                  std::span<const Vec3> centres, double reach, LoopWindows& windows,
                  std::span<const float> sizes = {});

@@ -15,8 +15,7 @@ namespace {
 
 constexpr std::size_t kPointsAtOnce = 64;
 
-/// The brick that holds a place in cells. It exists if a particle is within the kernel radius
-/// (FindBricks).
+/// The brick that contains a place in cells. It exists if a kernel reaches the place (FindBricks).
 BrickCoordinate BrickAt(const Vec3& place) {
   const auto along = [](double cells) {
     return static_cast<std::int32_t>(std::floor(cells / kBrickSize));
@@ -24,15 +23,15 @@ BrickCoordinate BrickAt(const Vec3& place) {
   return {along(place.z), along(place.y), along(place.x)};
 }
 
-/// The particles around a point: a place relative to a brick.
+/// The particles around a place, which is in cells relative to a brick.
 struct Around {
   const SpaceBins& bins;
   std::uint32_t brick;
   Vec3 place;
   double radius;  ///< The kernel radius of size 1, in cells.
 
-  /// Calls visit(particle, w k, D, s) for each particle whose kernel reaches the place: D is in
-  /// kernel radii of size 1, s the own size.
+  /// Calls visit(particle, w k, D, s) for each particle whose kernel reaches the place. D is the
+  /// offset of the particle in kernel radii of size 1, s its own size. With own sizes, w is s^3.
   template <typename Visit>
   void ForEach(Visit visit) const {
     const auto x = static_cast<float>(place.x), y = static_cast<float>(place.y),
@@ -58,7 +57,7 @@ struct Around {
     });
   }
 
-  /// The mean size, weighted by kernels and volumes; 1 for equal sizes.
+  /// The mean own size, weighted by w k; 1 for equal sizes.
   double Size() const {
     if (bins.size.empty()) return 1;
     double sum = 0, weights = 0;

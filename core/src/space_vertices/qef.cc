@@ -23,8 +23,7 @@ Vec3 Solve(const Symmetric& a, const Vec3& b) {
   return inverse * (b.x * yz + b.y * zx + b.z * xy);
 }
 
-/// Sets the normal of each crossing: the direction of the gradient, or, without a gradient, the
-/// direction of the edge, outward.
+/// Sets the normal of each crossing: the direction of the gradient, or of the edge if that is 0.
 void FindEdgeNormals(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                      const std::vector<Vec3>& positions, std::vector<Vec3>& normals) {
   ParallelFor(static_cast<std::uint32_t>(bins.bricks.size()), [&](std::uint32_t brick) {

@@ -1,7 +1,7 @@
 // The placement `qef`: vertices in cells minimise the squared distances from tangent planes.
 //
-// Ju, Losasso, Schaefer, Warren: Dual Contouring of Hermite Data, 2002; with the regularisation
-// towards the mean of the crossings instead of a truncated inverse.
+// Ju, Losasso, Schaefer, Warren: Dual Contouring of Hermite Data, 2002. A weight of the mean of the
+// crossings replaces their truncated inverse.
 #pragma once
 
 #include <span>
@@ -18,14 +18,14 @@ struct TangentPlane {
   Vec3 point, normal;  ///< The normal has length 1.
 };
 
-/// The point x that minimises sum (n . (x - e))^2 + .05 |x - mean|^2 over planes through e with
-/// normals n.
+/// The point x that minimises sum (n . (x - e))^2 + .05 |x - mean|^2 over planes through points e
+/// with normals n.
 Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean);
 
-/// Samples the level set at the crossings of the edges for their normals. Moves each vertex in a
-/// cell to the LeastSquarePoint of the crossings of its loop, but not out of the cell. The normal
-/// of the vertex is the normalised mean of the normals of these crossings. Lengths are in cells.
-/// Parallel over bricks and cells. Requires: vertices are at their crossings. Sets all normals.
+/// Sets the normals of vertices on edges to the direction of the gradient. Moves each vertex in a
+/// cell to the LeastSquarePoint of the crossings of its loop, but at most to kAnchorMargin from the
+/// faces of the cell. Its normal is the normalised mean of the normals of these crossings. Lengths
+/// are in cells. Parallel over bricks and cells. Requires: PlaceOnCrossings has set the positions.
 void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                 std::vector<Vec3>& positions, std::vector<Vec3>& normals);
 

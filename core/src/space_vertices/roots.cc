@@ -11,7 +11,7 @@
 namespace partiemc::space {
 namespace {
 
-// A smaller squared gradient has no direction.
+// Gradients with a smaller square are weak: their directions are not used.
 constexpr double kWeakGradient = 1e-3;
 
 // Cells along a block.
@@ -30,8 +30,8 @@ class RootFinder {
     sampler_.MoveTo(brick, {{x, y, z}, {x + kBlock, y + kBlock, z + kBlock}});
   }
 
-  /// Takes one step, which ends at the sides of the cell with the lowest node `low`. If the
-  /// gradient is weak, position and normal stay as they are. Returns the local size.
+  /// Takes one step of FindRoots in the cell with the lowest node `low`. If the gradient is weak,
+  /// position and normal stay as they are. Returns the local size.
   double Step(const Vec3& low, Vec3& position, Vec3& normal) {
     const PointSample sample = sampler_.Sample(position - origin_);
     const double square = Dot(sample.gradient, sample.gradient);
@@ -56,7 +56,7 @@ class RootFinder {
   Vec3 origin_;
 };
 
-/// The area normal of a loop, which is used if the gradient is weak.
+/// The normalised sum of the area normals of the triangles of a loop.
 Vec3 NormalOfLoop(const SpaceCrossings& crossings, const ActiveCell& cell, int loop,
                   const std::vector<Vec3>& positions) {
   const CellLoops& loops = LoopsOf(cell.corners);

@@ -1,4 +1,4 @@
-// Roots of the level set and normals at the vertices in cells.
+// Moves the vertices in cells towards roots of the level set.
 #pragma once
 
 #include <span>
@@ -13,13 +13,14 @@ namespace partiemc::space {
 
 struct RootConstants {
   double newton_step = .3;  ///< Longest step, in cells.
-  double long_step = .07;   ///< After longer steps the gradient is evaluated again, in cells.
+  double long_step = .07;  ///< If the step is longer, evaluates the gradient again after it. Cells.
 };
 
-/// Moves the vertices in cells by one Newton step, but not out of their cells, and sets their
-/// normals. If `sizes` is not empty, sets the local sizes there, in spacings. A normal is the
-/// direction of the gradient, or, if the gradient is weak, the area normal of the loop. Vertices on
-/// edges stay. Positions and normals by vertex, in cells. Parallel over cells.
+/// Moves the vertices in cells by one Newton step, at most to kAnchorMargin from the faces of their
+/// cells, and sets their normals. If `sizes` is not empty, sets their local sizes, in spacings. A
+/// normal is the direction of the gradient. If the gradient is weak, the vertex stays, and its
+/// normal is the area normal of the loop. Vertices on edges stay without a normal. Arrays are by
+/// vertex, lengths in cells. Parallel over bricks.
 void FindRoots(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                const RootConstants& constants, std::vector<Vec3>& positions,
                std::vector<Vec3>& normals, std::span<float> sizes = {});

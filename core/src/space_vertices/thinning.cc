@@ -31,8 +31,8 @@ double DistanceToTriangle(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 /// A crossed edge with the four cells around it.
 struct EdgeStar {
-  std::array<std::uint32_t, 4> loops;  ///< Their vertices, counter-clockwise around the axis.
-  Vec3 low, high;                      ///< The nodes at its ends, moved.
+  std::array<std::uint32_t, 4> loops;  ///< Vertices in the cells, counter-clockwise.
+  Vec3 low, high;                      ///< The moved positions of the nodes at its ends.
   bool is_low_inside;
 };
 
@@ -46,7 +46,7 @@ class Thinner {
         certificate_(certificate),
         positions_(positions) {}
 
-  /// Whether all quads at an edge are cut across cells; sets its star.
+  /// Whether all four quads at a crossed edge are cut across cells. If so, sets `star`.
   bool FindStar(const BrickPlace& node, int axis, EdgeStar& star) const;
 
   /// Returns the nearest valid quad that can replace a vertex, if it is at most `distance` cells

@@ -1,4 +1,4 @@
-// Places the vertices of the crossings.
+// Anchors of vertices, and normals from triangles.
 #pragma once
 
 #include <algorithm>
@@ -12,12 +12,11 @@
 
 namespace partiemc::space {
 
-/// Least distance of a crossing from the ends of its edge, in cells. With this distance, rounding
-/// to world coordinates cannot move a crossing to a node.
+/// Least distance of a linear crossing from the ends of its edge, in cells. Rounding to world
+/// coordinates then cannot move it to a node.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
-/// The least distance for anchors of vertices that move. Tetrahedra at a node then have room for
-/// the displacements: with .02, 2 % of the vertices of balls, tori and boxes had to return to their
-/// anchors.
+/// Least distance for the anchors of vertices that move. Tetrahedra at a node then have room for
+/// the displacements: 1 % of the vertices of balls, tori and boxes are set back, 2 % with .02.
 inline constexpr double kAnchorMargin = .12;
 
 /// The point nearest to `point` that is at least kAnchorMargin away from the faces of the cell at
@@ -29,22 +28,20 @@ inline Vec3 ClampedToCell(const Vec3& point, const Vec3& low) {
   return {clamp(point.x, low.x), clamp(point.y, low.y), clamp(point.z, low.z)};
 }
 
-/// Sets the vertices on edges to the linear crossings of F, at least `margin` away from the nodes,
-/// and the vertices in cells to the mean of the crossings of their loop. In cells.
+/// Places vertices on edges at the linear crossings of F, at least `margin` away from the nodes.
+/// Places vertices in cells at the mean of the crossings of their loop. Lengths are in cells.
 void PlaceOnCrossings(const BrickDirectory& bricks, const SpaceField& field,
                       const SpaceCrossings& crossings, double margin, std::vector<Vec3>& positions);
 
 /// The weights of the triangles around a vertex in its normal.
 enum class NormalWeights {
   kArea,  ///< The area of the triangle.
-  /// sin(a) / (l m) for the angle a between the sides of the lengths l and m at the vertex. The
-  /// normal is exact where the vertices lie on a sphere (Max, Journal of Graphics Tools 4(2),
-  /// 1999).
+  /// sin(a) / (l m) for the angle a between the sides of the lengths l and m at the vertex. Exact
+  /// where the vertices lie on a sphere (Max, Journal of Graphics Tools 4(2), 1999).
   kSphere,
 };
 
-/// Per vertex: the normalised weighted sum of the normals of its triangles; (0, 0, 1) without
-/// triangles.
+/// Sets each normal to the normalised weighted sum over its triangles; (0, 0, 1) if the sum is 0.
 void NormalsFromTriangles(NormalWeights weights, const std::vector<Vec3>& positions,
                           const std::vector<VertexTriangle>& triangles, std::vector<Vec3>& normals);
 

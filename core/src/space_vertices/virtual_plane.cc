@@ -63,8 +63,7 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   SmoothLoops(input, constants, scratch, centres, std::span(normals).subspan(crossings.edge_count));
   PlaceEdgesByLoops(bricks, crossings, anchors, positions, normals, sizes);
 
-  // The first round misses the volume of small bodies: where a surface bends strongly, moving it
-  // changes its area.
+  // One round misses the volume of small bodies, because their area changes as they move.
   for (int round = 0; round < 2; ++round) {
     MeasureBodies(bricks, crossings, cell_size, input.bodies, positions, scratch.volumes);
     MatchVolumes(input.bodies, {.unit = cell_size, .limit = constants.volume_limit * h}, normals,

@@ -37,11 +37,12 @@ struct PlacementInput {
 struct VirtualPlaneScratch {
   BodyVolumes volumes;
   LoopWindows windows;
-  std::vector<double> bases;          ///< By loop.
+  std::vector<double> bases;          ///< By loop: bends, then the bases of SmoothOnPlanes.
   std::vector<Vec3> smooth, smooth2;  ///< By loop.
 };
 
-/// Moves the vertices from their anchors to smoothed planes and sets their normals. In cells.
+/// Places the vertices on smoothed planes, sets their normals and matches the volumes of bodies.
+/// Lengths are in cells.
 void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& constants,
                    const std::vector<Vec3>& anchors, VirtualPlaneScratch& scratch,
                    std::vector<Vec3>& positions, std::vector<Vec3>& normals);

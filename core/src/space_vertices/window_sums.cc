@@ -16,7 +16,7 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kAtOnce = 8;  // Loops for each byte of a window.
+constexpr int kAtOnce = 8;  // Loops of a byte of a window.
 using Lanes = hn::CappedTag<float, kAtOnce>;
 using Vector = hn::Vec<Lanes>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes()));
@@ -39,7 +39,7 @@ HWY_INLINE void ForEachByte(std::span<const std::uint32_t> words, Visit visit) {
   for (std::size_t first = 0; first < words.size(); first += kWordsAtOnce) {
     std::uint64_t not_zero = 0;
     for (std::size_t k = first; k < std::min(first + kWordsAtOnce, words.size()); ++k) {
-      // The highest bit of each byte: whether any bit is set. Then these bits side by side.
+      // Sets the highest bit of each byte that is not 0. Then moves these bits side by side.
       const std::uint32_t low = (words[k] & 0x7f7f7f7fu) + 0x7f7f7f7fu;
       const std::uint32_t any = ((low | words[k]) & 0x80808080u) >> 7;
       not_zero |= std::uint64_t{any * 0x10204080u >> 28} << kPerWord * (k - first);
@@ -56,7 +56,7 @@ HWY_INLINE void ForEachByte(std::span<const std::uint32_t> words, Visit visit) {
 // processors take a hundred times as long, begin at 1.2e-38.
 constexpr float kLeastCosine = .125f;
 
-// The loop of a window and some near loops.
+// Pairs of the loop i of a window and a vector of near loops j.
 struct Pairs {
   Vector x, y, z;                         // c_j - c_i
   Vector normal_x, normal_y, normal_z;    // n_j
@@ -78,7 +78,8 @@ struct Pairs {
   }
 };
 
-// Calls add(pairs, first near loop) for the vectors of the partial sums [lane, lane + kLanes).
+// Calls add(pairs, k) for the vectors whose terms belong to the partial sums [lane, lane + kLanes).
+// k is the first near loop of the vector.
 template <class Add>
 HWY_INLINE void ForEachPair(const NearLoops& loops, const Window& window, int lane, Add add) {
   const Lanes d;

@@ -1,5 +1,5 @@
-// Weighted sums over windows of loops, in vectors. Every instruction set gives the same bits: terms
-// go to eight partial sums by their index, and the partial sums are added by halves.
+// Weighted sums over windows of loops, in vectors. Every instruction set gives the same bits,
+// because the order of each sum is fixed. Symbols are as in loop_filters.h.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace partiemc::space {
 
-/// The centres of the loops near a chunk of LoopWindows, from a common origin.
+/// The centres of the loops near a chunk of LoopWindows, relative to one of them.
 struct NearPlaces {
   static constexpr std::size_t kMost = LoopWindows::kMostNear;
 
@@ -23,28 +23,28 @@ struct NearPlaces {
 struct NearLoops : NearPlaces {
   std::array<float, kMost> area;
   std::array<float, kMost> normal_x, normal_y, normal_z;
-  std::array<float, kMost> base;  ///< Of SumPlanes.
+  std::array<float, kMost> base;  ///< For SumPlanes only.
 };
 
-/// The squared reaches of the windows of the first `count` near loops, and 0 after them.
+/// The squared reaches of the loops of a chunk, which are the first `count` near loops; then 0.
 struct WindowEnds {
   std::size_t count = 0;
   alignas(64) std::array<float, LoopWindows::kMostLoopsOfChunk> square;
 };
 
-/// Finds the near loops within windows: sets bit w of within[k] if the squared distance between the
-/// near loops k and w is below the square of window w. Cost: `count` times the windows.
+/// Sets bit w of within[k] if the squared distance between the near loops k and w is below
+/// ends.square[w]. `count`: the number of near loops. Cost: `count` times `ends.count`.
 void FindWithin(const NearPlaces& places, std::size_t count, const WindowEnds& ends,
                 std::uint64_t* within);
 
 /// A loop and its window: one bit for each near loop.
 struct Window {
   std::span<const std::uint32_t> bits;
-  std::size_t self;      ///< Its index among the near loops.
+  std::size_t self;      ///< The index of the loop among the near loops.
   float inverse_square;  ///< 1 / reach^2.
 };
 
-/// sum w n_j, where w = area_j B(d, reach), times max(0, n_i . n_j)^32 if `stops_at_edges`.
+/// sum w n_j. The weight w is as for kAtEdges if `stops_at_edges`.
 Vec3 SumNormals(const NearLoops& loops, const Window& window, bool stops_at_edges);
 
 struct BendSums {
@@ -54,7 +54,7 @@ struct BendSums {
 BendSums SumBends(const NearLoops& loops, const Window& window);
 
 struct PlaneSums {
-  double height = 0;  ///< sum w ((n_i + n_j) / 2 . (c_j - c_i) + base_j), stopped at edges.
+  double height = 0;  ///< sum w ((n_i + n_j) / 2 . (c_j - c_i) + base_j), w as for kAtEdges.
   double total = 0;   ///< sum w
 };
 PlaneSums SumPlanes(const NearLoops& loops, const Window& window);

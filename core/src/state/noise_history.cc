@@ -18,7 +18,7 @@ constexpr std::array<ArrayKind, 3> kNoiseKinds = {{{"ids", 8}, {"coordinates", 8
 constexpr std::size_t kNoiseHeaderBytes = 4 + 4 + 8;
 constexpr std::size_t kCountBytes = 8 * kNoiseKinds.size();
 
-// Largest offset in cells. The filter keeps offsets below a spacing, at most four cells.
+// Largest offset, in cells. The filter keeps offsets below a spacing, which is at most four cells.
 constexpr float kMostOffset = 5;
 
 auto NoiseArraysOf(auto& noise) { return std::tie(noise.ids, noise.given, noise.offsets); }

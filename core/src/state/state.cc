@@ -2,12 +2,11 @@
 // offset and time (kAbsent: none), largest identity, the box if the version is kVersionWithBox, the
 // numbers of normals, rings, runs and samples, these arrays, checksum.
 //
-// A state with sections has another magic, the version and the number of states. Each state
-// follows, the main one first: the number of its bytes, then its bytes. The checksum is last. The
-// state of a stream of surfaces has a third magic and the same layout. Its first state is a
-// SurfaceState.
+// A state with sections has another magic, the version and the number of states. The states follow,
+// the main one first, each with the number of its bytes before it. The checksum is last. The state
+// of a stream of surfaces has a third magic and the same layout; its first state is a SurfaceState.
 //
-// A NoiseHistory is written around these bytes, in its own layout (noise_history.h).
+// A NoiseHistory is written around these bytes (noise_history.h).
 #include "partiemc/state.h"
 
 #include <array>
@@ -172,7 +171,7 @@ std::size_t OwnBytes(const State& state) {
          kChecksumBytes;
 }
 
-// Appends the state of one outline, without the states of its sections.
+// Appends the state of one outline, without sections and noise.
 void PutOwn(const State& state, std::string& bytes) {
   const std::size_t start = bytes.size();
   PutNumber(kMagic, bytes);
@@ -221,7 +220,7 @@ absl::StatusOr<State> ParseOwn(std::string_view bytes) {
   return state;
 }
 
-// Reads the bytes of several states. The first one is a SurfaceState if `has_surface`.
+// Reads a state with sections, or if `has_surface` the state of a stream of surfaces.
 absl::StatusOr<State> ParseStates(std::string_view bytes, bool has_surface) {
   constexpr std::size_t kMostStates = 1 + ReconstructionParameters::kMaxSections;
   if (bytes.size() < kSectionsHeaderBytes + kChecksumBytes) {

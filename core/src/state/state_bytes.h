@@ -1,4 +1,6 @@
-// The bytes that all kinds of states have in common: optional numbers, arrays and a checksum.
+// The bytes that all kinds of states have in common: optional numbers, a box, arrays, a checksum.
+// TakeX removes X from the front of `rest`; callers check that the bytes of headers are there. All
+// errors are INVALID_ARGUMENT (CORRUPT_STATE).
 #pragma once
 
 #include <array>
@@ -33,7 +35,7 @@ inline absl::Status Corrupt(std::string value, std::string rule) {
       {std::string(kReasonCorruptState), "state", std::move(value), std::move(rule)});
 }
 
-/// Checks the last 8 bytes: the checksum of all bytes before them. Requires: at least 8 bytes.
+/// Checks that the last 8 bytes are the checksum of all others. Requires: at least 8 bytes.
 inline absl::Status CheckSum(std::string_view bytes) {
   const std::string_view body = bytes.substr(0, bytes.size() - kChecksumBytes);
   std::string_view tail = bytes.substr(body.size());
@@ -57,7 +59,7 @@ inline void PutOptional(std::optional<double> value, std::string& bytes) {
   PutNumber(value ? std::bit_cast<std::uint64_t>(*value) : kAbsent, bytes);
 }
 
-/// Returns whether the version is `with_box`, of a layout that has a box after its header.
+/// Returns whether the version is `with_box`, whose layout has a box after the header.
 inline absl::StatusOr<bool> TakeVersion(std::string_view& rest, std::uint32_t without_box,
                                         std::uint32_t with_box) {
   const auto version = TakeNumber<std::uint32_t>(rest);
@@ -66,7 +68,7 @@ inline absl::StatusOr<bool> TakeVersion(std::string_view& rest, std::uint32_t wi
                  absl::StrCat("must be version ", without_box, " or ", with_box));
 }
 
-/// The bytes of a box: origin and length of each axis, kAbsent for axes that are not periodic.
+/// A box is the origin and the length of each axis; both are kAbsent if the axis is not periodic.
 inline constexpr std::size_t kBoxBytes = 6 * 8;
 
 inline std::size_t BoxBytes(const std::optional<PeriodicBox>& box) { return box ? kBoxBytes : 0; }
@@ -79,7 +81,7 @@ inline void PutBox(const std::optional<PeriodicBox>& box, std::string& bytes) {
   }
 }
 
-/// Reads a box if `is_present`. Errors: INVALID_ARGUMENT (CORRUPT_STATE).
+/// Reads and checks a box if `is_present`; else leaves `box` as it is.
 inline absl::Status TakeBox(bool is_present, std::string_view& rest,
                             std::optional<PeriodicBox>& box) {
   if (!is_present) return absl::OkStatus();
@@ -100,7 +102,7 @@ inline absl::Status TakeBox(bool is_present, std::string_view& rest,
   return absl::OkStatus();
 }
 
-/// Reads a number. A bool is stored as a number of 4 bytes; returns false if this is not 0 or 1.
+/// Reads a number, or a bool from a number of 4 bytes. Returns false if that is neither 0 nor 1.
 template <typename Number>
 bool TakeNumberOrFlag(std::string_view& rest, Number& number) {
   if constexpr (std::is_same_v<Number, bool>) {
@@ -121,7 +123,7 @@ void PutNumberOrFlag(auto number, std::string& bytes) {
   }
 }
 
-/// An array of a state: its name, and the number of bytes of one element.
+/// An array of a state: its name in messages, and the bytes of one element.
 struct ArrayKind {
   const char* name;
   std::size_t bytes;
@@ -135,8 +137,8 @@ std::uint64_t BytesOf(const std::array<ArrayKind, kKinds>& kinds,
   return bytes;
 }
 
-/// Reads the sizes of the arrays, which fill the rest of the bytes. Each size is bounded before it
-/// is multiplied, so that the product cannot overflow. Requires: the bytes of the sizes.
+/// Reads the sizes of the arrays, and checks that the arrays fill the rest of the bytes. Each size
+/// is bounded before it is multiplied, so that nothing overflows.
 template <std::size_t kKinds>
 absl::StatusOr<std::array<std::uint64_t, kKinds>> TakeCounts(
     const std::array<ArrayKind, kKinds>& kinds, std::string_view& rest) {
@@ -155,8 +157,8 @@ absl::StatusOr<std::array<std::uint64_t, kKinds>> TakeCounts(
   return Corrupt(std::move(value), absl::StrCat(rule, " bytes"));
 }
 
-/// Appends the elements of a tuple of arrays. `numbers_of` gives the members of an element as a
-/// tuple of references, in the order of the layout.
+/// Appends the elements of a tuple of arrays. numbers_of(element) returns the element's members as
+/// a tuple of references, in the order of the layout.
 template <typename Arrays, typename NumbersOf>
 void PutArrays(const Arrays& arrays, NumbersOf numbers_of, std::string& bytes) {
   const auto put = [&](const auto&... number) { (PutNumberOrFlag(number, bytes), ...); };
@@ -166,8 +168,8 @@ void PutArrays(const Arrays& arrays, NumbersOf numbers_of, std::string& bytes) {
   std::apply([&](const auto&... array) { (put_all(array), ...); }, arrays);
 }
 
-/// Reads what PutArrays wrote. Returns false if a flag is not 0 or 1. Requires: the bytes of the
-/// arrays (TakeCounts).
+/// Reads the arrays that PutArrays wrote. Returns false if a bool is neither 0 nor 1. Requires: the
+/// bytes of the arrays, which TakeCounts checks.
 template <typename Arrays, std::size_t kKinds, typename NumbersOf>
 bool TakeArrays(const std::array<std::uint64_t, kKinds>& counts, NumbersOf numbers_of,
                 std::string_view& rest, Arrays arrays) {

@@ -1,6 +1,6 @@
-// The bytes of the state of surfaces. Little-endian layout: magic, version, cell size and time
-// (kAbsent: none), largest identity, the box if the version is kSurfaceVersionWithBox, the numbers
-// of shells, runs and samples, these arrays, checksum.
+// The bytes of a SurfaceState. Little-endian layout: magic, version, cell size and time (kAbsent:
+// none), largest identity, the box if the version is kSurfaceVersionWithBox, the numbers of shells,
+// runs and samples, these arrays, checksum.
 #include "partiemc/surface_state.h"
 
 #include <cmath>

@@ -7,20 +7,20 @@
 namespace partiemc {
 namespace {
 
-// The fitted stretch, in spacings: its least height above the wall, its length, and the least
-// lengths for a line and for a parabola.
+// The fitted part of a stretch, in spacings: its least height above the wall, its largest length,
+// and the least lengths for a line and for a parabola.
 constexpr double kLowest = 1.5, kLength = 6, kLineLength = 1.5, kParabolaLength = 4;
-// The stretch ends where it has come down by this from its highest point, in spacings.
+// The fitted part ends where it has come down by this from its highest point, in spacings.
 constexpr double kDescent = .5;
 // Least sine of the angle at the wall.
 constexpr double kLeastSine = .17;
-// Farthest foot from the fitted stretch, and from the contact along the wall, in spacings. With a
-// smaller angle the outline is a film.
+// Farthest foot from the fitted part, and from the contact along the wall, in spacings. An outline
+// that meets the wall farther away is a film.
 constexpr double kFarthest = 8, kFarthestMove = 4;
-// Largest height of the foot above the wall, in cells.
+// Largest distance of the foot from the wall, in cells.
 constexpr double kTolerance = 1e-6;
 
-// Weighted least squares for side = c . (1, s, s^2).
+// Weighted least squares for side(s) = c[0] + c[1] s + c[2] s^2.
 class Fit {
  public:
   void Add(double s, double side, double weight) {
@@ -36,7 +36,8 @@ class Fit {
     }
   }
 
-  // With `order` coefficients. Returns false if the points do not determine them.
+  // Finds the first `order` coefficients; others are 0. Returns false if the points do not
+  // determine them.
   bool Solve(std::size_t order, std::array<double, 3>& c) const {
     std::array<std::array<double, 4>, 3> a{};
     for (std::size_t row = 0; row < order; ++row) {
@@ -61,7 +62,7 @@ class Fit {
   std::array<double, 3> moments_{};
 };
 
-// The points [first, end) from the contact.
+// The fitted part: the points [first, end) from the contact; none if `first` is 0.
 struct Stretch {
   std::size_t first = 0, end = 0;
   double length = 0;
@@ -87,7 +88,8 @@ Stretch FindStretch(const Point& contact, const Point& up, double h,
   return stretch;
 }
 
-// Whether no other solid covers the wall from a contact on, up to a length along it.
+// Whether no other solid covers the wall from a contact on, along the wall by `move` cells. Places
+// without a tile near them count as free.
 bool IsFree(const ContactCurve::Surroundings& around, const WallPlace& contact, double move) {
   constexpr double kStep = 2;  // In cells; less than WallField::kMostHeight.
   if (around.tile == kNoTile) return true;

@@ -13,11 +13,13 @@
 namespace partiemc {
 namespace {
 
-// Sharp corners turn by more than 30 degrees: 1 - cos.
+// 1 - cosine of 30 degrees. Sharp corners turn by more.
 constexpr double kSharp = .134;
-// Least distance of free vertices from walls, and of vertices that a contact passes, in spacings.
+// Least distance of free vertices from walls, and from a contact to the next vertex on its wall, in
+// spacings.
 constexpr double kClearance = .02;
-// A contact keeps at least this share of the wet stretch to the next one.
+// Most part of the way to the next contact by which a contact moves. Below one half, so that two
+// contacts do not meet.
 constexpr double kMostShare = .45;
 
 // Fits one contact. Lengths are in cells.
@@ -48,7 +50,7 @@ class ContactFitter {
                               return std::nullopt;
                             return PointOf(Free(k));
                           });
-    bool is_free = false;  // Whether the contact moves as far as the curve says.
+    bool is_free = false;  // Whether the contact has moved to the foot of the curve.
     if (curve) {
       is_free = MoveContact(curve->foot());
       MoveStretch(*curve, is_free);
@@ -57,7 +59,7 @@ class ContactFitter {
   }
 
  private:
-  // The k-th point from the contact, along the free stretch or along the wall.
+  // The k-th point of the ring from the contact, along the free stretch and along the wall.
   std::size_t Free(std::size_t k) const { return Step(k, !is_wet_after_); }
   std::size_t Wet(std::size_t k) const { return Step(k, is_wet_after_); }
   std::size_t Step(std::size_t k, bool forward) const {
@@ -79,12 +81,13 @@ class ContactFitter {
     rings_.points[2 * point + 1] = at.y;
   }
   Point At() const { return lines_.At(p_.place[contact_]); }
-  // The wet side along the direction of the wall: a ring runs along its wall in its direction.
+  // 1 if the wet side is ahead in the direction of the wall, else -1. A ring runs along its wall in
+  // the wall's direction.
   double WetSign() const { return is_wet_after_ ? 1 : -1; }
-  // The length along the wall from the contact.
+  // The signed length along the wall from the contact's first place.
   double From(double along) const { return lines_.Between(loop_, start_, along); }
 
-  // Moves the contact to its foot. Returns false if something holds it back.
+  // Moves the contact to the foot of its curve. Returns false if it stops before.
   bool MoveContact(const WallPlace& foot) {
     const double wanted = From(lines_.Along(foot));
     double move = wanted;
@@ -95,7 +98,7 @@ class ContactFitter {
     return is_free;
   }
 
-  // The move up to the first sharp corner of the wall.
+  // The part of a move up to the first sharp corner of the wall.
   double ToCorner(double move) const {
     const auto of = lines_.EdgesOfLoop(loop_);
     if (of.front().is_endless) return move;
@@ -114,8 +117,8 @@ class ContactFitter {
     return move;
   }
 
-  // Moves the points on the wall that the contact passes ahead of it. Returns the move of the
-  // contact, which ends before the next contact and before another wall.
+  // Moves the points on the wall that the contact passes ahead of it. Returns the part of the move
+  // that ends before the next contact and before another wall.
   double PassWetPoints(double move) {
     const double sign = WetSign();
     if (sign * move <= 0) return move;
@@ -144,7 +147,8 @@ class ContactFitter {
     return move;
   }
 
-  // Moves the points between the contact and the fitted stretch.
+  // Moves the points between the contact and the fitted part: onto the curve if the contact is at
+  // its foot, else onto a straight line.
   void MoveStretch(const ContactCurve& curve, bool is_free) {
     const std::size_t count = curve.first_point();
     const Point foot = At(), end = curve.At(0);
@@ -156,7 +160,7 @@ class ContactFitter {
     }
   }
 
-  // From the contact to a point two spacings away, or to the end of a shorter stretch.
+  // The vector from the contact to a point two spacings away, or to the end of a shorter stretch.
   Point ChordOfStretch() const {
     Point chord = Minus(PointOf(Free(1)), At());
     for (std::size_t k = 2; k < count_ && p_.kind[Free(k)] == VertexKind::kFree; ++k) {

@@ -1,5 +1,5 @@
 // A hierarchical grid: grids with cells of different sizes, in one hash table. Each box is stored
-// in one cell, of the grid with the smallest cells that can hold the box.
+// once, in the grid with the smallest cells that can hold it.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline constexpr int kGridLevelBits = 5;
 inline constexpr int kGridLevels = 1 << kGridLevelBits;
 static_assert(2 * kGridIndexBits + kGridLevelBits <= 64);
 
-// Smallest ratio of the sizes of a cell and its box. The ratio ensures that two touching boxes lie
+// Smallest ratio of the size of a cell to the extent of a box in it. Two boxes that touch then lie
 // at most one cell apart, even if an index is rounded to the wrong side of a border. Any value well
 // above 1 + 2^-24, the error of an index, is sufficient.
 inline constexpr double kGridSlack = 1.0 + 0x1p-10;
@@ -37,7 +37,8 @@ class HierarchicalGrid {
     for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);
   }
 
-  /// The first level whose cells can hold a box of `extent`; at most 28, by the bounds of finest_.
+  /// The first level whose cells can hold a box of `extent`; at most 28, because of the second
+  /// bound of finest_.
   int LevelFor(double extent) const {
     int level = 0;
     while (level + 1 < kGridLevels && CellSize(level) < kGridSlack * extent) ++level;

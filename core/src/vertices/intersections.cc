@@ -1,6 +1,6 @@
 // Method. Segments are grouped into short runs along their rings. If all segments of a run point to
-// the right, for example, the run does not meet itself, nor the next run if that also points to the
-// right. On contours, comparing coordinates in this way excludes nearly all pairs of neighbours.
+// the right, for example, the run does not meet itself. It does not meet the next run either if all
+// segments of that run point to the right, too. This excludes nearly all pairs of neighbours.
 //
 // Successive runs of a ring form a block. A hierarchical grid finds blocks that are near each
 // other. Each block is stored in one cell: the cell at its lower left corner, in the grid whose
@@ -25,10 +25,10 @@ namespace {
 using Run = TouchingPairsBuffers::Run;
 using Block = TouchingPairsBuffers::Block;
 
-// Number of segments of a run. Longer runs would have larger boxes, and more boxes would overlap.
+// Most segments of a run. With longer runs more boxes would overlap.
 constexpr std::uint32_t kRunLength = 8;
 
-// Runs of a block.
+// Most runs of a block.
 constexpr std::uint32_t kBlockRuns = 8;
 
 // Bits of Run::directions.
@@ -46,7 +46,6 @@ bool FoldsBack(const Segment& first, const Segment& second) {
          Orientation(first.a, corner, second.b) == 0;
 }
 
-// One search.
 struct Search {
   std::span<const double> points;
   TouchingPairsBuffers& buffers;
@@ -122,7 +121,6 @@ HierarchicalGrid MakeGrid(const Search& s) {
   return HierarchicalGrid(bounds, extents / static_cast<double>(s.buffers.blocks.size()));
 }
 
-/// Puts every block into its cell.
 void FillGrid(Search& s, const HierarchicalGrid& grid) {
   std::vector<Block>& blocks = s.buffers.blocks;
   std::vector<std::uint32_t>& slots = s.buffers.slots;
@@ -141,7 +139,7 @@ void FillGrid(Search& s, const HierarchicalGrid& grid) {
   }
 }
 
-/// Whether two segments count as a pair: successive segments must overlap, others must touch.
+/// Whether two segments count as a pair: successive segments if they overlap, others if they touch.
 bool Touches(const Search& s, const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) {
   const Segment a = s.SegmentAt(of_i, i);
   const Segment b = s.SegmentAt(of_j, j);
@@ -197,10 +195,9 @@ void ForEachPairBetween(const Search& s, const Block& first, const Block& second
   }
 }
 
-/// Calls visit(i, j) for the pairs that a block finds: within the block, with later blocks of its
-/// grid, and with blocks of coarser grids. Searches the cells that can contain the lower left
-/// corner of a touching block: the cells that meet the block's box, one more column on the left and
-/// one more row below.
+/// Calls visit(i, j) for the touching pairs within a block, with later blocks of its grid, and with
+/// blocks of coarser grids. A touching block has its lower left corner in a cell that meets this
+/// block's box, one column to the left of these cells, or one row below.
 template <typename Visit>
 void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t index, Visit visit) {
   const std::span<const Block> blocks = s.buffers.blocks;
@@ -229,8 +226,8 @@ void ForEachPair(const Search& s, const HierarchicalGrid& grid, std::uint32_t in
   }
 }
 
-/// Sets `finds_pair` of each block: whether ForEachPair finds a pair for it. Only one of the two
-/// blocks of a pair finds it. Returns whether any block finds one.
+/// Sets Block::finds_pair: whether ForEachPair finds a pair. Only one of the two blocks of a pair
+/// finds the pair. Returns whether any block finds one.
 bool FindPairs(Search& s, const HierarchicalGrid& grid) {
   std::atomic<bool> has_pair = false;
   ParallelFor(static_cast<std::uint32_t>(s.buffers.blocks.size()), [&](std::uint32_t index) {
@@ -253,7 +250,7 @@ std::size_t CountTouchingPairs(std::span<const double> points,
   if (buffers.blocks.empty()) return 0;
   const HierarchicalGrid grid = MakeGrid(s);
   FillGrid(s, grid);
-  // Nearly all frames have no pair, so the blocks are searched in parallel first. Pairs are then
+  // Nearly all frames have no pair, so a parallel search looks for any first. The pairs are then
   // listed block by block, so that their order does not depend on the threads.
   if (!FindPairs(s, grid)) return 0;
   std::size_t count = 0;

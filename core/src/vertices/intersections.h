@@ -11,15 +11,15 @@
 
 namespace partiemc {
 
-/// Output and warm buffers of CountTouchingPairs. Memory: about 10 bytes for each segment. Segments
-/// are named by the index of their first point.
+/// Output and warm buffers of CountTouchingPairs. Memory: about 10 bytes for each segment, and 8
+/// for each pair. A segment has the index of its first point.
 struct TouchingPairsBuffers {
   /// Successive segments of a ring.
   struct Run {
     Box box;                             // Box of the segments.
     std::uint32_t first, last;           // Segments [first, last).
     std::uint32_t ring_begin, ring_end;  // The ring has the points [ring_begin, ring_end).
-    std::uint8_t directions = 0;         // Common directions of its segments (intersections.cc).
+    std::uint8_t directions = 0;         // Bits of the directions that all its segments share.
   };
   /// Successive runs of a ring.
   struct Block {
@@ -29,7 +29,7 @@ struct TouchingPairsBuffers {
     std::uint64_t cell = 0;          // Key of its cell in the grid of its level.
     std::uint32_t next_in_slot = 0;  // Next block of the same slot.
     std::uint8_t level = 0;          // Level of its grid.
-    bool finds_pair = false;         // Whether it is the first block of a touching pair.
+    bool finds_pair = false;         // Whether the search from this block finds a pair.
   };
   std::vector<Run> runs;
   std::vector<Block> blocks;
@@ -41,11 +41,11 @@ struct TouchingPairsBuffers {
 };
 
 /// Counts the pairs of segments, over all rings, that have a point in common, and lists them in
-/// `buffers.pairs`. Exact, by SegmentsTouch.
+/// `buffers.pairs`. Exact.
 ///
 /// Ring k has the points [ring_offsets[k], ring_offsets[k + 1]) of the interleaved `points`, and is
 /// closed by a segment from its last point to its first. Successive segments of a ring share a
-/// point by construction; they count only if they overlap, that is, if the ring folds back.
+/// point by construction. They count only if they overlap in more, where the ring folds back.
 ///
 /// Requires: offsets ascend from 0 to points.size() / 2; coordinates in the domain of predicates.h.
 /// Allocates nothing for an input no larger than an earlier one.

@@ -44,9 +44,8 @@ WindowMeasures MeasureInWindow(std::span<const double> points, const Window& win
     low[k] = window.axes[k]->origin;
     high[k] = low[k] + window.axes[k]->length;
   }
-  // The area is the integral of y dx over the ring after each point has moved to the nearest point
-  // of the window. Points beyond a side move along it. A segment consists of pieces that are each
-  // on one side of all sides' lines.
+  // The area is the integral of y dx over the ring, each of whose points moves to the nearest point
+  // of the window. The lines of the window's sides cut a segment into pieces, which stay straight.
   WindowMeasures measures;
   const std::size_t count = points.size() / 2;
   const double base = std::clamp(points[1], low[1], high[1]);

@@ -8,14 +8,14 @@
 
 namespace partiemc {
 
-/// Measures a closed ring of interleaved points; particle_count and identity are 0. Coordinates are
-/// taken relative to the first point, so that a ring far from the origin loses no digits.
-/// Requires: at least one point.
+/// Measures a closed ring of interleaved points; leaves particle_count and identity 0. A ring far
+/// from the origin loses no digits, because sums are relative to its first point. The centroid of a
+/// ring without area is its first point. Requires: at least one point.
 RingMeasures MeasureRing(std::span<const double> points);
 
 struct WindowMeasures {
-  double area = 0;       ///< Signed area of the part of a ring's inside that lies in the window.
-  double perimeter = 0;  ///< Length of the ring's part in the window, without its sides.
+  double area = 0;       ///< Signed area of the part of the ring's inside that lies in the window.
+  double perimeter = 0;  ///< Length of the ring's part in the window, without the window's sides.
 };
 
 /// Measures the part of a ring in a window. Requires: at least one point.

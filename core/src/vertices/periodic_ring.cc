@@ -5,7 +5,8 @@
 namespace partiemc {
 namespace {
 
-// Windows compare distances in floats and may include a vertex beyond the reach by this factor.
+// Windows compare distances in floats. They may include a vertex that is too far by this part of
+// the reach.
 constexpr double kReachTolerance = 1e-6;
 
 }  // namespace
@@ -23,7 +24,7 @@ PeriodicRingSize SizeForWindows(std::span<const Point> ring, std::span<const flo
   };
   const auto limit =
       static_cast<std::int64_t>(reach * (1 + kReachTolerance) * kRingUnitsPerCell) + 1;
-  // Numbers of vertices that windows need after the last vertex and before the first vertex.
+  // Vertices that windows need after the last vertex and before the first one.
   std::size_t after = 0;
   for (std::int64_t distance = length_after(count - 1); distance < limit; ++after) {
     distance += length_after(after % count);

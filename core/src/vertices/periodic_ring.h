@@ -1,4 +1,4 @@
-// Rings as arrays that repeat beyond both ends, so that every window along a ring is contiguous.
+// Rings as arrays that repeat beyond both ends, so that each window along a ring is contiguous.
 #pragma once
 
 #include <algorithm>
@@ -12,56 +12,53 @@
 
 namespace partiemc {
 
-/// Numbers of vertices of a ring, and of repeated vertices beyond each end.
+/// The number of vertices of a ring, and of repeated vertices beyond each end.
 struct PeriodicRingSize {
   std::uint32_t count = 0, margin = 0;
 };
 
 /// Coordinates and arc lengths are integers in units of 2^-22 cells, modulo 2^32. Differences of
-/// vertices less than 512 cells apart are therefore exact, independent of the position and length
-/// of the ring.
+/// less than 512 cells are therefore exact, wherever and however long the ring is.
 inline constexpr double kRingUnitsPerCell = 1 << 22;
 
-/// Converts cells to units, rounding towards 0.
-/// Requires: |cells| < 2^41.
+/// Converts cells to units, rounded towards 0. Requires: |cells| < 2^41.
 inline std::int32_t RingUnits(double cells) {
   return static_cast<std::int32_t>(static_cast<std::int64_t>(cells * kRingUnitsPerCell));
 }
 
-/// The difference `to` - `from`.
-/// Requires: less than 512 cells apart.
+/// The difference `to` - `from`. Requires: less than 512 cells.
 inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
                                    static_cast<std::uint32_t>(from));
 }
 
-/// Length of a step in units, rounded down. MeasureArc (ring_filters.h) sums the same lengths.
+/// Length of a step in units, by floats, rounded down. MeasureArc (ring_filters.h) sums the same
+/// lengths.
 inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   const auto x = static_cast<float>(step_x);
   const auto y = static_cast<float>(step_y);
   return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
 }
 
-/// A length between two vertices with these local sizes, divided by their mean size.
+/// The length between two vertices divided by the mean of their local sizes.
 /// Requires: sizes are at least 1/16.
 inline std::int32_t LengthInSizes(std::int32_t length, float from_size, float to_size) {
   return static_cast<std::int32_t>(static_cast<float>(length) * (2 / (from_size + to_size)));
 }
 
-/// The size of a closed ring. Its margin is the largest number of vertices that a window of `reach`
-/// cells needs beyond either end. The lengths are computed by LengthInUnits, as in the windows:
-/// with exact lengths, the margin could be too short for nearly coincident vertices. `sizes`: the
-/// local size of each vertex, by which lengths are divided; empty if all are 1.
-/// Cost: linear in the vertices.
+/// The size of a closed ring, with the margin that windows of `reach` cells need. `sizes`: by
+/// vertex, the local size, by which lengths are divided; empty if all are 1. Lengths are those of
+/// LengthInUnits, as in the windows. With exact lengths, the margin could be too short for nearly
+/// coincident vertices. Requires: at least one vertex. Cost: linear in the vertices.
 PeriodicRingSize SizeForWindows(std::span<const Point> ring, std::span<const float> sizes,
                                 double reach);
 
-/// One ring. Arrays are indexed by vertex, 0 <= k < count. They extend by `margin` elements beyond
-/// both ends, which repeat the ring, so that a window is a contiguous range.
+/// One ring, in the memory of a ShortRing or PeriodicRings. Arrays are indexed by vertex,
+/// 0 <= k < count, and have `margin` more elements beyond each end, which repeat the ring.
 struct PeriodicRing {
   static constexpr int kUnitArrays = 3, kFloatArrays = 7;
 
-  /// Makes a ring whose arrays have their first vertices at units(k) and floats(k).
+  /// Makes a ring. units(k) and floats(k) return where the first vertex is in the k-th array.
   template <typename Units, typename Floats>
   static PeriodicRing In(const PeriodicRingSize& size, Units units, Floats floats) {
     return {.count = size.count,
@@ -80,17 +77,17 @@ struct PeriodicRing {
 
   std::ptrdiff_t count, margin;
   std::int32_t *x, *y;         ///< Position relative to the origin of the world, in units.
-  std::int32_t* arc;           ///< Arc length up to the vertex, in units; continues in the margins.
-                               ///< With own sizes, lengths are divided by the local size.
+  std::int32_t* arc;           ///< Arc length up to the vertex, in units, with own sizes divided by
+                               ///< the local size. It does not repeat in the margins; it continues.
   float *normal_x, *normal_y;  ///< Unit, outward.
-  float *next_x, *next_y;      ///< Scratch: next normals; later next_x is the variance of supports.
+  float *next_x, *next_y;      ///< Scratch: next normals; later next_x: variances of supports.
   float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells; with
                   ///< own sizes divided by the local size.
   float* base;    ///< Shift of the vertex's plane along the normal, in cells.
-  float* shift;   ///< Scratch of the steps; has no margins.
+  float* shift;   ///< Scratch of the steps; margins are not set.
 
-  /// Copies the elements [begin, end) of an array to their repetitions in the margins. Calls with
-  /// disjoint ranges may run in parallel.
+  /// Copies the elements [begin, end) of an array to the margins. Calls with disjoint ranges may
+  /// run in parallel.
   template <typename Value>
   void Repeat(Value* values, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     // A margin may be longer than the ring.
@@ -105,7 +102,7 @@ struct PeriodicRing {
   }
 };
 
-/// The arrays of one short ring, small enough for the stack, so that they stay in the cache.
+/// The arrays of one short ring: small enough for the stack, so that they stay in the cache.
 class ShortRing {
  public:
   static bool Holds(const PeriodicRingSize& size) {
@@ -125,17 +122,17 @@ class ShortRing {
   float floats_[PeriodicRing::kFloatArrays][kCapacity];
 };
 
-/// The arrays of all long rings of a frame, kept warm from frame to frame.
+/// The arrays of all long rings of a frame; warm buffers.
 class PeriodicRings {
  public:
   using Size = PeriodicRingSize;
 
   /// The size of each ring, to be set before Allocate; 0 vertices for a ring that needs no arrays.
   std::vector<Size>& sizes() { return sizes_; }
-  /// Allocates the arrays. Elements are uninitialised.
+  /// Allocates the arrays. Elements are not initialised, and earlier rings become invalid.
   void Allocate();
 
-  /// Requires: Allocate was called after the sizes were set.
+  /// The ring with sizes()[ring]. Requires: Allocate was called after the sizes were set.
   PeriodicRing operator[](std::size_t ring);
 
  private:

@@ -6,13 +6,12 @@
 namespace partiemc {
 namespace {
 
-// The corner that a saddle's segment cuts off: corner c lies between edges c - 1 and c.
+// The corner that a saddle's segment cuts off. Corner c lies between the edges c - 1 and c.
 int CornerOf(const Segment& segment) {
   return ((segment.entry + 1) & 3) == segment.exit ? segment.exit : segment.entry;
 }
 
-// Coordinates closer to an axis than this, in cells, become 0. A tiny offset could otherwise move a
-// vertex from 0 into the range where the predicates (predicates.h) are not exact.
+// In cells.
 constexpr double kAxisReach = 0x1p-96;
 
 }  // namespace

@@ -12,18 +12,17 @@ namespace partiemc {
 /// rounding to world coordinates neither joins neighbouring vertices nor moves one across a side.
 inline constexpr double kCellMargin = 1.0 / 1024;
 
-/// Sets coordinates, in world units, that are closer to an axis than 2^-96 cells to 0: predicates.h
-/// is not exact for tiny ones.
+/// Sets coordinates nearer to 0 than 2^-96 cells to 0, because predicates.h is not exact for tiny
+/// ones. `coordinates` and `cell_size` are in world units.
 void SnapToAxes(double cell_size, std::span<double> coordinates);
 
-/// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. Coordinates
-/// are relative to the cell.
-/// Requires: the point is at least kCellMargin away from the sides.
+/// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. `point` is
+/// in cells relative to the cell, at least kCellMargin away from its sides.
 Point ClampToHalf(const Segment& segment, Point point);
 
-/// Moves `point` into its cell, kCellMargin away from the sides. In a saddle, `point` moves into
-/// the half that belongs to `segment`, so that the two segments never meet; other cells ignore
-/// `segment`.
+/// Moves `point`, in cells from the origin of the world, into `cell`, at least kCellMargin away
+/// from the sides. In a saddle the point moves into the half that belongs to `segment`, so that the
+/// two segments never meet. Other cells ignore `segment`.
 inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
                          const Segment& segment, Point point) {
   const Point origin = CellOrigin(directory, cell);
@@ -33,9 +32,9 @@ inline Point ClampToCell(const TileDirectory& directory, const ActiveCell& cell,
   return {origin.x + of_cell.x, origin.y + of_cell.y};
 }
 
-/// Minimises sum_j (n_j . (v - p_j))^2 over the segment's two ends (Eq. 14), in closed form. Along
-/// a direction that the normals barely constrain, the vertex stays at the middle of the segment. In
-/// lattice coordinates.
+/// The point v that minimises the sum of (n_j . (v - p_j))^2 over the segment's two ends p_j, whose
+/// normals are n_j (Eq. 14). Along a direction that the normals barely constrain, v stays at the
+/// middle of the segment. In cells from the origin of the world; may lie outside of the cell.
 Point QefVertex(const VertexInput& input, const CellPlane& plane);
 
 }  // namespace partiemc

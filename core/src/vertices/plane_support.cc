@@ -18,14 +18,13 @@ enum SupportChannel { kWeight, kDistance, kSquare, kSupportSums };
 
 HWY_INLINE Vector Constant(double value) { return hn::Set(Lanes(), static_cast<float>(value)); }
 
-// B(d, s), computed from d^2 and 1 / s^2.
+// B(d, r) from d^2 and 1 / r^2.
 HWY_INLINE Vector Bump(Vector square, Vector inverse_square) {
   const Vector t =
       hn::Max(hn::Sub(Constant(1), hn::Mul(square, inverse_square)), hn::Zero(Lanes()));
   return hn::Mul(t, t);
 }
 
-// The support shape in vectors.
 struct Shape {
   HWY_INLINE explicit Shape(const SupportShape& support)
       : radius_square(Constant(support.radius * support.radius)),
@@ -56,7 +55,7 @@ HWY_INLINE PartialSums<kSupportSums> SumChunk(const NeighbourRows& near,
     Vector own = hn::Set(d, 1.0f);  // The particle's size over the plane's.
     if constexpr (kSized) {
       own = hn::Mul(hn::LoadU(d, chunk.factor + k), per_size);
-      // The place at which a particle of the plane's size would have the same boundary.
+      // Moves the particle to where one of the plane's size would have the same boundary.
       const Vector lift = hn::Mul(hn::Sub(own, hn::Set(d, 1.0f)), shape.lift);
       dx = hn::Add(hn::Mul(dx, per_size), hn::Mul(lift, normal_x));
       dy = hn::Add(hn::Mul(dy, per_size), hn::Mul(lift, normal_y));

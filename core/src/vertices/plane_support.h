@@ -13,30 +13,30 @@ namespace partiemc {
 /// Selects and weighs the particles that support a plane. A particle supports a plane if it is
 /// nearer to the plane's point than `radius`, and less than `height` above the plane. The weight of
 /// a particle is B(distance, radius) max(0, u / spacing + depth)^8, where u is its height above the
-/// bent plane. Lengths in cells.
+/// bent plane, and B(d, r) = max(0, 1 - d^2 / r^2)^2. Lengths are in cells.
 ///
-/// If sizes differ, lengths are those of a place of size 1: distances are divided by the plane's
-/// size. A particle counts by the height of its boundary, half its size above it, less half a
-/// spacing. Its weight has its size as a factor, since it covers that much of the boundary.
+/// If sizes differ, all distances are divided by the plane's size. The height of a particle is then
+/// the height of its boundary, half its size above its centre, less half a spacing. Its size over
+/// the plane's is a factor of its weight, because a large particle covers more of the boundary.
 struct SupportShape {
   double radius;
-  /// Half a spacing if sizes differ, else 0: a particle is farther from its boundary than a
-  /// particle of the plane's size by at most this times the larger of both sizes.
+  /// Half a spacing if sizes differ, else 0. Heights of boundaries differ from heights of centres
+  /// by at most this times the larger of the particle's and the plane's size.
   double lift = 0;
   double height, spacing;
   double depth;  ///< In spacings.
 };
 
-/// A plane bent to a parabola through (x, y), in cells relative to a tile.
+/// A plane, bent to a parabola that touches it at (x, y), in cells relative to a tile.
 struct BentPlane {
   double x, y;
   double normal_x, normal_y;  ///< Unit.
-  double curvature;
-  double size = 1;  ///< The local size, in spacings.
+  double curvature;           ///< Per cell; positive where the boundary is convex.
+  double size = 1;            ///< The local size, in spacings.
 };
 
-/// Sums over the particles that support a plane: of weights, of weighted heights above the
-/// parabola, and of weighted squared heights.
+/// Sums over the particles that support a plane: weights, weighted heights above the parabola, and
+/// weighted squares of these heights.
 struct SupportSums {
   double weight, distance, square;
 };
@@ -52,7 +52,7 @@ using QuerySupports = std::array<SupportSums, kPointsAtOnce>;
 
 /// Computes sums[k][i] for planes[i] of queries[k]. Float arithmetic in a fixed order: the bits are
 /// the same on any processor, as in SampleAtPoints (point_kernels.h).
-/// Requires: at most kQueriesAtOnce queries.
+/// Requires: 1 to kQueriesAtOnce queries.
 void SumSupports(std::span<const SupportQuery> queries, const SupportShape& support,
                  std::span<QuerySupports> sums);
 

@@ -5,10 +5,10 @@
 namespace partiemc {
 namespace {
 
-// An eigenvalue of the QEF below this fraction of the larger one counts as 0.
+// If the smaller eigenvalue of the matrix is below this fraction of the larger one, it counts as 0.
 constexpr double kQefCutoff = 0.1;
 
-// The normal of the level set at a point of the cell, or the plane's normal if the gradient is
+// The unit normal of the level set at a point of the cell; the plane's normal if the gradient is
 // weak.
 Point NormalAt(const VertexInput& input, const CellPlane& plane, const Point& point) {
   const ActiveCell& cell = plane.cell;
@@ -41,7 +41,7 @@ Point QefVertex(const VertexInput& input, const CellPlane& plane) {
   const double radius = std::sqrt((xx - yy) * (xx - yy) / 4 + xy * xy);
   const double large = mean + radius;
   const double small = mean - radius;
-  // Selects the form of the eigenvector that has no cancellation.
+  // Of two forms of the eigenvector, takes the one without cancellation.
   double ex = xx >= yy ? large - yy : xy;
   double ey = xx >= yy ? xy : large - xx;
   const double length = std::sqrt(ex * ex + ey * ey);

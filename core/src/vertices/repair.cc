@@ -19,7 +19,7 @@ constexpr int kMostRounds = 24;
 // If a round has more misplaced rings than this, all rings return. Hardly any frame has even one.
 constexpr std::size_t kMostMisplaced = 100;
 
-// Marks both ends of a segment and the points before and after it.
+// Marks both ends of a segment, and the point before and the point after it.
 void MarkSegment(const Rings& rings, std::uint32_t segment, std::vector<std::uint8_t>& is_marked) {
   const auto after = std::upper_bound(rings.offsets.begin(), rings.offsets.end(), segment);
   const std::uint32_t begin = *(after - 1);
@@ -42,7 +42,7 @@ Box BoxOf(const Rings& rings, std::size_t ring) {
   return box;
 }
 
-// The point with the smallest x; ties are broken by the smallest y.
+// The point with the smallest x; among several, the lowest.
 Point LeftmostOf(const Rings& rings, std::size_t ring) {
   Point leftmost = PointAt(rings.points, rings.offsets[ring]);
   for (std::uint32_t k = rings.offsets[ring] + 1; k < rings.offsets[ring + 1]; ++k) {
@@ -52,8 +52,8 @@ Point LeftmostOf(const Rings& rings, std::size_t ring) {
   return leftmost;
 }
 
-// Lists the misplaced rings. An outer ring is misplaced if the winding number of the other rings
-// around it is not 0, a hole if this number is not 1. Rings turned inside out are misplaced, too.
+// Lists the misplaced rings: outer rings around which the winding number of the other rings is not
+// 0, holes around which it is not 1, and rings turned inside out.
 // Requires: rings were measured, and do not cross.
 void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   scratch.misplaced.clear();
@@ -66,8 +66,9 @@ void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   }
 }
 
-// Marks the misplaced rings, and the rings whose boxes surround them. Marks all rings if many are
-// misplaced, because searching around each of them would take too long.
+// Marks the misplaced rings, and the rings whose boxes begin before them and hold their leftmost
+// points. Marks all rings if more than kMostMisplaced are misplaced, because the search takes the
+// number of rings times that of misplaced rings.
 void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   if (scratch.misplaced.size() > kMostMisplaced) {
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
@@ -83,7 +84,7 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
     const Box box = BoxOf(rings, other);
     for (std::size_t k = 0; k < scratch.misplaced.size(); ++k) {
       const Point& point = scratch.leftmost[k];
-      // Of rings with equal left sides, the ring with the lower number begins first.
+      // Among rings with equal left sides, the ring with the lower number begins first.
       const bool begins_before =
           box.left != point.x ? box.left < point.x : other < scratch.misplaced[k];
       if (!begins_before || point.x > box.right || point.y < box.bottom || point.y > box.top) {
@@ -128,8 +129,8 @@ bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
       all_the_way = true;
     }
     if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
-    // Either the rounds are used up, or every marked point is at its root already, so an unmarked
-    // point is wrong. All points return.
+    // All points return. Either the rounds are used up, or every marked point is at its root
+    // already, so an unmarked point must move.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
     if (!Retreat(roots, true, scratch, rings)) return false;
   }

@@ -41,7 +41,7 @@ std::uint32_t RingDepths::Above(const Chain& chain) {
   return (chain.at == chain.first ? chain.last : chain.at) - 1;
 }
 
-// Whether a chain on the sweep line runs left of `point`. Advances the chain to this height.
+// Whether a chain on the sweep line runs left of `point`. Advances the chain to the point's height.
 bool RingDepths::RunsLeftOf(std::uint32_t chain, const Point& point) {
   Chain& c = chains_[chain];
   std::uint32_t above = Above(c);

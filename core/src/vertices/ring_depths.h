@@ -1,4 +1,4 @@
-// Finds the nesting of rings that do not cross: winding numbers and enclosing rings.
+// Finds the nesting of rings that do not cross: the winding number and the ring around each ring.
 #pragma once
 
 #include <cstddef>
@@ -12,19 +12,17 @@
 
 namespace partiemc {
 
-/// Nesting of rings.
-///
 /// Method: one sweep from bottom to top in the order of SweepsBefore. The sweep line crosses
 /// chains: the pieces of a ring between a local minimum and a local maximum. Chains begin in pairs
 /// at the local minima of a ring and end in pairs at its local maxima. In between, the order of the
 /// chains on the line stays the same, because rings do not cross. Each chain stores the winding
 /// number of the region directly left of it.
 ///
-/// The next call reuses the memory. Use one object per thread.
+/// Find reuses the memory of the call before. Use one object per thread.
 class RingDepths {
  public:
-  /// Computes the nesting. Ring k has the points [offsets[k], offsets[k + 1]) of the interleaved
-  /// `points`, and is closed by a segment from the last to the first. Exact.
+  /// Computes the nesting, exactly. Ring k has the points [offsets[k], offsets[k + 1]) of the
+  /// interleaved `points`, and is closed by a segment from the last to the first.
   /// Requires: CountTouchingPairs of the rings is 0; coordinates in the domain of predicates.h.
   /// Cost: linear in the points; n log n in the local minima and maxima (a round ring has two).
   void Find(std::span<const double> points, std::span<const std::uint32_t> offsets);
@@ -47,7 +45,7 @@ class RingDepths {
   // A rising piece of a ring, from a minimum to a maximum.
   struct Chain {
     std::uint32_t ring;
-    std::uint32_t at;           // Last point of the chain below the sweep line.
+    std::uint32_t at;           // Highest point of the chain below the sweep line.
     std::uint32_t first, last;  // The ring has the points [first, last).
     bool is_forward;            // Whether the chain rises in the ring's direction.
     std::int32_t depth;         // Winding number directly left of the chain.

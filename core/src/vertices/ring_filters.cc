@@ -26,8 +26,7 @@ HWY_INLINE Vector Dot(Vector ax, Vector ay, Vector bx, Vector by) {
   return hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by));
 }
 
-// max(0, cosine)^16: 1 at 0 degrees and 0.1 at 30 degrees, so vertices beyond a corner hardly
-// count.
+// max(0, cosine)^16: 1 at 0 degrees, 0.1 at 30 degrees. Vertices beyond a corner hardly count.
 HWY_INLINE Vector AngleWeight(Vector cosine) {
   Vector power = hn::Max(cosine, hn::Zero(Lanes()));
   for (int squaring = 0; squaring < 4; ++squaring) power = hn::Mul(power, power);
@@ -39,17 +38,17 @@ struct Block {
   std::ptrdiff_t first, lanes;
 };
 
-// Differences `to` - `from` of coordinates, in cells.
+// Differences `to` - `from` in cells, of coordinates in units.
 HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
   const Lanes d;
   const auto units = hn::Sub(hn::LoadU(Units(), to), from);
   return hn::Mul(hn::ConvertTo(d, units), hn::Set(d, static_cast<float>(1 / kRingUnitsPerCell)));
 }
 
-// Processes the vertices [begin, end) in blocks. Calls start(first vertex) for each block. Then
-// calls add(j, w) for each distance, counted in vertices, at which any vertex of the block has a
-// neighbour in its window. j is the neighbour of the first vertex; w has the weights of the
-// neighbours of all vertices, 0 beyond their windows. At the end calls finish(block).
+// Processes the vertices [begin, end) in blocks. For each block, calls start(first vertex), then
+// add(j, w) for each offset at which any of its vertices has a neighbour in its window, then
+// finish(block). j is the neighbour of the first vertex. w has the weight of each vertex's
+// neighbour, 0 beyond its window.
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {
@@ -76,8 +75,8 @@ HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, st
     const auto is_near = [&](Vector nearness) HWY_ATTR {
       return !hn::AllFalse(d, hn::And(hn::Gt(nearness, hn::Zero(d)), in_block));
     };
-    // The two directions end separately, because the margin on one side may be used up while the
-    // window on the other side continues.
+    // The two directions end separately: the margin on one side may end before the window on the
+    // other side does.
     bool goes_before = true, goes_after = true;
     for (std::ptrdiff_t apart = 1; goes_before || goes_after; ++apart) {
       if (goes_before) {
@@ -106,7 +105,7 @@ HWY_INLINE void StoreBlock(Vector values, const Block& block, float* target) {
   }
 }
 
-// Writes LengthInUnits of the step after each vertex to its arc.
+// Writes the length of the step after each vertex (LengthInUnits) to its `arc`.
 void MeasureSteps(const PeriodicRing& ring) {
   const Lanes d;
   const Units d_units;

@@ -10,7 +10,7 @@
 namespace partiemc {
 namespace {
 
-// Distance of the points beyond a wall, in spacings.
+// Distance between the points beyond a wall, in spacings.
 constexpr double kStep = .5;
 
 // The vertices of a ring, counted along it from vertex `first`.
@@ -19,7 +19,8 @@ struct Vertices {
   std::size_t At(std::size_t k) const { return first + k % count; }
 };
 
-// Outward normal where the ring, with the inside on its left, runs along `direction`.
+// Outward normal of a ring that runs along `direction` (`sign` 1) or against it (-1), with the
+// inside on its left.
 VertexNormal NormalOf(const Point& direction, double sign) {
   const double length = Length(direction) * sign;
   return {static_cast<float>(direction.y / length), static_cast<float>(-direction.x / length)};

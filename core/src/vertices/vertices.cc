@@ -23,8 +23,7 @@ void Store(Point point, double cell_size, double* target) {
   target[1] = point.y * cell_size;
 }
 
-// Writes the vertices of segment k to `target`. PlaceRefinedRings does this for `virtual-plane`,
-// this function for the other placements.
+// Writes the one or two vertices of segment k to `target`. Not for `virtual-plane`.
 void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   const CellPlane& plane = input.planes[k];
   const double cell_size = input.scale.cell_size;
@@ -57,8 +56,8 @@ void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>
   normals.push_back(static_cast<float>(y / length));
 }
 
-// The sign, +1 or -1, that makes the plane's normal point outward. The memory of normals may have
-// turned the normal inward, but reported normals point outward.
+// The factor, +1 or -1, that turns the plane's normal outward. The memory of normals may have
+// turned it inward.
 double OutwardSign(const CellPlane& plane) {
   return plane.normal_x * plane.OutwardX() + plane.normal_y * plane.OutwardY() < 0 ? -1 : 1;
 }
@@ -146,7 +145,8 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
       if (!vertices.is_kept[i]) continue;
-      // The cell vertex of segment i / 2 comes second and is always kept, so its index remains.
+      // The cell vertex of the segment comes after its edge vertex and is always kept, so its index
+      // remains.
       placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
       Store(vertices.point[i], cell_size, &rings.points[2 * point]);
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
@@ -198,7 +198,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
     if (outer != kNoRing) outer = placed.kept_as[outer];
   }
   MeasureRings(rings);
-  // If vertices are not particles, rings do not cross. Only Validate checks this.
+  // Other rings do not cross, so only Validate counts.
   if (!traits.takes_particles) return;
   placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }

@@ -26,17 +26,18 @@ inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
 /// Maps rings and segments of RingTopology to rings and points of Rings.
 struct PlacedVertices {
-  /// By segment: index in Rings::points of its cell's vertex (for `marching-squares` of its entry
-  /// crossing), or kNoPoint.
+  /// By segment: its cell's vertex, for `marching-squares` its entry crossing, as an index of a
+  /// point of Rings; or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
   std::vector<std::uint32_t> kept_as;  ///< By ring: its index in Rings, or kNoRing.
-  /// `virtual-plane` only: the anchor of each point, to which the repair may move it; interleaved,
-  /// in world units.
+  /// The anchor of each point, to which the repair may move it; interleaved, in world units. Empty
+  /// except for `virtual-plane`.
   std::vector<double> roots;
-  /// By ring of Rings: the outer ring of its component in the topology. Empty unless bodies were
-  /// cut (cut/ring_cut.h); rings are then those of the topology.
+  /// By ring of Rings, if bodies were cut (cut/ring_cut.h): the outer ring of its component in the
+  /// topology. Else empty; then rings have the order of the topology.
   std::vector<std::uint32_t> group_of_ring;
-  std::uint64_t self_intersections = 0;  ///< 0 for placements that guarantee simple rings.
+  /// Pairs of segments that touch; 0 for placements that guarantee simple rings.
+  std::uint64_t self_intersections = 0;
 };
 
 /// A unit normal, pointing outward.
@@ -44,16 +45,16 @@ struct VertexNormal {
   float x = 0, y = 0;
 };
 
-/// A point of a free stretch between walls.
+/// A point of a free stretch between walls, or of its continuation beyond a wall.
 struct StretchPoint {
-  Point point;
+  Point point;  ///< As RingVertices::point.
   VertexNormal normal;
-  std::size_t vertex;  ///< kNoVertex beyond a wall.
+  std::size_t vertex;  ///< Index in RingVertices; kNoVertex beyond a wall.
 };
 inline constexpr std::size_t kNoVertex = ~std::size_t{0};
 
-/// Vertices of `virtual-plane`, ring by ring. Vertex 2 k is the edge vertex of segment k of the
-/// topology, at its entry edge, and vertex 2 k + 1 its cell vertex. Positions are in cells from the
+/// Vertices of `virtual-plane`, ring by ring. Segment k of the topology has two vertices: 2 k on
+/// the edge where it enters its cell, and 2 k + 1 in the cell. Positions are in cells from the
 /// origin of the world.
 struct RingVertices {
   std::vector<Point> point;
@@ -63,11 +64,10 @@ struct RingVertices {
   std::vector<std::uint8_t> is_kept;  ///< 0 if thinning dropped the vertex.
   PeriodicRings periodic_rings;       ///< Scratch of the steps.
   WallVertices walls;
-  std::vector<std::uint8_t> meets_wall;  ///< By ring.
+  std::vector<std::uint8_t> meets_wall;  ///< By ring; unused without walls.
   std::vector<StretchPoint> stretch;     ///< Scratch of the stretches between walls.
   std::vector<Point> stretch_path;       ///< The same.
 
-  /// The local size at a vertex, in spacings.
   double SizeOf(std::size_t vertex) const { return size.empty() ? 1.0 : double{size[vertex]}; }
 
   void Resize(std::size_t count, bool has_sizes) {
@@ -81,7 +81,7 @@ struct RingVertices {
 
 /// Warm buffers of PlaceVertices.
 struct VertexScratch {
-  std::vector<double> points;         ///< One or two points for each segment, in world units.
+  std::vector<double> points;         ///< One or two for each segment; not for `virtual-plane`.
   RingVertices vertices;              ///< `virtual-plane` only.
   WallVertices walls;                 ///< Of the points of the rings.
   std::vector<float> sizes;           ///< By point: the factor of its offset (CorrectVolume).
@@ -89,7 +89,7 @@ struct VertexScratch {
   RepairScratch repair;
 };
 
-/// Results of the earlier stages.
+/// The frame, the parameters and the results of the earlier stages.
 struct VertexInput {
   const Frame& frame;
   const ParticleBins& bins;
@@ -106,21 +106,22 @@ struct VertexInput {
 };
 
 /// Places the vertices of every ring and measures the rings.
-///   - marching-squares: the crossings of lattice edges, by linear interpolation of F.
-///   - qef: the same, and in each cell the minimiser of Eq. 14, clamped to the cell.
+///   - marching-squares: a vertex at the crossing of each crossed lattice edge.
+///   - qef: these vertices, and in each cell the minimiser of Eq. 14, clamped to the cell.
+///   - farthest-particle: a particle for each segment (normals/farthest_particle.h).
 ///   - virtual-plane: a vertex for each cell and crossed edge, moved to a plane that particles
 ///     support (virtual_plane.h). The rings are then matched to the area of the particles
 ///     (volume_correction.h) and repaired (repair.h).
 ///
 /// The rings of marching-squares and qef are simple because each vertex stays in its cell or on its
 /// edge (core/METHOD.md, "Why rings are simple"). Vertices of virtual-plane may leave their cells;
-/// its repair makes rings simple. Placements with particles as vertices (placement_traits.h) drop
-/// consecutive equal vertices, and rings with fewer than three points left.
+/// its repair makes rings simple. farthest-particle drops consecutive equal vertices, and then
+/// rings with fewer than three points.
 ///
 /// `area_offset`, used by virtual-plane only, is the offset of the last frame and becomes the
 /// offset of this frame (volume_correction.h). Returns false if the repair failed, which is a bug.
-/// Deterministic. Parallel over segments.
-/// Cost: linear in segments and the particles near them.
+/// Deterministic. Parallel over segments and rings.
+/// Cost: near-linear in segments and the particles near them.
 [[nodiscard]] bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
                                  VertexScratch& scratch, PlacedVertices& placed, Rings& rings);
 

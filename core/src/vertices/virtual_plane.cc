@@ -31,8 +31,8 @@ VertexNormal UnitOf(const Point& v) {
   return {static_cast<float>(v.x * inverse), static_cast<float>(v.y * inverse)};
 }
 
-// Moves `point`, with the given value and gradient of F, by one Newton step towards F = 0, by at
-// most `max_step` cells. Returns `point` if the gradient is weak.
+// Moves `point` towards F = 0 by one Newton step of at most `max_step` cells. `value` and
+// `gradient`: of F at the point. Returns `point` if the gradient is weak.
 Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   const double square = Dot(gradient, gradient);
   if (square < kWeakGradientSquare) return point;
@@ -44,8 +44,8 @@ Point NewtonStep(Point point, double value, Point gradient, double max_step) {
   return {point.x + step * gradient.x, point.y + step * gradient.y};
 }
 
-// Finds the tile of a point in or near a cell. Usually this is the tile of the cell, which is
-// indexed because it has an active cell.
+// The tile of a point in or near an active cell, and the point relative to it; kNoTile if the
+// sampler has not indexed the tile. Usually this is the tile of the cell, which is indexed.
 FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point& point) {
   const Point origin = CellOrigin(input.bins.tiles, cell);
   const double x = point.x - origin.x + cell.i;
@@ -60,8 +60,8 @@ FieldPoint Locate(const VertexInput& input, const ActiveCell& cell, const Point&
   return {usable ? place.tile : kNoTile, place.i + (x - i), place.j + (y - j)};
 }
 
-// With grains: repeats the Newton step of a cell vertex, because the gradient changes within a
-// cell. The vertex may leave its cell, because a grain may reach into a cell without a node in it.
+// With grains: repeats the Newton step of cell vertex i, because the gradient changes within a
+// cell. The vertex may leave its cell: a grain may reach into a cell without a node in it.
 void ApproachGrain(const VertexInput& input, const CellPlane& plane, std::size_t i,
                    RingVertices& v) {
   constexpr int kSteps = 3;
@@ -126,13 +126,13 @@ struct ClosedRun {
   std::size_t VertexAt(std::ptrdiff_t k) const { return first + static_cast<std::size_t>(k); }
   const Point& PointAt(std::ptrdiff_t k) const { return v.point[VertexAt(k)]; }
   const VertexNormal& NormalAt(std::ptrdiff_t k) const { return v.normal[VertexAt(k)]; }
-  // The length of the run before it repeats itself backward.
+  // Number of points before the run returns on its own points.
   std::ptrdiff_t OwnCount() const { return count; }
   bool HasVertex(std::ptrdiff_t) const { return true; }
 };
 
-// A free stretch between walls and its continuations beyond them, as the ring that runs along it
-// and back.
+// A free stretch between walls with its continuations, as a ring: along the points and back, each
+// end once.
 struct OpenRun {
   std::span<const StretchPoint> points;
 
@@ -153,7 +153,7 @@ std::span<const float> SizesOf(const RingVertices& v, std::size_t first, std::si
   return v.size.empty() ? std::span<const float>() : std::span(v.size).subspan(first, count);
 }
 
-// Size of a ring with its margin; 0 vertices if the ring is too short for steps 2 and 3.
+// The size of a ring with its margin; 0 vertices if the ring is too short for steps 2 and 3.
 PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const RingVertices& v) {
   const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
   const std::size_t count = 2 * std::size_t{input.topology.offsets[ring + 1]} - first;
@@ -204,7 +204,7 @@ void CopyRing(std::span<const float> sizes, const Run& run, const PeriodicRing& 
   MeasureArc(ring, sizes);
 }
 
-// Calls body(begin, end) for ranges of a ring of `count` vertices, in parallel if it is long.
+// Calls body(begin, end) for ranges of the vertices [0, count), in parallel if there are many.
 template <typename Body>
 void ForEachRange(std::ptrdiff_t count, Body body) {
   constexpr std::ptrdiff_t kRange = 512;
@@ -245,9 +245,9 @@ double MeanOf(const Run& run, const PeriodicRing& ring, const float* values) {
   return weight > 0 ? sum / weight : 0;
 }
 
-// Estimates the distance of the boundary above a plane, in cells, and the variance of the
-// supporting particles' heights, in squared spacings. The distance is the mean height plus half a
-// spacing, clamped to the support's height. Both are 0 if no particle supports the plane.
+// The height of the boundary above a plane, in cells, and the variance of the supporting particles'
+// heights, in squared spacings. The boundary is half a spacing above the mean height, clamped to
+// +- the support's height. Both are 0 if no particle supports the plane.
 std::pair<double, double> EstimateOf(const SupportSums& sums, const SupportShape& support) {
   if (!(sums.weight > 0)) return {};
   const double mean = sums.distance / sums.weight;
@@ -272,7 +272,7 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 // Step 3: computes the shift `base` of each vertex's plane along its normal. The mean of the
 // estimates along the ring is subtracted: it depends on the arrangement of the particles, not on
 // the shape. A larger variance of the supporting particles reduces the weight of the estimates.
-// Estimates and their mean are in units of the local size.
+// Estimates, their mean and `shift` are divided by the local size.
 template <typename Run>
 void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
                  const RingVertices& v) {
@@ -313,7 +313,7 @@ void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
       const double sharpest = 1 / (h * size);
       const double curvature = std::clamp<double>(ring.shift[k], -sharpest, sharpest);
       ring.base[k] = steps.curvature ? static_cast<float>(rounding * size * size * curvature) : 0;
-      // Stays so if no particle supports the plane.
+      // These values remain if no particle can support the plane.
       ring.shift[k] = static_cast<float>(-ring.base[k] / size);
       scatter[k] = 0;
       if (!steps.support || !run.HasVertex(k)) continue;
@@ -387,8 +387,8 @@ void RefineRing(const VertexInput& input, std::size_t r, const PeriodicRing& rin
             ClosedRun{v, first, ring.count}, ring, v);
 }
 
-// Steps 2 and 3 for the free stretches of rings that meet walls. Stretches that are too short for
-// windows stay at their roots.
+// Steps 2 and 3 for the free stretches of rings that meet walls. Skips stretches that are too short
+// for windows.
 void RefineStretches(const VertexInput& input, RingVertices& v) {
   const double min_length = input.variant.constants.ShortestRing() * input.scale.spacing;
   PeriodicRings& memory = v.periodic_rings;

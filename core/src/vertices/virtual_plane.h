@@ -6,14 +6,13 @@
 
 namespace partiemc {
 
-/// Moves the middle of the segment towards F = 0, by one Newton step of at most `max_step` cells
-/// along the gradient. Returns the middle if the gradient is weak. In lattice coordinates.
+/// The middle of the segment, moved towards F = 0 by one Newton step of at most `max_step` cells.
+/// The middle itself if the gradient is weak. In cells from the origin of the world.
 Point VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
-/// Steps 1 to 3 (roots, normals, planes), and thinning. The area is matched by volume_correction.h,
-/// and rings are repaired by repair.h. Deterministic, in parallel over segments, rings and
-/// stretches of long rings. Cost: a few field samples and a window of about twenty vertices per
-/// vertex.
+/// Steps 1 to 3 (roots, normals, planes), and thinning. Deterministic. Parallel over rings and
+/// parts of long rings; stretches between walls follow one after another. Cost: for each vertex, a
+/// few field samples and windows of about twenty vertices.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);
 
 }  // namespace partiemc

@@ -14,7 +14,7 @@ namespace {
 // Longest mitre, as a multiple of the offset.
 constexpr double kMaxMitre = 2;
 
-// Sum of the volumes of an outer ring's particles, in squared cells.
+// Sum of the volumes of the particles of an outer ring's component, in squared cells.
 double VolumeOf(const VertexInput& input, std::size_t ring) {
   if (input.frame.volumes.empty()) {
     const double each = input.scale.spacing * input.scale.spacing;
@@ -23,14 +23,13 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-// The part of a ring that counts.
 struct RingPart {
   bool counts;
   double area, perimeter;
 };
 
-// Of a body that will be cut, only the part in the window counts, because the ends of its copies
-// are no part of the body.
+// The part of a ring that counts. Of a body that will be cut, this is the part in the window. The
+// rest surrounds copies of its particles.
 RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) {
   const RingMeasures& whole = rings.measures[ring];
   if (input.percolation == nullptr || !input.percolation->IsCut(input.topology, ring)) {
@@ -55,17 +54,16 @@ double SumOverSegments(std::span<const double> points, std::span<const float> si
   return sum;
 }
 
-// The length of a ring, each segment times the local size.
+// The length of a ring; each segment counts times the local size.
 double SizedLength(std::span<const double> points, std::span<const float> sizes) {
   return SumOverSegments(points, sizes, [](double length, double size) { return length * size; });
 }
 
-// The length of a ring, each segment divided by the local size.
+// The length of a ring; each segment counts divided by the local size.
 double LengthInLocalSizes(std::span<const double> points, std::span<const float> sizes) {
   return SumOverSegments(points, sizes, [](double length, double size) { return length / size; });
 }
 
-// The local sizes at the points of a ring.
 std::span<const float> SizesOf(const Rings& rings, std::size_t ring, std::span<const float> sizes) {
   if (sizes.empty()) return {};
   return sizes.subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);

@@ -13,20 +13,20 @@
 namespace partiemc {
 namespace {
 
-// Number of vertices of a stretch between contacts that may become wet.
+// A low stretch between contacts becomes wet if it has fewer free vertices than this.
 constexpr std::size_t kShortStretch = 6;
-// Corners that turn by less than about 5 degrees need no vertex: the cosine.
+// The cosine of about 5 degrees. Corners that turn by less need no vertex.
 constexpr double kStraight = .996;
-// A vertex moves at most this far to a corner, in cells.
+// A vertex moves to a corner only if it and its neighbour are at most this far away, in cells.
 constexpr double kMostMove = 2;
-// A corner counts as part of a cell if it is at most this far outside, in cells.
+// In cells. A corner this far outside of a cell still counts as in it.
 constexpr double kCornerTolerance = 1e-9;
 
 bool AreEqual(const Point& a, const Point& b) {
   return std::abs(a.x - b.x) < kCornerTolerance && std::abs(a.y - b.y) < kCornerTolerance;
 }
 
-// A crossed lattice edge, from its node in the fluid to the other one.
+// A crossed lattice edge, from its node inside the outline to its node outside.
 struct CrossedEdge {
   TilePlace inside, outside;
   Point from, to;
@@ -76,7 +76,7 @@ class WallVertexFinder {
     return crossed;
   }
 
-  // Whether the way along a crossed edge meets a wall before it leaves the fluid.
+  // Whether a crossed edge, from its inside node on, meets a wall before it leaves the fluid.
   bool MeetsWall(const CrossedEdge& edge) const {
     const double above = walls_.HeightAt(edge.inside), below = walls_.HeightAt(edge.outside);
     if (above <= 0 || below > 0) return false;
@@ -85,7 +85,7 @@ class WallVertexFinder {
     return out < 0 || in >= 0 || above / (above - below) <= in / (in - out);
   }
 
-  // Where the way from one node to the other first meets a wall.
+  // Where the edge, from its inside node on, first meets a wall.
   WallPlace PlaceOn(std::uint32_t tile, const CrossedEdge& edge) const {
     const Point way = Minus(edge.to, edge.from);
     std::optional<WallPlace> place;
@@ -150,10 +150,10 @@ class WallVertexFinder {
                     input_.crossings.segments[input_.topology.segments[segment]], v_.point[vertex]);
   }
 
-  // The sharpest corner of the walls in a cell, unless it is the vertex of an edge of the cell, at
-  // `a` or `b`; without one, the place nearest to the middle between them.
+  // The sharpest corner of the walls in a cell that is not at `a` or `b`, the edge vertices of the
+  // cell. Without one, the place nearest to the middle between them.
   WallPlace PlaceInCell(const ActiveCell& cell, const Point& a, const Point& b) const {
-    constexpr std::size_t kMostLines = 16;  // Of a cell. Others have no corner.
+    constexpr std::size_t kMostLines = 16;  // Crossings of further lines are not found.
     const Point origin = CellOrigin(input_.bins.tiles, cell);
     const auto is_in = [&](const Point& at) {
       const double x = at.x - origin.x, y = at.y - origin.y;
@@ -188,7 +188,7 @@ class WallVertexFinder {
     return best;
   }
 
-  // Considers where lines of two solids cross.
+  // Considers the crossing of two lines, if they bound different solids.
   template <typename Consider>
   void ConsiderCrossing(std::uint32_t of_a, std::uint32_t of_b, Consider consider) const {
     const WallEdge &a = lines_.edges()[of_a], &b = lines_.edges()[of_b];
@@ -203,8 +203,8 @@ class WallVertexFinder {
     if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{of_a, on_a}, a, b);
   }
 
-  // In a corner of a tank, the outline of the fluid may be just inside of the walls for a few
-  // vertices. These become vertices on walls.
+  // In a corner of a tank, a few vertices of the fluid's outline may be just off the walls. They
+  // become vertices on walls, and so do the contacts at their ends.
   void WetShortStretches(std::size_t first, std::size_t last) {
     const std::size_t count = last - first;
     const auto at = [&](std::size_t k) { return first + k % count; };
@@ -233,8 +233,8 @@ class WallVertexFinder {
   }
 
   // A corner of a tank may lie in a cell whose nodes are all outside. The ring then passes from one
-  // line to the other without a vertex at the corner: moves the nearer one of the two vertices
-  // there.
+  // line to the other without a vertex at the corner, so the nearer of its two vertices moves to
+  // the corner.
   void MoveToCorners(std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       const std::size_t next = k + 1 < last ? k + 1 : first;
@@ -260,7 +260,7 @@ class WallVertexFinder {
     return !lines_.edges()[place.edge].is_endless && (place.share == 0 || place.share == 1);
   }
 
-  // The sharpest corner between the places of two vertices that follow each other along walls.
+  // The sharpest corner of the walls between the places of two successive vertices.
   std::optional<WallPlace> CornerBetween(std::size_t k, std::size_t next) const {
     const WallPlace &from = v_.walls.place[k], &to = v_.walls.place[next];
     const WallEdge &a = lines_.edges()[from.edge], &b = lines_.edges()[to.edge];
@@ -292,7 +292,7 @@ class WallVertexFinder {
     return sharpest;
   }
 
-  // Whether a point is in a solid near the tile, deeper than rounding and less than one cell.
+  // Whether a point is in a solid near the tile, deeper than rounding but less than one cell.
   bool IsBehindWall(std::uint32_t tile, const Point& point) const {
     bool is_behind = false;
     walls_.ForEachSolidNear(tile, point, [&](std::size_t, const NearestWall& nearest) {

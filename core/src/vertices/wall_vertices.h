@@ -15,18 +15,19 @@ struct RingVertices;
 enum class VertexKind : std::uint8_t {
   kFree,
   kWall,     ///< On a wall.
-  kContact,  ///< Where a free stretch of a ring meets a wall.
+  kContact,  ///< On a wall, where a free stretch of the ring ends.
 };
 
-/// What is known of vertices, of RingVertices or of Rings, if there are walls; else unused.
+/// How the vertices of RingVertices, or the points of Rings, relate to walls. Arrays by vertex or
+/// point; unused without walls.
 struct WallVertices {
   std::vector<VertexKind> kind;
-  std::vector<WallPlace> place;  ///< Of vertices on walls and of contacts.
+  std::vector<WallPlace> place;  ///< On the wall; not set for kFree.
   /// Whether the ring runs along a wall from this vertex to the next.
   std::vector<std::uint8_t> is_wet;
   /// Tile of the vertex's cell if a wall is near the vertex, else kNoTile.
   std::vector<std::uint32_t> tile;
-  std::vector<float> angle;  ///< Of contacts: the angle of the fluid, in radians.
+  std::vector<float> angle;  ///< The fluid's angle at a contact, in radians, set by FitContacts.
 
   void Resize(std::size_t count) {
     kind.resize(count);
@@ -35,7 +36,7 @@ struct WallVertices {
     tile.resize(count);
     angle.resize(count);
   }
-  /// Copies all that is known of a vertex.
+  /// Copies all but `angle`.
   void Copy(const WallVertices& from, std::size_t vertex, std::size_t to) {
     kind[to] = from.kind[vertex];
     place[to] = from.place[vertex];
@@ -44,10 +45,11 @@ struct WallVertices {
   }
 };
 
-/// Finds the kinds and places of the vertices of a ring, and moves vertices and anchors of walls
-/// and contacts to their places: the vertex of a lattice edge to where the edge meets the wall,
-/// that of a cell to a corner of the walls in it, else to the place of the wall nearest to its
-/// middle there. Requires: the vertices have their roots. Returns whether the ring meets a wall.
+/// Sets `vertices.walls` for the vertices of a ring. Moves vertices on walls to their places: an
+/// edge vertex to where its edge meets the wall, a cell vertex to the sharpest corner of the walls
+/// in its cell. Without a corner, and for a contact, the place is the one nearest to the middle of
+/// the cell's two edge vertices. The anchors move, too, but stay on their edges and in their cells.
+/// Requires: the vertices have their roots. Returns whether a vertex of the ring is on a wall.
 bool FindWallVertices(const VertexInput& input, std::size_t ring, RingVertices& vertices);
 
 }  // namespace partiemc

@@ -125,8 +125,8 @@ std::optional<WallCornerScratch::Corner> CornerAt(const Ring& ring, std::size_t 
   return WallCornerScratch::Corner{static_cast<std::uint32_t>(point), at, distance};
 }
 
-// Keeps of corners that are nearer than two arms' beginnings only the one nearest to the outline:
-// one after another, along the ring.
+// Of corners closer along the ring than 2 kBegin spacings, keeps only the one nearest to the
+// outline. Compares each corner with the last one kept.
 void KeepNearest(const Ring& ring, double h, std::vector<WallCornerScratch::Corner>& corners) {
   const auto are_near = [&](const auto& a, const auto& b) {
     return std::abs(ring.Between(a.point, b.point)) < 2 * kBegin * h;

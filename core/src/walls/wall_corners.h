@@ -9,10 +9,10 @@
 
 namespace partiemc {
 
-/// Warm buffers of SharpenCorners.
+/// Scratch of SharpenCorners.
 struct WallCornerScratch {
   struct Corner {
-    std::uint32_t point;  // The ring's point in the middle of the rounded part.
+    std::uint32_t point;  // Of the ring, in the middle of the rounded part.
     Point at;
     double distance;  // Of `at` from the point.
   };

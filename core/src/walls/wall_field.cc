@@ -20,9 +20,9 @@ constexpr double kShortTiles = 64;
 // Half the diagonal of a tile.
 constexpr double kTileRadius = kTileSize * .7072;
 // The mark of a tile lies this far, in cells, left of and below its first node. From the mark,
-// paths between the columns and rows of nodes lead to every node of the tile. The number is odd, so
-// that corners of walls rarely lie on paths; a corner on one may put a row of nodes on the wrong
-// side.
+// paths between the columns and rows of nodes lead to every node of the tile. The number is no
+// simple fraction, so corners of walls rarely lie on paths. A corner on a path may put a row of
+// nodes on the wrong side.
 constexpr double kMark = .3819660112501051;
 
 // The height of the marks of a row of tiles.
@@ -239,7 +239,7 @@ void WallField::FindTiles(const TileDirectory& directory) {
   FindSolids(directory);
 }
 
-// Makes the near tiles of the sorted pairs. Lines of one solid follow each other.
+// Makes the near tiles of the sorted pairs. The lines of a solid are consecutive.
 void WallField::GroupBySolid(const TileDirectory& directory) {
   near_of_tile_.assign(directory.size(), kFluid);
   solids_.clear();
@@ -269,7 +269,8 @@ void WallField::GroupBySolid(const TileDirectory& directory) {
   }
 }
 
-// Sets `crossings_` to where closed loops cross the marks of a row of tiles.
+// Sets `crossings_` to the crossings of closed loops with the line through the marks of a row of
+// tiles.
 void WallField::CollectCrossings(std::int32_t row) {
   const double y = MarkOf(row);
   crossings_.clear();
@@ -311,7 +312,8 @@ void WallField::FindSolids(const TileDirectory& directory) {
   }
 }
 
-// Sets whether solids of the tile contain its mark. If others do, the tile is solid.
+// Sets for each solid near the tile whether it contains the tile's mark. If any other solid
+// contains the mark, the whole tile is solid.
 void WallField::SetTile(const TileDirectory& directory, std::uint32_t tile) {
   const Point origin = OriginOf(directory, tile);
   const Point mark{origin.x - kMark, origin.y - kMark};
@@ -334,7 +336,7 @@ void WallField::SetTile(const TileDirectory& directory, std::uint32_t tile) {
   if (covering > 0) near_of_tile_[tile] = kSolid;
 }
 
-// The heights above each solid, of which the lowest counts.
+// Sets the height of each node: the lowest of its heights above the solids near the tile.
 void WallField::MeasureHeights(const TileDirectory& directory, NearTile& near) const {
   const Point origin = OriginOf(directory, near.tile);
   near.height.fill(kMostHeight);

@@ -17,10 +17,10 @@ namespace partiemc {
 /// The fluid near walls. A node has the height w above the nearest wall, negative in the solid, and
 /// the value F of the fluid. Lengths are in cells.
 ///
-/// Kernels see no particles beyond a wall, so F near a wall does not tell whether the fluid touches
-/// it. An outside node lower than `kReach` spacings therefore has the F of the point
-/// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
-/// lattice: its zeros are the outline of the fluid, cut at the walls.
+/// Kernels see no particles beyond a wall, so F near a wall does not show whether the fluid touches
+/// it. An outside node lower than `kReach` spacings therefore has the F of the point straight above
+/// it at this height, if that point is inside. Then max(F, -w) replaces F on the lattice: its zeros
+/// are the outline of the fluid, cut at the walls.
 ///
 /// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
@@ -29,40 +29,39 @@ class WallField {
   /// spacing outside of the outermost particles, so a gap of this height holds no layer of
   /// particles.
   static constexpr double kReach = .5;
-  /// Heights of a larger magnitude are unknown.
+  /// In cells. Larger heights are not measured.
   static constexpr float kMostHeight = 4;
 
-  /// Reads the walls (WallLines::Build), and counts the pairs of a line and a tile near it, and the
-  /// tiles near lines. Cost:
-  /// linear in tiles and lines, and in the product of tiles and long lines.
+  /// Reads the walls (WallLines::Build). Counts the tiles near lines, and the pairs of a line and a
+  /// tile near it. Cost: linear in tiles and lines, and in the product of tiles and long lines.
   void ListLines(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
                  const TileDirectory& directory);
   std::size_t PairCount() const { return pair_count_; }
   std::size_t TileCount() const { return near_count_; }
 
-  /// Finds the tiles near walls and those in solids. Cost: near-linear in pairs, lines and tiles;
-  /// endless lines times tiles.
+  /// Finds the tiles near walls and the tiles in solids. Cost: near-linear in pairs, lines and
+  /// tiles, and in the product of tiles and long lines.
   void FindTiles(const TileDirectory& directory);
 
-  /// Replaces F at the nodes of all tiles. Parallel over tiles. Cost: linear in nodes; in the nodes
-  /// near walls times the lines near their tiles.
+  /// Replaces F at the nodes of the tiles near walls and in solids. Parallel over tiles. Cost:
+  /// linear in these nodes, near walls times the lines near their tiles.
   void Apply(const TileDirectory& directory, double spacing, LevelSet& level_set);
 
   const WallLines& lines() const { return lines_; }
 
-  /// Height of a node; kMostHeight in magnitude if it is not near a wall.
+  /// Height of a node in cells; kMostHeight in magnitude if it is not near a wall.
   float HeightAt(const TilePlace& node) const;
-  /// F of the fluid at a node.
+  /// F of the fluid at a node, extended to the walls but not cut by them.
   float FluidAt(const LevelSet& level_set, const TilePlace& node) const;
 
-  /// The wall nearest to a point near a tile, in cells from the origin of the world. Its height is
-  /// infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
+  /// The wall nearest to a point near the tile, given in cells from the origin of the world. The
+  /// height is infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
   NearestWall Nearest(std::uint32_t tile, const Point& point) const;
   /// The lines near a tile.
   std::span<const std::uint32_t> EdgesNear(std::uint32_t tile) const;
 
-  /// Calls visit(solid, nearest) for each solid with lines near a tile. `nearest` may be farther
-  /// than kMostHeight. Cost: linear in these lines.
+  /// Calls visit(solid, nearest) for each solid with lines near a tile; `nearest` is the place
+  /// nearest to the point on these lines, at any distance. Cost: linear in these lines.
   template <typename Visit>
   void ForEachSolidNear(std::uint32_t tile, const Point& point, Visit visit) const {
     const std::uint32_t of = near_of_tile_[tile];
@@ -119,7 +118,7 @@ class WallField {
   std::vector<std::pair<std::int32_t, std::uint32_t>> by_row_;  // Row of tiles, short line.
   std::vector<Crossing> crossings_;                             // In a row, by x.
   std::vector<std::uint8_t> is_odd_;  // By solid: odd number of crossings so far.
-  std::size_t covering_ = 0;          // Solids that cover the mark, of those with closed loops.
+  std::size_t covering_ = 0;          // Solids with closed loops that contain the mark.
 };
 
 }  // namespace partiemc

@@ -18,7 +18,7 @@
 
 namespace partiemc {
 
-/// Warm buffers of AddWallImages.
+/// Scratch of AddWallImages.
 struct WallImageScratch {
   std::vector<double> positions;
   std::vector<std::uint32_t> originals;  // The given particle of each particle.
@@ -40,20 +40,21 @@ struct WallImageInput {
   double depth = 0;  ///< Images reach this far behind a wall. World units.
   /// Particles farther behind a wall than this have no effect. World units.
   double tolerance = 0;
-  double nearest = 0;  ///< Particles are moved to this distance before a wall. World units.
+  double nearest = 0;  ///< Closer particles move to this distance before a wall. World units.
   /// Called with the bytes that the scratch requires, before they are allocated. Its error ends
   /// AddWallImages.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
 };
 
-/// Sets `with_images` to the particles before the walls or up to `tolerance` behind them, in their
-/// order and at least `nearest` before each wall, then their images, a view of `scratch`.
-/// `particles`: the number of the former. A particle has an image behind each wall that it is at
-/// most `depth` before. At edges and corners, images have images behind the walls of the next axes.
-/// An image has the id, volume and attributes of its particle, and its velocity, mirrored.
+/// Sets `with_images` to particles and their images, a view of `scratch`. The particles come first,
+/// in their order: those before the walls or up to `tolerance` behind one. Particles closer than
+/// `nearest` to a wall or behind it move to this distance before it. `particles`: their number. A
+/// particle has an image behind each wall that it is at most `depth` before. At edges and corners,
+/// images have images behind the walls of the next axes. An image has the id, volume and attributes
+/// of its particle, and its velocity, mirrored.
 /// Requires: CheckFrame has passed the frame, with three components.
 /// Errors: INVALID_ARGUMENT (TOO_MANY_PARTICLES) for more than FrameLimits::kMostParticles with the
-/// images; errors of `reserve`. Linear in particles.
+/// images; errors of `reserve`. Cost: linear in particles.
 absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& scratch,
                            Frame& with_images, std::size_t& particles);
 

@@ -210,7 +210,7 @@ NearestWall WallLines::NearestOn(std::uint32_t edge, const Point& point) const {
   const double ahead = Dot(line.unit, from);
   // From the nearer end, because the farther one is less precise.
   const double above = Cross(line.unit, std::abs(ahead) < line.length / 2 ? from : to);
-  // Differences from both ends, because one may be too far away to tell.
+  // Differences from both ends, because one may be too far away to be precise.
   const bool is_before = ahead < 0;
   const bool is_after = Dot(line.unit, to) > 0;
   if (line.is_endless || !(is_before || is_after)) {

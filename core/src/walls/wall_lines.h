@@ -19,7 +19,7 @@ struct WallEdge {
   Point unit;             ///< Its direction.
   double length = 0;      ///< In cells.
   double start = 0;       ///< Length of the loop up to `from`, in cells.
-  double share_size = 0;  ///< The length, in cells, for which the line counts in its loop.
+  double share_size = 0;  ///< Length that counts along the loop, in cells.
   std::uint32_t loop = 0, solid = 0;
   bool is_endless = false;  ///< The only line of its loop, and not limited to the two points.
 
@@ -53,8 +53,8 @@ class WallLines {
 
   /// Reads the walls of a stream, and the outlines of wall particles if there are any. Long lines
   /// get further points at the sides of the window, because shares of a long line are not precise.
-  /// Points of the window that round to the same cell coordinates become one. Requires: Validate
-  /// has passed the walls. A slanted line is off by 2^-52 of the distance of its points.
+  /// Successive points that round to the same cell coordinates become one. Requires: Validate has
+  /// passed the walls. A slanted line is off by 2^-52 of the distance of its points.
   void Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
              const Window& window);
 
@@ -69,11 +69,11 @@ class WallLines {
   }
   /// Whether the solid is bounded by one endless line.
   bool IsEndless(std::size_t solid) const { return edges_[solids_[solid].first].is_endless; }
-  /// Whether points inside of an odd number of its closed loops are solid; else the others are.
+  /// If true, the points inside of an odd number of its closed loops are solid, else all others.
   bool IsSolidInside(std::size_t solid) const { return solids_[solid].is_inside; }
 
-  /// A place in cells, and in world units. The latter is the given point, bit for bit, where
-  /// `share` is 0 or 1, and has the given coordinate on a line along an axis.
+  /// A place in cells, and in world units. In world units, ends of a line that is not endless have
+  /// the bits of the given points, and places on a line along an axis have its given coordinate.
   Point At(const WallPlace& place) const;
   Point InWorld(const WallPlace& place) const;
 
@@ -82,21 +82,22 @@ class WallLines {
     const WallEdge& edge = edges_[place.edge];
     return edge.start + place.share * edge.share_size;
   }
-  /// The length along a loop from one length to another, by the nearer way around a closed one.
+  /// The signed length along a loop from one length to another, by the shorter way around a closed
+  /// one.
   double Between(std::size_t loop, double from, double to) const;
   /// The place of a loop at a length. Cost: the logarithm of its lines.
   WallPlace PlaceAt(std::size_t loop, double along) const;
 
   /// The place on one line nearest to a point, and the signed distance.
   NearestWall NearestOn(std::uint32_t edge, const Point& point) const;
-  /// The nearest place on some lines. If a corner is nearest, two lines are equally near. The sign
-  /// is that of the line whose endless line is farther from the point. Cost: linear in the lines.
+  /// The nearest place on some lines. If a corner is nearest, two lines are equally near; the line
+  /// whose endless extension is farther from the point counts. Cost: linear in the lines.
   NearestWall Nearest(std::span<const std::uint32_t> edges, const Point& point) const;
   /// The same on the part of a loop within `reach` cells along it from a place. Cost: linear in its
   /// lines there.
   NearestWall NearestAlong(const WallPlace& place, double reach, const Point& point) const;
 
-  /// Whether a point is in the solid of an endless line; on the line counts as such.
+  /// Whether a point is in the solid of an endless line, or on the line.
   bool IsBehindEndless(std::size_t solid, const Point& point) const;
 
  private:

@@ -13,10 +13,10 @@ namespace partiemc {
 
 class WallParticles {
  public:
-  /// Divides a frame by ReconstructionParameters::wall_phases. Errors: INVALID_ARGUMENT if a frame
-  /// with particles lacks the attribute of the phases, or if this is not one whole number per
-  /// particle. Walls have positions and volumes only. Requires: CheckFrame has passed the frame.
-  /// Cost: linear.
+  /// Divides a frame by ReconstructionParameters::wall_phases. Wall particles keep only positions
+  /// and volumes. Errors: INVALID_ARGUMENT if a frame with particles lacks the attribute of the
+  /// phases, or if this is not one whole number per particle. Requires: CheckFrame has passed the
+  /// frame. Cost: linear.
   absl::Status Take(const Frame& frame, const ReconstructionParameters& parameters);
 
   /// An upper bound of the memory for a frame.

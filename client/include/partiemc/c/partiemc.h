@@ -38,10 +38,10 @@ enum {
   PARTIEMC_UNAUTHENTICATED = 16     /* Missing or invalid token. */
 };
 
-/* The error of this thread's last failed call. Strings are never NULL and stay valid until the
- * thread's next call. An error of partiemc_send with a `reason` refuses only that frame, and the
- * stream continues; an error without a reason has ended the stream. proto/PROTOCOL.md lists the
- * reasons. */
+/* Describes this thread's last call that returned a partiemc_code; PARTIEMC_OK if it succeeded.
+ * Strings are never NULL and stay valid until the thread's next call. An error of partiemc_send
+ * with a `reason` refuses only that frame, and the stream continues. An error without a reason has
+ * ended the stream. proto/PROTOCOL.md lists the reasons. */
 typedef struct partiemc_error {
   partiemc_code code;
   const char* message; /* One line for people. */
@@ -59,8 +59,8 @@ const char* partiemc_version(void);
 
 typedef struct partiemc_stream partiemc_stream;
 
-/* An additional outline of the particles; it differs from the stream's options in these members.
- * This struct will not grow. */
+/* An additional outline of the particles. These members replace the stream's options; the other
+ * options apply unchanged. This struct will not grow. */
 typedef struct partiemc_section {
   const double* slice; /* Six numbers as in partiemc_options; NULL: the stream's. */
   double isovalue;     /* As in partiemc_options; 0: the outline of the body. */
@@ -97,9 +97,10 @@ typedef struct partiemc_options {
   double deadline;        /* Seconds for each response; 0: 30. */
   double give_up_after;   /* Seconds to reconnect before the stream ends; 0: 300, with `latest`
                              30. Negative: do not reconnect. */
-  double send_timeout; /* Seconds for partiemc_send to get a slot in the window, in any state of the
-                          connection. Then it returns DEADLINE_EXCEEDED, and the stream continues.
-                          0: no limit while the stream lives. */
+  /* Seconds that partiemc_send waits for a slot in the window, below `deadline`. Then the frame is
+   * refused (SEND_TIMEOUT), and the stream continues. 0: waits for `deadline`, after a loss
+   * `give_up_after` longer; then the stream ends. In process 0 means no limit. */
+  double send_timeout;
   /* For a simulator with several processes. Each opens a stream with the same `name` and sends its
    * particles of every frame, even if it has none. Part 0 receives the results, the other parts
    * PARTIEMC_PART_TAKEN. Particles are ordered by id if they have ids, otherwise by part. Not with
@@ -115,24 +116,24 @@ typedef struct partiemc_options {
   const double* slice;    /* Six numbers: a point of a plane and its normal. Particles then have x,
                              y and z and fill space; the outline is the section with the plane.
                              Its coordinates are in the plane, relative to the point: x and y for a
-                             normal along z, x and z for -y, y and z for x. Requires `spacing`;
-                             `volumes` are then volumes. NULL: no slice. */
+                             normal along z, x and z for -y, y and z for x. Requires `spacing`.
+                             NULL: no slice. */
   double isovalue; /* In [.01, 10]: the outline is this isoline of the density, which is about 1
                       inside of bodies and .5 on flat boundaries. 0: the body's outline. */
   const partiemc_section* sections; /* Additional outlines of each frame, at most 16
-                                       (partiemc_event_section). Each costs like a frame. */
+                                       (partiemc_event_section). Each costs as much as a frame. */
   size_t section_count;
-  double attribute_tolerance; /* Largest error of attributes across triangles of "greedy", a
-                                 fraction of their range, at most 1. 0: the default, .01; for
+  double attribute_tolerance; /* Largest error of attributes across triangles of the fill "greedy",
+                                 as a fraction of their range, at most 1. 0: the default, .01. For
                                  the finest mesh set a tiny number, such as 1e-9. */
-  const char* output; /* "outline" or "surface"; NULL: outline. Surfaces require particles that have
-                         x, y and z and fill space, and `spacing`; `volumes` are then volumes, and
-                         each section needs a slice. */
-  /* Surfaces only: drops points on lattice edges that are at most this many spacings from the
-   * triangles without them. 0: the default, .03; negative: none. */
+  const char* output; /* "outline" or "surface"; NULL: outline. Surfaces require `spacing`, and
+                         particles that have x, y and z and fill space. Each section then needs a
+                         slice. */
+  /* Surfaces only: drops a point on a lattice edge if the triangles without it pass within this
+   * many spacings of it. 0: the default, .03; negative: drops none. */
   double thinning_distance;
   int64_t max_drop_particles; /* Surfaces only: bodies of up to this many particles become
-                                 ellipsoids. 0: the default, 30; negative: none. */
+                                 ellipsoids. 0: the default, 30; negative: no body. */
   double simplify; /* Surfaces only: removes points while the error stays below this many spacings,
                       in [0, 1]; .05 leaves a third of the triangles of large bodies. */
   double min_component_volume; /* Surfaces only: drops bodies with less particle volume, in cubed
@@ -163,8 +164,8 @@ typedef struct partiemc_options {
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
-  /* The phases (`phase_attribute`) of the particles of walls. Their outline is a further wall. At
-   * most 16. Excludes what `walls` exclude. */
+  /* Phases (`phase_attribute`) whose particles are walls. The outline of these particles is a
+   * further wall. At most 16. Excludes the same options as `walls`. */
   const int32_t* wall_phases;
   size_t wall_phase_count;
   /* Walls at which a surface is cut, at most one for each side of each axis. Excludes outlines,
@@ -226,7 +227,7 @@ typedef struct partiemc_particles {
   partiemc_array ids;     /* Optional: the same number for a particle in every frame. */
   /* Optional: world units per unit of time, in the components of the coordinates. */
   partiemc_array velocity_x, velocity_y, velocity_z;
-  /* Optional: only those named in the options are used. */
+  /* Optional: only attributes named in the options are used. */
   const partiemc_attribute* attributes;
   size_t attribute_count;
   const double* box; /* Optional: the periodic box of this frame, as in the options, with the same
@@ -245,9 +246,8 @@ void partiemc_set_float64(partiemc_particles* particles, const double* coordinat
 /* ---- Sending ---- */
 
 /* Sends a frame; `time` is finite. Waits while partiemc_window frames are sent and not yet
- * received; with `latest` it never waits. Stores the frame's number (0 with `latest`) in
- * `sequence`, which may be NULL. Errors: see partiemc_error. DEADLINE_EXCEEDED if no thread
- * receives. */
+ * received, at most as long as `send_timeout` describes; with `latest` it never waits. Stores the
+ * frame's number (0 with `latest`) in `sequence`, which may be NULL. Errors: see partiemc_error. */
 partiemc_code partiemc_send(partiemc_stream* stream, const partiemc_particles* particles,
                             double time, uint64_t* sequence);
 
@@ -255,10 +255,10 @@ partiemc_code partiemc_send(partiemc_stream* stream, const partiemc_particles* p
  * until the newest frame has been sent, so another thread must receive. */
 partiemc_code partiemc_finish(partiemc_stream* stream);
 
-/* Ends the stream at once: current and later calls return CANCELLED. */
+/* Ends the stream at once: other threads' current calls and all later calls return CANCELLED. */
 void partiemc_cancel(partiemc_stream* stream);
 
-/* Number of frames sent and not yet received, and its limit. */
+/* Number of frames sent whose answer has not been received, and its limit. */
 size_t partiemc_in_flight(const partiemc_stream* stream);
 size_t partiemc_window(const partiemc_stream* stream);
 
@@ -282,7 +282,7 @@ enum {
   PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and left no trace. */
   PARTIEMC_NOTICE = 2,      /* A notice from the server in `message`. */
   PARTIEMC_NOTHING_YET = 3, /* No event within the time to wait. */
-  PARTIEMC_END = 4,         /* partiemc_finish was called and every frame has been answered. */
+  PARTIEMC_END = 4,         /* After partiemc_finish: every frame has been answered. */
   PARTIEMC_PART_TAKEN = 5   /* A part of frame `sequence` was accepted; part 0 gets the result. */
 };
 
@@ -310,8 +310,9 @@ typedef struct partiemc_surface {
   const uint32_t* triangle_offsets; /* The same for triangles. */
   const uint32_t* outer_of; /* shell_count: a cavity's outer shell, otherwise PARTIEMC_NO_SHELL. */
   const partiemc_shell* shells; /* shell_count. */
-  /* Identities, in the frame before, that shell k continues: parents[parent_offsets[k]] to
-   * parents[parent_offsets[k + 1]]. NULL if shells are not tracked. */
+  /* Identities of the shells of the frame before that shell k continues:
+   * parents[parent_offsets[k]] to, not including, parents[parent_offsets[k + 1]]. NULL if shells
+   * are not tracked. */
   const uint64_t* parents;
   const uint32_t* parent_offsets;
   /* cut_count triangles, ascending, on walls or on faces of a periodic box. Areas do not count
@@ -324,12 +325,12 @@ typedef struct partiemc_surface {
 typedef struct partiemc_values {
   const char* name;
   int32_t components;  /* 1 to 3. */
-  const float* values; /* At the points of the surface; at the mesh vertices, which begin with the
-                          ring vertices; without a mesh at the ring vertices. */
+  const float* values; /* `components` numbers for each vertex. With a surface: its points. With a
+                          mesh: mesh_points, which begin with `points`. Otherwise: `points`. */
 } partiemc_values;
 
-/* One event. Pointers are valid until the next call on this stream that fills an event. Empty
- * arrays may be NULL. Strings are never NULL. */
+/* One event. Pointers are valid until the next partiemc_receive or partiemc_reconstruct on this
+ * stream. Empty arrays may be NULL. Strings are never NULL. */
 typedef struct partiemc_event {
   size_t size;
   int32_t kind;
@@ -354,7 +355,7 @@ typedef struct partiemc_event {
   const uint8_t* triangle_classes; /* 0: in the band along the outline, 1: inside. */
 
   uint64_t particle_count;
-  double area, perimeter;             /* Sums over rings; `area` also over shells. */
+  double area, perimeter;             /* Sums over rings; with a surface `area` is its area. */
   double spacing, cell_size;          /* As used in this frame, world units. */
   double milliseconds;                /* Computation time. */
   uint64_t rings_digest, mesh_digest; /* Equal digests mean equal bits. */
@@ -362,7 +363,7 @@ typedef struct partiemc_event {
   size_t attribute_count; /* Attributes of the options, in that order; not the phases. */
   const partiemc_values* attributes;
 
-  size_t section_count; /* Results: sections and phases of the options. */
+  size_t section_count; /* Results: number of sections and phases (partiemc_event_section). */
 
   /* Results of streams with the output "surface"; otherwise NULL and 0. Such results have no rings
    * and no mesh. */
@@ -394,8 +395,8 @@ void partiemc_event_init(partiemc_event* event, size_t size);
 partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_event* event);
 
 /* Fills `event` with section `index` of the stream's last event, which must be a result. `event` is
- * filled like a result with one outline; `milliseconds` is the frame's. Its pointers are valid as
- * long as the last event's. Errors: INVALID_ARGUMENT unless `index` is below section_count. */
+ * then a result with one outline; `milliseconds` is 0. Its pointers are valid as long as those of
+ * the last event. Errors: INVALID_ARGUMENT unless `index` is below section_count. */
 partiemc_code partiemc_event_section(partiemc_stream* stream, size_t index, partiemc_event* event);
 
 /* Sends a frame and waits for its result or refusal. For programs with one thread. Errors: see

@@ -22,7 +22,7 @@ namespace partiemc::client {
 /// buffers, so the stream cannot reuse these buffers. One thread sends.
 class AsyncStream {
  public:
-  /// The result of one frame; empty for parts other than 0 (StreamOptions). Errors: a status with a
+  /// The result of one frame; empty for parts other than 0 (FrameParts). Errors: a status with a
   /// Violation (FindViolation) refuses this frame only, and the stream continues. Any other status
   /// ended the stream.
   using Answer = absl::StatusOr<FrameResult>;
@@ -38,8 +38,8 @@ class AsyncStream {
   AsyncStream(const AsyncStream&) = delete;
   AsyncStream& operator=(const AsyncStream&) = delete;
 
-  /// Sends like FrameStream::Send and SendArrays: waits while the window is full. The future is
-  /// ready when the stream's deadline for the frame expires, or earlier.
+  /// Sends like FrameStream::Send and SendArrays: waits while the window is full. The future
+  /// becomes ready with the answer, or with the status that ended the stream.
   std::future<Answer> Send(const Frame& frame, double time);
   std::future<Answer> SendArrays(const ParticleArrays& particles, double time);
 

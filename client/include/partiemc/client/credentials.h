@@ -18,16 +18,16 @@ struct Credentials {
   std::string key_file = {};
 
   /// Bearer token sent with every call; empty: none. It is sent only over TLS or within this
-  /// machine; MakeChannel refuses any other address.
+  /// machine. Opening a connection to any other address fails (INVALID_ARGUMENT).
   std::string token = {};
-  /// File with the token; ignored if `token` is set. The first word outside comments is used, so a
-  /// server's token file works too.
+  /// File with the token; ignored if `token` is set. Its first word outside of # comments is the
+  /// token, so a server's token file works too.
   std::string token_file = {};
 };
 
 /// Reads PARTIEMC_TLS (0, false, no, off or empty: disabled), PARTIEMC_TLS_CA, PARTIEMC_TLS_CERT,
-/// PARTIEMC_TLS_KEY, PARTIEMC_TOKEN and PARTIEMC_TOKEN_FILE, like the command line. Setting a
-/// certificate enables TLS.
+/// PARTIEMC_TLS_KEY, PARTIEMC_TOKEN and PARTIEMC_TOKEN_FILE, like the command line. Each of the
+/// three files enables TLS.
 Credentials CredentialsFromEnvironment();
 
 /// The value of PARTIEMC_SERVER; 127.0.0.1:50051 if it is not set.

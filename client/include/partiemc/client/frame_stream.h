@@ -35,10 +35,11 @@ struct FrameTimes {
 struct FrameResult {
   Result result;  ///< Outputs that were not requested are empty.
   FrameTimes times;
-  std::uint64_t rings_digest = 0;                    ///< DigestRings of the whole result.
-  std::uint64_t mesh_digest = 0;                     ///< DigestMesh of the whole result.
-  std::uint64_t surface_digest = 0;                  ///< DigestSurface of the whole result.
-  std::vector<OutlineDigests> section_digests = {};  ///< The digests of each of result.sections.
+  // Digests of the geometry in float64, for any Outputs:
+  std::uint64_t rings_digest = 0;                    ///< DigestRings.
+  std::uint64_t mesh_digest = 0;                     ///< DigestMesh.
+  std::uint64_t surface_digest = 0;                  ///< DigestSurface.
+  std::vector<OutlineDigests> section_digests = {};  ///< One for each of result.sections.
 };
 
 /// One event of a stream. The caller keeps the object and passes it again, so that its buffers are
@@ -60,10 +61,10 @@ struct Event {
   std::string message;  ///< One line for people; not set for results and parts.
 };
 
-/// Size limits of one frame. A larger frame is refused.
+/// Size limits of one frame; 0: no limit. A larger frame is refused.
 struct StreamLimits {
   std::uint64_t max_particles_per_frame = 0;
-  std::uint64_t max_frame_bytes = 0;  ///< Bytes of one serialised frame; 0: no limit.
+  std::uint64_t max_frame_bytes = 0;  ///< Bytes of one serialised frame.
   std::uint64_t max_tiles_per_frame = 0;
 };
 
@@ -71,7 +72,7 @@ struct StreamLimits {
 struct StreamInfo {
   std::string stream_id;                ///< The id in the server's log; empty in process.
   ReconstructionParameters parameters;  ///< Resolved; `spacing` is absent if it is estimated.
-  std::size_t frames_in_flight = 1;  ///< Capacity of the window: frames sent and not yet received.
+  std::size_t frames_in_flight = 1;  ///< Capacity of the window: frames sent and not yet answered.
   StreamLimits limits;
   bool frame_boxes = true;  ///< The server uses Frame::box; Send refuses a box otherwise.
 };
@@ -87,7 +88,7 @@ struct Reconnecting {
 enum class Received : std::uint8_t {
   kEvent,       ///< The event was filled.
   kNothingYet,  ///< `wait` has passed without an event.
-  kEnd,         ///< FinishSending was called and every frame has been answered.
+  kEnd,         ///< After FinishSending: every frame has been answered.
 };
 
 class FrameStream {
@@ -102,11 +103,11 @@ class FrameStream {
   /// number, and the stream continues. After FinishSending, Send returns FAILED_PRECONDITION, and
   /// the stream continues too. Any other status ended the stream.
   /// If the wait exceeds `send_timeout`, Send returns DEADLINE_EXCEEDED with a Violation (reason
-  /// SEND_TIMEOUT). If it exceeds the stream's deadline, DEADLINE_EXCEEDED ends the stream.
+  /// SEND_TIMEOUT). If it exceeds StreamOptions::deadline, DEADLINE_EXCEEDED ends the stream.
   virtual absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) = 0;
 
   /// Same as Send for arrays with arbitrary strides. Errors: also INVALID_ARGUMENT with a Violation
-  /// if a coordinate is missing (reason COUNT) or the time is not finite (NOT_FINITE).
+  /// if a component is missing (reason COUNT) or the time is not finite (NOT_FINITE).
   virtual absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles,
                                                    double time) = 0;
 
@@ -115,14 +116,14 @@ class FrameStream {
 
   /// Waits for the next event, at most `wait` if given.
   /// Errors: the status that ended the stream. DEADLINE_EXCEEDED if a frame is not answered within
-  /// the stream's deadline, DATA_LOSS if a response is malformed; both end the stream.
+  /// StreamOptions::deadline, DATA_LOSS if a response is malformed; both end the stream.
   virtual absl::StatusOr<Received> Receive(
       Event& event, std::optional<std::chrono::milliseconds> wait = std::nullopt) = 0;
 
   /// Set while the stream reconnects after a loss. Receiver's thread only.
   virtual std::optional<Reconnecting> reconnecting() const { return std::nullopt; }
 
-  /// Number of frames sent and not yet received.
+  /// Number of frames sent whose answer has not been received.
   virtual std::size_t InFlight() const = 0;
 
   /// Ends the stream at once: current and later calls return CANCELLED.

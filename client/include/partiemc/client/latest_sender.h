@@ -17,16 +17,17 @@
 
 namespace partiemc::client {
 
-/// Counts of offered frames by outcome. A frame that is in none of the counts is still waiting.
+/// Counts of offered frames by outcome. A frame in none of the counts is waiting, or the stream
+/// ended before it was sent.
 struct OfferCounts {
   std::uint64_t sent = 0;     ///< Sent or being sent.
   std::uint64_t skipped = 0;  ///< Replaced by a newer frame before the stream accepted them.
   std::uint64_t refused = 0;  ///< Refused by a check that the stream makes before it sends.
 };
 
-/// Callbacks for the outcome of each offered frame, called one at a time in the order of the
-/// offers. They delay the next offer, so they must be quick; they must not call the sender. Frames
-/// are numbered from 1 as they are offered.
+/// Callbacks for the outcome of each offered frame, called one at a time: `skipped` on the thread
+/// that offers, the others on the sending thread. They delay the next offer, so they must be quick.
+/// They must not call the sender. Frames are numbered from 1 as they are offered.
 struct OfferHooks {
   /// Called before the frame is sent with the next sequence number of the stream.
   std::function<void(std::uint64_t offer)> sending = [](std::uint64_t) {};
@@ -36,12 +37,12 @@ struct OfferHooks {
       [](std::uint64_t, const absl::Status&) {};
 };
 
-/// While the server is lost, the sender skips frames. If the simulator must soon learn that its
-/// server is lost, set ReconnectPolicy::give_up_after to kShortPatience.
+/// One thread offers; an internal thread sends. While the server is lost, frames are skipped. If
+/// the simulator must soon receive an error, set ReconnectPolicy::give_up_after to kShortPatience.
 ///
 /// Two frames wait in addition to the window: one that is being sent and the newest one. Their
-/// memory is reused. One thread offers; an internal thread sends. Events are received from the
-/// stream as usual. `time` or the order of `OfferHooks::sending` identifies the frame of a result.
+/// memory is reused. Any one thread receives events from the stream as usual. `time` or the order
+/// of `OfferHooks::sending` identifies the frame of a result.
 class LatestSender {
  public:
   /// `stream` must outlive this object; no other code sends on it.

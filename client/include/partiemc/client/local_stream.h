@@ -30,7 +30,8 @@ class LocalStream : public FrameStream {
   /// Errors: INVALID_ARGUMENT, see Validate(ReconstructionParameters).
   static absl::StatusOr<std::unique_ptr<LocalStream>> Open(const LocalStreamOptions& options);
 
-  /// Waits for the frame that is being computed and drops the others. No call may be in progress.
+  /// Waits for the frame that is being computed and drops waiting frames. No call may be in
+  /// progress.
   ~LocalStream() override = default;
 };
 

@@ -62,21 +62,21 @@ struct AttributeArrays {
 };
 
 /// Same as Frame, with one view per quantity. Each view must stay valid until the call that
-/// receives it returns. The call copies each number once, directly into the message.
+/// receives it returns. The call copies each number; Stream::SendArrays copies it directly into the
+/// message.
 struct ParticleArrays {
   std::size_t count = 0;  ///< Number of particles; the length of each view that is given.
 
-  /// World units, finite. With `z`, all particles must lie in one plane parallel to
-  /// ReconstructionParameters::plane. Coordinates are sent as float if all of them are float,
-  /// otherwise as double.
+  /// World units, finite. With `z`, the particles lie in one plane parallel to
+  /// ReconstructionParameters::plane, or fill space for a slice or a surface. Coordinates are sent
+  /// as float if all of them are float, otherwise as double.
   Reals x, y, z;
 
-  // Optional, as in Frame. Doubles are rounded to float.
+  // All following members are optional, as in Frame. Doubles are rounded to float.
   Reals volumes;
   Ids ids;
   /// The same components as the coordinates, or none.
   Reals velocity_x, velocity_y, velocity_z;
-  /// Rounded to float.
   std::span<const AttributeArrays> attributes = {};
   std::optional<PeriodicBox> box = std::nullopt;  ///< As Frame::box.
 };

@@ -32,14 +32,15 @@ struct ServerInfo {
   std::uint32_t max_streams = 0;
   std::uint32_t max_watchers = 0;
   std::uint32_t idle_timeout_seconds = 0;  ///< 0: no timeout.
-  std::uint32_t frames_in_flight = 0;
+  std::uint32_t frames_in_flight = 0;      ///< Capacity of the window of each stream.
   std::uint32_t compute_threads = 0;
-  std::vector<Placement> placements;  ///< Placements that this client knows too.
+  // Only placements and fills that this client knows:
+  std::vector<Placement> placements;
   std::vector<Fill> fills;
-  std::vector<std::string> capabilities;
+  std::vector<std::string> capabilities;  ///< See proto/PROTOCOL.md.
   std::uint32_t open_streams = 0;
   bool draining = false;
-  std::optional<ServerLoad> load = {};  ///< Absent for a server of version 0.1.
+  std::optional<ServerLoad> load = {};  ///< Absent for servers that do not report it.
 };
 
 /// Requests the information from the server at `address` (HOST:PORT, [IPV6]:PORT or unix:PATH).

@@ -47,9 +47,9 @@ struct Outputs {
   bool normals = false;  ///< Outward unit normals at ring vertices. Surfaces always have them.
   Coordinates coordinates = Coordinates::kFloat64;
   bool echo_particles = false;  ///< Sends the particles to the stream's watchers too.
-  /// Attributes to interpolate to the vertices (Result::attributes), by the names of
-  /// Frame::attributes; at most 16. "velocity" names Frame::velocities. A frame with
-  /// particles that lacks one is refused.
+  /// Names of attributes to interpolate to the vertices (Result::attributes), at most 16.
+  /// "velocity" means Frame::velocities. A frame with particles that lacks one of these attributes
+  /// is refused.
   std::vector<std::string> attributes = {};
 };
 
@@ -60,32 +60,34 @@ inline constexpr std::chrono::seconds kShortPatience{30};
 
 /// How a stream reconnects after it lost its connection or its server.
 struct ReconnectPolicy {
-  /// Maximum time from the loss to the next new result. If it is exceeded, the stream ends with an
-  /// error. A lost connection is detected within 10 s. 0: do not reconnect.
+  /// Maximum time to reconnect, after which the stream ends with an error. The time starts at the
+  /// detection of a loss, within 10 s. Losses before the next new result count as one loss. 0: do
+  /// not reconnect.
   std::chrono::milliseconds give_up_after{kPatience};
-  /// Each address is first tried once without a pause. Then pauses follow; each is twice as long as
-  /// the previous one, minus a random part, so that many clients do not reconnect at the same
-  /// moment.
+  /// Each address is first tried once without a pause. Then a pause precedes each round over the
+  /// addresses: `first_pause`, doubled in each round up to `longest_pause`. Up to half of each
+  /// pause is removed at random, so that many clients do not reconnect at the same moment.
   std::chrono::milliseconds first_pause{50};
   std::chrono::milliseconds longest_pause{1000};
-  /// Receive reports each reconnection (Event::Kind::kReconnected).
+  /// If set, Receive reports each reconnection (Event::Kind::kReconnected).
   bool announce = false;
 };
 
 /// Settings for frames that several processes (ranks) of a simulator send in parts. Every rank
-/// opens a stream with the same name and sends its particles of every step, even if it has none;
-/// all ranks send the same number of frames in the same order. Rank 0 receives the results, the
+/// opens a stream with the same name and sends its particles of every step, even if it has none.
+/// All ranks send the same number of frames in the same order. Rank 0 receives the results, the
 /// others Event::Kind::kPartTaken for each part. Particles are ordered by id if they have ids,
 /// otherwise by part. Not for a LatestSender: ranks would skip different frames.
 struct FrameParts {
   std::uint32_t parts = 0;  ///< Number of parts; 0: frames are sent whole.
-  std::uint32_t part = 0;  ///< Below `parts`. Part 0 opens the stream; the other parts wait for it.
+  /// Below `parts`. Part 0 opens the stream; the other parts wait for it.
+  std::uint32_t part = 0;
   /// Secret shared by all parts, at most 128 bytes of printable ASCII. Empty: any caller that may
   /// produce a stream of this name may send its parts.
   std::string token = {};
   /// Time limit for all parts of a frame, from the arrival of the first part. If a part is missing
-  /// then, the server refuses the frame (PARTS_MISSING). 1 ms to ten minutes, at most `deadline`.
-  /// The value of part 0 applies to all parts.
+  /// after this time, the server refuses the frame (PARTS_MISSING). 1 ms to ten minutes, at most
+  /// `deadline`. The value of part 0 applies to all parts.
   std::chrono::milliseconds timeout{10000};
 };
 
@@ -94,7 +96,7 @@ struct StreamOptions {
   std::string name = {};
   ReconstructionParameters parameters = {};
   Outputs outputs = {};
-  /// Labels, shown in lists of streams. At most 16; each at most 128 bytes without control
+  /// Shown in lists of streams. At most 16; keys and values have at most 128 bytes and no control
   /// characters.
   std::map<std::string, std::string> labels = {};
   /// TLS, certificates and token. Loopback and Unix sockets need none unless the server requires
@@ -107,11 +109,11 @@ struct StreamOptions {
   std::chrono::milliseconds deadline{30000};
   /// Maximum time that Send waits for a slot in the window, even while the connection is lost. A
   /// frame that gets no slot is refused (SEND_TIMEOUT, DEADLINE_EXCEEDED), and the stream
-  /// continues. If absent, Send waits for `deadline`, after a loss `reconnect.give_up_after`
-  /// longer; then the stream ends.
+  /// continues. Set or not, Send waits at most `deadline`, while the connection is lost
+  /// `reconnect.give_up_after` longer; then the stream ends.
   std::optional<std::chrono::milliseconds> send_timeout = {};
-  /// Servers to fail over to, in addition to the address of Open. Each needs the same version, and
-  /// limits that are at least as large. Behind a proxy one address is enough.
+  /// Servers to fail over to, in addition to the address of Open. Their version must be the same,
+  /// their limits at least as large. Behind a proxy one address is enough.
   std::vector<std::string> fallback_addresses = {};
   /// Number of frames between checkpoints. A smaller number means fewer frames to hold and to
   /// resend after a loss, but more traffic: each checkpoint has the size of the outline. 0: do not
@@ -122,8 +124,8 @@ struct StreamOptions {
   /// addresses and times. All other options are read from part 0 only.
   FrameParts parts = {};
   /// Maximum total bytes of the frames held for resending (up to `checkpoint_interval` frames plus
-  /// the window). Send waits until responses free memory. A frame that does not fit even after all
-  /// responses is refused (HELD_BYTES).
+  /// the window). Send waits until responses free memory. A frame that does not fit after all
+  /// earlier frames are answered is refused (HELD_BYTES).
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
@@ -140,7 +142,8 @@ class Stream : public FrameStream {
   /// `address` is HOST:PORT, [IPV6]:PORT or unix:PATH. Errors: INVALID_ARGUMENT (address,
   /// credentials, parameters, name or labels), UNAVAILABLE (no server at any address, or TLS
   /// verification failed), UNAUTHENTICATED (token), RESOURCE_EXHAUSTED (no slot for another
-  /// stream), DEADLINE_EXCEEDED. Each message is one line.
+  /// stream), UNIMPLEMENTED (the server is too old for a parameter), DEADLINE_EXCEEDED. Each
+  /// message is one line.
   static absl::StatusOr<std::unique_ptr<Stream>> Open(std::string_view address,
                                                       const StreamOptions& options);
 

@@ -27,8 +27,8 @@
 namespace partiemc::client {
 
 enum class WatchMode : std::uint8_t {
-  kLatest,  ///< The newest frame when a credit is free; the others are dropped and counted.
-  kEvery,   ///< Every frame from now on; a slow watcher is disconnected.
+  kLatest,  ///< The newest frame when a credit is free; older ones are dropped and counted.
+  kEvery,   ///< Every frame; a slow watcher is disconnected.
 };
 
 struct WatcherOptions {
@@ -36,10 +36,10 @@ struct WatcherOptions {
   /// Number of frames that may be on the way or waiting to be received, at least 1. More credits
   /// hide a slow connection; with fewer credits the received frames are newer.
   std::uint32_t credits = 2;
-  /// First frame to receive: this sequence number, or the oldest frame that the server still holds
-  /// if that is newer. Held frames come in order and without gaps in either mode; live frames
-  /// follow. If all held frames are older, only live frames are received. Absent: starts with the
-  /// newest frame.
+  /// First frame to receive: this sequence number, or the oldest frame of the server's history if
+  /// that is newer. In either mode, frames of the history come in order and without gaps; live
+  /// frames follow. If the whole history is older, only live frames are received. Absent: starts
+  /// with the newest frame.
   std::optional<std::uint64_t> from_sequence = {};
   /// For streams of surfaces: receive simplified surfaces. Absent: exact ones. Servers without the
   /// capability "surface-levels" send exact ones, too.
@@ -49,16 +49,16 @@ struct WatcherOptions {
   std::vector<std::string> fallback_addresses = {};
   /// How a watch continues after it lost its connection or server, or after its stream was taken
   /// over or lost its producer. The watch looks for the stream at every address. In mode kEvery, or
-  /// with from_sequence, it continues after the last received frame and misses no frame that the
-  /// server still holds. Otherwise it continues with the newest frame. `announce` is not used,
+  /// with from_sequence, it continues after the last received frame and misses no frame of the
+  /// server's history. Otherwise it continues with the newest frame. `announce` is not used,
   /// because WatchedFrame reports a loss.
   ReconnectPolicy rejoin = {.give_up_after = kShortPatience};
   /// Maximum time to reach the server. It includes the wait for a server that is still starting.
-  /// The first connection divides it among the addresses; when the watch rejoins, each attempt has
-  /// all of it.
+  /// The first connection divides it among the addresses. When the watch rejoins, each attempt has
+  /// this time to be accepted.
   std::chrono::milliseconds connect_timeout{2000};
-  /// Time for the server to accept the watcher. There is no timeout for frames: they depend on the
-  /// producer.
+  /// Maximum time for a server to accept the watcher in Open. Frames have no timeout: they depend
+  /// on the producer.
   std::chrono::milliseconds deadline{30000};
 };
 
@@ -72,27 +72,28 @@ struct WatchedStream {
   std::string stream_id;                ///< The id in the server's log.
   ReconstructionParameters parameters;  ///< Resolved.
   std::map<std::string, std::string> labels;
-  /// Frames that the server held when the watch was opened or rejoined; absent if there were none.
+  /// The history when the watch was opened or rejoined; absent if it was empty.
   std::optional<HeldFrames> held = {};
 };
 
-/// The caller keeps the object and passes it again, so that its buffers are reused.
+/// One received frame. The caller keeps the object and passes it again, so that its buffers are
+/// reused.
 struct WatchedFrame {
   std::uint64_t sequence = 0;  ///< Number of the producer's frame.
   double time = 0;
   FrameResult frame;
-  /// Set if the surface is a level of detail. Statistics, digests, measures and identities are
-  /// those of the exact surface.
+  /// Set if the surface is a level of detail. Statistics, digests, measures and identities describe
+  /// the exact surface.
   std::optional<SurfaceLevel> level;
   /// x0, y0, x1, y1, ... in the stream's plane, or x0, y0, z0, ... if the stream has surfaces;
   /// empty unless the producer echoes its particles.
   std::vector<double> particles;
-  /// Other quantities of the echoed particles, velocities in the layout of `particles`. Each has
-  /// one entry per particle, or is empty.
+  /// Ids, volumes and velocities of the echoed particles; empty if the producer sends none.
+  /// Velocities have the layout of `particles`.
   std::vector<std::uint64_t> particle_ids;
   std::vector<float> particle_volumes, particle_velocities;
-  /// The attributes that the producer sends with its particles (ParticleFrame.scalars), such as
-  /// phases: `components` values per particle, distinct names.
+  /// The attributes that the producer sends with its echoed particles, such as phases: `components`
+  /// values per particle, distinct names.
   std::vector<AttributeValues> particle_attributes;
   /// The periodic box that the producer sent with the frame. Absent: the box of the stream.
   std::optional<PeriodicBox> particle_box;
@@ -101,18 +102,19 @@ struct WatchedFrame {
   /// where the watch continues, and the duration. Otherwise empty.
   std::string rejoined;
   /// Set together with `rejoined`: number of sequence numbers between the previous frame and this
-  /// one. They belong to missed results and to refused frames, and `dropped` is then 0.
+  /// one. They belong to missed results and to refused frames. `dropped` is then 0. Without a
+  /// previous frame, `gap` is 0 and `dropped` counts.
   std::uint64_t gap = 0;
   /// The oldest frame that WatcherOptions::from_sequence could request when this one was sent; 0 if
   /// the server has no histories.
   std::uint64_t oldest_sequence = 0;
 };
 
-/// Why a watch ended.
+/// The server's reason for the end of a watch.
 struct WatchEnd {
   std::string reason;   ///< "FINISHED", "PRODUCER_LOST", ...; see the table in proto/PROTOCOL.md.
   std::string message;  ///< One line for people.
-  std::uint64_t dropped = 0;  ///< Frames dropped since the last one.
+  std::uint64_t dropped = 0;  ///< Frames dropped since the last received one.
 };
 
 /// One thread receives; any thread may call Cancel. Messages are read in the background. Receiving

@@ -8,7 +8,7 @@ export interface Theme {
   band: Rgb;
   /** Triangles of merged whole cells. */
   interior: Rgb;
-  /** `band` and `interior` if only the outline has colours. */
+  /** `band` and `interior` while the outline shows an attribute that the mesh lacks. */
   neutralBand: Rgb;
   neutralInterior: Rgb;
   edge: Rgb;
@@ -81,7 +81,6 @@ export function unpacked(colour: number): Rgb {
   return [(colour & 255) / 255, ((colour >> 8) & 255) / 255, ((colour >> 16) & 255) / 255];
 }
 
-/** Linear interpolation between two colours. */
 export function mix(from: Rgb, to: Rgb, share: number): Rgb {
   return [
     from[0] + (to[0] - from[0]) * share,
@@ -106,7 +105,7 @@ export function oklch(lightness: number, chroma: number, hue: number): Rgb {
 
 const HUES = 256;
 const TIERS = 2;
-const GOLDEN_RATIO = 0x9e3779b1; // Times 2^-32.
+const GOLDEN_RATIO = 0x9e3779b1; // 0.618 * 2^32.
 
 /** All hues of each tier of lightness, by theme. Made at first use. */
 const identityColours: { light?: Rgb[]; dark?: Rgb[] } = {};

@@ -1,14 +1,14 @@
 import type { Frame } from '../protocol/frame';
 import { toCss, type Size, type View } from './view';
 
-/** A point where the outline leaves a wall, on a picture in CSS pixels, and its text. */
+/** A contact (Rings.contacts) in a picture, in CSS pixels, and its text. */
 export interface ContactMark { x: number; y: number; text: string }
 
-/** Texts of more contacts would cover the picture. */
+/** With more contacts than this, texts would cover the picture. */
 const MOST_TEXTS = 24;
 const MOST_MARKS = 1000;
 
-/** The contacts in a picture. The text is the angle of the fluid between the wall and the outline. */
+/** The contacts in a picture. The text is the angle in degrees; empty if there are more than MOST_TEXTS contacts. */
 export function contactMarks({ rings, origin }: Frame, view: View, size: Size): ContactMark[] {
   const marks: ContactMark[] = [];
   rings.contacts.forEach((point, k) => {

@@ -1,7 +1,7 @@
 import { type Frame, NO_RING, type Rings } from '../protocol/frame';
 import { RingIndex } from './pick';
 
-/** Vertices of a ring that are compared. */
+/** Number of vertices of a ring that are compared. */
 const SAMPLES = 16;
 
 /**

@@ -1,12 +1,12 @@
-/** What the gestures on a canvas change. All lengths are in CSS pixels. */
+/** The effects of gestures on a canvas. All lengths are in CSS pixels. */
 export interface Gestures {
   /** A pointer is pressed. False ignores it. */
   press(event: PointerEvent): boolean;
-  /** The pointers have moved, `hasTwo`: two fingers. */
+  /** The pressed pointer, or the middle of two fingers (`hasTwo`), has moved by this distance. */
   drag(right: number, down: number, hasTwo: boolean): void;
   /** Two fingers, or the wheel, zoom by a factor about a place. */
   zoom(x: number, y: number, factor: number): void;
-  /** Applies a key. False: the key means nothing here. */
+  /** Applies a key. False: the key has no meaning for the canvas, and the page may use it. */
   key(key: string, shift: boolean): boolean;
 }
 
@@ -21,10 +21,10 @@ const CLICK_PIXELS = 4;
 
 /** Zoom per key press. */
 export const KEY_ZOOM = 1.25;
-/** A key with Shift pans by so many times the distance. */
+/** Factor of the distance of a pan by a key with Shift. */
 export const FAST = 4;
 
-/** Directions of the arrow keys, to the right and down. The picture moves the other way. */
+/** Movement of the content by each arrow key, to the right and down: opposite to the arrow. */
 export const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowLeft: [1, 0],
   ArrowRight: [-1, 0],

@@ -16,13 +16,13 @@ export interface Look {
   axes: boolean;
   /** Outlines without a line: 0 is the stream's own, k is section k - 1. */
   hidden: readonly number[];
-  /** The outline to show as the picture. */
+  /** The outline to show as the picture, numbered as in `hidden`. */
   outlineShown: number;
   /** One colour for all, one for each identity, or a channel of an attribute (protocol/channels.ts). */
   colour: 'plain' | 'identity' | string;
   /** Colours of an attribute. */
   map: MapName;
-  /** Numbers with the first and the last colour of the map. Null: of all frames so far. */
+  /** Numbers with the first and the last colour of the map. Null: smallest and largest of all frames so far. */
   from: number | null;
   to: number | null;
   dark: boolean;

@@ -2,11 +2,11 @@ import { NO_RING, type Rings } from '../protocol/frame';
 import { identityColour, oklch, packed, type Rgb, theme } from './colours';
 import { attributeOf, type Look } from './look';
 
-/** Successive sections differ by a golden angle, beginning at the hue of the first one. */
+/** Hues of successive sections differ by a golden angle. The first section has the hue ISOLINE_HUE. */
 const GOLDEN_TURN = (3 - Math.sqrt(5)) / 2;
 const ISOLINE_HUE = 0.13;
 
-/** Colours of triangles without a colour of their own. */
+/** Colours of triangles that show neither an identity nor an attribute. */
 export function fillTones(look: Look): { band: Rgb; interior: Rgb } {
   const { band, interior, neutralBand, neutralInterior } = theme(look.dark);
   return attributeOf(look) === null

@@ -2,9 +2,9 @@ import { type Mesh, NO_RING, type Rings } from '../protocol/frame';
 import { RingIndex } from './pick';
 
 /**
- * The colour of the outer ring for each point of the mesh. Triangles that share a point belong to
- * the same component, so one vertex of a ring identifies the ring of a whole piece. A piece without
- * such a vertex is located by its first triangle. Takes about 3 ms for 100,000 points.
+ * For each point of the mesh, the colour of its outer ring. Triangles that share a point form a
+ * piece, which lies in one outer ring. A vertex of a ring identifies the ring of its whole piece. A
+ * piece without such a vertex is located by its first triangle. Takes about 3 ms for 100,000 points.
  */
 export function pieceTints(
   mesh: Mesh, rings: Rings, colourOf: (ring: number) => number,

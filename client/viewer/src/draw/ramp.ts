@@ -22,7 +22,6 @@ const MAPS = {
 export type MapName = keyof typeof MAPS;
 export const MAP_NAMES = Object.keys(MAPS) as MapName[];
 
-/** A colour map in one theme. */
 export interface Ramp { dark: boolean; map: MapName }
 
 /** The colour of a number from 0 to 1. */
@@ -49,20 +48,21 @@ export function rampTexels(count: number, ramp: Ramp): Uint8Array {
   return texels;
 }
 
-/** Range of an attribute. */
+/** Smallest and largest number of an attribute. */
 export interface Range {
   min: number;
   max: number;
 }
 
-/** Position of a number in a range, 0 to 1. */
+/** Position of a number in a range: 0 at `min`, 1 at `max`, not limited. 0 in an empty range. */
 export function shareOf({ min, max }: Range, value: number): number {
   return max > min ? (value - min) / (max - min) : 0;
 }
 
 /**
- * The range of the colours. `from` and `to`: its ends as chosen, or null for those of the numbers. An
- * end beyond all numbers moves the other one, so that all numbers have the colour of the nearer end.
+ * The range of the colours. `all`: the range of the numbers. `from` and `to`: the chosen ends; null: as
+ * of `all`. If a chosen end is beyond all numbers, the other end moves beyond it, so that all numbers
+ * have the colour of the nearer end.
  */
 export function chosenRange(all: Range, from: number | null, to: number | null): Range {
   const width = all.max - all.min || 1;

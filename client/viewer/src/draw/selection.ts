@@ -4,7 +4,7 @@ import { continuations } from './continuation';
 /** Largest gap between frames over which a ring is still found by its position. */
 const NEAR_FRAMES = 16n;
 
-/** What a selection needs of a frame: its rings, or the shells of a surface. */
+/** The rings of a frame, or the shells of its surface, for a selection. */
 export interface Tracked { sequence: bigint; identities: BigUint64Array; parents: bigint[][] }
 
 /**
@@ -17,7 +17,7 @@ export class Tracking<F> {
   private readonly since = new Map<bigint, bigint>();
   private latest: { frame: F; sequence: bigint; rings: readonly number[] } | null = null;
 
-  /** `byPlace`: rings that continue `chosen` ones of an earlier frame, if parents are unknown. */
+  /** `byPlace`: finds rings by position that continue the `chosen` ones, if parents are unknown. */
   constructor(private readonly trackedOf: (frame: F) => Tracked,
               private readonly byPlace: (before: F, chosen: readonly number[], after: F) => number[]) {}
 

@@ -36,8 +36,8 @@ export function normalLength(spacing: number): number {
 }
 
 /**
- * Every how many vertices a normal is drawn, for `count` vertices at a distance of `gap` pixels. A
- * power of two, so that few normals appear or vanish during a zoom.
+ * Number of vertices from one drawn normal to the next, for `count` vertices at a distance of `gap`
+ * pixels. A power of two, so that few normals appear or vanish during a zoom.
  */
 export function normalStride(gap: number, count: number): number {
   let stride = 1;

@@ -92,7 +92,6 @@ export function boundsOf(points: Float32Array, origin: readonly [number, number]
   };
 }
 
-/** The box around two boxes. */
 export function union(a: Bounds, b: Bounds): Bounds {
   return {
     left: Math.min(a.left, b.left), bottom: Math.min(a.bottom, b.bottom),

@@ -9,7 +9,7 @@ export class CanvasCopy {
   readonly canvas = document.createElement('canvas');
   private readonly context: CanvasRenderingContext2D;
 
-  /** Throws without WebGL, where the scene is no canvas. */
+  /** Throws without WebGL, because the scene then draws SVG instead of its canvas. */
   constructor(private readonly scene: Drawn, private readonly marks: () => readonly Mark[]) {
     const context = this.canvas.getContext('2d');
     if (!context || !scene.canvas.getContext('webgl2')) {

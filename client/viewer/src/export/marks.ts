@@ -43,7 +43,7 @@ const HALO = 3;
 /** Rectangles of the legend's bar per colour. */
 const STEPS_PER_STOP = 10;
 
-/** The axes, contacts and measurement on the page. */
+/** The axes, contacts and measurement that lie over the picture. */
 function overlaidMarks({ axes, contacts, points, text }: Overlaid, size: Size, view: View, dark: boolean): Mark[] {
   const ink = hex(theme(dark).outline);
   const halo = hex(theme(dark).background);
@@ -76,8 +76,8 @@ function overlaidMarks({ axes, contacts, points, text }: Overlaid, size: Size, v
 }
 
 /**
- * Caption, scale and legend, and what is drawn over the picture. `caption`: name, frame and time of the
- * picture. Axes move caption, scale and legend inward.
+ * The marks of a picture: caption (name, frame and time), scale, legend and `overlaid`. Axes move
+ * caption, scale and legend inward.
  */
 export function marksOf(
   caption: string, size: Size, view: View, legend: Legend | null, dark: boolean, overlaid: Overlaid = NOTHING,

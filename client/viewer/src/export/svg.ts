@@ -133,7 +133,7 @@ function outline(
     stroke(path, colour, look.lineWidth, 1));
 }
 
-/** The particles, in one colour or in those of an attribute. */
+/** The particles, in one colour or in the colours of an attribute. */
 function dots(
   { particleAttributes }: Frame, particles: Float32Array, look: Look, range: Range | null,
   diameter: number, at: Projection,
@@ -159,7 +159,6 @@ function colourAt(extent: Range, value: number, look: Look): string {
   return hex(rampColour(Math.round(share * RAMP_STEPS) / RAMP_STEPS, look));
 }
 
-/** Groups rings by colour. */
 function grouped(rings: Rings, colourOf: (ring: number) => number): Map<number, number[]> {
   const groups = new Map<number, number[]>();
   for (let ring = 0; ring < rings.outerOf.length; ++ring) {

@@ -1,9 +1,9 @@
 // Contact angles and angles of repose, by the same fits as in the core.
 import { lineCrossings, type MeasuredRings, type Point } from './rings';
 
-/** An outline is rounded within this distance of a wall, in spacings. */
+/** Width of the zone along a wall in which an outline is rounded, in spacings. Fits leave this zone out. */
 const ROUNDED_SPACINGS = 1;
-/** Samples of the upper surface. A flank lies between these fractions of the peak's height. */
+/** Number of samples of the upper surface. A flank lies between these fractions of the peak's height. */
 const SURFACE_SAMPLES = 200;
 const [FLANK_FROM, FLANK_TO] = [0.2, 0.8];
 const MOST_STEPS = 50;
@@ -65,8 +65,9 @@ function fitSlope(points: readonly Point[]): number {
 interface Contact { place: number; angle: number }
 
 /**
- * One contact point and its angle. `points`: coordinates along the wall and heights above it. `first`: 1 for the start
- * of the contact, -1 for its end.
+ * One contact point and its angle, by a circle. `points`: coordinates along the wall and heights above it. `reach`:
+ * radius of the fit. `rounded`: height below which points are left out. `first`: 1 for the start of the contact, -1 for
+ * its end.
  */
 function findContact(points: readonly Point[], reach: number, rounded: number, first: 1 | -1): Contact {
   const none = { place: NaN, angle: NaN };

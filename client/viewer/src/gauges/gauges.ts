@@ -23,7 +23,7 @@ export class Gauges {
     return this.values.get(summary)?.get(gauge)?.[k] ?? NaN;
   }
 
-  /** Measures the newest frames first, until all are measured or `isLate()`. A frame is decoded for it. */
+  /** Decodes and measures frames that lack values, the newest first, until `isLate()`. */
   measure(entries: readonly (Entry | null)[], isLate: () => boolean): void {
     if (this.all.length === 0) return;
     for (let k = entries.length; k-- > 0 && !isLate();) {

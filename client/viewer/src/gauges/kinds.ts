@@ -3,7 +3,7 @@
 interface Kind {
   numbers: readonly string[];
   values: readonly string[];
-  /** How many of the first values a curve shows. */
+  /** Number of values, from the first on, that a curve shows. */
   drawn: number;
 }
 

@@ -55,7 +55,7 @@ function clipped(polygon: readonly Point[], depth: (point: Point) => number): Po
   return kept;
 }
 
-/** If a box lies in a hole, the clipped outer ring and hole cancel, except for this share. */
+/** If a box lies in a hole, the areas of the clipped outer ring and hole cancel, up to this share of both. */
 const ROUNDING = 1e-14;
 
 /** Area and centroid. */

@@ -24,7 +24,7 @@ export function ringsOf({ origin: [x, y], rings, statistics }: Frame): MeasuredR
   return { rings: all, largest: largest === null ? null : all[largest], spacing: statistics.spacing };
 }
 
-/** Where a line crosses rings, ascending: `origin` has 0, `origin + direction` has 1. */
+/** Positions at which a line crosses rings, ascending: 0 at `origin`, 1 at `origin + direction`. */
 export function lineCrossings(rings: readonly Point[][], origin: Point, direction: Point): number[] {
   const [dx, dy] = direction;
   const squared = dx * dx + dy * dy;

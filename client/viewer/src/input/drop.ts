@@ -52,7 +52,7 @@ const textOfBytes = (bytes: Uint8Array) => String.fromCharCode(...bytes);
 
 const isTimes = (file: File) => plainName(file) === 'times.csv';
 
-/** A kind of tables: which files have it, and their reader. */
+/** A file format with tables: how its files are recognised, and their reader. `name` is in lower case. */
 interface Kind {
   matches(name: string, head: string): boolean;
   open(file: File): Promise<TableReader> | TableReader;
@@ -93,7 +93,7 @@ export interface FileInput {
   open(options: FileOptions): Promise<FrameSource>;
 }
 
-/** Reads what dropped files are. Throws InputError. */
+/** Determines the kind and the facts of dropped files. Throws InputError. */
 export async function inspectFiles(dropped: File[]): Promise<FileInput> {
   const files = dropped.filter((file) => !file.name.startsWith('.'))
     .sort((a, b) => naturalOrder(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name));

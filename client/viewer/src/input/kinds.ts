@@ -3,7 +3,7 @@
 /** The beginning of a file: its bytes as Latin-1 text, and its extension in lower case. */
 export interface FileHead { text: string; extension: string }
 
-/** What the page reads, for errors. */
+/** Formats that the page reads, for errors. */
 export const READABLE = 'CSV, LAMMPS text dumps, NPY, NPZ, VTK (.vtk, .vtp, .vtu, .pvd, .series), extended XYZ and recordings (.pemc)';
 
 const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?: string }[] = [
@@ -30,7 +30,7 @@ const KINDS: readonly { name: string; matches(head: FileHead): boolean; remedy?:
   },
 ];
 
-/** Why a file is refused, and what to do. */
+/** The reason why a file is refused, and a remedy, as sentences. */
 export function refusalOf(name: string, head: FileHead): string {
   const kind = KINDS.find(({ matches }) => matches(head));
   if (!kind) return `${name} is of an unknown kind. The page reads ${READABLE}.`;

@@ -4,7 +4,7 @@ import { NumberRows } from './rows';
 import { InputError } from './source';
 import type { FrameTable, TableReader } from './table_source';
 
-/** Most components of an array that can be numbers of particles. */
+/** Arrays with more components than this are no columns of particles. */
 export const MOST_COMPONENTS = 16;
 /** Largest header. numpy.load has a limit of 10,000 bytes. */
 const MOST_HEADER_BYTES = 65_536;

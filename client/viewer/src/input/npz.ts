@@ -15,7 +15,7 @@ const LOCAL_BYTES = 30;
 const MOST_COMMENT_BYTES = 65_535;
 const STORED = 0;
 const DEFLATED = 8;
-/** Bytes that a byte can unpack to at most. */
+/** Largest number of bytes to which deflate can unpack one byte. */
 const MOST_EXPANSION = 1032;
 
 interface ZipEntry { name: string; method: number; packed: number; size: number; at: number }

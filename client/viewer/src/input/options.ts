@@ -10,7 +10,7 @@ export type FileOptions = Record<FileField, string>;
 
 export const NO_OPTIONS: Readonly<FileOptions> = { spacing: '', columns: '', select: '', slice: '' };
 
-/** Content of files, for the defaults of their options. */
+/** Facts of files, which are the defaults of their options. */
 export interface FileFacts {
   /** World units: of the recording, or estimated for 3D particles. Empty: the server estimates it. */
   spacing: string;
@@ -76,7 +76,7 @@ export const NOT_IN_SPACE = 'has two coordinates. Planes and surfaces are of par
 /** The word for surfaces in the option `slice`. */
 export const SURFACE = 'surface';
 
-/** How 3D particles are reconstructed: as surfaces in space, or in the first of the planes. Each other plane is a section. */
+/** How 3D particles are reconstructed: as surfaces, or as the outline in the first plane. Other planes are sections. */
 export interface SpaceChoice { isSurface: boolean; slices: readonly SectionPlane[] }
 
 /** Planes `z=0.5` or `OX,OY,OZ,NX,NY,NZ`, and `surface`, separated by semicolons. Throws FieldError. */
@@ -90,7 +90,7 @@ export function parseSlices(text: string): SpaceChoice {
   return { isSurface: parts.includes(SURFACE), slices };
 }
 
-/** Throws FieldError if particles are reconstructed in space, or in a plane of it, without their spacing. */
+/** Throws FieldError if surfaces or planes are chosen without a spacing. */
 export function checkSpacing({ isSurface, slices }: SpaceChoice, spacing: number | null): void {
   if (spacing !== null || (!isSurface && slices.length === 0)) return;
   throw new FieldError('spacing', isSurface ? 'Surfaces need the spacing of the particles.'

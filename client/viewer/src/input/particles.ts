@@ -5,7 +5,7 @@ import type { ColumnPlan } from './columns';
 import { CHOOSE_SPACE, FieldError, NOT_IN_SPACE } from './options';
 import type { Rows } from './rows';
 
-/** Relative extent above which an axis counts. Above the rounding of six-digit text. */
+/** An axis with an extent below this share of the largest one is flat. Above the rounding of six-digit text. */
 const FLAT = 1e-6;
 
 type Axes = (Float64Array | null)[];
@@ -70,7 +70,7 @@ export type Place = (axes: Axes, images: Axes, scaled: boolean) => void;
 /** The particles of a frame. */
 export interface ParticleTable {
   rows: Rows;
-  /** Null: none. The particles then have no velocities, and `step` or else `index` as time. */
+  /** Null: unknown. The particles then have no velocities, and their time is `step`, or `index` without a step. */
   time: number | null;
   /** Number of the time step. */
   step?: number;

@@ -10,11 +10,11 @@ export interface FrameSource {
   readonly spacing: number | null;
   /** Whether 3D particles are reconstructed as surfaces. The planes are sections then. */
   readonly isSurface: boolean;
-  /** Planes that cut 3D particles: the picture, then more. Empty without surfaces: the particles are 2D. */
+  /** Planes that cut 3D particles. The first is the picture, unless `isSurface`. Empty for 2D particles. */
   readonly slices: readonly SectionPlane[];
   /** Names of scalars that every frame has. */
   readonly scalars: string[];
-  /** What the user must know about the files, such as their truncation; empty without it. */
+  /** A warning about the files for the user, such as their truncation; empty without one. */
   readonly notice: string;
   /** Reads frame `index`, starting at 0. Throws InputError. */
   frame(index: number): Promise<Particles>;

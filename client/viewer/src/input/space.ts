@@ -9,9 +9,9 @@ import { rowsOf } from './share';
 const AXES = ['x', 'y', 'z'];
 /** Digits of proposed numbers. */
 const DIGITS = 4;
-/** Particles whose neighbours are searched. */
+/** Number of particles whose neighbours are searched. */
 const SAMPLES = 200;
-/** Distances that are computed at most. */
+/** Limit of computed distances. It reduces the samples of large frames. */
 const MOST_DISTANCES = 4e7;
 
 /** Whether positions have three coordinates. */

@@ -88,7 +88,7 @@ function planOf({ names, columnCount, name }: FrameTable, request: ColumnRequest
 /** Most values of a column that can be a type of particles. */
 const MOST_TYPES = 8;
 
-/** What the first frame shows about the options. Throws InputError if it cannot be read. */
+/** Facts of the first frame, for the defaults of the options. Throws InputError if the frame cannot be read. */
 export async function factsOf(reader: TableReader): Promise<FileFacts> {
   const table = await reader.table(0);
   const { names, columnCount, rows } = table;

@@ -16,7 +16,6 @@ export interface VtkArray { name: string; components: number; type: string; litt
 /** Bytes of an element. */
 export const sizeOf = (type: string) => Number(type.slice(1));
 
-/** The columns of an array. */
 function columns({ name, components, type, little, bytes }: VtkArray): NamedColumns {
   const field = { name: '', type, little, components: 1, offset: 0 };
   const rows = bytes.length / sizeOf(type) / components;

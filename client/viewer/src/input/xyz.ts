@@ -39,7 +39,6 @@ function refuse(properties: string, where: string): never {
   throw new InputError(`${where}: Properties=${properties} must list NAME:TYPE:COLUMNS.`);
 }
 
-/** An XYZ file. */
 export class XyzReader implements TableReader {
   private constructor(private readonly lines: readonly string[], private readonly name: string,
                       private readonly starts: readonly number[]) {}

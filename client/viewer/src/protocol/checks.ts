@@ -2,13 +2,13 @@
 // itself is refused with a sentence that names the field.
 import { arrayOf } from './arrays';
 
-/** What closed curves and surfaces are called in sentences. */
+/** The name of closed curves or surfaces in error messages. */
 export type Owner = 'ring' | 'shell';
 
-/** In an array of outer rings or shells: the ring or shell is an outer one itself. */
+/** The entry of an outer ring or shell in `outerOf`. */
 export const NO_OUTER = 0xffffffff;
 
-/** The message contradicts itself. */
+/** The error for a message that contradicts itself. */
 export function lost(field: string, rule: string): Error {
   return new Error(`${field} ${rule}.`);
 }
@@ -24,7 +24,7 @@ export function offsetsOf(bytes: Uint8Array, field: string, owner: Owner, fewest
   return offsets;
 }
 
-/** Returns a check of the number of entries of a field: `isRight`, or the field must have `unit` for each ring or shell. */
+/** Returns a check that throws unless `isRight`: the field must have `unit` for each of the `count` rings or shells. */
 export function countCheck(owner: Owner, count: number): (isRight: boolean, field: string, unit: string) => void {
   return (isRight, field, unit) => {
     if (!isRight) throw lost(field, `must have ${unit} for each of the ${count} ${owner}s`);

@@ -12,7 +12,7 @@ import { surfaceMessageOf } from './surface';
 
 const EMPTY = new Uint8Array(0);
 
-/** Converts float64 world coordinates to float32 relative to their first point. */
+/** Converts coordinates to float32 relative to `origin`: the message's, or the first point of float64 coordinates. */
 class Relative {
   origin: [number, number];
 
@@ -126,7 +126,7 @@ function decodeRings(message: RingsMessage, relative: Relative): Rings {
   };
 }
 
-/** The outline and its mesh. A message that contradicts itself has none, and a sentence with the reason. */
+/** The outline and its mesh. For a message that contradicts itself: neither, and the reason as `problem`. */
 function decodeOutline(message: ReconstructedFrame, relative: Relative): Pick<Frame, 'rings' | 'mesh' | 'problem'> {
   try {
     const rings = message.rings ? decodeRings(message.rings, relative) : NO_RINGS;
@@ -156,7 +156,7 @@ function decodeStatistics(message: ReconstructedFrame): Statistics {
   };
 }
 
-/** A section sets neither sequence nor time. */
+/** Decodes a section. Its message has neither sequence nor time, so it gets both from the frame. */
 function decodeSection(section: ReconstructedFrame, { sequence, time }: ReconstructedFrame): Frame {
   return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }

@@ -22,7 +22,7 @@ export interface Rings {
   cuts: Uint32Array;
   /** Vertices, ascending, whose segment to the next one lies on a wall. */
   wetted: Uint32Array;
-  /** Vertices, ascending, where an outline meets a wall, or a phase two others, or one and the outside. */
+  /** Vertices, ascending, where an outline meets a wall, or where a phase meets two others, or one and the outside. */
   contacts: Uint32Array;
   /** Of each contact: the angle of the fluid or phase there, in radians. */
   contactAngles: Float32Array;
@@ -86,9 +86,9 @@ export interface Frame {
   /** Surfaces in space, not decoded yet. The outlines of such a frame are its sections. */
   surface?: SurfaceMessage;
   surfaceDigest?: bigint;
-  /** Numbers of a surface that the frame does not have whole. */
+  /** Counts of the exact surface, if `surface` is simplified or missing (reports). */
   shells?: { bodies: number; cavities: number; genus: number };
-  /** Why the frame has neither rings nor mesh: the contradiction in its message. Absent for an intact one. */
+  /** Why the frame cannot be shown, as a sentence. Absent for a frame that can. */
   problem?: string;
 }
 

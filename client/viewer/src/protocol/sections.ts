@@ -10,11 +10,11 @@ export interface SectionPlane { origin: Vector; normal: Vector }
 export interface Outline {
   /** Null: the particles are 2D. */
   plane: SectionPlane | null;
-  /** Of the density; null: the outline of the body. */
+  /** The outline is this isoline of the density; null: the outline of the body. */
   isovalue: number | null;
-  /** Of these particles; absent: of all. */
+  /** The phase whose particles the outline encloses; absent: all particles. */
   phase?: number;
-  /** The surface in space of a stream of surfaces. */
+  /** True for the stream's own result if it is a surface. */
   isSurface?: boolean;
 }
 
@@ -76,7 +76,7 @@ function isSamePlane(a: SectionPlane | null | undefined, b: SectionPlane | null 
   return shiftBetween(a, b) !== null && (!a || !b || a.origin.every((part, k) => part === b.origin[k]));
 }
 
-/** Points relative to the origin `from`, relative to the origin `to`. */
+/** Converts points relative to the origin `from` to points relative to the origin `to`. */
 function moved(points: Float32Array | null, from: [number, number], to: [number, number]): Float32Array | null {
   const shift = [from[0] - to[0], from[1] - to[1]];
   return points && points.map((value, k) => value + shift[k % 2]);

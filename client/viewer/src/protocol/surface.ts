@@ -13,7 +13,7 @@ const FEWEST_OF_SHELL = 4;
 const MOST_STEPS = 2 ** 30;
 /** The vertex codec stores at least 2 bits for 16 bytes. */
 const MOST_EXPANSION = 64;
-/** Of one array after decompression. */
+/** Limit of one array after decompression. */
 const MOST_BYTES = 1 << 30;
 const NORMAL_BYTES = 4;
 
@@ -85,7 +85,7 @@ export interface Surface {
   particles: Float32Array | null;
 }
 
-/** The message contradicts itself. */
+/** The error for a message that contradicts itself. */
 function lost(field: string, rule: string): Error {
   return lostField(`surface.${field}`, rule);
 }
@@ -127,7 +127,7 @@ export function surfaceMessageOf(message: ReconstructedFrame): SurfaceMessage {
   };
 }
 
-/** An array of its own: the result travels to another thread, and the message stays. */
+/** Copies bytes to a new array, because the result is transferred to another thread. */
 function copyOf<T extends Uint32Array | Float32Array | BigUint64Array>(
   type: { readonly BYTES_PER_ELEMENT: number; new (buffer: ArrayBufferLike, byteOffset: number, length: number): T },
   bytes: Uint8Array,
@@ -205,7 +205,7 @@ function decodeCompact(message: SurfaceMessage, points: number, triangles: numbe
   return { origin: message.origin, positions, triangles: indices, normals, attributes };
 }
 
-/** float64 in world coordinates, relative to the first point; to `other` without points. */
+/** Converts world coordinates to float32 relative to the first point. Without points the origin is `other`. */
 function relativeToFirst(world: Float64Array, other: [number, number, number]): Pick<Surface, 'origin' | 'positions'> {
   const origin: [number, number, number] = world.length > 0 ? [world[0], world[1], world[2]] : other;
   const positions = new Float32Array(world.length);
@@ -236,7 +236,7 @@ function decodePlain(message: SurfaceMessage, points: number, triangles: number)
   };
 }
 
-/** Every shell uses its own points. Returns the edges: each lies between two triangles, once in either direction. */
+/** Checks that every shell uses only its own points. Returns the edges, each once: two triangles share it. */
 function checkTriangles(triangles: Uint32Array, { pointOffsets, triangleOffsets }: Shells): Uint32Array {
   const edges = new Uint32Array(triangles.length);
   let count = 0;

@@ -17,7 +17,6 @@ export interface Geometry {
 /** Name of the attribute, and the range of each of its channels. */
 export interface Colors { name: string; ranges: readonly (readonly [number, number])[] }
 
-/** Decodes the geometry of a frame. */
 export function decodeGeometry(base64: string, colors: Colors | null): Geometry {
   const reader = new Reader(bytesOfBase64(base64));
   const origin = reader.origin();
@@ -40,7 +39,7 @@ export function decodeGeometry(base64: string, colors: Colors | null): Geometry 
   return { origin, rings: { ...rings, attributes }, sections, mesh, particles, particleAttributes };
 }
 
-/** Numbers from bytes, which are positions in a range from 0 to 255. */
+/** Converts bytes to numbers: 0 is the lower end of the range, 255 the upper. */
 function numbersOf(shares: Uint8Array, [low, high]: readonly [number, number]): Float32Array {
   return Float32Array.from(shares, (byte) => low + (byte / 255) * (high - low));
 }
@@ -82,7 +81,7 @@ class ReportMesh implements Mesh {
   attribute(name: string): Float32Array | undefined { return this.attributes.get(name); }
 }
 
-/** Points of the mesh follow those of the rings, even if the mesh does not share them. */
+/** Points of the mesh follow the points of the rings, even if the mesh does not share them. */
 function decodeMesh(reader: Reader, ringPoints: Float32Array): ReportMesh | null {
   const ownPoints = reader.points(reader.count());
   const isShared = reader.count() === 1;

@@ -11,13 +11,13 @@ import { type SpaceEvents, SpacePicture } from '../space/picture';
 import { createDrawing } from '../space/renderer';
 import { bytesOfBase64, Reader } from './reader';
 
-/** What the script of the report uses. */
+/** The functions that the report's main script calls. */
 export interface SpacePart {
   frameOf(base64: string): Frame;
   pictureOf(events: SpaceEvents): SpacePicture;
 }
 
-/** A frame by the format of client/output/report_surface.h; without anything for an empty text. */
+/** Decodes a frame in the format of client/output/report_surface.h. An empty text is a frame without a surface. */
 export function frameOf(base64: string): Frame {
   if (base64 === '') return decodeSpaceFrame(create(ReconstructedFrameSchema));
   const reader = new Reader(bytesOfBase64(base64));

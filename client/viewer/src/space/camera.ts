@@ -92,7 +92,6 @@ export function zoomAt(camera: Camera, x: number, y: number, factor: number, con
   return { ...view, height, target: plus(fixed, minus(view.target, fixed), height / view.height) };
 }
 
-/** The corners of a box. */
 export function cornersOf({ low, high }: Box): Vector[] {
   return Array.from({ length: 8 }, (_, k): Vector =>
     [k & 1 ? high[0] : low[0], k & 2 ? high[1] : low[1], k & 4 ? high[2] : low[2]]);

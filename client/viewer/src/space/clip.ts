@@ -9,10 +9,10 @@ export interface Clip { normal: Vector; at: number }
 /** A square in the clip plane that covers every cut body. Relative to the surface's origin. */
 export interface CutFace { middle: Vector; halfWidth: number }
 
-/** The square covers bodies that rounding puts beside the box: by this share of its diagonal. */
+/** Margin of the square for bodies that rounding puts outside the box, as a share of the box's diagonal. */
 const ROUNDING = 1e-3;
 
-/** The direction along which the position of the clip plane counts. Null: no clip plane. */
+/** The normal of the clip plane, not flipped. Null: no clip plane. */
 function directionOf({ clipAxis, clipHeld }: SpaceLook, view: SpaceView): Vector | null {
   if (clipAxis === 'none') return null;
   if (clipAxis !== 'view') return [Number(clipAxis === 'x'), Number(clipAxis === 'y'), Number(clipAxis === 'z')];
@@ -31,8 +31,8 @@ export function clipOf(look: SpaceLook, view: SpaceView, box: Box, origin: Vecto
 }
 
 /**
- * The cut face that a camera sees; null if it is on the side that stays, or if the look has none. Behind the cut
- * face, the nearest surface is then seen from its inside exactly where the plane cuts a body.
+ * The cut face that a camera sees; null if the camera is on the side that stays, or if the look has no cut faces.
+ * Where the plane cuts a body, the camera then sees the inside of the nearest surface behind the cut face.
  */
 export function cutFaceOf(clip: Clip | null, look: SpaceLook, { view, isPerspective }: Camera, box: Box, origin: Vector): CutFace | null {
   if (!clip || !look.hasCutFaces || look.isTranslucent) return null;

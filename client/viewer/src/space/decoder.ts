@@ -3,13 +3,13 @@ import type { Answer, Job } from './worker';
 
 interface Waiting { resolve(surface: Surface): void; reject(error: Error): void }
 
-/** Decodes surfaces in a worker, which starts with the first one. All pictures share it. */
+/** Decodes surfaces in a worker, which starts with the first surface. All pictures share the worker. */
 class Decoder {
   private worker: Worker | null = null;
   private readonly waiting = new Map<number, Waiting>();
   private id = 0;
 
-  /** Throws an Error with a sentence if the bytes are wrong or the browser starts no worker. */
+  /** Rejects with an Error whose message is a sentence if the bytes are wrong or the browser starts no worker. */
   decode(message: SurfaceMessage): Promise<Surface> {
     return new Promise((resolve, reject) => {
       this.worker ??= this.start();

@@ -7,10 +7,9 @@ import type { SpaceLook } from './look';
 /** The outlines of a section, or the border of its plane, as lines: pairs of points relative to the surface's origin. */
 export interface SectionLines { positions: Float32Array; colour: Rgb; isBorder: boolean }
 
-/** Alpha of a point's tint if its shell is selected, and if its body is, which colours the cut face. The sum for both. */
+/** Alpha of a point's tint: the sum of `shell` if its shell is selected, and `body` if its body is (for cut faces). */
 export const SELECTED = { shell: 170, body: 85 } as const;
 
-/** Colours of one picture. */
 export interface SpaceTheme {
   background: Rgb;
   edge: Rgb;
@@ -21,7 +20,7 @@ export interface SpaceTheme {
   ambient: number;
 }
 
-/** Numbers to colour by, one for each point and each particle; null for tints. */
+/** Numbers to colour by, one for each point and each particle. Null: points have tints, particles one colour. */
 export interface ValueColours {
   points: Float32Array | null;
   particles: Float32Array | null;
@@ -31,7 +30,7 @@ export interface ValueColours {
   texels: Uint8Array;
 }
 
-/** What is drawn besides the surface. */
+/** All that a drawing depends on, except surface, tints and sections. */
 export interface SpaceState {
   camera: Camera;
   look: SpaceLook;

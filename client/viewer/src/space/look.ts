@@ -1,6 +1,6 @@
 import type { Vector } from './camera';
 
-/** How a surface is drawn. Its other parts and its colours are those of the common look (draw/look.ts). */
+/** Style of a picture of surfaces. Colours and visible parts are in the common look (draw/look.ts). */
 export interface SpaceLook {
   shading: 'smooth' | 'flat';
   isTranslucent: boolean;

@@ -2,7 +2,7 @@ import { NO_SHELL, type Surface } from '../protocol/surface';
 import { dot, plus, type Vector } from './camera';
 import type { Clip } from './clip';
 
-/** What a ray hits: a shell, and the point relative to the surface's origin. */
+/** The hit of a ray: a shell, and the point relative to the surface's origin. */
 export interface Hit { shell: number; point: Vector }
 
 /** Whether a ray meets a box. */

@@ -25,13 +25,13 @@ export interface SpaceEvents {
   shown(frame: Frame): void;
 }
 
-/** Where a picture gets its decoder and its drawing. Both throw an Error with a sentence. */
+/** Loads the drawing of a picture, and decodes its surfaces. Both reject with an Error whose message is a sentence. */
 export interface SpaceSource {
   load(): Promise<SpaceModule>;
   decode(message: SurfaceMessage): Promise<Surface>;
 }
 
-/** A selected point lies in its surface, so rounding may put it beside the box: by this share of the box. */
+/** Margin of a shell's box, as a share of the box, for a selected point that rounding puts outside it. */
 const ROUNDING = 1e-3;
 const SVG = 'http://www.w3.org/2000/svg';
 

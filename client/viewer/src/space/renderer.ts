@@ -27,7 +27,7 @@ const MAP_COLOURS = 256;
 const NO_CLIP = 1e30;
 const SMALLEST_DOT = 1.5;
 const BORDER_WIDTH = 1;
-/** The border of a cut is smooth over this depth at most, in pixels: a silhouette's depth changes without limit. */
+/** Largest depth over which the border of a cut is smoothed, in pixels. At silhouettes the depth changes without limit. */
 const DEEPEST_BORDER = 8;
 
 // The shaders use sRGB throughout.
@@ -83,7 +83,7 @@ class SectionPart {
     }
   }
 
-  /** `planes`: cut away the lines behind them. */
+  /** `planes`: clip planes of the lines. */
   setStyle(lineWidth: number, { width, height }: Size, planes: Plane[]): void {
     for (const { material } of this.parts) {
       material.clippingPlanes = planes;
@@ -131,8 +131,8 @@ class Drawing implements SpaceDrawing {
   private readonly inside: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
   /**
-   * The depth of the clip plane where it cuts a body, so that the cut face hides what is in the body. The surface
-   * draws its colour: `inside` sets the stencil, and `outside` clears it, so it remains where the inside is in front.
+   * Writes the depth of the clip plane where it cuts a body, so that the cut face hides the content of the body. The
+   * surface draws its colour. `inside` sets the stencil, `outside` clears it: it stays set where the inside is in front.
    */
   private readonly cutFace = new Mesh(new PlaneGeometry(2, 2), new ShaderMaterial({
     vertexShader: CUT_FACE_VERTEX, fragmentShader: CUT_FACE_FRAGMENT, side: DoubleSide, colorWrite: false,
@@ -219,7 +219,7 @@ class Drawing implements SpaceDrawing {
     this.renderer.forceContextLoss();
   }
 
-  /** Both setters allocate the picture anew, even for the size that it has. */
+  /** Calls the setters only for a new size: each call reallocates the picture. */
   private resize({ camera: { size: { width, height } }, ratio }: SpaceState): void {
     const held = this.renderer.getSize(new Vector2());
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
@@ -285,7 +285,7 @@ class Drawing implements SpaceDrawing {
     this.outside.material.side = hasTwoSteps ? FrontSide : DoubleSide;
   }
 
-  /** The clip plane for lines: those in the plane stay, with their width. */
+  /** The clip plane for lines, moved by their width, so that lines in the plane stay visible. */
   private clipOfLines({ clip, camera, lineWidth }: SpaceState): Plane[] {
     if (!clip) return [];
     return [new Plane(new Vector3(...clip.normal).negate(), clip.at + lineWidth * unitsPerPixel(camera))];

@@ -27,7 +27,7 @@ export interface SpaceFrame { frame: Frame; surface: Surface; channels: Channels
 export interface PickedShell { shell: number; point: Vector }
 
 const MAP_COLOURS = 256;
-/** The camera never shows what is nearer than this share of its distance. */
+/** Smallest depth that a perspective camera shows, as a share of its distance from the target. */
 const NEAREST = 1e-3;
 
 /** A frame with a surface, ready to draw. Throws an Error with a sentence if its sections contradict themselves. */
@@ -87,13 +87,11 @@ export class SpaceScene {
   get isDrawing(): boolean { return this.drawing !== null; }
   get selectedShells(): readonly number[] { return this.selected; }
 
-  /** Begins to draw by `drawing`. */
   attach(drawing: SpaceDrawing): void {
     this.drawing = drawing;
     this.upload();
   }
 
-  /** Shows a frame, or null for none. */
   show(shown: SpaceFrame | null, outlines: readonly Outline[]): void {
     const begin = performance.now();
     this.shown = shown;
@@ -201,7 +199,7 @@ export class SpaceScene {
     this.drawing?.setSections(lines);
   }
 
-  /** Writes the colour of each shell to its points. A cavity has the colour of its body, which is beside it in a cut. */
+  /** Writes the colour of each shell to its points. A cavity has the colour of its body, because a cut shows both. */
   private tint(): void {
     if (!this.shown || !this.drawing) return;
     const { pointOffsets, identities, outerOf, positions } = this.shown.surface;

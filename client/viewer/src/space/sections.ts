@@ -5,7 +5,7 @@ import { inPlane, inSpace, type Outline, type SectionPlane } from '../protocol/s
 import { type Box, cornersOf, dot, minus, plus, type Vector } from './camera';
 import type { SectionLines } from './drawing';
 
-/** Throws an Error with a sentence if the rings of a section have other points than it. */
+/** Throws an Error with a sentence if the offsets of a section do not match its points. */
 export function checkSections(sections: readonly Frame[]): void {
   sections.forEach(({ rings: { points, offsets } }, k) => {
     const isRising = offsets.every((offset, ring) => ring === 0 ? offset === 0 : offset >= offsets[ring - 1]);

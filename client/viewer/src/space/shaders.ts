@@ -1,9 +1,9 @@
 // Shaders of surfaces and particles. Colours are sRGB; positions are relative to the frame's origin.
 
-/** `plain`: the colour of the tint; `values`: of the colour map. */
+/** `tint`: the colour of the tint, or one colour for particles; `values`: the colour map. */
 export const COLOUR_MODE = { tint: 0, values: 1 } as const;
 
-/** Light on a cut face, whatever its direction: it must not look like a shadow. */
+/** Light on a cut face. It does not depend on the direction, so that the face does not look like a shadow. */
 const CUT_FACE_LIGHT = '0.8';
 
 const VALUE_COLOUR = `
@@ -142,7 +142,7 @@ void main() {
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
-/** Nothing but its depth is drawn. */
+/** The colour does not matter: the cut face writes its depth only. */
 export const CUT_FACE_FRAGMENT = `
 void main() {
   gl_FragColor = vec4(0.0);

@@ -1,4 +1,4 @@
-// Decodes surfaces beside the main thread. Bundled as space_worker.js.
+// Decodes surfaces in a worker, away from the main thread. Bundled as space_worker.js.
 import { CoordinateFormat } from '@proto/v1/reconstruction_pb';
 import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import { buffersOf, decodeSurface, type Surface, type SurfaceMessage } from '../protocol/surface';

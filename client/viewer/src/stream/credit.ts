@@ -4,7 +4,7 @@
 const LEAST = 4;
 const MOST = 64;
 const BYTES_IN_FLIGHT = 8 << 20;
-/** Share of the frames in flight that one message allows. A message for each frame takes longer than parsing the frame. */
+/** Least share of the target that is sent as credits at once. A message for each frame would cost more than the frame. */
 const BATCH_SHARE = 1 / 4;
 export const FIRST_CREDITS = 8;
 

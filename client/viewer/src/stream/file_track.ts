@@ -105,7 +105,7 @@ export class FileTrack implements Track {
     if (this.retry !== null) clearTimeout(this.retry);
   }
 
-  /** Sends scalars if the server supports attributes. */
+  /** Reads the server's capabilities, then opens the stream. Scalars are sent if the server supports attributes. */
   private connect(): void {
     const attempt = ++this.attempt;
     this.gateway.info()

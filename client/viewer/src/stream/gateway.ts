@@ -41,7 +41,7 @@ export class Channel {
   /** Sent bytes that have not left this machine. */
   get unsentBytes(): number { return this.socket.bufferedAmount; }
 
-  /** Ends the requests. Responses still arrive. */
+  /** Half-closes the call: no request follows. Responses still arrive. */
   halfClose(): void {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send('end');
   }

@@ -53,7 +53,8 @@ export class History<E extends Entry = Entry> {
 
   /**
    * Adds an entry, or keeps the existing one of the same sequence. Evicts the oldest entries to stay
-   * within the limit, but none from `keepFrom` on. Returns false if the entry does not fit.
+   * within the limit, but only entries before `keepFrom` and before the new entry. Returns false if the
+   * entry does not fit.
    */
   insert(entry: E, keepFrom: number): boolean {
     if (this.get(entry.sequence)) return true;

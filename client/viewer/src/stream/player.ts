@@ -1,4 +1,4 @@
-/** Sequences of the available frames. */
+/** Sequences of the first and the last available frame. */
 export interface Range { first: number; last: number }
 
 /** `live` follows the newest frame at a fixed latency; `playing` continues from any position. */
@@ -57,7 +57,7 @@ export class Player {
     this.mode = 'playing';
   }
 
-  /** Follows the newest frame. */
+  /** Follows the newest frame of a live stream; plays files. */
   follow(): void {
     this.mode = this.live ? 'live' : 'playing';
   }

@@ -53,7 +53,7 @@ export const FILLS: Record<string, Fill> = {
   polygon: Fill.POLYGON,
 };
 
-/** Sizes of the particles, and what the outline runs around. */
+/** Sizes of the particles, and the kind of boundary (Boundary in core/include/partiemc/parameters.h). */
 export const SIZES: Record<string, { sizes: Sizes; boundary: Boundary }> = {
   equal: { sizes: Sizes.EQUAL, boundary: Boundary.BULK },
   own: { sizes: Sizes.OWN, boundary: Boundary.BULK },

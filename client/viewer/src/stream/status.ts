@@ -10,7 +10,7 @@ export interface CallStatus {
 export const UNAVAILABLE = 14;
 export const UNAUTHENTICATED = 16;
 
-/** What the user or the page does next. The server's message describes the error itself. */
+/** The next step of the user or the page, by reason. The server's message describes the error itself. */
 const NEXT_STEPS: Record<string, string> = {
   TOKEN_MISSING: 'Enter an access token.',
   TOKEN_UNKNOWN: 'Enter another access token.',

@@ -49,7 +49,6 @@ export interface Track extends Playable {
   labelOf(sequence: number): string;
   /** The inverse of `labelOf`; for a label between two frames, the next one. */
   sequenceOf(label: number): number;
-  /** Explanation of a doubt. */
   doubtText(doubt: number): string;
   /** Why a frame is refused; empty if it is not. */
   refusalOf?(sequence: number): string;
@@ -57,7 +56,7 @@ export interface Track extends Playable {
   readonly hasNewRun?: boolean;
   /** Drops the former stream and shows the one that has the name now. */
   switchRun?(): void;
-  /** What the user must know about the files, or empty. Files only. */
+  /** A warning about the files for the user, or empty. Files only. */
   readonly notice?: string;
   /** Particles of a frame, for another reconstruction; null if they are not available. */
   particlesOf(sequence: number): Promise<Particles | null>;

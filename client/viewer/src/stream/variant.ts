@@ -8,7 +8,7 @@ import { outputsFor, parametersOf, settingsText, type Settings } from './setting
 import type { Track } from './track';
 import { NO_PARTICLES } from './variant_stream';
 
-/** One frame of files whose stream lacks its result. Sends one request at a time, for the newest frame. */
+/** Computes one frame of files, without state, while their stream lacks its result. Sends one request at a time. */
 export class Variant {
   result: Frame | null = null;
   /** The last error, or empty. */

@@ -14,13 +14,13 @@ import { CallError, describe, mayRetry, sentence, type CallStatus } from './stat
 import { summarise, type Counts } from './summary';
 import { HISTORY_BYTES, type CurveSource, type Track } from './track';
 
-/** Frames before the first one shown, so that its rings have a past. */
+/** Number of frames computed before the first one shown, so that its rings are steady and tracked. */
 const WARM_UP = 25;
 /** Frames that the variant may be behind before it skips some. */
 const MOST_BEHIND = 300;
 /** Frames kept before the player's position if the history is full. */
 const KEPT_BEHIND = 8;
-/** Time for which an earlier frame stays chosen before the stream starts again there. */
+/** Time that the player must stay at an earlier frame before the stream starts again there. */
 const REST_MS = 200;
 
 export const NO_PARTICLES = 'Other settings need the particles, which this stream does not send. ' +
@@ -41,7 +41,7 @@ export function nextOf(history: Pick<History, 'after'>, last: number, target: nu
  * The frames of a track with other settings: a temporary stream on the server, with its own state,
  * identities, curves and times. Sends the particles of the track in order, from WARM_UP frames before
  * the one shown, and skips frames if it is MOST_BEHIND behind. Starts again if the player stays at a
- * frame before the first one.
+ * frame before the first frame sent.
  */
 export class VariantStream implements CurveSource {
   readonly history = new History(HISTORY_BYTES);
@@ -93,7 +93,6 @@ export class VariantStream implements CurveSource {
     return this.problem || (this.refusals.get(this.frameAt(position)) ?? '');
   }
 
-  /** Counts a frame as drawn. */
   drawn(entry: Entry, now: number): void {
     if (!Number.isNaN(entry.summary.latency)) return;
     entry.summary.latency = now - entry.receivedAt;

@@ -43,7 +43,7 @@ export class WatchTrack implements Track {
   private backfill: WatchCall | null = null;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private lineage = '';
-  /** Frames up to here are history. They arrive in a burst, so the clock ignores them. */
+  /** Newest frame of the server's history at opening. Frames up to it arrive in a burst, so the clock ignores them. */
   private historyEnd = 0;
   /** Oldest frame that the server holds, and newest frame of the stream. */
   private serverOldest = Infinity;
@@ -105,7 +105,7 @@ export class WatchTrack implements Track {
     this.fetch(missing.first, missing.last);
   }
 
-  /** Fetches a frame first. */
+  /** Fetches this frame of the past before others. */
   request(sequence: number): void {
     this.requested = sequence;
   }

@@ -28,7 +28,7 @@ import { TimeLink } from './time_link';
 import { TimePanel } from './time_panel';
 
 const TOKEN_KEY = 'partiemc-token';
-/** For gauges, in each refresh of the screen. */
+/** Time for gauges in each refresh of the screen. */
 const GAUGES_MS = 3;
 
 /** The page: connects the controls with the tracks on the stage. */
@@ -53,7 +53,7 @@ export class App {
   private readonly opened = new Map<Track, OpenFile>();
   /** The address that was read or written last. */
   private address = '';
-  /** False while the address of the link is read, which must not be overwritten. */
+  /** False until the address has been read, which must not be overwritten before. */
   private isReady = false;
   /** Frame of the link, until it is shown. */
   private linkedFrame: number | null = null;
@@ -184,7 +184,7 @@ export class App {
     this.writeAddress();
   }
 
-  /** Shows files; those of the link as the link says. Files that are shown get their new options. */
+  /** Shows files. Files of the link get the panes of the link. Files on the stage are reopened with their new options. */
   private openFile(source: FrameSource, file: OpenFile): void {
     const address = this.linkedFile?.file === source.title ? this.linkedFile : null;
     const old = [...this.opened].find(([, { input }]) => input === file.input)?.[0];
@@ -231,14 +231,14 @@ export class App {
     if (!pane) return;
     this.status.report('', false);
     // If the pane shows dropped files, only the first pane of these files reopens their stream with
-    // the new settings. The other panes request single frames from the server.
+    // the new settings. Each other pane has a temporary stream for its settings (VariantStream).
     const isFirst = this.stage.panes.find(({ track }) => track === pane.track) === pane;
     if (isFirst) pane.track.reopen?.(settings);
     pane.setSettings(settings);
     this.writeAddress();
   }
 
-  /** By the chosen picture, or another one of its stream if it is empty. */
+  /** The cell size for `cells` cells across the chosen picture; if it is empty, across another one of its track. */
   private cellSizeFor(cells: number): number | null {
     const { chosen } = this.stage;
     const siblings = this.stage.panes.filter(({ track }) => track === chosen?.track);
@@ -362,7 +362,7 @@ export class App {
     this.address = location.hash;
   }
 
-  /** Goes to the frame of the link once it has arrived. Until then the first picture says that it waits. */
+  /** Goes to the frame of the link once it has arrived. Until then a notice over the first picture says so. */
   private followLink(): void {
     const linked = this.linkedFrame;
     const [pane] = this.stage.panes;

@@ -4,7 +4,7 @@ import type { Entry, Summary } from '../stream/history';
 import { reductionOf, STAGES } from '../stream/summary';
 import type { CurveSource, Track } from '../stream/track';
 
-/** About one point per pixel. */
+/** Limit of points in a curve: about one per pixel. */
 const MOST_POINTS = 600;
 
 /** Points of curves. A null entry is a gap: frames are missing there. */

@@ -8,7 +8,7 @@ import { count, number } from './format';
 import type { TextPace } from './text_pace';
 import { tickDigits, ticks } from './ticks';
 
-/** `text`: the value as under the picture. */
+/** `text`: formats a value as in the numbers under the picture. */
 interface Line { name: string; value(summary: Summary): number; text(value: number): string }
 
 export interface Curve {
@@ -70,7 +70,7 @@ const PLOTS_PER_REFRESH = 1;
 /** Width of a digit on an axis. */
 const LABEL_PIXELS = 6;
 
-/** Values of the lines at each entry; null for gaps. Bands are sums from the top band down. */
+/** Values of the lines at each entry; null for gaps. Bands are cumulative sums, the largest first. */
 function valuesOf({ lines, total }: Curve, entries: readonly (Entry | null)[]): (number | null)[][] {
   const values = lines.map((line) => entries.map((entry) => (entry ? line.value(entry.summary) : NaN)));
   if (total) {
@@ -80,7 +80,7 @@ function valuesOf({ lines, total }: Curve, entries: readonly (Entry | null)[]): 
   return values.map((row) => row.map((value) => (Number.isFinite(value) ? value : null)));
 }
 
-/** Values without a neighbour, which no line shows. */
+/** Indices of values without a neighbour, which no line shows. */
 function isolated(values: ArrayLike<number | null | undefined>): number[] {
   const isThere = (k: number) => values[k] !== null && values[k] !== undefined;
   return [...Array(values.length).keys()].filter((k) => isThere(k) && !isThere(k - 1) && !isThere(k + 1));
@@ -172,7 +172,6 @@ export class CurvesPanel {
     this.lastRefresh = -Infinity;
   }
 
-  /** The frames that the curves show. */
   get shownEntries(): readonly (Entry | null)[] { return this.entries; }
 
   /**
@@ -220,7 +219,7 @@ export class CurvesPanel {
     this.showCaptions();
   }
 
-  /** The values at the pointer, or else those under the picture, in the colours of the lines. */
+  /** Writes the values at the pointer, or else of the frame shown, in the colours of the lines. */
   private showCaptions(): void {
     const summary = this.hovered === null ? this.shown : this.entries[this.hovered]?.summary ?? null;
     for (const { curve: { title, lines, isWide, total }, caption } of this.items) {

@@ -9,7 +9,6 @@ export const button = (id: string) => byId(id, HTMLButtonElement);
 export const input = (id: string) => byId(id, HTMLInputElement);
 export const select = (id: string) => byId(id, HTMLSelectElement);
 
-/** A new element with attributes and children. */
 export function make<K extends keyof HTMLElementTagNameMap>(
   tag: K, attributes: Record<string, string> = {}, ...children: (Node | string)[]
 ): HTMLElementTagNameMap[K] {

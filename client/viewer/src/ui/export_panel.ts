@@ -10,7 +10,7 @@ import type { Pane } from './pane';
 const OF_OUTLINES = 'A surface has no outline to save, so choose a section under "Picture of" first.';
 const PNG_TITLE = 'Saves the picture with legend, scale and time in pixels.';
 
-/** The button that records. A running recording can always be stopped. */
+/** State of the button that records. A running recording can always be stopped. */
 export function clipButton(isRecording: boolean, hasWebgl: boolean): { text: string; title: string; isDisabled: boolean } {
   if (isRecording) {
     return { text: 'Stop and save', title: 'Ends the recording and saves the video.', isDisabled: false };
@@ -46,7 +46,7 @@ export class ExportPanel {
       downloadCurves(curves, track.title, gauges, hasSurfaces);
     });
     button('export-clip').addEventListener('click', () => {
-      // The picture that is recorded may be closed by now.
+      // Works without a chosen picture, because the recorded one may be closed by now.
       if (this.recording) this.run(this.stopClip(this.recording));
       else this.withPicture(async (shown) => this.startClip(shown));
     });
@@ -55,7 +55,7 @@ export class ExportPanel {
     });
   }
 
-  /** Offers only what the browser can export. */
+  /** Enables the exports that the browser and the kind of picture allow. */
   offer(hasWebgl: boolean, isSpace: boolean): void {
     for (const id of ['export-svg', 'export-geojson']) block(button(id), isSpace ? OF_OUTLINES : '');
     const png = button('export-png');
@@ -69,7 +69,7 @@ export class ExportPanel {
     setText(clipOf, text);
   }
 
-  /** Browsers allow a page to copy only by HTTPS or from this machine. */
+  /** Copies the link, or shows it. Browsers allow a page to copy only by HTTPS or from this machine. */
   private async copyLink(): Promise<void> {
     const field = input('link');
     try {

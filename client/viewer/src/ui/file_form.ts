@@ -47,7 +47,7 @@ export class FileForm {
     }
   }
 
-  /** Asks for the option that is missing or wrong. Proposes the defaults of the file. */
+  /** Shows the error at the option that is missing or wrong, and fills in the defaults for 3D particles. */
   ask({ field, message }: FieldError): void {
     const facts = this.file?.facts;
     this.details.open = true;

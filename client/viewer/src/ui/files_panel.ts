@@ -5,7 +5,7 @@ import type { Settings } from '../stream/settings';
 import { button, byId, input, make } from './dom';
 import { FileForm } from './file_form';
 
-/** Closed files that are offered. Their bytes stay in memory only if they are recordings. */
+/** Limit of closed files that are offered. Only recordings stay in memory. */
 const MOST_CLOSED = 6;
 
 /** A file that was opened, with its options. */
@@ -23,7 +23,7 @@ export interface FilesEvents {
   asks(): void;
   /** `isGone`: whether the cause of an error has gone. */
   report(text: string, isError: boolean, isGone?: () => boolean): void;
-  /** Options of a file at first. */
+  /** Options of a file when it is first opened. */
   optionsOf(title: string): FileOptions;
 }
 
@@ -31,7 +31,7 @@ export interface FilesEvents {
 export class FilesPanel {
   private readonly form: FileForm;
   private readonly closed: OpenFile[] = [];
-  /** The file that the form asks about. */
+  /** The file for which the form shows an error; null for none. */
   private asked: FileInput | null = null;
 
   constructor(private readonly events: FilesEvents) {
@@ -53,7 +53,6 @@ export class FilesPanel {
     this.form.show(file?.input ?? null, file?.options ?? NO_OPTIONS);
   }
 
-  /** Offers a closed file. */
   addClosed(file: OpenFile): void {
     this.forget(file.input);
     this.closed.unshift(file);
@@ -105,7 +104,7 @@ export class FilesPanel {
     }
   }
 
-  /** Opens a file. Asks for an option that is missing or wrong. */
+  /** Opens a file. If an option is missing or wrong, shows the form with the error. */
   private async open(file: OpenFile): Promise<void> {
     try {
       const source = await file.input.open(file.options);

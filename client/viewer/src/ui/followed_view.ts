@@ -31,7 +31,7 @@ export class FollowedView {
     this.fit(extent);
   }
 
-  /** The canvas has another size. */
+  /** Call after the canvas has changed its size. */
   resize(): void {
     if (this.isFree && this.extent) this.fit(this.extent);
   }

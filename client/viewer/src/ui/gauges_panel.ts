@@ -4,7 +4,6 @@ import type { Curve } from './curves_panel';
 import { block, button, byId, input, make, setText } from './dom';
 import { number } from './format';
 
-/** The curve of a gauge. */
 export function curveOf(gauges: Gauges, gauge: Gauge): Curve {
   const lines = columnsOf(gauge).slice(0, kindOf(gauge).drawn).map((name, k) => ({
     name, value: (summary: Parameters<Gauges['value']>[0]) => gauges.value(summary, gauge, k),
@@ -24,7 +23,7 @@ export class GaugesPanel {
     });
   }
 
-  /** Gauges measure outlines, which surfaces lack. */
+  /** Disables the form for surfaces: gauges measure outlines. */
   offer(hasSurfaces: boolean): void {
     if (hasSurfaces === this.isBlocked) return;
     this.isBlocked = hasSurfaces;

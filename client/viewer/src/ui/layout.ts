@@ -4,7 +4,7 @@ const KEY = 'partiemc-side';
 /** Widest screen of the layout for phones, as in page.css. */
 const PHONE = '(max-width: 600px)';
 
-/** Whether an address asks for the picture and its time alone. */
+/** Whether an address requests only the picture and its time. */
 export function isEmbedded(search: string): boolean {
   return new URLSearchParams(search).has('embed');
 }
@@ -28,12 +28,12 @@ export class Layout {
     this.fold(foldsAtFirst(this.phone.matches, stored()));
   }
 
-  /** Called after the user has chosen a picture in the side panel. */
+  /** On a phone, folds the side panel. Call it after the user has chosen a picture there. */
   chosen(): void {
     if (this.phone.matches) this.fold(true);
   }
 
-  /** Shows the side panel, which needs an answer of the user. */
+  /** Shows the side panel, because its form needs an answer of the user. */
   ask(): void { this.fold(false); }
 
   private fold(isFolded: boolean): void {

@@ -19,7 +19,7 @@ const TITLES: Record<keyof typeof SWITCHES, string> = {
   edges: 'Draws the edges of the triangles.', particles: 'Draws the particles as dots.',
   normals: 'Draws the normals of the outline.', sections: 'Draws the other outlines in this plane as lines.', axes: 'Shows coordinates along the edges of the picture.',
 };
-/** Beside a picture of surfaces. */
+/** Tooltips for a picture of surfaces, if they differ. */
 const SPACE_TITLES: Partial<Record<keyof typeof SWITCHES, string>> = {
   fill: 'Draws the surface.', particles: 'Draws the particles as dots, which an opaque surface hides.',
   sections: 'Draws the sections as lines in their planes.', axes: 'Shows coordinates along the box of the surface.',
@@ -228,7 +228,7 @@ export function rangeOf(from: number | null, to: number | null): Pick<Look, 'fro
   return from !== null && to !== null && from >= to ? { from: null, to: null } : { from, to };
 }
 
-/** The channels to offer: those of the frame, of earlier frames, and the chosen one. */
+/** The channels to offer: `known` (of this frame and earlier frames of the track), and the chosen one. */
 export function offeredChannels(known: Iterable<string>, chosen: string): string[] {
   const names = [...known];
   return ['plain', 'identity', ...names].includes(chosen) ? names : [...names, chosen];

@@ -2,7 +2,7 @@ import { number } from './format';
 
 export type Point = readonly [number, number];
 
-/** What a click measures. */
+/** The quantity that clicks measure. */
 export type MeasureMode = 'off' | 'distance' | 'angle' | 'ring';
 
 export function distanceOf(a: Point, b: Point): number {

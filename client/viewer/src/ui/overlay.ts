@@ -12,13 +12,13 @@ function element(name: string, attributes: Record<string, string | number>, text
   return one;
 }
 
-/** What lies over the picture: axes, contacts with walls, and a measurement with its result. */
+/** Marks over the picture: axes, contacts with walls, and a measurement with its result. */
 export interface Overlaid { axes: boolean; contacts: readonly ContactMark[]; points: readonly Point[]; text: string }
 
-/** Draws what lies over the picture. */
+/** Draws the marks over the picture. */
 export class Overlay {
   readonly element = element('svg', { class: 'overlay', 'aria-hidden': 'true' });
-  /** What is drawn, as text. */
+  /** The state of the last drawing, as JSON. */
   private drawn = '';
 
   draw(view: View, size: Size, overlaid: Overlaid): void {

@@ -88,7 +88,7 @@ export class Pane {
 
   /**
    * `variants`: computes other settings; null if they are not offered. `pictureOfSpace`: makes the
-   * picture of surfaces; null where there are none.
+   * picture of surfaces; null if the pane cannot show surfaces.
    */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
               private readonly variants: Variants | null,
@@ -191,7 +191,7 @@ export class Pane {
     else if (!this.isSpace) this.setView(other.scene.view);
   }
 
-  /** What lies over a picture of surfaces, for exports; null for another picture. */
+  /** Marks of a picture of surfaces, for exports; null for another picture. */
   spaceMarks(dark: boolean): Mark[] | null {
     return this.space && this.isSpace ? this.space.marks(this.caption, dark) : null;
   }
@@ -263,10 +263,9 @@ export class Pane {
     return isOwn && this.shown !== null && 'summary' in this.shown ? this.shown : null;
   }
 
-  /** The outlines of the frame. */
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
-  /** The outline that the pane shows: the first one if the frame lacks the chosen one. */
+  /** Index of the outline that the pane shows: 0 if the frame lacks the chosen one. */
   private get outlineShown(): number {
     const chosen = this.look?.outlineShown ?? 0;
     return chosen < this.outlines.length ? chosen : 0;
@@ -357,7 +356,7 @@ export class Pane {
     return !this.hasSurfaces && isOther && !isAsStreamed(this.settings);
   }
 
-  /** Shows the frame of the variant's stream. While it is computed, the former one stays. */
+  /** Shows the frame of the variant's stream. While this frame is computed, the picture stays as it is. */
   private updateVariant(stream: VariantStream, sequence: number, now: number): void {
     stream.refresh(sequence, now);
     this.refusal = stream.refusalOf(sequence);
@@ -500,7 +499,7 @@ export class Pane {
     this.dirty = true;
   }
 
-  /** Selects the ring or the body at a world position, or none. A picture of the other kind selects nothing. */
+  /** Selects the ring or the body at a world position, or none. A position of the other kind of picture selects none. */
   selectAt(point: Point | Vector | null): void {
     if (this.isSpace || point?.length === 3) {
       this.space?.selectAt(point?.length === 3 ? point : null);

@@ -2,7 +2,7 @@ import type { Track } from '../stream/track';
 import { make, setText } from './dom';
 import type { PaneState } from './pane_state';
 
-/** The notice over the picture of a pane: why it shows nothing, or what the user must know about it. */
+/** The notice over the picture of a pane: why it shows nothing, or a warning about its files or its stream. */
 export class PaneNotice {
   private readonly text = make('span');
   private readonly switchButton = make('button', { type: 'button', title: 'Shows the stream that has this name now.' },

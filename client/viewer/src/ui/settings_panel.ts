@@ -50,7 +50,7 @@ export class SettingsPanel {
     this.offerOffset();
   }
 
-  /** Surfaces have no other settings than those of their stream. */
+  /** Disables the controls for surfaces, which keep the settings of their stream. */
   offer(hasSurfaces: boolean): void {
     if (hasSurfaces === this.isBlocked) return;
     this.isBlocked = hasSurfaces;

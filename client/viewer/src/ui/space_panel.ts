@@ -6,7 +6,7 @@ import { byId, input, select } from './dom';
 export class SpacePanel {
   private chosen: SpaceLook = { ...DEFAULT_SPACE_LOOK };
 
-  /** `direction`: of the chosen picture to its camera; null for none. */
+  /** `direction`: returns the direction to the camera of the chosen picture; null without one. */
   constructor(private readonly changed: () => void, private readonly direction: () => Vector | null) {
     const form = byId('space-look', HTMLElement);
     form.addEventListener('change', () => this.read());

@@ -4,13 +4,13 @@ import type { Player } from '../stream/player';
 const TEXT_MS = 100;
 
 /**
- * When the page writes the texts of a frame: numbers, captions, positions. Each writing costs a layout, which takes
- * longer than drawing the picture. Texts of a paused track are written at once.
+ * Decides when the page writes the texts of a frame: numbers, captions, positions. Each writing costs a layout, which
+ * takes longer than drawing the picture. Texts of a paused track are written at once.
  */
 export class TextPace {
   /** Time of this refresh of the screen, in milliseconds. */
   now = 0;
-  /** Whether texts of moving tracks are written in this refresh. All of them have the same frame. */
+  /** Whether texts of moving tracks are written in this refresh, all for the same frame. */
   isDue = true;
   private last = -Infinity;
 

@@ -30,8 +30,8 @@ export class TimeLink {
   }
 
   /**
-   * Makes a track the one that the others follow. If the former one plays, the chosen one goes on playing. Call it
-   * as soon as the user chooses, so that what the user does next to the track is not undone.
+   * Makes a track the leader, which the other tracks follow. If the former leader plays, the new one continues to play.
+   * Call it as soon as the user chooses. Otherwise the link would undo the user's next action on the track.
    */
   choose(chosen: Track | null): void {
     if (chosen === this.leader) return;

@@ -11,7 +11,7 @@ export class TimePanel {
   private readonly scrub = input('scrub');
   private readonly position = byId('position', HTMLElement);
   private scrubbing = false;
-  /** Frame, and place of the slider as a share of its length, when they were written last. */
+  /** The frame, and the position of the slider as a share of its length, that were written last. */
   private shown: number | null = null;
   private shownShare = NaN;
 
@@ -67,7 +67,7 @@ export class TimePanel {
     });
   }
 
-  /** Updates the controls. Without `pace` at once, else the numbers of frames at this pace. */
+  /** Updates the controls. Frame numbers are written at `pace`; without it at once. */
   refresh(pace: TextPace | null = null): void {
     const track = this.track();
     const range = track?.range() ?? null;

@@ -1,4 +1,4 @@
-/** Texels per row, which every WebGL2 supports. `at` in the shaders uses its logarithm. */
+/** Texels per row, which every WebGL2 supports. `at` in the shaders (program.ts) contains its logarithm. */
 const WIDTH = 2048;
 
 /** Factor of spare rows, so that a growing stream rarely reallocates. */
@@ -22,7 +22,7 @@ export const TEXELS = {
 
 /**
  * An array that shaders read by index (`texelFetch(name, at(index), 0)`). Arrays of a message are
- * uploaded without rearrangement on the main thread. It grows and never shrinks.
+ * uploaded as they are. The texture grows and never shrinks.
  */
 export class DataTexture {
   private texture: WebGLTexture | null = null;
@@ -58,7 +58,6 @@ export class DataTexture {
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
   }
 
-  /** Binds the texture to a unit. */
   bind(unit: number): void {
     this.gl.activeTexture(this.gl.TEXTURE0 + unit);
     if (!this.texture) this.reserve(1);

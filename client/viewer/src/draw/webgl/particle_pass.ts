@@ -36,7 +36,7 @@ void main() {
 }
 `;
 
-/** Particles as round dots, in one colour or in those of an attribute. */
+/** Draws particles as round dots, in one colour or in the colours of an attribute. */
 export class ParticlePass {
   private readonly programs: Programs;
 

@@ -46,7 +46,6 @@ vec4 attributeColour(float value) {
 /** An attribute's range, and the colour of points without a number. */
 export interface AttributeStyle { min: number; max: number; missing: Rgb }
 
-/** Camera of the shaders. */
 export interface Camera {
   /** World coordinates relative to the frame's origin. */
   centre: [number, number];

@@ -36,7 +36,7 @@ export interface Picture {
 
 /** Draws pictures on a canvas. */
 export interface Drawing {
-  /** Uploads what the look needs. Throws a RangeError if the frame is too large. */
+  /** Uploads the parts of the frame that the look draws. Throws a RangeError if the frame is too large. */
   prepare(frame: Frame, look: Look): void;
   draw(picture: Picture): void;
   destroy(): void;
