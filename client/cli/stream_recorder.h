@@ -1,6 +1,6 @@
 // `partiemc watch --record`: records the particles that a producer sends. If the recording has all
-// frames of the stream, its replay has the same rings, bit for bit, except for streams with an
-// isovalue or with boxes of frames.
+// frames of the stream, its replay has the same results, bit for bit, except for streams with an
+// isovalue.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class StreamRecorder {
   absl::Status Finish();
 
   /// Returns lines for a user: the number of frames and the command that replays the recording. If
-  /// frames are missing, further lines state that a replay may have other bits.
+  /// frames are missing or the stream has an isovalue, further lines state that a replay differs.
   std::string Summary() const;
 
  private:

@@ -52,7 +52,8 @@ class RecordingWriter {
                                                                  const RecordingOptions& options);
   ~RecordingWriter();
 
-  /// Appends a frame with its arrays, without its box. Frames are numbered in the order of calls.
+  /// Appends a frame with its arrays and its box. A triclinic box is left out, as are the bounds of
+  /// axes that are not periodic. Frames are numbered in the order of calls.
   /// If a frame has no time, its velocities are left out, and its time is the number of its time
   /// step, else the number of the frame. Errors: INVALID_ARGUMENT (float32 is too coarse); the
   /// errors of AtomicFile.
