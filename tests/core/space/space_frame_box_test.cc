@@ -15,6 +15,8 @@
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
+#include "space/periodic_bodies.h"
+#include "space/surface_of.h"
 #include "space/surface_stream.h"
 #include "support/tries.h"
 
@@ -23,25 +25,22 @@ namespace {
 
 using support::Known;
 using support::Random;
+using testing::Cube;
+using testing::ExpectInBox;
 using testing::SpaceParticles;
+using testing::Sums;
+using testing::SumsOf;
 using testing::SurfaceStream;
 using testing::TrackedParticles;
-
-PeriodicBox Cube(double length, bool wraps = false, double origin = 0) {
-  const PeriodicAxis axis{origin, length};
-  return {.axes = {axis, axis, axis}, .wraps = wraps};
-}
+using testing::Wrap;
 
 SurfaceParameters In(const PeriodicBox& box,
                      SurfacePlacement placement = SurfacePlacement::kVirtualPlane) {
   return {.placement = placement, .box = box};
 }
 
-void Wrap(std::vector<double>& xyz, const PeriodicBox& box) {
-  for (std::size_t k = 0; k < xyz.size(); ++k) {
-    const auto& axis = box.axes[k % 3];
-    if (axis) xyz[k] -= axis->length * std::floor((xyz[k] - axis->origin) / axis->length);
-  }
+Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
+  return testing::SurfaceOf(particles, parameters);
 }
 
 SpaceParticles BallAt(const Vec3& centre, double radius) {
@@ -49,46 +48,6 @@ SpaceParticles BallAt(const Vec3& centre, double radius) {
   SpaceParticles ball = testing::Ball({0, 0, 0}, radius, .2, random), moved;
   for (std::size_t k = 0; k < ball.size(); ++k) moved.Add(ball.At(k) + centre);
   return moved;
-}
-
-Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
-  SurfaceWorkspace workspace;
-  Surface surface;
-  const auto reconstructor = SurfaceReconstructor::Create(parameters);
-  EXPECT_TRUE(reconstructor.ok()) << reconstructor.status();
-  if (!reconstructor.ok()) return surface;
-  SurfaceState state;
-  const absl::Status status =
-      reconstructor->Reconstruct(particles.AsFrame(), state, workspace, surface);
-  EXPECT_TRUE(status.ok()) << status;
-  const absl::Status valid = Validate(surface);
-  EXPECT_TRUE(valid.ok()) << valid;
-  return surface;
-}
-
-struct Sums {
-  double area = 0, volume = 0;
-  std::uint64_t particles = 0;
-};
-
-Sums SumsOf(const Surface& surface) {
-  Sums sums;
-  for (const ShellMeasures& measures : surface.measures) {
-    sums.area += measures.area;
-    sums.volume += measures.volume;
-    sums.particles += measures.particles;
-  }
-  return sums;
-}
-
-void ExpectInBox(const Surface& surface, const PeriodicBox& box) {
-  for (std::size_t k = 0; k < surface.points.size(); ++k) {
-    const auto& axis = box.axes[k % 3];
-    if (!axis) continue;
-    // Faces move by up to .0002 spacings where a vertex lies on them.
-    ASSERT_GE(surface.points[k], axis->origin - 1e-3);
-    ASSERT_LE(surface.points[k], axis->origin + axis->length + 1e-3);
-  }
 }
 
 class WrappedSurface : public ::testing::TestWithParam<SurfacePlacement> {};

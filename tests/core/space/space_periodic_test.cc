@@ -13,6 +13,7 @@
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
+#include "space/periodic_bodies.h"
 #include "space/surface_of.h"
 #include "space/surface_stream.h"
 
@@ -21,25 +22,14 @@ namespace {
 
 using support::Known;
 using support::Random;
+using testing::Cube;
 using testing::SpaceParticles;
 using testing::SurfaceStream;
 using testing::TrackedParticles;
-
-constexpr PeriodicBox Cube(double length) {
-  const PeriodicAxis axis{0, length};
-  return {.axes = {axis, axis, axis}};
-}
+using testing::Wrap;
 
 SurfaceParameters In(const PeriodicBox& box, SurfacePlacement placement) {
   return {.placement = placement, .box = box};
-}
-
-// Moves coordinates into the box, as simulators do.
-void Wrap(std::vector<double>& xyz, const PeriodicBox& box) {
-  for (std::size_t k = 0; k < xyz.size(); ++k) {
-    const auto& axis = box.axes[k % 3];
-    if (axis) xyz[k] -= axis->length * std::floor((xyz[k] - axis->origin) / axis->length);
-  }
 }
 
 SpaceParticles BallAt(const Vec3& centre, double radius) {
