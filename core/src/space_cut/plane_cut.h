@@ -88,15 +88,14 @@ void RemoveCaps(PlaneCutScratch& scratch, CutMesh& mesh);
 
 /// Replaces the mesh by its part on the kept side of the plane, and adds a cap without triangles to
 /// `mesh.caps`. Crossed edges get new points, exactly on the plane. Their other coordinates are
-/// rounded, but lie between those of the edge's ends. Their normals are interpolated.
+/// rounded, but lie between the ends of the edge. Their normals are interpolated.
 ///
 /// A triangle becomes one or two triangles, or is dropped. Where the plane crosses an earlier cap,
 /// inside and outside alternate along the common line of both planes. Each stretch inside becomes
 /// an edge of both caps.
 ///
 /// Returns false, with `mesh` in any state, if a point is less than `clearance` away from the
-/// plane, if rounding moves a new point onto another plane, or if inside and outside do not
-/// alternate.
+/// plane, or if rounding breaks the alternation or moves a new point onto another plane.
 /// Requires: the mesh is closed and its coordinates are in the domain of predicates_in_space.h;
 /// planes with the same axis are different.
 /// Deterministic. Cost: linear in triangles, n log n in crossed edges.

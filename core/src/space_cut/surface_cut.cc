@@ -29,8 +29,8 @@ constexpr std::array kShiftAlong = {1., 1.37, 1.71};
 // Points closer to a plane than this part of a step are too close. It is small because the vertices
 // of a flat face in the plane are up to 1e-7 spacings away.
 constexpr double kClearance = 1. / 256;
-// A piece is dust if its volume is below this part of the cube of its size, or its size below this
-// part of its distance from the origin: rounding hides its volume or its centroid.
+// A piece is dust if its volume is below this part of the cube of its size, or if its size is below
+// this part of its distance from the origin. Rounding hides its volume or its centroid.
 constexpr double kLeastVolume = 1e-14, kLeastSize = 1e-9;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -66,8 +66,8 @@ struct SurfacePieces {
 /// The largest part of a body gets the particles, identity and parents of the body's first outer
 /// shell; other parts have none.
 ///
-/// If a vertex lies on a plane, or rounding leaves a decision open, all planes move: by up to .0002
-/// spacings plus 3e-9 of the coordinate, the same for planes with one axis (kShifts in
+/// If a vertex lies on a plane, or rounding leaves a decision open, all planes move. Those with the
+/// same axis move alike, by up to .0002 spacings plus 3e-9 of the coordinate (kShifts in
 /// surface_cut.cc). Walls move by at most a seventh of this, each on its own. Returns false, with
 /// `surface` unchanged, if this does not help, which is a bug. Requires: S1 to S5;
 /// `surface.attributes` without values. Deterministic. Cost: linear in the surface, plus CutAtPlane

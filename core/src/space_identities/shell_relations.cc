@@ -51,8 +51,8 @@ NodeShift ShiftOf(const KnownShell& shell, double cells) {
   return {rounded(x), rounded(y), rounded(z)};
 }
 
-/// Shifts the bodies of this frame backward by their velocities, and without samples those of the
-/// last frame forward.
+/// Shifts the bodies of this frame backward by their velocities. Without samples, also shifts the
+/// bodies of the last frame forward.
 void ShiftByVelocities(const ShellHistory& previous, const ShellsNow& now, bool by_samples,
                        ShellRelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
@@ -155,9 +155,9 @@ void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, const Com
   Unite(relations);
 }
 
-/// Relates two shells by the nodes that they share unmoved, if neither has a relation that counts:
-/// a cavity may not follow the body around it, and velocities may be wrong. Skips bodies of the
-/// last frame with samples.
+/// Relates shells by the nodes that they share unmoved, if neither has a relation that counts. A
+/// cavity may not follow the body around it, and velocities may be wrong. Skips bodies of the last
+/// frame with samples.
 void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, const ComparedRuns& runs,
                 ShellRelationScratch& s, std::vector<Relation>& relations) {
   const Evidence& e = s.evidence;

@@ -121,8 +121,8 @@ bool LiesInBox(const ShellInput& input, const Surface& surface, std::uint32_t sh
   return true;
 }
 
-/// Finds the shell whose number each shell gets: for images of a cut body the first image, for
-/// cavities of cut bodies that do not lie in the box kNoShell, for other shells the shell itself.
+/// Finds the shell whose number each shell gets. Images of a cut body get the number of the first
+/// image. Cavities of cut bodies get none (kNoShell) if they do not lie in the box.
 void FindStandIns(const ShellInput& input, const Surface& surface, NumberedShells& shells) {
   std::vector<std::uint32_t>& stand_in = shells.stand_in;
   stand_in.resize(surface.ShellCount());

@@ -76,7 +76,7 @@ struct NumberedShells {
 /// ellipsoid has the nodes of its body. If it replaces a particle without a body, it has one node,
 /// the lowest of the particle's cell (space_vertices/drops.h).
 ///
-/// Of a body that will be cut, only the nodes in the box count, and all its images have one number.
+/// If a body will be cut, only its nodes in the box count, and all its images have one number.
 /// Cost: n log n in the crossed edges along x, linear in particles and shells.
 void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
                   std::vector<ShellRun>& runs);

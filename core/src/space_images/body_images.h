@@ -18,8 +18,8 @@ namespace partiemc::space {
 struct BodyImageInput {
   const LiftedFrame& lifted;
   const SpaceBins& bins;
-  /// Corners of the planes within which copies are complete, so bodies are, too; infinite along
-  /// axes without copies. World units.
+  /// The planes, as corners of a box. Bodies within them are complete. Infinite along axes without
+  /// copies. World units.
   Vec3 low, high;
   double spacing, cell_size;  ///< World units.
   bool wraps = false;         ///< PeriodicBox::wraps.
@@ -32,7 +32,7 @@ struct BodyImageScratch {
     std::uint32_t set = kNoIndex;  ///< Union-find: an image of the same body, or itself.
     std::uint64_t given = 0;       ///< Its given particles, without copies.
     bool has_copies = false;       ///< Whether it has copies; for the first image: whether any has.
-    // Of all images, set for the first image only:
+    // Set for the first image only, over all images:
     std::uint64_t particles = 0;
     double volume = 0;
     std::uint32_t best = kNoIndex;  ///< The image that remains whole.

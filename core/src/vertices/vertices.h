@@ -83,7 +83,7 @@ struct RingVertices {
 struct VertexScratch {
   std::vector<double> points;         ///< One or two for each segment; not for `virtual-plane`.
   RingVertices vertices;              ///< `virtual-plane` only.
-  WallVertices walls;                 ///< Of the points of the rings.
+  WallVertices walls;                 ///< By point of the rings.
   std::vector<float> sizes;           ///< By point: the factor of its offset (CorrectVolume).
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
