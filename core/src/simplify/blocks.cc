@@ -17,8 +17,8 @@
 namespace partiemc::simplify {
 namespace {
 
-// Side of a block, as a multiple of the error. In units of the extent, the floats of meshoptimizer
-// cannot sum smaller squared errors. A multiple of 8,000 left three times the triangles.
+// Side of a block, as a multiple of the error. meshoptimizer sums squared errors as floats in units
+// of the side, so larger blocks hide the error: a multiple of 8,000 left three times the triangles.
 constexpr double kBlock = 1000;
 
 // Largest error, in extents of the block. A larger one has the same effect.

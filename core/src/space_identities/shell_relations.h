@@ -40,10 +40,10 @@ struct ShellRelationScratch {
 void MoveWithBox(const BoxMotion& motion, const ShellHistory& history, ShellHistory& moved);
 
 /// Finds the related shells by the rules for rings (core/IDENTITIES.md). First moves the shells of
-/// the last frame by the median displacement of their samples, or by their velocities if that frame
-/// has no samples. Also moves the shells of this frame backward by their velocities. Then counts
-/// the nodes that shells share. If samples contradict the nodes, the samples decide. `relations`
-/// gets each pair once, in no particular order. Cost: n log n in runs, shells and samples.
+/// the last frame by the median displacement of their samples; by their velocities if no shell has
+/// samples. Also moves the shells of this frame backward by their velocities. Then counts the nodes
+/// that shells share. If samples contradict the nodes, the samples decide. `relations` gets each
+/// pair once, in no particular order. Cost: n log n in runs, shells and samples.
 void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& scratch,
                   std::vector<Relation>& relations);
 

@@ -25,9 +25,9 @@ struct RepairScratch {
 /// the rings, interleaved, in world units.
 ///
 /// If segments cross or touch, a round moves their ends, and the points next to these, half way
-/// back; from the fifth round on all the way. If none does, misplaced rings return as a whole, with
-/// the rings around them. A ring is misplaced if it is turned inside out, or if another ring has
-/// passed over it. Ordinary frames need no round. After 24 rounds, all points return.
+/// back; from the fifth round on all the way. Without such segments, misplaced rings return as a
+/// whole, with the rings around them. A ring is misplaced if it is turned inside out, or if another
+/// ring has passed over it. Ordinary frames need no round. After 24 rounds, all points return.
 ///
 /// Returns false if rings cross or are misplaced with every point at its root. This is a bug,
 /// because rings through the roots are simple and nested (core/METHOD.md, "Why rings are simple";
