@@ -12,7 +12,6 @@
 namespace partiemc {
 namespace {
 
-// A tile without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
 // The number of tiles after which positions along x repeat.

@@ -110,7 +110,6 @@ bool AddCrossings(const AxisPlane& plane, const PlaneCutScratch& s, CutMesh& mes
   return true;
 }
 
-/// Finds the new points of crossed edges.
 class CrossingPoints {
  public:
   CrossingPoints(const PlaneCutScratch& scratch, std::uint32_t first)

@@ -65,7 +65,6 @@ void AddShell(const Surface& surface, std::uint32_t shell, CutMesh& mesh) {
   }
 }
 
-/// Copies the shells that are cut to the mesh.
 void FillMesh(const SurfaceCutInput& input, const Surface& surface, PlaneCutScratch& plane,
               CutMesh& mesh) {
   mesh.points = surface.points;

@@ -109,7 +109,6 @@ struct NodeBox {
   }
 };
 
-/// Whether all points of a shell lie in the box.
 bool LiesInBox(const ShellInput& input, const Surface& surface, std::uint32_t shell) {
   for (std::uint32_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1]; ++p) {
     const Vec3 at = (1 / input.cell_size) * Vec3At(surface.points, p);
