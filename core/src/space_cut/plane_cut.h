@@ -94,11 +94,10 @@ void RemoveCaps(PlaneCutScratch& scratch, CutMesh& mesh);
 /// inside and outside alternate along the common line of both planes. Each stretch inside becomes
 /// an edge of both caps.
 ///
-/// Returns false, with `mesh` in any state, if a point is less than `clearance` away from the
-/// plane, or if rounding breaks the alternation or moves a new point onto another plane.
-/// Requires: the mesh is closed and its coordinates are in the domain of predicates_in_space.h;
-/// planes with the same axis are different.
-/// Deterministic. Cost: linear in triangles, n log n in crossed edges.
+/// Returns false, with `mesh` in any state, if a point is less than `clearance` from the plane.
+/// Also if rounding breaks the alternation, or moves a new point onto another plane. Requires: the
+/// mesh is closed and its coordinates are in the domain of predicates_in_space.h; planes with the
+/// same axis are different. Deterministic. Cost: linear in triangles, n log n in crossed edges.
 [[nodiscard]] bool CutAtPlane(const AxisPlane& plane, double clearance, PlaneCutScratch& scratch,
                               CutMesh& mesh);
 
