@@ -12,7 +12,6 @@
 namespace partiemc {
 namespace {
 
-// A tile without a run.
 constexpr std::uint32_t kNoRun = 0xffffffff;
 
 // The number of tiles after which positions along x repeat.
@@ -135,9 +134,9 @@ void LevelSetSampler::LinkRuns(const TileDirectory& directory, std::uint32_t til
   }
 }
 
-// Sorts the needed particles of a run by bucket, by a counting sort. At first offsets[b + 2] counts
-// the particles of bucket b. Then offsets[b + 1] is the index of its next particle, and at the end
-// offsets[b] that of its first particle.
+// Sorts the needed particles of a run by bucket, by a counting sort. At first offsets[b + 2] is the
+// count of bucket b. Then offsets[b + 1] is the index of its next particle. At the end offsets[b]
+// is the index of its first particle.
 void LevelSetSampler::SortRun(const ParticleBins& bins, const Run& run) {
   const std::span offsets = std::span(bucket_offsets_).subspan(run.first_bucket, OffsetCount(run));
   std::fill(offsets.begin(), offsets.end(), 0);

@@ -50,7 +50,8 @@ using FieldPoints = PointGroup<Point>;
 using FieldSamples = std::array<LevelSetSample, kPointsAtOnce>;
 
 /// An index of the particles near the outline. Particles are sorted into rows of buckets
-/// (NeighbourGrid) that span adjacent tiles; a query visits the buckets around its points.
+/// (NeighbourGrid) that span adjacent tiles. A query visits the buckets around its points. All
+/// const functions are thread-safe.
 class LevelSetSampler {
  public:
   /// Indexes the particles for samples at points in active cells, and in cells at most `wander`

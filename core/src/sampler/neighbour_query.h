@@ -15,7 +15,7 @@ inline constexpr std::size_t kPointsAtOnce = 8;
 /// Most queries that run at once, so that their memory accesses overlap.
 inline constexpr std::size_t kQueriesAtOnce = 6;
 
-/// Positions along x are modulo this number of cells; no query spans as much.
+/// Positions along x are modulo this number of cells, which is more than any query spans.
 inline constexpr float kColumnPeriod = 128;
 
 /// Consecutive buckets in consecutive rows of a run of tiles.

@@ -64,8 +64,8 @@ class NeighbourDisc {
         reach_(hn::Set(Lanes(), near.reach)),
         reach_per_size_(hn::Set(Lanes(), near.reach_per_size)) {}
 
-  // Of the first kPartialSums particles of [first, last), appends those in the disc to a chunk,
-  // which has `to` particles and space for kPartialSums more. Returns the new number of particles.
+  // Reads the first kPartialSums particles of [first, last). Appends those in the disc to a chunk
+  // of `to` particles, with space for kPartialSums more. Returns the new number of particles.
   template <Factor kFactor>
   HWY_INLINE int Append(Vector origin_y, std::uint32_t first, std::uint32_t last, int to,
                         NeighbourChunk& chunk) const {

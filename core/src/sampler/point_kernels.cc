@@ -130,8 +130,8 @@ void SumThird(double inverse_square, const NeighbourRows& near, const Point& poi
   });
 }
 
-// Sums at the points of some queries. The totals of all points are computed at once, except those
-// of queries with several chunks. There the totals of chunks are added in doubles, point by point.
+// Sums at the points of some queries. The totals of all points are computed at once. If a query has
+// several chunks, the totals of its chunks are added in doubles, point by point.
 template <Factor kFactor>
 class SumsAtPoints {
  public:

@@ -18,7 +18,7 @@ namespace partiemc::simplify {
 namespace {
 
 // Side of a block, as a multiple of the error. meshoptimizer sums squared errors as floats in units
-// of the extent, and 8,000 left three times as many triangles, because rounding exceeds the error.
+// of the side, which are too coarse in larger blocks: 8,000 left three times as many triangles.
 constexpr double kBlock = 1000;
 
 // Largest error, in extents of the block. A larger one has the same effect.

@@ -25,8 +25,7 @@ Box BoxOf(std::span<const double> points, std::span<const std::uint32_t> indices
 void FindManifoldFaults(std::span<const double> points, std::span<const std::uint32_t> triangles,
                         std::vector<Box>& faults);
 
-/// Whether triangles are connected and have this number of different points. Requires: at least one
-/// triangle.
+/// Whether triangles (at least one) are connected and have this number of different points.
 bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points);
 
 /// Two triangles that break S3, or one that is degenerate (a == b).

@@ -46,8 +46,7 @@ enum class Progress : std::uint8_t {
 };
 
 /// Simplifies shells, and simplifies those again that break a guarantee. A shell without attempts
-/// left keeps its certified triangles. Certified triangles do not touch each other, so the rounds
-/// end.
+/// left keeps its certified triangles, which do not touch each other, so the rounds end.
 class Simplifier {
  public:
   Simplifier(const SimplifyLimits& limits, const Surface& certified)
@@ -61,8 +60,7 @@ class Simplifier {
         progress_(shells_, Progress::kToSimplify),
         faults_(shells_) {}
 
-  /// Sets points, triangles, offsets and outer_of of `simplified`, so that they keep the
-  /// guarantees.
+  /// Sets points, triangles, offsets and `outer_of` of `simplified`.
   SimplifyReport Run(Surface& simplified);
   /// By point of the certified surface: its index among the remaining points, or kNoIndex.
   std::span<const std::uint32_t> NewIndices() const { return new_index_; }

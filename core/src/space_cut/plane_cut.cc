@@ -21,14 +21,14 @@ double Coordinate(const CutMesh& mesh, std::uint32_t point, int axis) {
 
 Edge EdgeOf(std::uint32_t a, std::uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-/// The axes of a plane, in an order in which the cap has its inside on the left of its edges.
+/// The two axes in a plane, in the order for which a cap lies on the left of its edges.
 std::array<int, 2> FrameOf(const AxisPlane& plane) {
   const int next = (plane.axis + 1) % 3, last = (plane.axis + 2) % 3;
   // The outside is below the plane if the points above it are kept.
   return plane.keeps_above ? std::array{last, next} : std::array{next, last};
 }
 
-/// Finds the side of each point. Returns false if a point that is used is too close to the plane.
+/// Finds the side of each point. Returns false if a used point is too close to the plane.
 bool FindSides(const AxisPlane& plane, double clearance, const CutMesh& mesh, PlaneCutScratch& s) {
   const std::size_t count = mesh.points.size() / 3;
   s.side.resize(count);
@@ -65,8 +65,7 @@ void ListCrossedEdges(const CutMesh& mesh, PlaneCutScratch& s) {
   s.edges.erase(std::unique(s.edges.begin(), s.edges.end()), s.edges.end());
 }
 
-/// Whether the point lies on a plane of an earlier cap although one of the ends of its edge does
-/// not.
+/// Whether a point lies on the plane of an earlier cap although an end of its edge does not.
 bool LiesOnOtherPlane(const CutMesh& mesh, const Edge& edge, std::uint32_t point) {
   return std::any_of(mesh.caps.begin(), mesh.caps.end(), [&](const CutMesh::Cap& cap) {
     const auto is_on = [&](std::uint32_t p) {
@@ -76,8 +75,8 @@ bool LiesOnOtherPlane(const CutMesh& mesh, const Edge& edge, std::uint32_t point
   });
 }
 
-/// Appends the normal at the part t of an edge. Opposite normals have no mean; the lower end's
-/// normal takes its place.
+/// Appends the normal at the part t of an edge, counted from edge.low. Where normals cancel, it is
+/// the normal of edge.low.
 void AddNormal(const Edge& edge, double t, CutMesh& mesh) {
   const auto normal_of = [&](std::uint32_t point) {
     const float* const normal = &mesh.normals[3 * std::size_t{point}];
@@ -91,7 +90,7 @@ void AddNormal(const Edge& edge, double t, CutMesh& mesh) {
   }
 }
 
-/// Appends a point for each crossed edge. Returns false if rounding has put one onto another plane.
+/// Appends a point for each crossed edge. Returns false if rounding moves one onto another plane.
 bool AddCrossings(const AxisPlane& plane, const PlaneCutScratch& s, CutMesh& mesh) {
   for (const Edge& edge : s.edges) {
     const double low = Coordinate(mesh, edge.low, plane.axis);
@@ -102,7 +101,7 @@ bool AddCrossings(const AxisPlane& plane, const PlaneCutScratch& s, CutMesh& mes
       const double from = Coordinate(mesh, edge.low, axis), to = Coordinate(mesh, edge.high, axis);
       const double between =
           std::clamp(from + t * (to - from), std::min(from, to), std::max(from, to));
-      // Coordinates below the domain of the predicates are 0.
+      // Coordinates too small for the predicates become 0.
       mesh.points.push_back(axis == plane.axis ? plane.at : InSpaceDomain(between) ? between : 0.0);
     }
     AddNormal(edge, t, mesh);
@@ -111,7 +110,6 @@ bool AddCrossings(const AxisPlane& plane, const PlaneCutScratch& s, CutMesh& mes
   return true;
 }
 
-/// Numbers the points of crossed edges.
 class CrossingPoints {
  public:
   CrossingPoints(const PlaneCutScratch& scratch, std::uint32_t first)
@@ -178,13 +176,13 @@ void ClipTriangles(const CrossingPoints& crossings, CutMesh& mesh, PlaneCutScrat
   mesh.is_clipped.swap(s.is_clipped);
 }
 
-/// Clips the edges of an earlier cap, and closes it along the common line of both planes. Returns
-/// false if inside and outside do not alternate.
+/// Clips the edges of an earlier cap, and closes the cap along the common line of both planes.
+/// Returns false if inside and outside do not alternate on the line.
 bool ClipCap(const AxisPlane& plane, const CrossingPoints& points, CutMesh& mesh, CutMesh::Cap& cap,
              PlaneCutScratch& s) {
   s.crossings.clear();
   s.line_edges.clear();
-  const int third = 3 - plane.axis - cap.plane.axis;  // Used only if the planes are not parallel.
+  const int third = 3 - plane.axis - cap.plane.axis;  // Parallel planes have no crossings.
   for (const CapEdge& edge : cap.edges) {
     const bool begins = s.side[edge.from] > 0, ends = s.side[edge.to] > 0;
     if (begins && ends) s.line_edges.push_back(edge);
@@ -214,7 +212,7 @@ bool ClipCap(const AxisPlane& plane, const CrossingPoints& points, CutMesh& mesh
   return true;
 }
 
-/// Joins the edges of a cap to loops of points of the cap. Returns false if they are not closed, or
+/// Joins the edges of a cap to closed loops of its points. Returns false if that is impossible, or
 /// if two points have the same position.
 bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s) {
   const std::array<int, 2> frame = FrameOf(cap.plane);
@@ -263,8 +261,8 @@ bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s)
   return true;
 }
 
-/// Whether clipped triangles are degenerate or touch triangles of the mesh. Only triangles within
-/// the boxes of the planes' clipped triangles can touch them.
+/// Whether a clipped triangle is degenerate or intersects another triangle of the mesh. Only
+/// triangles in the layers of clipped triangles at the planes can do so.
 bool ClippedTouch(const CutMesh& mesh, PlaneCutScratch& s) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const std::size_t count = mesh.triangles.size() / 3;

@@ -16,20 +16,21 @@
 namespace partiemc::space {
 namespace {
 
-// By how many steps planes move, one try after another. A step is in spacings and in last bits of
-// the coordinate.
+// The moves of planes, in steps, one for each try. A step is kShiftSpacings spacings plus
+// kShiftBits last bits of the coordinate.
 constexpr std::array kShifts = {0.,   1.,   2.,   3.,    5.,    8.,     13.,    21.,    55.,
                                 144., 377., 987., 2584., 6765., 17711., 46368., 121393.};
-// Walls move by these only: a larger move could bring them to other shells.
+// Walls use only the first ones: a larger move could bring them to other shells.
 constexpr std::size_t kShiftsOfWalls = 15;
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 64;
-// Moved alike along two axes, planes would follow diagonal edges of bodies on a lattice.
+// Factors by axis. With equal moves along two axes, the crossing line of two planes would follow
+// diagonal edges of bodies on a lattice.
 constexpr std::array kShiftAlong = {1., 1.37, 1.71};
-// Points closer to a plane than this part of a step are too close. Many vertices may be near a
-// plane: those of a flat face in it are up to 1e-7 spacings away.
+// Points closer to a plane than this part of a step are too close. It is small because the vertices
+// of a flat face in the plane are up to 1e-7 spacings away.
 constexpr double kClearance = 1. / 256;
-// A piece is dust if its volume is below this part of the volume of a cube around it, or its size
-// below this part of its distance from the origin: rounding hides its volume or its centroid.
+// A piece is dust if its volume is below this part of the cube of its size, or if its size is below
+// this part of its distance from the origin. Rounding hides its volume or its centroid.
 constexpr double kLeastVolume = 1e-14, kLeastSize = 1e-9;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -46,7 +47,7 @@ std::uint32_t BodyOf(const SurfaceCutInput& input, const Surface& surface, std::
   return input.body_of.empty() ? OuterOf(surface, shell) : input.body_of[shell];
 }
 
-// The number of a triangle in CutMesh::shell_of: its shell, and whether it is in Surface::cuts.
+// CutMesh::shell_of of a triangle: its shell, and whether it is in Surface::cuts.
 std::uint32_t NumberOf(std::uint32_t shell, bool is_listed) {
   return 2 * shell + (is_listed ? 1 : 0);
 }
@@ -64,7 +65,6 @@ void AddShell(const Surface& surface, std::uint32_t shell, CutMesh& mesh) {
   }
 }
 
-/// Copies the shells that are cut to the mesh.
 void FillMesh(const SurfaceCutInput& input, const Surface& surface, PlaneCutScratch& plane,
               CutMesh& mesh) {
   mesh.points = surface.points;
@@ -87,7 +87,7 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
   }
   for (AxisPlane plane : input.planes) {
     ThrowIfCancelled();
-    // Opposite faces of a box move alike; a wall moves alone, because the next one may be far away.
+    // Opposite faces of a box move alike. A wall moves alone: the opposite one may be far away.
     const double far =
         input.are_walls ? std::abs(plane.at) : farthest[static_cast<std::size_t>(plane.axis)];
     const double step =
@@ -136,7 +136,7 @@ class Assembly {
   }
 
  private:
-  // All shells are in the order of their points, so whole shells are pieces as well.
+  // Pieces are in the order of their first points, so shells that are not cut become pieces, too.
   void AddWholeTriangles();
   void FindPieces();
   bool DropDust();
@@ -165,7 +165,7 @@ void Assembly::AddWholeTriangles() {
   }
 }
 
-/// Numbers the connected parts by their first points.
+/// Numbers the connected parts, the pieces, in the order of their first points.
 void Assembly::FindPieces() {
   const CutMesh& mesh = s_.mesh;
   const auto points = static_cast<std::uint32_t>(mesh.points.size() / 3);
@@ -199,7 +199,7 @@ void Assembly::FindPieces() {
   }
 }
 
-/// Removes the triangles of pieces that are dust. Returns whether there are any.
+/// Removes the triangles of dust. Returns whether there is any.
 bool Assembly::DropDust() {
   CutMesh& mesh = s_.mesh;
   using Size = SurfaceCutScratch::PieceSize;
@@ -249,7 +249,7 @@ bool Assembly::DropDust() {
   return true;
 }
 
-/// Turns counts at index k + 1 into offsets, and copies them.
+/// Turns counts at index k + 1 into offsets, and copies these to `next`.
 void SumUp(std::vector<std::uint32_t>& offsets, std::vector<std::uint32_t>& next) {
   for (std::size_t k = 1; k < offsets.size(); ++k) offsets[k] += offsets[k - 1];
   next.assign(offsets.begin(), offsets.end());
@@ -273,7 +273,7 @@ void Assembly::CopyPoints() {
   }
 }
 
-/// Copies the triangles, those on planes last, and lists them.
+/// Copies the triangles, those on planes last, and lists the latter in Surface::cuts.
 void Assembly::CopyTriangles() {
   const CutMesh& mesh = s_.mesh;
   to_.triangle_offsets.assign(pieces_.sources.size() + 1, 0);
@@ -312,8 +312,7 @@ void Assembly::Measure() {
   NameLargest();
 }
 
-/// Gives the largest piece of each body that is cut its particles and its identity; the other
-/// pieces have none.
+/// Gives the largest piece of each cut body the body's particles and identity, other pieces none.
 void Assembly::NameLargest() {
   std::vector<std::uint32_t>& largest = s_.largest;
   largest.assign(from_.ShellCount(), kNoShell);
@@ -335,10 +334,10 @@ void Assembly::NameLargest() {
   }
 }
 
-/// Sets outer_of. A piece with triangles on a plane is next to the outside beyond it.
+/// Sets outer_of. A piece with triangles on a plane borders on the outside, so it is no cavity.
 void Assembly::Nest() {
   const auto pieces = static_cast<std::uint32_t>(pieces_.sources.size());
-  // By shell of the given surface: its only outer piece, kNoShell, or kNoIndex - 1 for several.
+  // `only` is kNoShell without an outer piece.
   constexpr std::uint32_t kSeveral = kNoIndex - 1;
   std::vector<std::uint32_t>& only = s_.only;
   only.assign(from_.ShellCount(), kNoShell);

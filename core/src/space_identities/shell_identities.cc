@@ -8,8 +8,7 @@
 namespace partiemc::space {
 namespace {
 
-/// Passes on identities along the largest relations first. Gives new identities to the other
-/// shells.
+/// Passes on identities, first along the relations with most nodes. Other shells get new ones.
 void AssignShellIdentities(const ShellHistory& previous, ShellIdentityScratch& s,
                            ShellHistory& next) {
   std::vector<KnownShell>& shells = s.shells.shells;
@@ -22,7 +21,7 @@ void AssignShellIdentities(const ShellHistory& previous, ShellIdentityScratch& s
   }
 }
 
-/// Writes identities and parents to the surface. Requires: relations sorted by `now`.
+/// Writes identities and parents to the surface. Requires: relations are sorted by `now`.
 void WriteIdentities(const ShellHistory& previous, const ShellIdentityScratch& s,
                      Surface& surface) {
   surface.parents.clear();
@@ -42,8 +41,7 @@ void WriteIdentities(const ShellHistory& previous, const ShellIdentityScratch& s
   }
 }
 
-/// Writes the history: shells sorted by identity, and runs and samples with indices of these
-/// shells.
+/// Writes the history: the shells by identity. Runs and samples get the indices of these shells.
 void WriteShellHistory(const ShellInput& input, ShellIdentityScratch& s, ShellHistory& next) {
   const std::vector<KnownShell>& shells = s.shells.shells;
   std::vector<std::uint32_t>& by_identity = s.by_identity;

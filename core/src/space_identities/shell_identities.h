@@ -16,7 +16,7 @@ namespace partiemc::space {
 struct ShellIdentityScratch {
   NumberedShells shells;
   ShellTracks tracks;
-  ShellHistory carried;  // The last frame, moved with its box.
+  ShellHistory carried;  // The history of the last frame, moved with the box.
   ShellRelationScratch relation_scratch;
   std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By shell of the last frame.
@@ -26,11 +26,12 @@ struct ShellIdentityScratch {
 };
 
 /// Gives an identity and parents to every shell of `surface`, and writes `next`, the history for
-/// the next frame. The rules are those for rings (core/IDENTITIES.md).
+/// the next frame. The rules are those for rings (core/IDENTITIES.md). Shells without a number
+/// (NumberedShells) get neither.
 ///
-/// Ties: if pairs of shells share equally large numbers of nodes, the older identity comes first,
-/// then the shell with the earlier first run. New identities are given in the order of first runs.
-/// The result depends neither on the order of particles nor on the number of threads.
+/// Of pairs of shells that share equally many nodes, the pair with the older identity comes first,
+/// then the shell with the earlier first run. New identities follow the order of first runs. The
+/// result depends neither on the order of particles nor on the number of threads.
 /// Cost: n log n in the crossed edges along x, shells and their relations; linear in particles.
 void ContinueShells(const ShellInput& input, const ShellHistory& previous,
                     ShellIdentityScratch& scratch, ShellHistory& next, Surface& surface);

@@ -15,14 +15,14 @@ void CountNodes(std::span<const ShellRun> runs, std::size_t shells,
   for (const ShellRun& run : runs) nodes[run.shell] += NodeCount(run.first, run.last);
 }
 
-/// Moves cavities with their outer shells.
+/// Cavities move with their outer shells.
 void MoveCavitiesAlong(std::span<const KnownShell> shells, std::vector<NodeShift>& shifts) {
   for (std::size_t shell = 0; shell < shifts.size(); ++shell) {
     if (shells[shell].outer != kNoShell) shifts[shell] = shifts[shells[shell].outer];
   }
 }
 
-/// Moves each body by the median displacement of its samples.
+/// Shifts each body of the last frame by the median displacement of its found samples.
 void ShiftBySamples(std::span<const FoundShellSample> found, ShellRelationScratch& s) {
   for (std::size_t first = 0, last = 0; first < found.size(); first = last) {
     while (last < found.size() && found[last].before == found[first].before) ++last;
@@ -38,7 +38,8 @@ void ShiftBySamples(std::span<const FoundShellSample> found, ShellRelationScratc
   }
 }
 
-/// The shift by a velocity over a time in units of one cell per velocity.
+/// The shift of a shell by its velocity; 0 if it is too large. `cells`: the shift in cells of the
+/// velocity 1.
 NodeShift ShiftOf(const KnownShell& shell, double cells) {
   const auto is_possible = [](double value) { return std::abs(value) <= kMaxShift; };
   const auto rounded = [](double value) {
@@ -50,8 +51,8 @@ NodeShift ShiftOf(const KnownShell& shell, double cells) {
   return {rounded(x), rounded(y), rounded(z)};
 }
 
-/// Moves the bodies of the last frame forward by their velocities, unless samples move them, and
-/// the bodies of this frame backward by their velocities.
+/// Shifts the bodies of this frame backward by their velocities. Without samples, also shifts the
+/// bodies of the last frame forward.
 void ShiftByVelocities(const ShellHistory& previous, const ShellsNow& now, bool by_samples,
                        ShellRelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
@@ -73,8 +74,8 @@ bool ComesBefore(const ShellRun& a, const ShellRun& b) {
   return std::tie(a.layer, a.row, a.first, a.shell) < std::tie(b.layer, b.row, b.first, b.shell);
 }
 
-/// Writes `runs`, moved by the shifts of their shells, to `moved`, sorted by row, then node. Moved
-/// runs may overlap. Drops runs that leave the range of coordinates.
+/// Writes `runs`, moved by the shifts of their shells, to `moved`, sorted by layer, row, node. They
+/// may overlap. Drops runs that leave the range of coordinates.
 void MoveRuns(std::span<const ShellRun> runs, std::span<const NodeShift> shift_of_shell,
               std::vector<ShellRun>& moved) {
   const auto fits = [](std::int64_t value) {
@@ -95,7 +96,7 @@ void MoveRuns(std::span<const ShellRun> runs, std::span<const NodeShift> shift_o
   std::sort(moved.begin(), moved.end(), ComesBefore);
 }
 
-/// Writes `runs`, wrapped into the periodic box, to `wrapped`, sorted by row, then node.
+/// Writes `runs`, wrapped into the periodic box, to `wrapped`, sorted by layer, row, node.
 void WrapRuns(std::span<const ShellRun> runs, const LatticePeriods& periods,
               std::vector<ShellRun>& wrapped) {
   wrapped.clear();
@@ -110,7 +111,7 @@ void WrapRuns(std::span<const ShellRun> runs, const LatticePeriods& periods,
   std::sort(wrapped.begin(), wrapped.end(), ComesBefore);
 }
 
-/// Moves runs, and wraps them if the box is periodic.
+/// Moves runs, and wraps them if the box is periodic. The result is valid until the next call.
 std::span<const ShellRun> Moved(std::span<const ShellRun> runs, std::span<const NodeShift> shifts,
                                 const LatticePeriods& periods, ShellRelationScratch& s) {
   MoveRuns(runs, shifts, s.moved);
@@ -119,7 +120,7 @@ std::span<const ShellRun> Moved(std::span<const ShellRun> runs, std::span<const 
   return s.wrapped;
 }
 
-/// The runs of both frames, comparable.
+/// The runs of both frames at their positions, wrapped if the box is periodic.
 struct ComparedRuns {
   std::span<const ShellRun> before, now;
 };
@@ -136,8 +137,8 @@ bool AreOfOneKind(const ShellHistory& previous, const ShellsNow& now, std::uint3
   return previous.shells[before].is_cavity == now.shells[number].is_cavity;
 }
 
-/// Relates shells by the nodes that they share after moving the last frame's shells forward, or
-/// this frame's shells backward.
+/// Relates shells by the nodes that they share after the last frame's shells have moved forward,
+/// and by those that they share after this frame's shells have moved backward.
 void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, const ComparedRuns& runs,
                    ShellRelationScratch& s, std::vector<Relation>& relations) {
   const auto add = [&](std::uint32_t before, std::uint32_t number, std::uint64_t nodes) {
@@ -154,9 +155,9 @@ void RelateByNodes(const ShellHistory& previous, const ShellsNow& now, const Com
   Unite(relations);
 }
 
-/// Relates two shells by their nodes at the original positions, if moving found no relation for
-/// either: a cavity may not follow the body around it, and velocities may be wrong. Skips bodies
-/// with samples.
+/// Relates shells by the nodes that they share unmoved, if neither has a relation that counts. A
+/// cavity may not follow the body around it, and velocities may be wrong. Skips bodies of the last
+/// frame with samples.
 void AddUnmoved(const ShellHistory& previous, const ShellsNow& now, const ComparedRuns& runs,
                 ShellRelationScratch& s, std::vector<Relation>& relations) {
   const Evidence& e = s.evidence;

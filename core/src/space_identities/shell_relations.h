@@ -30,7 +30,7 @@ struct ShellRelationScratch {
   std::vector<NodeShift> shift_before, shift_now;
   std::vector<std::int64_t> displacements;
   std::vector<ShellRun> moved, wrapped;
-  std::vector<ShellRun> wrapped_before, wrapped_now;  // Used only with a periodic box.
+  std::vector<ShellRun> wrapped_before, wrapped_now;  // Unused without a periodic box.
   std::vector<SharedNodes> shared;
   std::vector<std::uint32_t> newest;  // For SweepSharedNodes.
   Evidence evidence;
@@ -39,11 +39,11 @@ struct ShellRelationScratch {
 /// Sets `moved` to `history` after the motion of its box, as MoveWithBox for rings.
 void MoveWithBox(const BoxMotion& motion, const ShellHistory& history, ShellHistory& moved);
 
-/// Finds the related shells by the rules for rings (core/IDENTITIES.md). Shells move by the
-/// displacement of their samples, else by their velocities, else not at all; then the nodes that
-/// they share are counted. If samples contradict the nodes, the samples decide. `relations` has
-/// each pair once, in no particular order.
-/// Cost: n log n in runs, shells and samples.
+/// Finds the related shells by the rules for rings (core/IDENTITIES.md). First moves the shells of
+/// the last frame by the median displacement of their samples; by their velocities if no shell has
+/// samples. Also moves the shells of this frame backward by their velocities. Then counts the nodes
+/// that shells share. If samples contradict the nodes, the samples decide. `relations` gets each
+/// pair once, in no particular order. Cost: n log n in runs, shells and samples.
 void RelateShells(const ShellHistory& previous, const ShellsNow& now, ShellRelationScratch& scratch,
                   std::vector<Relation>& relations);
 

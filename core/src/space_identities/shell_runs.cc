@@ -16,12 +16,10 @@ std::uint32_t ShellOfVertex(const ShellInput& input, std::uint32_t vertex) {
   return input.shell_of[is_dropped ? input.thin[vertex].corners[0] : vertex];
 }
 
-/// Whether a shell will be cut at the faces of a periodic box.
 bool IsCut(const ShellInput& input, std::uint32_t shell) {
   return input.cut != nullptr && input.cut->any && input.cut->is_cut[shell] != 0;
 }
 
-/// Finds the outer shell of each body.
 void FindShellsOfBodies(const ShellInput& input, NumberedShells& shells) {
   const Bodies& bodies = input.bodies;
   shells.shell_of_body.assign(bodies.bodies.size(), kNoShell);
@@ -38,14 +36,14 @@ void FindShellsOfBodies(const ShellInput& input, NumberedShells& shells) {
   }
 }
 
-/// Lists the crossed edges along x, and around a node of each particle without a body that is an
-/// ellipsoid.
+/// Lists the crossed edges along x. An ellipsoid of a particle without a body gets two edges,
+/// around its node.
 void ListEdges(const ShellInput& input, NumberedShells& shells) {
   const BrickDirectory& bricks = input.bins.bricks;
   shells.edges.clear();
   for (std::uint32_t brick = 0; brick < bricks.size(); ++brick) {
     const BrickCoordinate at = bricks[brick];
-    // Along x come first among the vertices of a brick.
+    // Edges along x have the first vertices of a brick.
     std::uint32_t vertex = input.crossings.bricks[brick].first_edge;
     for (int k = 0; k < kBrickSize; ++k) {
       for (std::uint64_t bits = input.crossings.bricks[brick].crossed[0][k]; bits != 0;
@@ -72,7 +70,7 @@ void ListEdges(const ShellInput& input, NumberedShells& shells) {
     shells.edges.push_back({z, y, x - 1, shell, false});
     shells.edges.push_back({z, y, x, shell, true});
   }
-  // Two ellipsoids at neighbouring nodes: the first one ends before the second one begins.
+  // Of two ellipsoids at neighbouring nodes, the first one ends before the second one begins.
   std::sort(shells.edges.begin(), shells.edges.end(),
             [](const NumberedShells::Edge& a, const NumberedShells::Edge& b) {
               return std::tie(a.layer, a.row, a.node, b.begins_inside, a.shell) <
@@ -88,7 +86,7 @@ std::uint32_t NumberOf(std::uint32_t shell, NumberedShells& shells) {
   return shells.number[shell];
 }
 
-/// The nodes in the half-open box of the bodies that are cut.
+/// The nodes in the box, without those on its upper faces.
 struct NodeBox {
   std::array<std::int32_t, 3> first, last;
 
@@ -102,7 +100,7 @@ struct NodeBox {
     }
   }
 
-  /// Clips a run; false if nothing remains.
+  /// Clips a run. Returns false if nothing remains.
   bool Clip(ShellRun& run) const {
     run.first = std::max(run.first, first[0]);
     run.last = std::min(run.last, last[0]);
@@ -111,7 +109,6 @@ struct NodeBox {
   }
 };
 
-/// Whether all points of a shell lie in the box.
 bool LiesInBox(const ShellInput& input, const Surface& surface, std::uint32_t shell) {
   for (std::uint32_t p = surface.point_offsets[shell]; p < surface.point_offsets[shell + 1]; ++p) {
     const Vec3 at = (1 / input.cell_size) * Vec3At(surface.points, p);
@@ -123,8 +120,8 @@ bool LiesInBox(const ShellInput& input, const Surface& surface, std::uint32_t sh
   return true;
 }
 
-/// Sets the shell that has the number of each shell: all images of a body that is cut have that of
-/// the first one. kNoShell for their cavities that do not remain.
+/// Finds the shell whose number each shell gets. Images of a cut body get the number of the first
+/// image. Cavities of cut bodies get none (kNoShell) if they do not lie in the box.
 void FindStandIns(const ShellInput& input, const Surface& surface, NumberedShells& shells) {
   std::vector<std::uint32_t>& stand_in = shells.stand_in;
   stand_in.resize(surface.ShellCount());
@@ -150,7 +147,7 @@ void CollectRuns(const ShellInput& input, const Surface& surface, NumberedShells
     const NumberedShells::Edge &from = shells.edges[k - 1], &to = shells.edges[k];
     if (from.layer != to.layer || from.row != to.row || from.node == to.node) continue;
     std::uint32_t shell = to.shell;
-    if (!to.begins_inside) {  // The nodes of the run are outside.
+    if (!to.begins_inside) {  // Its nodes are outside.
       if (surface.outer_of[shell] == kNoShell) shell = from.shell;
       if (surface.outer_of[shell] == kNoShell) continue;
     } else if (surface.outer_of[shell] != kNoShell) {
@@ -163,8 +160,7 @@ void CollectRuns(const ShellInput& input, const Surface& surface, NumberedShells
     run.shell = NumberOf(stand_in, shells);
     runs.push_back(run);
   }
-  // Each shell has a run, so this numbers no other shells unless that is wrong, or a body that is
-  // cut has no node in the box.
+  // Also numbers shells without a run: cut bodies may have no node in the box.
   for (std::uint32_t shell = 0; shell < surface.ShellCount(); ++shell) {
     const std::uint32_t stand_in = shells.stand_in[shell];
     if (stand_in != kNoShell) shells.number[shell] = NumberOf(stand_in, shells);
@@ -177,7 +173,7 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
   shells.particles.assign(shells.shells.size(), 0);
   for (std::uint32_t p = 0; p < body_of.size(); ++p) {
     if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
-    // Copies are particles of bodies that are whole.
+    // Copies count for bodies that are not cut.
     const bool counts_images = !input.bins.are_images_mirrored && !input.bodies.IsCut(body_of[p]);
     if (input.bins.IsImage(p) && !counts_images) continue;
     const std::uint32_t number = shells.number[shells.shell_of_body[body_of[p]]];

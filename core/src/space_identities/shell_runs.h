@@ -1,4 +1,4 @@
-// The shells of a frame as sets of lattice nodes, and the shell that each particle belongs to.
+// The shells of a frame as sets of lattice nodes, and the shell of each particle.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace partiemc {
 
-/// The row of a run. Rows are ordered by layer, then row.
+/// The row of a run, for SweepSharedNodes: its layer and its row in the layer.
 inline std::pair<std::int32_t, std::int32_t> RowOf(const ShellRun& run) {
   return {run.layer, run.row};
 }
@@ -30,7 +30,7 @@ inline std::uint32_t PieceOf(const ShellRun& run) { return run.shell; }
 
 namespace space {
 
-/// Results of the earlier stages.
+/// The frame and the results of the earlier stages.
 struct ShellInput {
   const Frame& frame;
   const SpaceBins& bins;
@@ -42,40 +42,41 @@ struct ShellInput {
   std::span<const std::uint32_t> shell_of;  ///< By vertex, also of drops (MeshScratch).
   double cell_size;                         ///< World units.
   LatticePeriods periods = {};
-  /// With copies of particles: the shells that will be cut. Empty or null otherwise.
+  /// The shells that will be cut at the faces of a periodic box; null or empty if there are none.
   const CutShells* cut = nullptr;
-  Vec3 low = {}, high = {};   ///< Then: the box in cells; infinite along axes without copies.
+  Vec3 low = {}, high = {};   ///< With `cut`: the box in cells; infinite along axes without copies.
   BoxMotion box_motion = {};  ///< Motion of the box since the last frame, in cells.
   std::optional<PeriodicBox> box_to_store = std::nullopt;  ///< For ShellHistory::box.
 };
 
 /// The shells of a frame, numbered from 0 in the order of their first runs: by layer, row, node.
 struct NumberedShells {
-  std::vector<KnownShell> shells;        ///< By number; `outer` is a number.
+  std::vector<KnownShell> shells;        ///< By number; KnownShell::outer is a number.
   std::vector<std::uint64_t> particles;  ///< By number.
-  /// By shell of the surface; kNoShell for cavities of cut bodies that do not lie in the box.
+  /// By shell of the surface: its number. kNoShell for cavities of cut bodies that do not lie in
+  /// the box.
   std::vector<std::uint32_t> number;
   std::vector<std::uint32_t> of_particle;    ///< By particle of the bins: number, or kNoShell.
-  std::vector<std::uint32_t> surface_shell;  ///< By number.
+  std::vector<std::uint32_t> surface_shell;  ///< By number: its (first) shell of the surface.
 
   struct Edge {
-    std::int32_t layer, row, node;  // The lower node.
+    std::int32_t layer, row, node;  // Its lower node.
     std::uint32_t shell;            // Index in the surface.
     bool begins_inside;
   };
   std::vector<Edge> edges;                   ///< Scratch: the crossed edges along x.
-  std::vector<std::uint32_t> shell_of_body;  ///< Scratch: the outer shell.
-  std::vector<std::uint32_t> stand_in;       ///< Scratch: by shell, the shell with its number.
+  std::vector<std::uint32_t> shell_of_body;  ///< Scratch: by body, its outer shell.
+  std::vector<std::uint32_t> stand_in;  ///< Scratch: by shell, the shell that gives its number.
 };
 
-/// Collects the runs of the shells and numbers the shells. `surface` has shells.
+/// Collects the runs of the shells, with numbers, and sets all members of `shells`.
 ///
-/// A run lies between two crossed edges of a row. The run of a body belongs to its outer shell. A
-/// run of outside nodes belongs to a cavity if an end of it is on the shell of the cavity. An
-/// ellipsoid has the nodes of its body; one that replaces a particle without a body has one node,
+/// A run lies between two crossed edges of a row. A run of a body belongs to its outer shell. A run
+/// of outside nodes belongs to a cavity if one of its ends is on the shell of the cavity. An
+/// ellipsoid has the nodes of its body. If it replaces a particle without a body, it has one node,
 /// the lowest of the particle's cell (space_vertices/drops.h).
 ///
-/// Of a body that will be cut, only the nodes in the box count, and its images have one number.
+/// If a body will be cut, only its nodes in the box count, and all its images have one number.
 /// Cost: n log n in the crossed edges along x, linear in particles and shells.
 void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
                   std::vector<ShellRun>& runs);

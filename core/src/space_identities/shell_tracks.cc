@@ -10,7 +10,7 @@
 namespace partiemc::space {
 namespace {
 
-/// Reserves a range of samples for each shell, one for each particle, but at most kMaxSamples.
+/// Reserves a range of samples for each shell: one for each particle, at most kMaxSamples.
 void ReserveShellSamples(const NumberedShells& shells, ShellTracks& t) {
   t.first_sample.clear();
   std::uint32_t count = 0;

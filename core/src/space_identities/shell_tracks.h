@@ -18,15 +18,15 @@ struct NodeShift {
   friend bool operator==(const NodeShift&, const NodeShift&) = default;
 };
 
-/// A sample of the last frame that is in a body of this frame.
+/// A sample of the last frame whose particle is in a body of this frame.
 struct FoundShellSample {
-  std::uint32_t before = 0, now = 0;  ///< Its shells: index in the history; number.
+  std::uint32_t before = 0, now = 0;  ///< Its shells: index in the history; number in this frame.
   NodeShift displacement;             ///< Since the last frame.
 };
 
-/// Samples of a frame and their warm buffers.
+/// Samples of a frame, and warm buffers.
 struct ShellTracks {
-  std::vector<ShellSample> samples;     ///< In any order; `shell` is a number.
+  std::vector<ShellSample> samples;     ///< By number; ShellSample::shell is a number.
   std::vector<FoundShellSample> found;  ///< By `before`, then `now`.
 
   // Scratch.
@@ -39,11 +39,11 @@ struct ShellTracks {
   std::vector<Sum> velocity;  // By number.
 };
 
-/// If the frame has ids, samples the bodies and finds the samples of the last frame; if it has
+/// If the frame has ids, samples the bodies and finds the samples of the last frame. If it has
 /// velocities, sets the mean velocity of each body.
 ///
 /// The samples of a body are its kMaxSamples particles with the smallest hashes of their ids, as
-/// for rings (identities/ring_samples.h). The means are sums of integers. Therefore nothing depends
+/// for rings (identities/ring_samples.h). The means come from sums of integers. So no value depends
 /// on the order of the particles.
 /// Requires: a checked frame; the velocities of `shells` are 0. Cost: linear in particles.
 void FollowShells(const Frame& frame, const SpaceBins& bins, const ShellHistory& previous,

@@ -20,7 +20,7 @@ std::uint32_t RootOf(std::vector<Image>& images, std::uint32_t body) {
   return body;
 }
 
-/// Extends the box of a body by a part of it in a brick.
+/// Extends the box of an image by its nodes in one brick. `origin`: the brick's lowest node.
 void IncludePart(const Vec3& origin, const BrickBits& nodes, Image& image) {
   std::uint64_t columns = 0;
   int first = kBrickSize, last = 0;
@@ -65,8 +65,8 @@ bool IsWithin(const BodyImageInput& input, const Vec3& at) {
          at.x <= input.high.x && at.y <= input.high.y && at.z <= input.high.z;
 }
 
-/// Joins the bodies that share a particle, and counts the particles of each set. Copies outside of
-/// the planes do not count.
+/// Joins the images that share a particle, and counts their particles. Ignores copies outside of
+/// the planes.
 void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies) {
   const std::size_t given = input.lifted.particles;
   const Frame& frame = input.lifted.frame;
@@ -110,7 +110,7 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
   }
 }
 
-/// Whether the surface of a body lies within the planes.
+/// Whether the surface of an image lies within the planes.
 bool IsComplete(const BodyImageInput& input, const Image& image) {
   const Vec3 cell{1, 1, 1};
   const Vec3 low = input.cell_size * (image.low - cell);
@@ -118,7 +118,7 @@ bool IsComplete(const BodyImageInput& input, const Image& image) {
   return IsWithin(input, low) && IsWithin(input, high);
 }
 
-/// Finds the image of each set that remains whole.
+/// Finds the image of each body that remains whole.
 void FindBest(const BodyImageInput& input, const Bodies& bodies, std::vector<Image>& images) {
   for (std::uint32_t body = 0; body < images.size(); ++body) {
     Image& set = images[RootOf(images, body)];
@@ -128,7 +128,7 @@ void FindBest(const BodyImageInput& input, const Bodies& bodies, std::vector<Ima
   for (Image& set : images) {
     if (set.best == kNoIndex) continue;
     const Body& best = bodies.bodies[set.best];
-    // An image with a particle and its copy has more.
+    // Fewer: particles are missing. More: the image has a particle and its copy.
     if (best.particles + best.images != set.particles) set.best = kNoIndex;
   }
 }

@@ -1,5 +1,5 @@
-// Decides which bodies of a frame with copies of particles are whole, and which are cut at the
-// faces of the periodic box.
+// Decides which bodies of a frame with copies of particles remain whole, are dropped, or are cut at
+// the faces of the periodic box.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,8 @@ namespace partiemc::space {
 struct BodyImageInput {
   const LiftedFrame& lifted;
   const SpaceBins& bins;
-  /// Bodies within these planes are complete; infinite along axes without copies. World units.
+  /// The planes, as corners of a box. Bodies within them are complete. Infinite along axes without
+  /// copies. World units.
   Vec3 low, high;
   double spacing, cell_size;  ///< World units.
   bool wraps = false;         ///< PeriodicBox::wraps.
@@ -28,10 +29,10 @@ struct BodyImageInput {
 struct BodyImageScratch {
   struct Image {
     Vec3 low, high;                ///< Bounding box of its nodes, in cells.
-    std::uint32_t set = kNoIndex;  ///< A body of the same set, with a smaller or the same index.
-    std::uint64_t given = 0;       ///< Its particles without copies.
-    bool has_copies = false;       ///< Of its set.
-    // Only the first body of a set has these:
+    std::uint32_t set = kNoIndex;  ///< Union-find: an image of the same body, or itself.
+    std::uint64_t given = 0;       ///< Its given particles, without copies.
+    bool has_copies = false;       ///< Whether it has copies; for the first image: whether any has.
+    // Set for the first image only, over all images:
     std::uint64_t particles = 0;
     double volume = 0;
     std::uint32_t best = kNoIndex;  ///< The image that remains whole.
@@ -46,27 +47,27 @@ struct BodyImageScratch {
 ///   - Among the images within the planes, the image with the most given particles remains whole,
 ///     at a tie the first one. The other images are dropped.
 ///   - If there is no such image, or it lacks particles of the body, all images are cut. If the box
-///     wraps, this is so for all bodies with copies.
-/// Sets the particles and the volume of each body to the sum of all its images. If a particle has
-/// no body but its copy has one, it belongs to this body, and its own body is kDroppedBody, so that
-/// it does not become a drop; in a box that wraps, the same for copies. Bodies without particles
-/// remain whole.
+///     wraps, all images of bodies with copies are cut.
+/// Sets the particles and the volume of each image to the sum over all images. If a given particle
+/// has no body but a copy of it has one, the particle counts for that body. To prevent a drop
+/// there, it gets the body kDroppedBody. In a box that wraps, so do copies without a body whose
+/// particle has one.
 /// Requires: FindBodies. Deterministic. Cost: linear in particles and parts.
 void ChooseImages(const BodyImageInput& input, BodyImageScratch& scratch, Bodies& bodies);
 
 /// The shells of the bodies that are cut.
 struct CutShells {
   bool any = false;
-  /// By shell: not 0. kLoneDrop for the ellipsoid of a particle without a body, which counts for
-  /// identities although its node may lie outside of the box.
+  /// By shell: 0 if it is not cut, else 1, or kLoneDrop for the ellipsoid of a particle without a
+  /// body. The ellipsoid's node counts for identities even outside of the box.
   std::vector<std::uint8_t> is_cut;
   static constexpr std::uint8_t kLoneDrop = 2;
   std::vector<std::uint32_t> outer_of;  ///< By shell: the first outer shell of its body.
   std::vector<std::uint32_t> first;     ///< Scratch: by body.
 };
 
-/// Finds the shells of bodies that are cut, cavities included. `body_of_shell`: the body of each
-/// shell, or kNoIndex for an ellipsoid. Linear in shells and bodies.
+/// Finds the shells of bodies that are cut, cavities included. `body_of_shell`: by shell, its body;
+/// kNoIndex for an ellipsoid of a particle without a body. Cost: linear in shells and bodies.
 void FindCutShells(const Bodies& bodies, std::span<const std::uint32_t> body_of_shell,
                    const Surface& surface, CutShells& shells);
 

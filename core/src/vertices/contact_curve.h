@@ -45,10 +45,9 @@ class ContactCurve {
   };
 
   /// Fits the part of the stretch from 1.5 h above the wall by least squares. `spacing`: h in
-  /// cells. Empty if this part is too short, or if the curve does not meet the wall of the contact
-  /// nearby, at an angle of at least about ten degrees. Empty also if another solid covers the wall
-  /// between the contact and the foot. Cost: linear in the points and in the lines near the
-  /// contact.
+  /// cells. Empty if this part is too short, or if the curve does not meet the wall nearby at ten
+  /// degrees or more. Empty also if another solid covers the wall between the contact and the foot.
+  /// Cost: linear in the points and in the lines near the contact.
   static std::optional<ContactCurve> Fit(const Surroundings& around, const WallPlace& contact,
                                          double spacing, StretchPoint point);
 

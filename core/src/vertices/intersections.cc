@@ -5,7 +5,7 @@
 // Successive runs of a ring form a block. A hierarchical grid finds blocks that are near each
 // other. Each block is stored in one cell: the cell at its lower left corner, in the grid whose
 // cells are just larger than its box. A block is compared with blocks of the same grid and of
-// coarser grids. In each of these grids, only a few cells can hold blocks that reach it. Comparing
+// coarser grids. In each of these grids, only a few cells can hold blocks that touch it. Comparing
 // all runs of two blocks costs less than finding the neighbours of each run in a grid.
 #include "vertices/intersections.h"
 

@@ -21,7 +21,6 @@ struct WindowMeasures {
 /// Measures the part of a ring in a window. Requires: at least one point.
 WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window);
 
-/// Measures all rings, in parallel.
 void MeasureRings(Rings& rings);
 
 }  // namespace partiemc

@@ -47,9 +47,9 @@ inline std::int32_t LengthInSizes(std::int32_t length, float from_size, float to
 }
 
 /// The size of a closed ring, with the margin that windows of `reach` cells need. `sizes`: by
-/// vertex, the local size, by which lengths are divided; empty if all are 1. Lengths are those of
-/// LengthInUnits, as in the windows. With exact lengths, the margin could be too short for nearly
-/// coincident vertices. Requires: at least one vertex. Cost: linear in the vertices.
+/// vertex, the local size, by which lengths are divided; empty if all are 1. Sums LengthInUnits, as
+/// the windows do: by exact lengths, the margin could be too short for nearly coincident vertices.
+/// Requires: at least one vertex. Cost: linear in the vertices.
 PeriodicRingSize SizeForWindows(std::span<const Point> ring, std::span<const float> sizes,
                                 double reach);
 

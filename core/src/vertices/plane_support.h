@@ -11,9 +11,9 @@
 namespace partiemc {
 
 /// Selects and weighs the particles that support a plane. A particle supports a plane if it is
-/// nearer to the plane's point than `radius`, and less than `height` above the plane. The weight of
-/// a particle is B(distance, radius) max(0, u / spacing + depth)^8, where u is its height above the
-/// bent plane, and B(d, r) = max(0, 1 - d^2 / r^2)^2. Lengths are in cells.
+/// nearer to the plane's point than `radius`, and less than `height` above the plane. With the
+/// height u above the bent plane, its weight is B(distance, radius) max(0, u / spacing + depth)^8.
+/// Here B(d, r) = max(0, 1 - d^2 / r^2)^2. Lengths are in cells.
 ///
 /// If sizes differ, all distances are divided by the plane's size. The height of a particle is then
 /// the height of its boundary, half its size above its centre, less half a spacing. Its size over

@@ -67,8 +67,7 @@ void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Marks the misplaced rings, and the rings whose boxes begin before them and hold their leftmost
-// points. Marks all rings if more than kMostMisplaced are misplaced, because the search takes the
-// number of rings times that of misplaced rings.
+// points. Marks all rings if many are misplaced, because each one is compared with all rings.
 void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   if (scratch.misplaced.size() > kMostMisplaced) {
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});

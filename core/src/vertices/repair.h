@@ -24,11 +24,10 @@ struct RepairScratch {
 /// are simple, do not touch and are nested by `outer_of`. `roots` has one root for each point of
 /// the rings, interleaved, in world units.
 ///
-/// In a round with segments that cross or touch, both ends of each and the points next to these
-/// ends move half way back, from the fifth round on all the way. In other rounds, misplaced rings
-/// return as a whole, with the rings around them. A ring is misplaced if it is turned inside out,
-/// or if another ring has passed over it. Ordinary frames need no round. After 24 rounds, all
-/// points return.
+/// If segments cross or touch, a round moves their ends, and the points next to these, half way
+/// back; from the fifth round on all the way. Without such segments, misplaced rings return as a
+/// whole, with the rings around them. A ring is misplaced if it is turned inside out, or if another
+/// ring has passed over it. Ordinary frames need no round. After 24 rounds, all points return.
 ///
 /// Returns false if rings cross or are misplaced with every point at its root. This is a bug,
 /// because rings through the roots are simple and nested (core/METHOD.md, "Why rings are simple";

@@ -145,8 +145,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
       if (!vertices.is_kept[i]) continue;
-      // The cell vertex of the segment comes after its edge vertex and is always kept, so its index
-      // remains.
+      // The cell vertex comes after the edge vertex and is always kept, so its index remains.
       placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
       Store(vertices.point[i], cell_size, &rings.points[2 * point]);
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);

@@ -29,12 +29,12 @@ struct PlacedVertices {
   /// By segment: its cell's vertex, for `marching-squares` its entry crossing, as an index of a
   /// point of Rings; or kNoPoint.
   std::vector<std::uint32_t> point_of_segment;
-  std::vector<std::uint32_t> kept_as;  ///< By ring: its index in Rings, or kNoRing.
+  std::vector<std::uint32_t> kept_as;  ///< By ring of the topology: its index in Rings, or kNoRing.
   /// The anchor of each point, to which the repair may move it; interleaved, in world units. Empty
   /// except for `virtual-plane`.
   std::vector<double> roots;
-  /// By ring of Rings, if bodies were cut (cut/ring_cut.h): the outer ring of its component in the
-  /// topology. Else empty; then rings have the order of the topology.
+  /// Set by CutRings (cut/ring_cut.h) in frames with copies of particles, else empty. By ring of
+  /// Rings: the outer ring of its component in the topology.
   std::vector<std::uint32_t> group_of_ring;
   /// Pairs of segments that touch; 0 for placements that guarantee simple rings.
   std::uint64_t self_intersections = 0;
@@ -83,7 +83,7 @@ struct RingVertices {
 struct VertexScratch {
   std::vector<double> points;         ///< One or two for each segment; not for `virtual-plane`.
   RingVertices vertices;              ///< `virtual-plane` only.
-  WallVertices walls;                 ///< Of the points of the rings.
+  WallVertices walls;                 ///< By point of the rings.
   std::vector<float> sizes;           ///< By point: the factor of its offset (CorrectVolume).
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
@@ -101,7 +101,7 @@ struct VertexInput {
   const ReconstructionParameters& parameters;
   const VirtualPlaneVariant& variant;
   const Scale& scale;
-  const Percolation* percolation = nullptr;  ///< Null unless bodies will be cut.
+  const Percolation* percolation = nullptr;  ///< Null without copies of particles.
   const WallField* walls = nullptr;          ///< Null without walls.
 };
 

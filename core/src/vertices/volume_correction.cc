@@ -28,8 +28,8 @@ struct RingPart {
   double area, perimeter;
 };
 
-// The part of a ring that counts. Of a body that will be cut, this is the part in the window. The
-// rest surrounds copies of its particles.
+// The part of a ring that counts. If the body will be cut, this is the part in the window: the rest
+// surrounds copies of its particles.
 RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) {
   const RingMeasures& whole = rings.measures[ring];
   if (input.percolation == nullptr || !input.percolation->IsCut(input.topology, ring)) {
