@@ -17,7 +17,8 @@ struct CallerQuota {
   std::optional<std::uint32_t> calls;     ///< Concurrent calls of all methods.
   std::optional<std::uint32_t> streams;   ///< Open streams.
   std::optional<std::uint32_t> watchers;  ///< Open watches.
-  std::optional<std::uint64_t> bytes;     ///< Bytes of requests and responses held by the server.
+  /// Bytes of requests and responses held by the server; separately, bytes of states of streams.
+  std::optional<std::uint64_t> bytes;
 
   friend bool operator==(const CallerQuota&, const CallerQuota&) = default;
 };
