@@ -42,8 +42,8 @@ class FrameOutputs {
   /// colours that surfaces do not have, and for `compress_glb` without GLB files.
   static absl::Status Check(const Places& places);
 
-  /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: as Check and AtomicFile.
+  /// Creates the output directory and opens the file of statistics. If an existing directory is not
+  /// writable, the first Write fails. Errors: as Check and AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
   /// Whether a file shows the normals of ring vertices.

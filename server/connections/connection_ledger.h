@@ -12,8 +12,9 @@ namespace partiemc::server {
 
 /// Limits of one connection. The defaults are the limits of a server without options.
 struct ConnectionRules {
-  /// Maximum number of received bytes that belong to no call and no message. gRPC 1.51 uses up to
-  /// 40 bytes of memory for each (if headers have four bytes). 0: no limit, and no Flood::kHeaders.
+  /// Maximum of the received bytes that belong to no call and no message, less 16 KiB for each
+  /// second (ConnectionLedger). gRPC 1.51 uses up to 40 bytes of memory for each of them; the worst
+  /// case is headers of four bytes. 0: no limit, and no Flood::kHeaders.
   std::uint64_t unaccounted_bytes = std::uint64_t{512} << 10;
   /// Maximum size of a message.
   std::uint64_t max_message_bytes = std::uint64_t{64} << 20;

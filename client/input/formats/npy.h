@@ -36,7 +36,7 @@ struct NpyHeader {
 
 /// Reads the header. `name` is for messages. Errors: kDataLoss for an invalid header or a frame of
 /// over 4 GiB; kUnimplemented for elements without plain numbers (Python objects, text, complex,
-/// half precision).
+/// half precision), and for structured arrays with nested, titled or object fields.
 absl::StatusOr<NpyHeader> ReadNpyHeader(ByteSource& source, const std::string& name);
 
 /// Reads the header, the text of a Python dict, and stops before the elements. Errors: kDataLoss.

@@ -17,7 +17,7 @@ struct Scale {
   bool is_slice = false;         ///< Slice or surface: particles fill space; volumes are cubic.
   bool has_own_sizes = false;    ///< Sizes::kOwn: particle i has the kernel radius beta h_i.
   bool has_grains = false;       ///< Boundary::kGrains: particles are discs.
-  SizeRange sizes;               ///< Both 1 for equal sizes.
+  SizeRange sizes;               ///< Both 1 for Sizes::kEqual.
   double spacing = 0;            ///< h.
   double kernel_radius = 0;      ///< R = beta h.
   double reach = 0;              ///< The largest kernel radius of a particle.

@@ -15,7 +15,7 @@ namespace partiemc {
 /// node at which two interior cells touch diagonally, each loop stays with its cell.
 struct Staircases {
   std::vector<TilePlace> corners;      ///< Corners, and requested nodes on straight parts.
-  std::uint64_t straight_nodes = 0;    ///< Number of requested nodes in `corners`.
+  std::uint64_t straight_nodes = 0;    ///< Number of requested nodes on straight parts.
   std::vector<std::uint32_t> offsets;  ///< Loop k has corners [offsets[k], offsets[k + 1]).
   std::uint64_t pinches = 0;
   std::vector<BitRows> visited;  ///< Scratch: bottom edges that a loop has passed.

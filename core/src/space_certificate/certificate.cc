@@ -90,7 +90,9 @@ bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
   });
 }
 
-/// Sets the vertices and nodes of refused faces back. Returns whether any of them could move.
+/// Sets the vertices of refused faces back, and counts a setback for their nodes (moved_nodes.h).
+/// Returns false if all these vertices are at their anchors, and all these nodes have had
+/// kMostSetbacks.
 bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
               const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
               Certificate& certificate) {

@@ -67,7 +67,8 @@ class FaceChecker {
   /// than FaceOf and FindMode.
   bool IsPlainlyValid(const std::array<int, 3>& cell, int face);
 
-  /// Returns whether a mode is valid, and sets `mode` to it. A face without crossings has no mode.
+  /// Returns whether the face is valid. If it has crossings, sets `mode` to a valid mode; otherwise
+  /// `mode` has no meaning.
   bool FindMode(const Face& face, QuadMode& mode) const;
 
   /// Calls visit(item) for the vertices and nodes of a bipyramid that may move.

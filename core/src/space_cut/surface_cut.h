@@ -55,20 +55,21 @@ struct SurfacePieces {
   std::vector<std::uint8_t> has_cuts;  ///< Whether it has triangles on a plane.
 };
 
-/// Replaces the shells that are cut by their parts. `surface.cuts` lists the triangles on the
-/// planes; triangles already listed stay listed. Each part that has triangles on a plane is an
-/// outer shell. Other parts are whole shells and keep their measures. The parts of a shell take its
-/// place; parts without a point of the given surface come last.
+/// Replaces each shell that crosses a plane with its parts. `surface.cuts` lists the triangles on
+/// the planes; triangles already listed stay listed. Each part that has triangles on a plane is an
+/// outer shell. A part without such triangles is a whole shell, and keeps area, volume and
+/// centroid. The parts of a shell take its place; parts without a point of the given surface come
+/// last.
 ///
 /// Drops dust: parts smaller than 1e-9 of their distance from the origin, or thinner than rounding.
 /// Their measures would have no correct digits.
 ///
-/// The largest part of a body gets the particles, identity and parents of the body's first outer
-/// shell; other parts have none.
+/// Of the outer parts of a body, the largest gets the particles, identity and parents of the body's
+/// first outer shell; the others get none. Whole cavities keep theirs.
 ///
 /// If a vertex lies on a plane, or rounding leaves a decision open, all planes move. Those with the
-/// same axis move alike, by up to .0002 spacings plus 3e-9 of the coordinate (kShifts in
-/// surface_cut.cc). Walls move by at most a seventh of this, each on its own. Returns false, with
+/// same axis move alike, by up to .00021 spacings plus 3e-9 of their largest coordinate (kShifts in
+/// surface_cut.cc). Walls move by at most a sixth of this, each on its own. Returns false, with
 /// `surface` unchanged, if this does not help, which is a bug. Requires: S1 to S5;
 /// `surface.attributes` without values. Deterministic. Cost: linear in the surface, plus CutAtPlane
 /// and CapPlanes, plus ShellsAround if a shell with a cavity falls into several parts.

@@ -29,9 +29,9 @@ class HierarchicalGrid {
   /// `bounds` contains all boxes; `mean_extent` is their mean extent.
   HierarchicalGrid(const Box& bounds, double mean_extent)
       : origin_{bounds.left, bounds.bottom},
-        // With cells of twice the mean extent, nearly all boxes lie in one grid, and a cell has few
-        // candidates. The second term keeps indices below 2^27, the third keeps sizes above 0 if
-        // all points coincide.
+        // With cells of twice the mean extent, nearly all boxes are in the finest grid, and a cell
+        // has few candidates. The second term keeps indices at or below 2^27, the third keeps sizes
+        // above 0 if all points coincide.
         finest_(std::max(
             {2 * mean_extent, bounds.Extent() * 0x1p-27, std::numeric_limits<double>::min()})) {
     for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);

@@ -265,7 +265,7 @@ export class Pane {
 
   get outlines(): readonly Outline[] { return this.track.outlines; }
 
-  /** Index of the outline that the pane shows: 0 if the frame lacks the chosen one. */
+  /** Index of the outline that the pane shows: 0 if the stream lacks the chosen one. */
   private get outlineShown(): number {
     const chosen = this.look?.outlineShown ?? 0;
     return chosen < this.outlines.length ? chosen : 0;
