@@ -143,7 +143,9 @@ void StreamStateMachine::Granted(std::uint64_t bytes) {
 
 void StreamStateMachine::ReadPermitted() {
   const Event event(*this);
-  if (state_.reading == Reading::kPermit) Read(Reading::kNext);
+  if (state_.reading != Reading::kPermit) return;
+  counts_.last_activity = std::chrono::steady_clock::now();  // The client's time begins again.
+  Read(Reading::kNext);
 }
 
 // Ends a stream whose read in progress exceeds the memory (ReadPermits). Abandoning the stream also
@@ -211,7 +213,9 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
     }
     return look_again;
   }
-  const bool waits_for_us = opens || computed_ < read_;
+  const bool waits_for_permit =
+      state_.reading == Reading::kPermit && state_.writing == Writing::kIdle;
+  const bool waits_for_us = opens || computed_ < read_ || waits_for_permit;
   const TimePoint due = (waits_for_us ? now : counts_.last_activity) + limit;
   if (now < due) return std::min(look_again, due);
   if (state_.writing != Writing::kIdle) {
@@ -371,6 +375,7 @@ void StreamStateMachine::DecideCompute() {
 
 void StreamStateMachine::Write(Writing what) {
   state_.writing = what;
+  counts_.last_activity = std::chrono::steady_clock::now();  // The frame's time in the server ends.
   const Outgoing outgoing = what == Writing::kOpened   ? Outgoing::kOpened
                             : what == Writing::kNotice ? Outgoing::kDraining
                                                        : Outgoing::kAnswer;
