@@ -44,6 +44,21 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
  private:
+  // Waits for the first bytes of another request.
+  void AwaitRequest() {
+    if (connection_->buffer.size() > 0) return ReadRequest();
+    parser_.reset();
+    connection_->CloseIdleAfter(kWebHeaderTime);
+    connection_->stream.async_read_some(
+        connection_->buffer.prepare(kFirstBytes),
+        [self = this->shared_from_this()](error_code error, std::size_t bytes) {
+          if (error) return self->connection_->Close();
+          self->connection_->buffer.commit(bytes);
+          self->ReadRequest();
+        });
+  }
+
+  static constexpr std::size_t kFirstBytes = 512;
   static constexpr std::size_t kFilePiece = 32 << 10;
 
   void OnHeader(error_code error) {
@@ -123,7 +138,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   void BeginPost(Methods::Method method, CallOrigin origin) {
     std::make_shared<PostCall<Stream>>(connection_, std::move(parser_), std::move(allowed_origin_),
-                                       [self = this->shared_from_this()] { self->ReadRequest(); })
+                                       [self = this->shared_from_this()] { self->AwaitRequest(); })
         ->Begin(method, std::move(origin));
   }
 
@@ -153,7 +168,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   void WriteMore() {
     if (!file_) {
       if (closes_) return connection_->CloseGently();
-      return ReadRequest();
+      return AwaitRequest();
     }
     piece_.resize(kFilePiece);
     const auto count = read(file_->file.descriptor(), piece_.data(),
