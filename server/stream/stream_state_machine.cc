@@ -27,6 +27,9 @@ std::string Name(RequestKind kind) {
 
 constexpr std::chrono::milliseconds kLookWhileOpening(100);
 
+constexpr char kIdleStreamRule[] =
+    "must do so within this time (Limits.idle_timeout_seconds); open a new stream";
+
 }  // namespace
 
 StreamStateMachine::StreamStateMachine(StreamTransport& transport, StreamHandler& handler,
@@ -219,9 +222,10 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
   const TimePoint due = (waits_for_us ? now : counts_.last_activity) + limit;
   if (now < due) return std::min(look_again, due);
   if (state_.writing != Writing::kIdle) {
-    AbandonAndCut(IdleError("takes no answer", limit));
+    AbandonAndCut(IdleError("takes no answer", limit, kIdleStreamRule));
   } else {
-    End(IdleError(is_opening ? "sends no `open`" : "sends no frame", limit));
+    End(is_opening ? IdleError("sends no `open`", limit)
+                   : IdleError("sends no frame", limit, kIdleStreamRule));
   }
   return look_again;
 }
