@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "common/printable.h"
 #include "partiemc/status.h"
@@ -23,13 +22,6 @@ absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string
                      std::string value, std::string rule) {
   return ViolationError(code,
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
-}
-
-// Quotes a client's text for messages and the log: escapes it and cuts it after 40 characters.
-std::string Quoted(const std::string& text) {
-  constexpr std::size_t kShown = 40;
-  return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
-                      text.size() > kShown ? "..." : "");
 }
 
 bool IsNameCharacter(char c) {
