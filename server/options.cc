@@ -87,9 +87,10 @@ void AddServingOptions(CLI::App& app, Raw& raw) {
       ->capture_default_str()
       ->type_name("N")
       ->envname("PARTIEMC_THREADS");
-  app.add_option("--grace-seconds", raw.grace_seconds,
-                 "Time limit of a drain: remaining calls are cancelled, and the process ends a "
-                 "second later")
+  app.add_option(
+         "--grace-seconds", raw.grace_seconds,
+         "Time limit of a drain: remaining calls are cancelled, and the process ends half a "
+         "second later")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->type_name("SECONDS")
@@ -238,7 +239,8 @@ void AddLimits(CLI::App& app, Raw& raw) {
       ->group(kGroup);
   app.add_option(
          "--memory-budget", raw.line.server.limits.memory_budget,
-         "Memory for requests, responses and histories of all streams, with a unit as in 2GB. "
+         "Memory for requests, responses, workers and histories of all streams, with a unit as in "
+         "2GB. "
          "When it is used up, streams take turns with one frame each (default: half of the "
          "memory of this machine or container)")
       ->transform(CLI::AsSizeValue(false))

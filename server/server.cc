@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <thread>
 #include <utility>
@@ -77,15 +78,17 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 }
 
 // The limits that IntakeGuard enforces for the memory of the process. The process may hold its
-// memory at the start, the workers, the states of streams, and the budget, which includes the
-// histories. In addition it may hold frames beyond the budget, and results that watchers have not
-// received yet or levels of detail of them, up to a sixteenth of the budget.
+// memory at the start, the workers, the states of streams, the newest results of streams, and the
+// budget, which includes the histories. In addition it may hold frames beyond the budget, and
+// results that watchers have not received yet or levels of detail of them, up to a sixteenth of the
+// budget.
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const StateMemory& states, const WatchRegistry& watchers,
                                     const LevelQueue& levels) {
   const std::uint64_t own_states = options.limits.max_streams * options.limits.OwnStateBytes();
   const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes +
-                                options.limits.AllHistoryBytes() + own_states;
+                                options.limits.AllHistoryBytes() +
+                                KeptBytesBeyondHistories(options.limits) + own_states;
   const std::uint64_t room = budget.bytes(), more = room / kPartsOfBudgetBeyond;
   const std::uint64_t most =
       room + options.limits.ReadBytesBeyond() + options.limits.WorkerBytesBeyond();
@@ -116,8 +119,9 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   if (getrlimit(RLIMIT_NOFILE, &descriptors) != 0) return limits;
   const std::uint64_t free =
       descriptors.rlim_cur - std::min<std::uint64_t>(descriptors.rlim_cur, kOtherDescriptors);
-  limits.connections =
-      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(free / 2, 1, limits.connections));
+  constexpr std::uint32_t kNoLimit = std::numeric_limits<std::uint32_t>::max();
+  const std::uint32_t most = limits.connections == 0 ? kNoLimit : limits.connections;
+  limits.connections = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(free / 2, 1, most));
   return limits;
 }
 

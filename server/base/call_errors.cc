@@ -21,12 +21,11 @@ absl::Status DrainingError() {
 
 absl::Status ClientGone() { return absl::CancelledError("the client went away"); }
 
-absl::Status IdleError(std::string what, std::chrono::milliseconds limit) {
+absl::Status IdleError(std::string what, std::chrono::milliseconds limit, std::string rule) {
   const std::string seconds = absl::StrCat(std::chrono::duration<double>(limit).count(), " s");
   return ViolationError(
       absl::StatusCode::kDeadlineExceeded,
-      {std::string(kReasonIdle), "client", absl::StrCat(what, " for ", seconds),
-       "must do so within this time (Limits.idle_timeout_seconds once open); open a new stream"});
+      {std::string(kReasonIdle), "client", absl::StrCat(what, " for ", seconds), std::move(rule)});
 }
 
 }  // namespace partiemc::server

@@ -25,7 +25,9 @@ absl::Status DrainingError();
 /// CANCELLED: the client has disconnected or cancelled the call.
 absl::Status ClientGone();
 /// DEADLINE_EXCEEDED (IDLE): the client has kept the call waiting for the time `limit`. `what`
-/// completes the sentence "The client ...": "sends no `open`".
-absl::Status IdleError(std::string what, std::chrono::milliseconds limit);
+/// completes the sentence "The client ...": "sends no `open`". `rule` becomes the rule of the
+/// Violation.
+absl::Status IdleError(std::string what, std::chrono::milliseconds limit,
+                       std::string rule = "must do so within this time; call again");
 
 }  // namespace partiemc::server

@@ -3,6 +3,9 @@
 #include <cstddef>
 #include <optional>
 
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+
 namespace partiemc::server {
 
 // Matches greedily from left to right and backtracks to the last `*` only. This suffices: the text
@@ -28,6 +31,12 @@ bool MatchesPattern(std::string_view pattern, std::string_view name) {
   }
   while (p < pattern.size() && pattern[p] == '*') ++p;
   return p == pattern.size();
+}
+
+std::string Quoted(std::string_view text) {
+  constexpr std::size_t kShown = 40;
+  return absl::StrCat("\"", absl::CHexEscape(std::string(text.substr(0, kShown))), "\"",
+                      text.size() > kShown ? "..." : "");
 }
 
 }  // namespace partiemc::server

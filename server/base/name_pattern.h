@@ -1,7 +1,8 @@
-// Matches stream names with the patterns of a token file.
+// Stream names: matches them with the patterns of a token file, and quotes them in messages.
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace partiemc::server {
@@ -12,5 +13,8 @@ inline constexpr std::size_t kMaxStreamNameBytes = 128;
 /// empty one), `?` matches any single character, and any other character matches itself. Cost: the
 /// product of the lengths.
 bool MatchesPattern(std::string_view pattern, std::string_view name);
+
+/// Quotes a client's text for messages and the log: escapes it and cuts it after 40 characters.
+std::string Quoted(std::string_view text);
 
 }  // namespace partiemc::server

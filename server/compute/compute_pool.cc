@@ -59,7 +59,7 @@ void ComputePool::Run() {
   std::optional<Arena> narrow;  // For jobs of competing callers.
   const MutexLock lock(mutex_);
   while (std::optional<Task> task = WaitForTask()) {
-    Begin(*task);
+    running_.push_back(task->caller);
     const bool shares = Shares(task->caller);
     std::unique_ptr<Worker> worker = TakeWorker();
     {
@@ -114,8 +114,6 @@ std::optional<ComputePool::Task> ComputePool::NextTask() {
 bool ComputePool::Shares(const CallerAccount* caller) const {
   return threads_ > 1 && recent_.AnybodyBut(caller, WarmSize::Clock::now() - kSharingTime);
 }
-
-void ComputePool::Begin(const Task& task) { running_.push_back(task.caller); }
 
 void ComputePool::End(const Task& task) {
   running_.erase(std::ranges::find(running_, task.caller));

@@ -98,7 +98,6 @@ class ComputePool {
   std::optional<Task> WaitForTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::optional<Task> NextTask() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool Shares(const CallerAccount* caller) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Begin(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void End(const Task& task) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::unique_ptr<Worker> TakeWorker() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void PutBack(std::unique_ptr<Worker> worker, BusyStreams::Mark* stream)

@@ -90,7 +90,6 @@ void MemoryBudget::GiveBack(std::uint64_t bytes, const CallerAccount* caller) {
     share_.GiveBack(caller, bytes);
     held_ -= bytes;
   }
-  may_compute_.NotifyAll();
   Grant();
   reads_.ServeWaiting();
 }
@@ -168,6 +167,7 @@ void MemoryBudget::Grant() {
       claim = claims_.erase(claim);
     }
   }
+  may_compute_.NotifyAll();  // Memory may be free now, or a claim no longer blocks the workers.
   for (const auto& [waiter, bytes] : granted) waiter->Granted(bytes);
 }
 
@@ -207,6 +207,7 @@ bool MemoryBudget::TryPlan(std::uint64_t bytes, const CallerAccount* caller) {
 void MemoryBudget::Unplan(std::uint64_t bytes, const CallerAccount* caller) {
   const MutexLock lock(mutex_);
   share_.GiveBack(caller, bytes);
+  may_compute_.NotifyAll();
 }
 
 absl::Status MemoryBudget::CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const {
@@ -221,6 +222,7 @@ void MemoryBudget::ChangeBeyond(std::uint64_t before, std::uint64_t after) {
   const MutexLock lock(mutex_);
   share_.RemoveBeyond(before);
   share_.AddBeyond(after);
+  may_compute_.NotifyAll();
 }
 
 bool MemoryBudget::FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const {

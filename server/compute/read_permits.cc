@@ -22,8 +22,7 @@ constexpr std::uint64_t kBeside = 1 << 20;
 absl::Status OutOfMemoryForReads() {
   return absl::UnavailableError(
       "the server has no memory for the frames that are on their way: connect again; the next "
-      "frame "
-      "is read when there is room");
+      "frame is read when there is room");
 }
 
 }  // namespace

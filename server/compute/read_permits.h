@@ -114,7 +114,6 @@ class ReadPermits {
   /// take turns in keeping a read. Returns the number of ended streams.
   std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  const ReadTerms& terms() const { return terms_; }
   std::size_t waiting() const { return waiting_; }
   std::size_t streams_beyond() const ABSL_LOCKS_EXCLUDED(mutex_);
 

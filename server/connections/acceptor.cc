@@ -39,7 +39,10 @@ Acceptor::Acceptor(Address address, Listeners listeners, ConnectionWatch& watch)
       sockets_(std::move(listeners.sockets)),
       wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
 
-Acceptor::~Acceptor() { StopListening(); }
+Acceptor::~Acceptor() {
+  StopListening();
+  watch_.EndWaiting();  // Their hand-over would use this object.
+}
 
 void Acceptor::Start(HandOver hand_over) {
   hand_over_ = std::make_unique<HandOverThreads>(std::move(hand_over));

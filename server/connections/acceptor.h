@@ -29,7 +29,8 @@ class Acceptor {
   static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const Address& address,
                                                           std::chrono::milliseconds dead_after,
                                                           ConnectionWatch& watch);
-  /// Stops listening. Waits until every call of the hand-over function has returned.
+  /// Stops listening. Ends the connections that wait for their hand-over, and waits until every
+  /// call of the hand-over function has returned.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;

@@ -133,7 +133,10 @@ void ConnectionLedger::CountStreams(const Counts& counts, const ConnectionReadin
   const double forgiven = static_cast<double>(rules_.max_streams) * seconds / kLingerSeconds;
   waiting_streams_ = std::max(0.0, waiting_streams_ - forgiven);
   if (!reading.has_streams) return;
-  waiting_streams_ += static_cast<double>(reading.streams_started - counted_started_) -
+  // streams_started decreases if the counts were first those of an earlier connection from the same
+  // port.
+  waiting_streams_ += static_cast<double>(reading.streams_started) -
+                      static_cast<double>(counted_started_) -
                       static_cast<double>(counts.calls_begun - counted_begun_);
   waiting_streams_ = std::max(0.0, waiting_streams_);
   counted_started_ = reading.streams_started;

@@ -53,11 +53,6 @@ std::shared_ptr<TrackedConnection> ConnectionTable::BeginCall(std::string_view p
   return connection;
 }
 
-std::size_t ConnectionTable::size() const {
-  const MutexLock lock(mutex_);
-  return connections_.size();
-}
-
 std::string NormalPeer(std::string_view peer) {
   if (!peer.starts_with("ipv6:")) return std::string(peer);
   std::string text(peer);

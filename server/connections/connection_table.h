@@ -64,8 +64,6 @@ class ConnectionTable {
   std::shared_ptr<TrackedConnection> BeginCall(std::string_view peer, CallKind kind) const
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  std::size_t size() const ABSL_LOCKS_EXCLUDED(mutex_);
-
  private:
   mutable Mutex mutex_;
   std::map<std::string, std::shared_ptr<TrackedConnection>, std::less<>> connections_

@@ -93,7 +93,10 @@ void ConnectionWatch::Start(StreamCounter* streams) {
 void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   auto peer = PeerOf(socket.get());
   Connection connection;
-  connection.socket = Descriptor(fcntl(socket.get(), F_DUPFD_CLOEXEC, 0));
+  const auto duplicate = [&socket] { return fcntl(socket.get(), F_DUPFD_CLOEXEC, 0); };
+  connection.socket = Descriptor(duplicate());
+  // The accepted connection may have taken the last free descriptor.
+  if (connection.socket.get() < 0 && EvictIdle()) connection.socket = Descriptor(duplicate());
   if (!peer || connection.socket.get() < 0) return;
   connection.peer = *std::move(peer);
   const std::string& address = connection.peer.address;
@@ -125,6 +128,16 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   by_key_.emplace(connections_.back().key, std::prev(connections_.end()));
   count_ = connections_.size();
   if (admission == Admission::kKept) hand_over(std::move(socket));
+}
+
+void ConnectionWatch::EndWaiting() {
+  const MutexLock lock(mutex_);
+  for (auto next = connections_.begin(); next != connections_.end();) {
+    const auto connection = next++;
+    if (connection->waiting.get() < 0) continue;
+    Abort(connection->socket.get());
+    Remove(connection);
+  }
 }
 
 void ConnectionWatch::EndAllAt(Clock::time_point deadline) {

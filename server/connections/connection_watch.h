@@ -66,6 +66,9 @@ class ConnectionWatch {
   /// Ends a connection that has no call, to free its descriptors. Returns false if there is none.
   /// Does not end connections that may only make health checks.
   bool EvictIdle() ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Ends the connections that wait for their hand-over. No function that Add has received is
+  /// called afterwards.
+  void EndWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Sets the time from which all connections end, so that a silent peer does not delay the drain.
   void EndAllAt(Clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 

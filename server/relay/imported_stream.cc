@@ -1,6 +1,7 @@
 #include "server/relay/imported_stream.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "partiemc/status.h"
@@ -20,6 +21,10 @@ constexpr seconds kWantEvery(1);
 constexpr seconds kFetchPatience(2);
 // Time for which an import without watchers is kept, so that watchers can reconnect.
 constexpr seconds kLinger(5);
+
+// Largest number of a result, so that each one has a successor. Messages with a larger number are
+// ignored.
+constexpr std::uint64_t kLargestNumber = std::numeric_limits<std::uint64_t>::max() - 1;
 
 constexpr char kNoAnswer[] =
     "must be a stream that its replica shows: that one does not answer; "
@@ -88,7 +93,7 @@ void ImportedStream::SetOldest(std::uint64_t sequence) {
 }
 
 void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
-  if (ended_ || result.number() == 0) return;
+  if (ended_ || result.number() == 0 || result.number() > kLargestNumber) return;
   if (result.fetch() == fetch_.fetch()) heard_ = now;
   SetOldest(result.oldest_sequence());
   if (result.first() && result.fetch() == fetch_.fetch()) DeliverUpTo(result.number() - 1);
@@ -110,7 +115,7 @@ void ImportedStream::OnMessage(relay::v1::Result& result, TimePoint now) {
 }
 
 void ImportedStream::OnMessage(const relay::v1::FetchEnd& end, TimePoint now) {
-  if (ended_) return;
+  if (ended_ || end.last_number() > kLargestNumber) return;
   if (end.gone()) {
     return Lost({std::string(kReasonProducerLost), "the producer has gone", {}}, now);
   }
@@ -171,7 +176,7 @@ void ImportedStream::DeliverWaiting(TimePoint now) {
 }
 
 void ImportedStream::OnMessage(const relay::v1::StreamEnd& end, TimePoint now) {
-  if (ended_) return;
+  if (ended_ || end.last_number() > kLargestNumber) return;
   if (fetching_ || next_number_ <= end.last_number()) {
     const bool asked = fetching_;
     end_ = end;

@@ -43,6 +43,13 @@ void PieceJoiner::Forget(const std::string& replica) {
   if (found != begun_.end()) TakeOut(found);
 }
 
+void PieceJoiner::ForgetIdle() {
+  for (auto next = begun_.begin(); next != begun_.end();) {
+    const auto begun = next++;
+    if (std::exchange(begun->second.idle, true)) TakeOut(begun);
+  }
+}
+
 std::optional<std::string> PieceJoiner::Add(std::string_view bytes) {
   relay::v1::Piece piece;
   if (!piece.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return std::nullopt;
@@ -63,6 +70,7 @@ std::optional<std::string> PieceJoiner::Add(std::string_view bytes) {
     TakeOut(found);
     return std::nullopt;
   }
+  begun.idle = false;
   begun.bytes += piece.data();
   held_bytes_ += size;
   if (++begun.next_piece < piece.pieces()) return std::nullopt;

@@ -33,6 +33,9 @@ class PieceJoiner {
   std::optional<std::string> Add(std::string_view piece);
   /// Drops the incomplete message of this sender.
   void Forget(const std::string& replica);
+  /// Drops the incomplete messages that got no piece since the last call. Such a sender may be
+  /// lost, and its message would take room from those of others.
+  void ForgetIdle();
   /// Bytes of incomplete messages.
   std::size_t held_bytes() const { return held_bytes_; }
 
@@ -40,6 +43,7 @@ class PieceJoiner {
   struct Begun {
     std::uint64_t message = 0;
     std::uint32_t next_piece = 0;
+    bool idle = false;  // No piece since ForgetIdle.
     std::string bytes;
   };
 

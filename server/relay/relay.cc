@@ -23,6 +23,9 @@ constexpr milliseconds kTickEvery(50);
 constexpr seconds kAnnounceEvery(1);
 // A replica counts as lost after this time without an announcement, so after three missing ones.
 constexpr seconds kReplicaPatience(3);
+// An incomplete message is dropped if none of its pieces arrives within this time. It may be kept
+// for twice this time.
+constexpr seconds kPiecePatience(3);
 // Time for which the knowledge about other replicas is kept while the bus is disconnected.
 constexpr seconds kBusPatience(30);
 // A stream is exported for this time after each fetch.
@@ -127,6 +130,11 @@ void Relay::Tick(TimePoint now) {
     Announce(now, false, false);
   } else if (now - announced_ >= kAnnounceEvery) {
     Announce(now, false, false);
+  }
+  if (now - pieces_checked_ >= kPiecePatience) {
+    pieces_checked_ = now;
+    joiner_.ForgetIdle();
+    asked_joiner_.ForgetIdle();
   }
   if (std::exchange(changed_, false)) EndTakenOver();
   LookAtExports(now);

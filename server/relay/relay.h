@@ -166,7 +166,7 @@ class Relay final : private RelayPort {
   bool was_asked_ = false;    // Another replica has requested an announcement.
   bool will_drain_ = false;
   const TimePoint began_ = clock_.Now();
-  TimePoint announced_, asked_, ticked_, answered_, acted_, disconnected_ = began_;
+  TimePoint announced_, asked_, ticked_, answered_, acted_, pieces_checked_, disconnected_ = began_;
   std::optional<TimePoint> connected_since_, draining_since_;
   std::promise<void> drained_;
   bool has_drained_ = false;

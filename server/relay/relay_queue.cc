@@ -18,11 +18,12 @@ std::unique_ptr<MessageBus::Subscription> RelayQueue::Listen(MessageBus& bus,
   return bus.Subscribe(subject, [queue = shared_from_this(), lane](std::string_view message) {
     const MutexLock lock(queue->mutex_);
     if (queue->stopped_) return;
-    if (queue->message_bytes_[lane] + message.size() > queue->max_bytes_[lane]) {
+    const std::size_t bytes = message.size() + kBytesOfMessage;
+    if (queue->message_bytes_[lane] + bytes > queue->max_bytes_[lane]) {
       ++queue->lost_messages_;
       return;
     }
-    queue->message_bytes_[lane] += message.size();
+    queue->message_bytes_[lane] += bytes;
     queue->work_.messages[lane].emplace_back(message);
     queue->came_.NotifyOne();
   });
@@ -40,7 +41,7 @@ bool RelayQueue::Take(std::chrono::milliseconds patience, Work& work) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     auto& waiting = work_.messages[lane];
     for (std::size_t k = 0; k < kMostMessages && !waiting.empty(); ++k) {
-      message_bytes_[lane] -= waiting.front().size();
+      message_bytes_[lane] -= waiting.front().size() + kBytesOfMessage;
       work.messages[lane].push_back(std::move(waiting.front()));
       waiting.pop_front();
     }

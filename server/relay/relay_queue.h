@@ -32,6 +32,10 @@ class RelayQueue : public std::enable_shared_from_this<RelayQueue> {
   /// Maximum number of messages of one lane that a call of Take returns.
   static constexpr std::size_t kMostMessages = 64;
 
+  /// Bytes that a queued message takes in addition to its content. They count, so that a flood of
+  /// empty messages is limited.
+  static constexpr std::size_t kBytesOfMessage = sizeof(std::string);
+
   struct Work {
     std::deque<std::function<void()>> actions;
     std::array<std::deque<std::string>, kLanes> messages;

@@ -89,7 +89,12 @@ bool ChannelzStreams::Read(const std::string& peer, std::int64_t& socket,
                            ConnectionReading& reading) {
   if (socket == 0) socket = Find(peer);
   if (socket == 0) return false;
-  const Text text(grpc_channelz_get_socket(socket), &gpr_free);
+  Text text(grpc_channelz_get_socket(socket), &gpr_free);
+  if (text == nullptr) {
+    // gRPC has closed this socket. It belonged to an earlier connection from the same port.
+    socket = Find(peer);
+    text.reset(grpc_channelz_get_socket(socket));
+  }
   if (text == nullptr) return false;
   reading.streams_started = Count(text.get(), "streamsStarted");
   const std::uint64_t ended =

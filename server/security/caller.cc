@@ -3,9 +3,9 @@
 #include <limits>
 #include <optional>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
+#include "server/base/name_pattern.h"
 
 namespace partiemc::server {
 namespace {
@@ -116,13 +116,9 @@ absl::Status Caller::CheckMayList() const { return CheckMay(terms_->may_list, "l
 
 absl::Status Caller::CheckMayUse(std::string_view stream_name) const {
   if (MayUse(stream_name)) return absl::OkStatus();
-  constexpr std::size_t kShown = 40;
-  return NotPermitted(
-      "open.stream_name",
-      absl::StrCat("\"", absl::CHexEscape(std::string(stream_name.substr(0, kShown))), "\"",
-                   stream_name.size() > kShown ? "..." : ""),
-      "must be a name that this token may use (`names=` in the server's "
-      "--token-file)");
+  return NotPermitted("open.stream_name", Quoted(stream_name),
+                      "must be a name that this token may use (`names=` in the server's "
+                      "--token-file)");
 }
 
 }  // namespace partiemc::server

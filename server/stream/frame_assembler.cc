@@ -1,6 +1,7 @@
 #include "server/stream/frame_assembler.h"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -110,7 +111,7 @@ absl::Status FrameAssembler::Missing(const Gathered& frame, bool has_leader) con
 }
 
 void FrameAssembler::Answered(std::uint64_t next_sequence, bool with_checkpoint) {
-  std::map<std::uint64_t, Gathered> over;  // Freed after the lock is released.
+  Frames over;  // Freed after the lock is released.
   const MutexLock lock(mutex_);
   next_ = next_sequence;
   wanted_ = std::max(wanted_, next_);
@@ -146,7 +147,7 @@ void FrameAssembler::TellMembers() {
 
 void FrameAssembler::End(const absl::Status& status) {
   std::vector<std::weak_ptr<AssemblyMember>> calls;
-  std::map<std::uint64_t, Gathered> frames;
+  Frames frames;
   {
     const MutexLock lock(mutex_);
     if (std::exchange(ended_, true)) return;
@@ -190,15 +191,29 @@ void FrameAssembler::Drop(Gathered& frame, std::uint32_t part) {
   --frame.count;
 }
 
+FrameAssembler::Frames::iterator FrameAssembler::Withdraw(Frames::iterator found,
+                                                          std::uint32_t part) {
+  Gathered& frame = found->second;
+  Drop(frame, part);
+  if (frame.is_over) return std::next(found);
+  if (frame.count == 0) return frames_.erase(found);
+  // The timeout starts with the first part that is held.
+  frame.since = Clock::time_point::max();
+  for (std::size_t k = 0; k < frame.parts.size(); ++k) {
+    if (frame.parts[k] != nullptr) frame.since = std::min(frame.since, frame.arrivals[k]);
+  }
+  return std::next(found);
+}
+
 void FrameAssembler::DropAll(std::uint32_t part) {
-  for (auto& [sequence, frame] : frames_) Drop(frame, part);
+  for (auto frame = frames_.begin(); frame != frames_.end();) frame = Withdraw(frame, part);
 }
 
 void FrameAssembler::Withdraw(const Seat& seat, std::uint64_t sequence) {
   const MutexLock lock(mutex_);
   if (members_[seat.part - 1].holder != seat.holder) return;
   if (const auto found = frames_.find(sequence); found != frames_.end()) {
-    Drop(found->second, seat.part);
+    Withdraw(found, seat.part);
   }
 }
 
@@ -248,8 +263,10 @@ absl::Status FrameAssembler::Offer(const Seat& seat, std::uint64_t sequence, std
     Gathered& frame = frames_.try_emplace(sequence, Gathered{.since = now}).first->second;
     frame.parts.resize(other_parts());
     frame.bytes.resize(other_parts());
+    frame.arrivals.resize(other_parts());
     frame.parts[seat.part - 1] = std::move(part);
     frame.bytes[seat.part - 1] = bytes;
+    frame.arrivals[seat.part - 1] = now;
     frame.all_bytes += bytes;
     if (++frame.count == other_parts()) leader = leader_.lock();
   }

@@ -137,9 +137,10 @@ class FrameAssembler {
   struct Gathered {
     std::vector<std::shared_ptr<const PartBytes>> parts;  // From part 1 on; null: missing.
     std::vector<std::uint64_t> bytes;                     // Sizes of `parts`.
+    std::vector<Clock::time_point> arrivals;              // Arrivals of `parts`.
     std::uint64_t all_bytes = 0;
     std::uint32_t count = 0;
-    Clock::time_point since;  // Arrival of the first part.
+    Clock::time_point since;  // Arrival of the first part that is held.
     bool is_over = false;     // Part 0 came too late; the parts were dropped.
   };
   struct Member {
@@ -147,10 +148,15 @@ class FrameAssembler {
     std::weak_ptr<AssemblyMember> call;
   };
 
+  using Frames = std::map<std::uint64_t, Gathered>;
+
   std::uint32_t other_parts() const { return terms_.parts - 1; }
   absl::Status CheckOffer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Drop(Gathered& frame, std::uint32_t part);
+  // Removes a part that may come again. Returns the next frame.
+  Frames::iterator Withdraw(Frames::iterator found, std::uint32_t part)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void DropAll(std::uint32_t part) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Missing(const Gathered& frame, bool has_leader) const;
   std::vector<std::weak_ptr<AssemblyMember>> Calls() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -162,7 +168,7 @@ class FrameAssembler {
   std::vector<Member> members_ ABSL_GUARDED_BY(mutex_);  // From part 1 on.
   std::uint64_t holders_ ABSL_GUARDED_BY(mutex_) = 0;
   // By sequence, from wanted_ on.
-  std::map<std::uint64_t, Gathered> frames_ ABSL_GUARDED_BY(mutex_);
+  Frames frames_ ABSL_GUARDED_BY(mutex_);
   // next_ is the next frame to be answered. wanted_ is the first frame that Take has not closed:
   // next_, or next_ + 1 while frame next_ is being computed. last_of_leader_ is the highest frame
   // whose part 0 has arrived.

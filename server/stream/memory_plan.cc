@@ -1,5 +1,7 @@
 #include "server/stream/memory_plan.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_format.h"
 #include "server/compute/worker_memory.h"
 
@@ -13,11 +15,19 @@ constexpr std::uint64_t kOnTheirWayBytes = std::uint64_t{64} << 20;
 
 }  // namespace
 
+std::uint64_t KeptBytesBeyondHistories(const ServerLimits& limits) {
+  if (limits.max_streams == 0) return 0;
+  const std::uint64_t kept = limits.max_streams * limits.KeptResultBytes();
+  return kept - std::min(kept, limits.AllHistoryBytes());
+}
+
 MemoryPlan::MemoryPlan(const ServerLimits& limits, unsigned threads)
     : parts{
           {kProgramBytes, "the program"},
           {threads * kWorkerBytes, absl::StrFormat("%d compute threads (--threads)", threads)},
           {limits.AllHistoryBytes(), "results for who goes back (--history-bytes, --max-streams)"},
+          {KeptBytesBeyondHistories(limits),
+           "newest results of streams, beyond that (--history-bytes, --max-streams)"},
           {limits.FrameBudget(), "requests and answers (the rest of --memory-budget)"},
           {limits.ReadBytesBeyond(),
            absl::StrFormat("frames of %d streams beyond that (--streams-beyond-budget, "

@@ -27,6 +27,11 @@ struct MemoryPlan {
   std::vector<Part> parts;
 };
 
+/// Bytes of the newest results that all streams keep for later watchers
+/// (ServerLimits::KeptResultBytes), as far as they exceed the histories. A stream keeps such a
+/// result only while its history is empty.
+std::uint64_t KeptBytesBeyondHistories(const ServerLimits& limits);
+
 /// Bytes that a connection may buffer before the server reads the messages of its call.
 inline constexpr std::uint64_t kUnreadBytes = 256 << 10;
 

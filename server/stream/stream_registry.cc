@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "common/printable.h"
 #include "partiemc/status.h"
@@ -23,13 +22,6 @@ absl::Status Refused(absl::StatusCode code, std::string_view reason, std::string
                      std::string value, std::string rule) {
   return ViolationError(code,
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
-}
-
-// Quotes a client's text for messages and the log: escapes it and cuts it after 40 characters.
-std::string Quoted(const std::string& text) {
-  constexpr std::size_t kShown = 40;
-  return absl::StrCat("\"", absl::CHexEscape(text.substr(0, kShown)), "\"",
-                      text.size() > kShown ? "..." : "");
 }
 
 bool IsNameCharacter(char c) {
@@ -208,7 +200,7 @@ absl::StatusOr<JoinedPart> StreamRegistry::JoinPart(const StreamStateMachine& ma
   {
     const MutexLock lock(mutex_);
     if (auto status = CheckPart(stream->description, terms); !status.ok()) return status;
-    entries_.at(&machine).sends_part = true;
+    if (auto status = TakePart(entries_.at(&machine), terms); !status.ok()) return status;
     if (tell_earlier_look_) tell_earlier_look_();
   }
   // Without the lock, because Join may end an earlier call of this part, which then calls Leave.
@@ -230,9 +222,23 @@ absl::Status StreamRegistry::CheckPart(const StreamDescription& stream,
     return Refused(absl::StatusCode::kFailedPrecondition, kReasonPartsCount, "open.parts",
                    absl::StrCat(terms.parts), absl::StrCat("must be ", parts, ", as in part 0"));
   }
-  const auto senders = std::count_if(entries_.begin(), entries_.end(),
-                                     [](const auto& item) { return item.second.sends_part; });
-  if (senders < max_parts_) return absl::OkStatus();
+  return absl::OkStatus();
+}
+
+absl::Status StreamRegistry::TakePart(Entry& entry, const PartTerms& terms) {
+  std::uint32_t senders = 0;
+  std::vector<Entry*> former;
+  for (auto& [key, other] : entries_) {
+    if (other.part_of.empty()) continue;
+    const bool is_former = other.part == terms.part && other.part_of == terms.stream_name;
+    is_former ? former.push_back(&other) : void(++senders);
+  }
+  if (senders < max_parts_) {
+    for (Entry* const replaced : former) replaced->part_of.clear();
+    entry.part_of = terms.stream_name;
+    entry.part = terms.part;
+    return absl::OkStatus();
+  }
   return Refused(
       absl::StatusCode::kResourceExhausted, kReasonTooManyParts, "streams",
       absl::StrCat(senders, " connections that send parts"),
@@ -251,7 +257,7 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
     const auto found = entries_.find(&machine);
     if (found != entries_.end()) {
       found->second.place = {};
-      found->second.sends_part = false;
+      found->second.part_of.clear();
       summary.swap(found->second.stream);
       ++changes_;
     }

@@ -164,7 +164,9 @@ class StreamRegistry {
     std::optional<StreamSummary> stream;  // Set from Open to Close; its `counts` are out of date.
     std::string token;                    // The stream token.
     bool taken_over = false;              // Whether another entry continues the stream.
-    bool sends_part = false;              // Whether it sends parts of another entry's stream.
+    // The name of the stream whose parts it sends, and its part. No name: it sends no parts.
+    std::string part_of;
+    std::uint32_t part = 0;
 
     bool IsOpen() const { return stream && !taken_over; }
   };
@@ -187,6 +189,9 @@ class StreamRegistry {
   Entry* FindOpen(std::string_view token) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Lets `entry` send a part, unless `max_parts` calls do. Does not count calls that sent this part
+  // before: Join ends them, or their stream has ended.
+  absl::Status TakePart(Entry& entry, const PartTerms& terms) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void BeginHistory(const StreamDescription& description, const Entry* former)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 

@@ -27,6 +27,9 @@ std::string Name(RequestKind kind) {
 
 constexpr std::chrono::milliseconds kLookWhileOpening(100);
 
+constexpr char kIdleStreamRule[] =
+    "must do so within this time (Limits.idle_timeout_seconds); open a new stream";
+
 }  // namespace
 
 StreamStateMachine::StreamStateMachine(StreamTransport& transport, StreamHandler& handler,
@@ -143,7 +146,9 @@ void StreamStateMachine::Granted(std::uint64_t bytes) {
 
 void StreamStateMachine::ReadPermitted() {
   const Event event(*this);
-  if (state_.reading == Reading::kPermit) Read(Reading::kNext);
+  if (state_.reading != Reading::kPermit) return;
+  counts_.last_activity = std::chrono::steady_clock::now();  // The client's time begins again.
+  Read(Reading::kNext);
 }
 
 // Ends a stream whose read in progress exceeds the memory (ReadPermits). Abandoning the stream also
@@ -211,13 +216,16 @@ TimePoint StreamStateMachine::EndIfIdle(const IdleLimits& limits, TimePoint now)
     }
     return look_again;
   }
-  const bool waits_for_us = opens || computed_ < read_;
+  const bool waits_for_permit =
+      state_.reading == Reading::kPermit && state_.writing == Writing::kIdle;
+  const bool waits_for_us = opens || computed_ < read_ || waits_for_permit;
   const TimePoint due = (waits_for_us ? now : counts_.last_activity) + limit;
   if (now < due) return std::min(look_again, due);
   if (state_.writing != Writing::kIdle) {
-    AbandonAndCut(IdleError("takes no answer", limit));
+    AbandonAndCut(IdleError("takes no answer", limit, kIdleStreamRule));
   } else {
-    End(IdleError(is_opening ? "sends no `open`" : "sends no frame", limit));
+    End(is_opening ? IdleError("sends no `open`", limit)
+                   : IdleError("sends no frame", limit, kIdleStreamRule));
   }
   return look_again;
 }
@@ -371,6 +379,7 @@ void StreamStateMachine::DecideCompute() {
 
 void StreamStateMachine::Write(Writing what) {
   state_.writing = what;
+  counts_.last_activity = std::chrono::steady_clock::now();  // The frame's time in the server ends.
   const Outgoing outgoing = what == Writing::kOpened   ? Outgoing::kOpened
                             : what == Writing::kNotice ? Outgoing::kDraining
                                                        : Outgoing::kAnswer;

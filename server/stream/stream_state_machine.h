@@ -167,8 +167,8 @@ class StreamStateMachine final : public SerializedCall,
   void Drain();
   /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`. The
   /// client has either not sent a request, or not received a response; in the second case the call
-  /// is cut. A frame's wait for parts or a worker does not count. The stream's wait for a permit to
-  /// read does. Returns the time of the next check.
+  /// is cut. Time in which the server lets the client wait does not count: a frame's wait for parts
+  /// or a worker, and the stream's wait for a permit to read. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfIdle(const IdleLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 

@@ -34,6 +34,10 @@ std::string_view WriteAll(int file, std::string_view bytes) {
   return bytes;
 }
 
+std::uint64_t LinesOf(std::string_view text) {
+  return static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
 }  // namespace
 
 struct LogWriter::State {
@@ -65,6 +69,10 @@ void LogWriter::Stop() {
     while (!state_->ended && state_->changed.WaitUntil(state_->mutex, deadline)) {
     }
     ended = state_->ended;
+    if (!ended) {  // The process ends before the thread can write them.
+      state_->dropped += LinesOf(state_->waiting);
+      state_->waiting.clear();
+    }
   }
   if (ended) {
     thread_.join();
@@ -103,7 +111,7 @@ void LogWriter::Run(const std::shared_ptr<State>& state) {
   auto next_tick = std::chrono::steady_clock::now() + kTick;
   std::string lines;
   const MutexLock lock(state->mutex);
-  while (!state->stop) {
+  while (!state->stop || !state->waiting.empty()) {
     while (!state->stop && state->waiting.empty() &&
            state->changed.WaitUntil(state->mutex, next_tick)) {
     }
@@ -111,7 +119,7 @@ void LogWriter::Run(const std::shared_ptr<State>& state) {
     {
       const MutexUnlock unlock(state->mutex);
       const std::string_view left = WriteAll(state->options.file, lines);
-      state->dropped += static_cast<std::uint64_t>(std::count(left.begin(), left.end(), '\n'));
+      state->dropped += LinesOf(left);
       lines.clear();
     }
     if (!state->stop && std::chrono::steady_clock::now() >= next_tick) {

@@ -40,7 +40,8 @@ class LogWriter {
   void FlushInSignal(std::chrono::milliseconds patience) const;
 
   /// Flushes for at most half a second and ends the writer thread. Lines that follow are dropped.
-  /// If the thread blocks on a full pipe for another half second, it is abandoned.
+  /// If the thread blocks on a full pipe for another half second, it is abandoned, and the lines
+  /// that wait for it are dropped.
   void Stop();
 
   std::uint64_t dropped() const;

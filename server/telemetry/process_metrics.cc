@@ -24,14 +24,15 @@ double CpuSeconds() {
   return Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
 }
 
-}  // namespace
-
+// Returns a metric family that contains one gauge without labels.
 prometheus::MetricFamily GaugeFamily(const std::string& name, const std::string& help,
                                      double value) {
   prometheus::MetricFamily family{name, help, prometheus::MetricType::Gauge, {}};
   family.metric.emplace_back().gauge.value = value;
   return family;
 }
+
+}  // namespace
 
 std::vector<prometheus::MetricFamily> ProcessFamilies() {
   std::vector<prometheus::MetricFamily> families;

@@ -3,7 +3,6 @@
 
 #include <prometheus/metric_family.h>
 
-#include <string>
 #include <vector>
 
 namespace partiemc::server {
@@ -11,9 +10,5 @@ namespace partiemc::server {
 /// Returns memory, processor time, threads and file descriptors. Omits metrics that /proc does not
 /// provide.
 std::vector<prometheus::MetricFamily> ProcessFamilies();
-
-/// Returns a metric family that contains one gauge without labels.
-prometheus::MetricFamily GaugeFamily(const std::string& name, const std::string& help,
-                                     double value);
 
 }  // namespace partiemc::server

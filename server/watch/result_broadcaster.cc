@@ -127,7 +127,7 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   left = std::move(*found);
   watchers_.erase(found);
   if (--watcher_count_ != 0) return;
-  news = std::exchange(news_, {});
+  news = TakeNews();
   newest = newest_;
   Collect();
 }
@@ -164,7 +164,7 @@ void ResultBroadcaster::Collect() {
     mutex_.AssertHeld();
     collected_ = published.number;
     if (history_) history_->Add(published);
-    if (!watchers_.empty()) news_.push_back(published);
+    if (!watchers_.empty()) AddNews(published);
     newest_ = std::move(published);
   });
   const bool is_in_history = history_ && !history_->empty();
@@ -173,6 +173,19 @@ void ResultBroadcaster::Collect() {
     newest_ = {};
   }
   NoteOldest();
+}
+
+void ResultBroadcaster::AddNews(const Published& published) {
+  if (!news_.empty() && news_bytes_ + published.pending_bytes() > limits_.mailbox_bytes) {
+    TakeNews();
+  }
+  news_.push_back(published);
+  news_bytes_ += published.pending_bytes();
+}
+
+std::vector<Published> ResultBroadcaster::TakeNews() {
+  news_bytes_ = 0;
+  return std::exchange(news_, {});
 }
 
 void ResultBroadcaster::NoteOldest() {
@@ -187,7 +200,7 @@ void ResultBroadcaster::Serve() {
     const MutexLock lock(mutex_);
     if (history_) history_->Shrink();
     Collect();
-    news = std::exchange(news_, {});
+    news = TakeNews();
     watchers = watchers_;
     end = end_;
   }

@@ -106,6 +106,9 @@ class ResultBroadcaster final : public Dispatched {
   void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Collect() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Adds a frame to news_. Drops the older ones if they exceed `mailbox_bytes` together with it.
+  void AddNews(const Published& published) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::vector<Published> TakeNews() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void NoteOldest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   template <typename Action>
   void CountWaits(Action action);
@@ -124,6 +127,7 @@ class ResultBroadcaster final : public Dispatched {
   std::uint64_t collected_ ABSL_GUARDED_BY(mutex_) = 0;
   // Frames that were taken from the mailbox and have not been offered to watchers yet.
   std::vector<Published> news_ ABSL_GUARDED_BY(mutex_);
+  std::size_t news_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   std::optional<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
   Published newest_ ABSL_GUARDED_BY(mutex_);  // Kept if it is in the history, small, or watched.
   std::optional<WatchEnd> end_ ABSL_GUARDED_BY(mutex_);

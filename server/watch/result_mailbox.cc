@@ -5,7 +5,7 @@
 namespace partiemc::server {
 
 void ResultMailbox::Put(Published published) {
-  const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
+  const std::size_t bytes = published.pending_bytes();
   auto* const post = new Post{std::move(published), nullptr, bytes};
   // Takes the list out of the mailbox before it links the new frame, so that no other thread
   // accesses the list at the same time. No other frame can be added between the two exchanges,

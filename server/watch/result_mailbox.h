@@ -28,6 +28,9 @@ class WatchFrame {
   const std::size_t bytes_, memory_;
 };
 
+/// Approximate memory overhead of a published frame, counted in addition to its bytes.
+inline constexpr std::size_t kPublishedBytes = 512;
+
 /// A result of a stream and its result number, which counts results from 1. Refused frames have
 /// sequence numbers but no result numbers.
 struct Published {
@@ -35,10 +38,10 @@ struct Published {
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< Sequence number of the producer's frame.
   bool follows_loss = false;   ///< Results before it were lost on their way between servers.
-};
 
-/// Approximate memory overhead of a published frame, counted in addition to its bytes.
-inline constexpr std::size_t kPublishedBytes = 512;
+  /// Bytes that count while the result waits for its delivery. Requires: `frame` is not null.
+  std::size_t pending_bytes() const { return frame->bytes() + kPublishedBytes; }
+};
 
 /// A lock-free list of results that were published but not processed yet. Put is called by one
 /// thread at a time, Take by any thread.

@@ -101,7 +101,7 @@ void WatchStateMachine::WriteRefused(const absl::Status& status) {
 
 Published WatchStateMachine::TakeInWrite() {
   state_.writing = Writing::kIdle;
-  if (in_write_.frame != nullptr) held_bytes_ -= in_write_.frame->bytes() + kPublishedBytes;
+  if (in_write_.frame != nullptr) held_bytes_ -= in_write_.pending_bytes();
   return std::exchange(in_write_, {});
 }
 
@@ -140,7 +140,7 @@ void WatchStateMachine::Take(const Published& published) {
   const std::uint64_t missed = offered_ == 0 ? 0 : published.number - offered_ - 1;
   offered_ = published.number;
   counts_.dropped += missed;
-  const std::size_t bytes = published.frame->bytes() + kPublishedBytes;
+  const std::size_t bytes = published.pending_bytes();
   if (bytes > max_bytes_) {
     ++counts_.dropped;
     return End(WatchEnd::TooLarge(published.frame->bytes(), max_bytes_));
@@ -171,7 +171,7 @@ bool WatchStateMachine::IsHeld(std::uint64_t number) const {
 bool WatchStateMachine::LeaveToHistory(const Published& published) {
   const std::uint64_t first = pending_.empty() ? published.number : pending_.front().number;
   if (!IsHeld(first)) return false;
-  for (const Published& left : pending_) held_bytes_ -= left.frame->bytes() + kPublishedBytes;
+  for (const Published& left : pending_) held_bytes_ -= left.pending_bytes();
   pending_.clear();
   next_held_ = first;
   return true;
@@ -190,12 +190,12 @@ void WatchStateMachine::TakeHeld() {
     MissUntil(held.frame != nullptr ? held.number : offered_ + 1);
     if (held.frame == nullptr) return CatchUp();
   }
-  if (held.frame->bytes() + kPublishedBytes > max_bytes_) {
+  if (held.pending_bytes() > max_bytes_) {
     return End(WatchEnd::TooLarge(held.frame->bytes(), max_bytes_));
   }
   if (credit_ == 0) return;
   ++next_held_;
-  held_bytes_ += held.frame->bytes() + kPublishedBytes;
+  held_bytes_ += held.pending_bytes();
   counts_.most_held_bytes = std::max(counts_.most_held_bytes, held_bytes_);
   pending_.push_back(std::move(held));
 }
@@ -275,7 +275,7 @@ bool WatchStateMachine::goes_back() const {
 
 void WatchStateMachine::DropPending() {
   counts_.dropped += pending_.size();
-  for (const Published& dropped : pending_) held_bytes_ -= dropped.frame->bytes() + kPublishedBytes;
+  for (const Published& dropped : pending_) held_bytes_ -= dropped.pending_bytes();
   pending_.clear();
   if (next_held_ == 0) return;
   MissUntil(std::max(next_held_, offered_ + 1));

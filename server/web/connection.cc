@@ -43,16 +43,16 @@ void WebConnection::Close() {
   if (closed_) std::exchange(closed_, nullptr)();
 }
 
-void WebConnection::CloseAfter(std::chrono::milliseconds time) {
+void WebConnection::CloseAfter(std::chrono::milliseconds time, bool is_refusal) {
   if (is_closed_) return;
   deadline_.expires_after(time);
-  deadline_.async_wait([weak = weak_from_this()](error_code error) {
+  deadline_.async_wait([weak = weak_from_this(), is_refusal](error_code error) {
     const auto self = weak.lock();
     // Ignores the timer if the deadline has been moved since the timer fired.
     if (error || self == nullptr || self->deadline_.expiry() > std::chrono::steady_clock::now()) {
       return;
     }
-    self->context.refusals.Count(WebRefusal::kTimeout);
+    if (is_refusal) self->context.refusals.Count(WebRefusal::kTimeout);
     self->Close();
   });
 }

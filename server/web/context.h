@@ -52,7 +52,8 @@ struct WebContext {
   void Refuse(WebRefusal refusal, const std::string& peer, const absl::Status& why);
 };
 
-/// Time limit for the handshakes of a connection, and for receiving the header of a request.
+/// Time limit for the handshakes of a connection, for receiving the header of a request, and for
+/// the pause between two requests.
 inline constexpr std::chrono::seconds kWebHeaderTime{10};
 /// Time limit for sending a response that does not belong to a call, and for each piece of a file.
 inline constexpr std::chrono::seconds kWebResponseTime{30};

@@ -44,16 +44,32 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
  private:
+  // Waits for the first bytes of another request.
+  void AwaitRequest() {
+    if (connection_->buffer.size() > 0) return ReadRequest();
+    parser_.reset();
+    connection_->CloseIdleAfter(kWebHeaderTime);
+    connection_->stream.async_read_some(
+        connection_->buffer.prepare(kFirstBytes),
+        [self = this->shared_from_this()](error_code error, std::size_t bytes) {
+          if (error) return self->connection_->Close();
+          self->connection_->buffer.commit(bytes);
+          self->ReadRequest();
+        });
+  }
+
+  static constexpr std::size_t kFirstBytes = 512;
   static constexpr std::size_t kFilePiece = 32 << 10;
 
   void OnHeader(error_code error) {
     namespace http = boost::beast::http;
     if (error == http::error::header_limit || error == http::error::buffer_overflow) {
-      return Refuse({WebRefusal::kTooLarge, 431, "must have a header of at most 16 KiB"});
+      return Refuse(
+          {WebRefusal::kTooLarge, 431, "the request must have a header of at most 16 KiB"});
     }
     if (error.category() == make_error_code(http::error::bad_method).category() &&
         error != http::error::end_of_stream && error != http::error::partial_message) {
-      return Refuse({WebRefusal::kMalformed, 400, "must be HTTP/1.1"});
+      return Refuse({WebRefusal::kMalformed, 400, "the request must be HTTP/1.1"});
     }
     if (error) return connection_->Close();
     WebAnswer answer = Understand(ViewOf(*parser_), connection_->context.rules);
@@ -67,7 +83,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   static WebRefused FullServer() {
     return {WebRefusal::kFull, 503,
-            "must come again later: all connections of the server, or of this address, have calls"};
+            "the client must try again later: all connections of the server, or of this address, "
+            "have calls"};
   }
 
   void Refuse(WebRefused refused) {
@@ -79,7 +96,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   void Do(const WebRefused& refused) {
     closes_ = closes_ || refused.http_status == 400;  // The request's end is unknown.
     connection_->context.Refuse(refused.refusal, connection_->peer,
-                                absl::InvalidArgumentError("the request " + refused.rule));
+                                absl::InvalidArgumentError(refused.rule));
     Send(ResponseTo(refused));
   }
   void Do(const WebHealth& health) { Send(ResponseTo(health, connection_->context.draining())); }
@@ -115,7 +132,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   void BeginSocket(Methods::Method method, CallOrigin origin, bool from_page) {
     if (connection_->buffer.size() > 0) {
-      return Refuse({WebRefusal::kMalformed, 400, "must wait for the answer to its handshake"});
+      return Refuse(
+          {WebRefusal::kMalformed, 400, "the client must wait for the answer to its handshake"});
     }
     std::make_shared<SocketCall<Stream>>(connection_, std::move(parser_), from_page)
         ->Begin(method, std::move(origin));
@@ -123,7 +141,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   void BeginPost(Methods::Method method, CallOrigin origin) {
     std::make_shared<PostCall<Stream>>(connection_, std::move(parser_), std::move(allowed_origin_),
-                                       [self = this->shared_from_this()] { self->ReadRequest(); })
+                                       [self = this->shared_from_this()] { self->AwaitRequest(); })
         ->Begin(method, std::move(origin));
   }
 
@@ -153,7 +171,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   void WriteMore() {
     if (!file_) {
       if (closes_) return connection_->CloseGently();
-      return ReadRequest();
+      return AwaitRequest();
     }
     piece_.resize(kFilePiece);
     const auto count = read(file_->file.descriptor(), piece_.data(),

@@ -24,7 +24,7 @@ namespace partiemc::server {
 template <typename Stream>
 class PostCall final : public WebChannel {
  public:
-  /// `next`: function that reads the next HTTP request of the connection after this call.
+  /// `next`: function that awaits the next HTTP request of the connection after this call.
   PostCall(std::shared_ptr<WebConnectionOver<Stream>> connection,
            std::unique_ptr<HttpParser> parser, std::string allowed_origin,
            std::function<void()> next)
@@ -157,7 +157,7 @@ class PostCall final : public WebChannel {
     if (!keeps) return connection_->CloseGently();
     connection_->slot.SetState(ConnectionSlots::State::kNoCall);
     goes_on_ = true;
-    connection_->CloseAfter(kWebHeaderTime);
+    connection_->CloseIdleAfter(kWebHeaderTime);
     if (!watching_) next_();
   }
 

@@ -16,6 +16,7 @@ namespace {
 constexpr char kMessageType[] = "application/x-protobuf";
 constexpr std::string_view kCalls = "/v1/";
 constexpr std::size_t kMostPathBytes = 1024;
+constexpr char kMustBeGet[] = "the request must be a GET";
 
 struct Route {
   std::string_view path;
@@ -115,17 +116,17 @@ bool IsLocalHost(std::string_view host) {
 
 WebAnswer SocketCallOf(const WebRequest& request, WebMethod method, bool from_page) {
   if (request.method != "GET") {
-    return RefusedAs(WebRefusal::kMalformed, 405, "is called by GET, as a WebSocket", "GET");
+    return RefusedAs(WebRefusal::kMalformed, 405,
+                     "the method must be called by GET, as a WebSocket", "GET");
   }
   if (!request.is_upgrade || request.has_body) {
-    return RefusedAs(WebRefusal::kMalformed, 426, "is a WebSocket");
+    return RefusedAs(WebRefusal::kMalformed, 426, "the method must be called as a WebSocket");
   }
   OfferedProtocols offered = ParseProtocols(request.protocols);
   if (!offered.ours || offered.is_malformed) {
-    return RefusedAs(
-        WebRefusal::kMalformed, 400,
-        "must offer the subprotocol partiemc.v1, and at most one bearer.TOKEN beside it, TOKEN in "
-        "base64url without padding");
+    return RefusedAs(WebRefusal::kMalformed, 400,
+                     "the request must offer the subprotocol partiemc.v1, and at most one "
+                     "bearer.TOKEN beside it, TOKEN in base64url without padding");
   }
   WebCall call{.method = method, .authorization = {}, .from_page = from_page};
   if (request.authorizations.size() + offered.tokens.size() == 1) {
@@ -138,12 +139,13 @@ WebAnswer SocketCallOf(const WebRequest& request, WebMethod method, bool from_pa
 WebAnswer PostCallOf(const WebRequest& request, WebMethod method, bool from_page) {
   if (request.method == "OPTIONS" && from_page) return {.what = WebPreflight{}};
   if (request.method != "POST") {
-    return RefusedAs(WebRefusal::kMalformed, 405, "is called by POST", "POST");
+    return RefusedAs(WebRefusal::kMalformed, 405, "the method must be called by POST", "POST");
   }
   const std::string_view type =
       request.content_type.substr(0, request.content_type.find_first_of("; \t"));
   if (Lower(type) != kMessageType) {
-    return RefusedAs(WebRefusal::kMalformed, 415, "takes Content-Type application/x-protobuf");
+    return RefusedAs(WebRefusal::kMalformed, 415,
+                     "the request must have Content-Type application/x-protobuf");
   }
   return {.what = WebCall{.method = method,
                           .authorization = OnlyOne(request.authorizations),
@@ -174,23 +176,24 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
   const bool head_only = request.method == "HEAD";
   const bool is_get = request.method == "GET" || head_only;
   if (request.hosts.size() != 1) {
-    return RefusedAs(WebRefusal::kMalformed, 400, "must have one header Host");
+    return RefusedAs(WebRefusal::kMalformed, 400, "the request must have one header Host");
   }
   const auto& encodings = request.transfer_encodings;
   if (encodings.size() > 1 || (encodings.size() == 1 && encodings.front() != "chunked")) {
     return RefusedAs(WebRefusal::kMalformed, 400,
-                     "must have no Transfer-Encoding, or once and exactly `chunked`");
+                     "the request must have no Transfer-Encoding, or once and exactly `chunked`");
   }
   if (path == "/v1/healthz") {
-    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
+    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
     return {.what = WebHealth{.head_only = head_only}};
   }
   if (!IsHostAllowed(request.hosts.front(), rules)) {
-    return RefusedAs(WebRefusal::kHost, 421,
-                     "must name a host of this machine, or one of the server's --web-host");
+    return RefusedAs(
+        WebRefusal::kHost, 421,
+        "the request must name a host of this machine, or one of the server's --web-host");
   }
   if (!path.starts_with(kCalls)) {
-    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, "is asked by GET", "GET, HEAD");
+    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
     auto file = FilePathOf(request.target);
     if (!file) return RefusedAs(WebRefusal::kMalformed, 404, "there is no such page");
     return {.what = WebFile{.path = *std::move(file),
@@ -206,7 +209,7 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
                     !IsOriginAllowed(request.origins.front(), request.hosts.front(), rules))) {
     return RefusedAs(
         WebRefusal::kOrigin, 403,
-        "must be called by a page of this server, or of an origin of its --web-origin");
+        "the method must be called by a page of this server, or of an origin of its --web-origin");
   }
   WebAnswer answer = route->is_socket ? SocketCallOf(request, route->method, from_page)
                                       : PostCallOf(request, route->method, from_page);

@@ -78,7 +78,7 @@ struct WebPreflight {};
 struct WebRefused {
   WebRefusal refusal = WebRefusal::kMalformed;
   unsigned http_status = 400;
-  std::string rule;        ///< The broken rule, one line.
+  std::string rule;        ///< The broken rule, a sentence of one line.
   std::string allow = {};  ///< Allowed methods; set for 405.
 };
 

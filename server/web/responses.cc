@@ -31,8 +31,8 @@ std::string WebResponse::Text() const {
   absl::StrAppend(&text, "X-Content-Type-Options: nosniff\r\n");
   if (close) absl::StrAppend(&text, "Connection: close\r\n");
   // Omits the length for status 304, which has no body: a length would describe the file that is
-  // not sent.
-  if (status != 304) {
+  // not sent. RFC 9110, section 8.6, forbids a length for status 204.
+  if (status != 304 && status != 204) {
     absl::StrAppend(&text, "Content-Length: ", body_bytes > 0 ? body_bytes : body.size(), "\r\n");
   }
   absl::StrAppend(&text, "\r\n");

@@ -5,6 +5,7 @@
 #include <boost/asio/buffer.hpp>
 #include <string_view>
 
+#include "absl/strings/str_cat.h"
 #include "server/telemetry/logging.h"
 
 namespace partiemc::server {
@@ -63,12 +64,18 @@ std::shared_ptr<ssl::context> TlsContexts::Get() {
   auto context = Make(*version.identity, asks_clients_, error);
   version_ = version.number;
   if (error) {
-    LogEvent(spdlog::level::warn, "TLS identity is not taken by the gateway",
-             {{"error", error.message()}});
+    error_ = error.message();
+    LogEvent(spdlog::level::warn, "TLS identity is not taken by the gateway", {{"error", error_}});
   } else {
     context_ = std::move(context);
   }
   return context_;
+}
+
+absl::Status TlsContexts::Check() {
+  if (Get() != nullptr) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("--tls-cert and --tls-key cannot be used by --web: ", error_));
 }
 
 }  // namespace partiemc::server

@@ -4,7 +4,9 @@
 #include <boost/asio/ssl/context.hpp>
 #include <cstdint>
 #include <memory>
+#include <string>
 
+#include "absl/status/status.h"
 #include "server/security/tls_identity.h"
 
 namespace partiemc::server {
@@ -20,12 +22,15 @@ class TlsContexts {
   /// Returns the context of the current identity. If OpenSSL rejects this identity, returns the
   /// previous context, or null if there is none.
   std::shared_ptr<boost::asio::ssl::context> Get();
+  /// Returns OK if Get returns a context. Errors: INVALID_ARGUMENT with OpenSSL's reason.
+  absl::Status Check();
 
  private:
   const CurrentTlsIdentity& current_;
   const bool asks_clients_;
   std::uint64_t version_ = 0;  // Version of context_.
   std::shared_ptr<boost::asio::ssl::context> context_;
+  std::string error_;  // OpenSSL's reason, if it rejected the last identity.
 };
 
 }  // namespace partiemc::server

@@ -118,6 +118,9 @@ class WebGateway::Implementation {
 
   // Listens on all addresses of a host name, because browsers differ in which of them they use.
   absl::Status Listen() {
+    if (tls_) {
+      if (auto status = tls_->Check(); !status.ok()) return status;
+    }
     error_code error;
     tcp::resolver resolver(io_);
     const auto found =

@@ -27,7 +27,7 @@ using server::RelayQueue;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMaxMessageBytes = 4096;
-constexpr std::array<std::size_t, RelayQueue::kLanes> kQueueBytes = {8192, 2048};
+constexpr std::array<std::size_t, RelayQueue::kLanes> kQueueBytes = {16384, 8192};
 constexpr std::size_t kPeers = 4, kMaxSteps = 256;
 
 // Delivers at once.
@@ -61,12 +61,13 @@ class Receiver {
   void Send(bool asked, std::string_view bytes) {
     const std::size_t lane = asked ? RelayQueue::kAsked : RelayQueue::kNews;
     const std::uint64_t lost = queue_->lost_messages();
+    const std::size_t size = bytes.size() + RelayQueue::kBytesOfMessage;
     bus_.Publish(asked ? "asked" : "news", bytes);
     if (queue_->lost_messages() == lost) {
-      queued_bytes_[lane] += bytes.size();
+      queued_bytes_[lane] += size;
       queued_[lane] += 1;
     } else {
-      Require(queued_bytes_[lane] + bytes.size() > kQueueBytes[lane],
+      Require(queued_bytes_[lane] + size > kQueueBytes[lane],
               "nothing is lost while its lane has room");
     }
     Require(queued_bytes_[lane] <= kQueueBytes[lane], "a lane is bounded");
@@ -81,7 +82,7 @@ class Receiver {
               "each lane is emptied in small numbers, whatever the others hold");
       queued_[lane] -= work.messages[lane].size();
       for (const std::string& piece : work.messages[lane]) {
-        queued_bytes_[lane] -= piece.size();
+        queued_bytes_[lane] -= piece.size() + RelayQueue::kBytesOfMessage;
         Take(lane, piece, now);
       }
     }

@@ -71,6 +71,24 @@ TEST(Pieces, OfManySendersTogetherTakeNoMoreThanThereIsRoomFor) {
   EXPECT_EQ(joiner.held_bytes(), 0u);
 }
 
+TEST(Pieces, OfSendersThatStoppedMakeRoom) {
+  PieceJoiner joiner(4 * kPieceBytes);
+  const auto slow = PiecesOf("slow", 1, std::string(2 * kPieceBytes, 's'));
+  EXPECT_FALSE(joiner.Add(slow[0]));
+  for (const char* sender : {"a", "b", "c", "d"}) {
+    const auto pieces = PiecesOf(sender, 1, std::string(4 * kPieceBytes, 'x'));
+    for (int k = 0; k < 3; ++k) EXPECT_FALSE(joiner.Add(pieces[k]));
+  }
+  joiner.ForgetIdle();
+  EXPECT_EQ(joiner.held_bytes(), 13 * kPieceBytes) << "they may still be sent";
+  const auto third = PiecesOf("slow", 2, std::string(3 * kPieceBytes, 's'));
+  EXPECT_FALSE(joiner.Add(third[0]));
+  joiner.ForgetIdle();
+  EXPECT_EQ(joiner.held_bytes(), kPieceBytes);
+  EXPECT_FALSE(joiner.Add(third[1]));
+  EXPECT_TRUE(joiner.Add(third[2]));
+}
+
 TEST(Pieces, AMessageWithAPieceMissingIsLeftOutAndTheNextIsNot) {
   const std::string large(3 * kPieceBytes, 'a');
   for (int missing = 0; missing < 3; ++missing) {

@@ -2,6 +2,7 @@
 // delayed.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "relay/memory_replica.h"
 #include "server/base/call_errors.h"
 #include "server/relay/pieces.h"
+#include "server/relay/relay_queue.h"
 #include "server/stream/stream_token.h"
 
 namespace partiemc::server {
@@ -123,6 +125,21 @@ TEST_F(RelayFlood, AnnouncementsThatAskDelayNothing) {
   has_->relay().Drain();
   has_.reset();
   ExpectFinished(*watcher, 50);
+}
+
+TEST(RelayQueue, EmptyMessagesTakeRoom) {
+  MemoryHub hub;
+  const auto here = hub.Connect(), stranger = hub.Connect();
+  const auto queue =
+      std::make_shared<RelayQueue>(std::array<std::size_t, RelayQueue::kLanes>{2048, 2048});
+  const auto subscription = queue->Listen(*here, "news", RelayQueue::kNews);
+  for (int k = 0; k < 10'000; ++k) stranger->Publish("news", "");
+  const std::uint64_t lost = queue->lost_messages();
+  EXPECT_GT(lost, 9'000u);
+  RelayQueue::Work work;
+  ASSERT_TRUE(queue->Take(milliseconds(0), work));
+  stranger->Publish("news", "");
+  EXPECT_EQ(queue->lost_messages(), lost) << "taken messages have left room";
 }
 
 }  // namespace

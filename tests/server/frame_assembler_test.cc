@@ -60,9 +60,10 @@ class FrameAssemblerTest : public ::testing::Test {
     }
     assembler_->SetLeader(members_[0]);
   }
-  absl::Status Offer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
+  absl::Status Offer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10,
+                     milliseconds age = milliseconds(0)) {
     return assembler_->Offer(seats_[part], sequence, bytes,
-                             std::make_shared<NumberedPart>(part, sequence), begin_);
+                             std::make_shared<NumberedPart>(part, sequence), begin_ + age);
   }
   std::string Refusal(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes = 10) {
     return ReasonOf(Offer(part, sequence, bytes));
@@ -242,6 +243,25 @@ TEST_F(FrameAssemblerTest, APartThatIsWithdrawnCanComeAgain) {
   EXPECT_FALSE(IsReady(1));
   EXPECT_EQ(Refusal(1, 1), "");
   EXPECT_TRUE(IsReady(1));
+}
+
+TEST_F(FrameAssemblerTest, TheTimeoutForgetsPartsThatWereDropped) {
+  Begin(3);
+  const auto is_ready = [&](int age) {  // Part 0 arrives later than the parts.
+    const auto since = begin_ + milliseconds(1000);
+    return assembler_->IsReady(1, since, begin_ + milliseconds(age));
+  };
+  ASSERT_TRUE(Offer(1, 1).ok());
+  ASSERT_TRUE(Offer(2, 1, 10, milliseconds(60)).ok());
+  assembler_->Withdraw(seats_[1], 1);
+  EXPECT_FALSE(is_ready(159)) << "part 2 is held since 60 ms";
+  EXPECT_TRUE(is_ready(160));
+  assembler_->Leave(seats_[2]);
+  EXPECT_FALSE(is_ready(160)) << "no part is held";
+  ASSERT_TRUE(Offer(1, 1, 10, milliseconds(500)).ok());
+  EXPECT_FALSE(is_ready(599));
+  EXPECT_FALSE(assembler_->IsOver(1, begin_ + milliseconds(599)));
+  EXPECT_TRUE(is_ready(600));
 }
 
 TEST_F(FrameAssemblerTest, MembersAreToldOfAnswersAndOfTheEnd) {

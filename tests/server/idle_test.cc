@@ -9,6 +9,7 @@
 #include "partiemc/status.h"
 #include "server/memory_transport.h"
 #include "server/moving_blob.h"
+#include "server/scripted_transport.h"
 #include "server/stream/idle_timer.h"
 #include "server/stream/stream_registry.h"
 
@@ -85,6 +86,41 @@ TEST_F(Idle, WaitingForAWorkerDoesNotCount) {
   EXPECT_EQ(transport_.Receive()->sequence, 2u);
   transport_.HalfClose();
   EXPECT_TRUE(transport_.status().ok());
+}
+
+TEST_F(Idle, TheTimeToTakeAnAnswerBeginsWithItsWrite) {
+  std::promise<void> go;
+  pool_.Submit([future = go.get_future().share()](Worker&) { future.wait(); });
+  transport_.Open();
+  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
+  transport_.Send(1, MovingBlob(1, 0));
+  transport_.Send(2, MovingBlob(1, 1));
+  transport_.WaitUntilRead(2);
+  const auto before_answer = steady_clock::now();
+  go.set_value();
+  while (transport_.machine().counts().frames < 2) std::this_thread::yield();
+  EXPECT_GE(EndIfIdle(milliseconds(0)), before_answer + kIdle.streaming);
+}
+
+TEST(IdleStream, WaitingForAPermitToReadDoesNotCount) {
+  SteppedPool pool;
+  MemoryBudget budget(1, {.reads = {.streams_beyond = 1, .message_bytes = 1000}});
+  ScriptedTransport first(pool, budget, 2, BlobParameters(), kLimits);
+  ScriptedTransport second(pool, budget, 2, BlobParameters(), kLimits);
+  for (ScriptedTransport* transport : {&first, &second}) {
+    transport->BringRequest({.kind = RequestKind::kOpen, .positions = {}});
+    transport->EndWrite(true);
+  }
+  ASSERT_TRUE(first.reading());
+  ASSERT_FALSE(second.reading()) << "the first stream has the only slot";
+  second.machine().EndIfIdle(kIdle, steady_clock::now() + minutes(100));
+  ASSERT_FALSE(second.finished().has_value());
+  const auto before_read = steady_clock::now();
+  first.machine().Cancelled();
+  ASSERT_TRUE(second.reading());
+  EXPECT_GE(second.machine().EndIfIdle(kIdle, before_read), before_read + kIdle.streaming);
+  second.machine().EndIfIdle(kIdle, steady_clock::now() + minutes(10));
+  EXPECT_TRUE(second.finished().has_value());
 }
 
 TEST_F(Idle, WithoutALimitNothingEnds) {

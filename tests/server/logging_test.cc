@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -93,6 +94,17 @@ TEST(LogWriter, CanBeLeftWhileAPipeHoldsItsThread) {
   Pipe pipe;
   LogWriter writer({.file = pipe.ends[1]});
   for (int k = 0; k < 1000; ++k) writer.Write(Line(k));
+}
+
+TEST(LogWriter, LinesThatWaitForAnAbandonedThreadAreCounted) {
+  Pipe pipe;
+  LogWriter writer({.file = pipe.ends[1]});
+  writer.Write(std::string(100'000, 'x') + "\n");
+  pollfd written{.fd = pipe.ends[0], .events = POLLIN, .revents = 0};
+  ASSERT_EQ(poll(&written, 1, 60'000), 1);  // Now the full pipe blocks the thread.
+  writer.Write(Line(1));
+  writer.Stop();
+  EXPECT_EQ(writer.dropped(), 1u);
 }
 
 TEST(LogWriter, AReaderThatHasGoneIsNoEnd) {

@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <future>
 #include <limits>
 #include <memory>
 #include <random>
@@ -67,6 +69,53 @@ TEST(MemoryBudget, ServesThoseWhoWaitInTheirOrderAndLetsNobodyPast) {
   EXPECT_EQ(budget.held(), 90u);
 }
 
+class Reader final : public ReadPermits::Reader {
+ public:
+  void ReadPermitted() override {}
+  void ReadRevoked(const absl::Status&) override {}
+};
+
+// A worker that waits for memory while another worker computes beyond the budget.
+class WaitingWorker : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(budget_.TryTake(60), Fit::kYes);
+    ASSERT_EQ(budget_.TakeForWorker(1000, &beyond_), 1000u);
+    ASSERT_TRUE(budget_.IsBeyond(&beyond_));
+  }
+  // Takes memory for the second worker on another thread.
+  void Begin(std::uint64_t bytes) {
+    taken_ = std::async(std::launch::async,
+                        [this, bytes] { return budget_.TakeForWorker(bytes, &worker_); });
+    ASSERT_EQ(taken_.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
+  }
+  bool Gets() {
+    const bool gets = taken_.wait_for(std::chrono::seconds(5)) == std::future_status::ready;
+    budget_.GiveBackOfWorker(1000, &beyond_);  // Lets the worker end in any case.
+    return gets;
+  }
+
+  int beyond_ = 0, worker_ = 0;
+  MemoryBudget budget_{100, {.reads = {.streams_beyond = 1, .message_bytes = 40}}};
+  std::future<std::uint64_t> taken_;
+};
+
+TEST_F(WaitingWorker, GoesOnWhenAClaimBeforeItIsGone) {
+  const auto claim = std::make_shared<Waiter>();
+  ASSERT_FALSE(budget_.TakeOrWait(80, claim));
+  Begin(30);
+  budget_.StopWaiting(claim);
+  EXPECT_TRUE(Gets());
+}
+
+TEST_F(WaitingWorker, GoesOnWhenAReadEndsWithoutAMessage) {
+  const auto reader = std::make_shared<Reader>();
+  budget_.reads().BeginNow(reader, {.stream = reader.get(), .expected_bytes = 40});
+  Begin(30);
+  budget_.reads().End(*reader);
+  EXPECT_TRUE(Gets());
+}
+
 TEST(MemoryBudget, WhoeverWaitsNoMoreOrHasGoneStandsInNobodysWay) {
   MemoryBudget budget(100);
   auto first = std::make_shared<Waiter>(), gone = std::make_shared<Waiter>();
@@ -122,12 +171,6 @@ TEST(MemoryBudget, ATokensBytesAreItsMost) {
   budget.GiveBack(1, &caller);
   EXPECT_THAT(waiter->granted, ElementsAre(1));
 }
-
-class Reader final : public ReadPermits::Reader {
- public:
-  void ReadPermitted() override {}
-  void ReadRevoked(const absl::Status&) override {}
-};
 
 // The memory of callers changes while the next read is selected.
 TEST(ReadPermits, SelectTheNextReadWhileCallersTakeAndGiveBack) {

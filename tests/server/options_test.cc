@@ -62,8 +62,10 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond that"));
   EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond that"));
   EXPECT_THAT(early->text, HasSubstr("     256 MiB  states of streams"));
-  // 24 + 48 + 8 + 1016 + 640 + 305 + 256 + 63.5 + 64 + 66
-  EXPECT_THAT(early->text, HasSubstr("    2491 MiB  in all"));
+  // 64 MiB of newest results, of which the histories cover 8.
+  EXPECT_THAT(early->text, HasSubstr("      56 MiB  newest results"));
+  // 24 + 48 + 8 + 56 + 1016 + 640 + 305 + 256 + 63.5 + 64 + 66
+  EXPECT_THAT(early->text, HasSubstr("    2547 MiB  in all"));
 }
 
 TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {

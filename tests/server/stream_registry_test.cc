@@ -176,6 +176,32 @@ TEST_F(Registry, TakingOverNeedsNoFreePlace) {
   EXPECT_TRUE(registry_.Open(*Enter(), {.name = "", .labels = {}, .parameters = {}}, token).ok());
 }
 
+TEST_F(Registry, ARankThatComesBackReplacesItsCallAtTheLimit) {
+  StreamRegistry registry(1, nullptr, /*max_parts=*/1);
+  const auto enter = [&] {
+    auto machine = std::make_shared<StreamStateMachine>(transport_, transport_, pool_, budget_, 1);
+    EXPECT_TRUE(registry.Enter(machine).ok());
+    return machine;
+  };
+  const auto leader = enter(), lost = enter(), again = enter(), other = enter();
+  StreamDescription stream{.name = "tank", .labels = {}, .parameters = {}, .broadcaster = {}};
+  stream.assembler = std::make_shared<FrameAssembler>(FrameAssembler::Terms{.parts = 3});
+  ASSERT_TRUE(registry.Open(*leader, stream, NewStreamToken()).ok());
+  const auto join = [&](const StreamStateMachine& machine, std::uint32_t part) {
+    return ReasonOf(
+        registry.JoinPart(machine, {.stream_name = "tank", .part = part, .parts = 3, .token = ""})
+            .status());
+  };
+  EXPECT_EQ(join(*lost, 1), "OK");
+  EXPECT_EQ(join(*other, 2), kReasonTooManyParts);
+  EXPECT_EQ(join(*again, 1), "OK");
+  EXPECT_EQ(join(*other, 2), kReasonTooManyParts);
+  registry.Close(*lost);  // Frees nothing: the other call has its slot.
+  EXPECT_EQ(join(*other, 2), kReasonTooManyParts);
+  registry.Close(*again);
+  EXPECT_EQ(join(*other, 2), "OK");
+}
+
 TEST_F(Registry, TokensOfAnotherFormAreRefusedAndNotRepeated) {
   const auto machine = Enter();
   for (const std::string& token : {std::string(), std::string("secret"), std::string(33, 'a'),

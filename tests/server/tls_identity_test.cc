@@ -10,6 +10,7 @@
 #include <fstream>
 #include <string>
 
+#include "server/web/tls_contexts.h"
 #include "support/certificates.h"
 #include "support/temporary_folder.h"
 
@@ -52,6 +53,19 @@ TEST_F(TlsIdentityFiles, AreReadAsTheyAre) {
   const auto left = identity->not_after - std::chrono::system_clock::now();
   EXPECT_GT(left, std::chrono::minutes(50));
   EXPECT_LE(left, std::chrono::hours(1));
+}
+
+TEST_F(TlsIdentityFiles, TheGatewayDoesNotStartWithAChainThatIsDamaged) {
+  CurrentTlsIdentity current;
+  current.Set({.certificate = issued_.certificate, .key = issued_.key, .client_ca = ""});
+  EXPECT_TRUE(TlsContexts(current).Check().ok());
+  current.Set({.certificate = issued_.certificate +
+                              "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n",
+               .key = issued_.key,
+               .client_ca = ""});
+  const absl::Status refused = TlsContexts(current).Check();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("--tls-cert"));
 }
 
 TEST_F(TlsIdentityFiles, AnExpiredCertificateIsReadAndItsEndKnown) {

@@ -5,10 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <future>
 #include <memory>
 #include <optional>
 #include <random>
@@ -150,6 +152,39 @@ TEST(ResultMailbox, HoldsNoMoreBytesThanItMayAndDropsTheOlderOnes) {
   EXPECT_THAT(taken(), ElementsAre(1, 2, 3));
   for (const std::uint64_t number : {4, 5, 6, 7}) put(number);
   EXPECT_THAT(taken(), ElementsAre(7));
+}
+
+// Occupies the dispatcher's thread until it is released.
+class Occupied final : public Dispatched {
+ public:
+  std::promise<void> begun, released;
+
+ private:
+  void Serve() override {
+    begun.set_value();
+    released.get_future().wait();
+  }
+};
+
+TEST_F(WatchTest, ResultsForABusyDispatcherAreBounded) {
+  const auto watcher = Join(WatchMode::kLatest, 1000);
+  while (broadcaster_->watcher_count() == 0) std::this_thread::yield();
+  const auto occupied = std::make_shared<Occupied>();
+  dispatcher_.Wake(*occupied);
+  occupied->begun.get_future().wait();
+  std::vector<std::weak_ptr<const WatchFrame>> frames;
+  for (std::uint64_t k = 1; k <= 100; ++k) {
+    const auto frame = std::make_shared<NumberedFrame>(k, kFrameBytes);
+    frames.push_back(frame);
+    if (broadcaster_->Publish(frame, k)) broadcaster_->Announce();
+    EXPECT_EQ(broadcaster_->LastNumber(), k);  // Takes the frame out of the mailbox.
+  }
+  const auto held =
+      std::ranges::count_if(frames, [](const auto& frame) { return !frame.expired(); });
+  EXPECT_LE(held * (kFrameBytes + kPublishedBytes), kMaxBytes);
+  occupied->released.set_value();
+  watcher->WaitForFrames(1);
+  EXPECT_EQ(watcher->seen().back().number, 100u);
 }
 
 TEST_F(WatchTest, ADrainEndsThoseWithoutCreditAndCutsThoseWhoTakeNothing) {

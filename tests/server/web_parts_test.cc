@@ -1,4 +1,4 @@
-// Parts of the gateway without connections: slots, signs of life, gathered messages.
+// Parts of the gateway without connections: slots, signs of life, gathered messages, responses.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 
 #include "server/web/connection_slots.h"
 #include "server/web/gathered_message.h"
+#include "server/web/responses.h"
 #include "server/web/signs_of_life.h"
 
 namespace partiemc::server {
@@ -193,6 +194,15 @@ TEST(GatheredMessage, IsWhatCameAndTakesMemoryAsItComes) {
     for (const auto& slice : slices) got.append(slice.begin(), slice.end());
     EXPECT_EQ(got, sent);
   }
+}
+
+TEST(WebResponse, HasALengthUnlessItsStatusHasNoBody) {
+  const auto has_length = [](const WebResponse& response) {
+    return response.Text().find("Content-Length:") != std::string::npos;
+  };
+  EXPECT_FALSE(has_length(ResponseToPreflight()));
+  EXPECT_FALSE(has_length({.status = 304}));
+  EXPECT_TRUE(has_length({.status = 200}));
 }
 
 }  // namespace

@@ -110,7 +110,9 @@ TEST(NormalHostName, IsANameWithoutAPort) {
 TEST(Understand, KnowsWhatIsAskedFor) {
   WebRequest request{.method = "GET", .target = "/v1/watch", .hosts = {"localhost"}};
   const auto refused = [&] {
-    return std::get<WebRefused>(Understand(request, {}).what).http_status;
+    const auto refusal = std::get<WebRefused>(Understand(request, {}).what);
+    EXPECT_TRUE(refusal.rule.starts_with("the ")) << "a whole sentence: " << refusal.rule;
+    return refusal.http_status;
   };
   EXPECT_EQ(refused(), 426u);
   request.is_upgrade = true;

@@ -292,9 +292,17 @@ TEST_F(CallRefused, MEMORY_BUDGET) {
 TEST_F(CallRefused, IDLE) {
   options_.limits.idle.opening = std::chrono::milliseconds(50);
   Serve();
-  StreamClient client(channel_);
-  const auto status = client.Finish();
-  Expect(status, client.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE");
+  StreamClient silent(channel_);
+  const auto status = silent.Finish();
+  Expect(status, silent.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE");
+  server_.reset();
+  options_.limits.idle = {.opening = std::chrono::seconds(30),
+                          .streaming = std::chrono::milliseconds(60)};
+  Serve();
+  StreamClient idle(channel_);
+  ASSERT_TRUE(idle.SendAndReceive(OpenRequest()).has_opened());
+  const auto later = idle.Finish();
+  Expect(later, idle.reason(), StatusCode::DEADLINE_EXCEEDED, "IDLE");
 }
 
 TEST_F(CallRefused, DRAINING) {

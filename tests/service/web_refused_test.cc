@@ -136,6 +136,19 @@ TEST_F(WebGatewayTest, WhatIsNoRequestOfOursIsRefusedAndCounted) {
   EXPECT_EQ(Refusals("malformed"), before + 5);
 }
 
+TEST_F(WebGatewayTest, ClosingAnIdleConnectionIsNoRefusal) {
+  Serve();
+  WebPipe page(web()), call(web()), slow(web());
+  EXPECT_EQ(Ask(page, "GET", "/v1/healthz").status, 200u);
+  const std::string type = "Content-Type: application/x-protobuf\r\n";
+  EXPECT_EQ(Ask(call, "POST", "/v1/info", type).status, 200u);
+  EXPECT_EQ(Ask(slow, "GET", "/v1/healthz").status, 200u);
+  slow.Send("GET /v1/healthz");  // The rest does not follow.
+  for (WebPipe* pipe : {&page, &call, &slow}) EXPECT_TRUE(pipe->IsClosedWithin(60'000));
+  EXPECT_TRUE(Eventually([&] { return Connections() == 0; }));
+  EXPECT_EQ(Refusals("timeout"), 1);
+}
+
 TEST_F(WebGatewayTest, OfSocketsThatSayNothingTheOldestGiveWayAndCallsStay) {
   options_.web->max_connections = options_.web->max_per_address = 8;
   Serve();
