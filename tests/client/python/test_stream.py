@@ -238,6 +238,30 @@ class Streams(unittest.TestCase):
             self.assertEqual(len(list(stream)), 3 * stream.window - 1)
             sender.join()
 
+    def test_a_send_timeout_of_none_waits(self):
+        with partiemc.connect(self.address, spacing=1, send_timeout=None) as stream:
+            def send():
+                try:
+                    for k in range(3 * stream.window):
+                        stream.send(block(0.1 * k))
+                finally:
+                    stream.finish()
+
+            sender = threading.Thread(target=send)
+            sender.start()
+            stream.receive()
+            time.sleep(0.3)  # The window is full, so the sender waits.
+            self.assertEqual(len(list(stream)), 3 * stream.window - 1)
+            sender.join()
+
+    def test_a_token_file_of_none_keeps_the_token(self):
+        self.addCleanup(os.environ.pop, "PARTIEMC_TOKEN")
+        os.environ["PARTIEMC_TOKEN"] = "not a token"
+        for options in ({}, {"token_file": None}):
+            with self.assertRaises(partiemc.Error) as caught:
+                partiemc.connect(self.address, spacing=1, **options)
+            self.assertEqual(caught.exception.field, "token")
+
     def test_time_must_be_finite(self):
         for latest in (False, True):
             with partiemc.connect(self.address, spacing=1, latest=latest) as stream:
