@@ -62,6 +62,13 @@ test('legacy VTK is read as text', async () => {
   await isTheFrame(file('b.vtk', LEGACY.replace('VERTICES 2 4\n1 0\n1 1', 'VERTICES 3 2\nOFFSETS vtktypeint64\n0 1 2\nCONNECTIVITY vtktypeint64\n0 1')));
 });
 
+test('a legacy VTK name that is not UTF-8 stays encoded', async () => {
+  for (const [written, name] of [['p%20q', 'p q'], ['100%', '100%'], ['a%FFb', 'a%FFb']]) {
+    const source = await openDropped([file('a.vtk', LEGACY.replace('SCALARS p', `SCALARS ${written}`))]);
+    assert.deepEqual(source.scalars, [name]);
+  }
+});
+
 test('files of VTK have the same particles in every encoding', async () => {
   const names = ['appended_raw_bigendian.vtu', 'appended_raw_zlib_u64.vtp', 'inline_base64_zlib.vtp', 'polydata_v51_binary.vtk',
     'ugrid_v42_binary.vtk'];
