@@ -112,18 +112,6 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
   box->wraps = wraps;
 }
 
-py::object ToPython(const std::optional<PeriodicBox>& box) {
-  if (!box) return py::none();
-  py::dict dict;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto& axis = box->axes[k];
-    if (!axis) continue;
-    dict[py::str(std::string(1, "xyz"[k]))] =
-        py::make_tuple(axis->origin, axis->origin + axis->length);
-  }
-  return dict;
-}
-
 // Reads dicts of the values that differ.
 void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   const auto given = Take<std::vector<py::dict>>(arguments, "sections");
@@ -206,6 +194,18 @@ PeriodicBox BoxOf(const py::dict& given) {
     box.axes[*axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
   }
   return box;
+}
+
+py::object ToPython(const std::optional<PeriodicBox>& box) {
+  if (!box) return py::none();
+  py::dict dict;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& axis = box->axes[k];
+    if (!axis) continue;
+    dict[py::str(std::string(1, "xyz"[k]))] =
+        py::make_tuple(axis->origin, axis->origin + axis->length);
+  }
+  return dict;
 }
 
 ReconstructionParameters TakeParameters(py::dict arguments) {

@@ -14,7 +14,7 @@ import warnings
 import numpy
 import partiemc
 
-from scenes import Server, ball, block, digests, digests_of_replay, readme
+from scenes import Server, assert_equal, ball, block, digests, digests_of_replay, readme
 
 
 class Streams(unittest.TestCase):
@@ -505,6 +505,17 @@ class Streams(unittest.TestCase):
                 stream.finish()
                 self.assertEqual(list(watch), [])
                 self.assertEqual(watch.end, "FINISHED")
+
+    def test_watchers_see_the_box_of_a_frame(self):
+        with partiemc.connect(self.address, spacing=1, name="boxed", box={"x": (0, 40)},
+                              echo_particles=True) as stream, \
+                partiemc.watch(self.address, "boxed", mode="every") as watch:
+            for box in (None, {"x": (-0.5, 40.25)}):
+                stream.send(block(2), box=box)
+                self.assertIsNone(stream.receive().particle_box)
+                seen = next(watch)
+                self.assertEqual(seen.particle_box, box)
+                assert_equal(self, pickle.loads(pickle.dumps(seen)), seen)
 
     def test_a_watcher_goes_back_to_what_is_held(self):
         with partiemc.connect(self.address, spacing=1, name="held") as stream:
