@@ -212,6 +212,7 @@ export class SpacePicture {
   }
 
   private resized(): void {
+    this.scene.resize();
     if (this.scene.size.width > 0) this.keepInView();
     this.dirty = true;
   }
