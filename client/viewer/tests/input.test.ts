@@ -7,7 +7,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { planNamedColumns } from '../src/input/columns';
 import { parseTimes } from '../src/input/csv';
-import { inspectFiles, openDropped } from '../src/input/drop';
+import { inspectFiles } from '../src/input/drop';
 import { parseLammpsFrame } from '../src/input/lammps';
 import { naturalOrder } from '../src/input/natural_order';
 import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices } from '../src/input/options';
@@ -18,6 +18,7 @@ import { nearPlane } from '../src/input/space';
 import { parseTable } from '../src/input/table';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
 import type { Particles } from '../src/protocol/particles';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const recording = new URL('../../../recordings/dam_break.pemc', import.meta.url);

@@ -3,11 +3,12 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { deflateRawSync, gzipSync } from 'node:zlib';
-import { inspectFiles, openDropped } from '../src/input/drop';
+import { inspectFiles } from '../src/input/drop';
 import { parseNpyHeader, parsePython } from '../src/input/npy';
 import { NO_OPTIONS } from '../src/input/options';
 import { InputError } from '../src/input/source';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const data = (name: string) => new File([readFileSync(new URL(`../../../../tests/data/formats/${name}`, import.meta.url))], name);

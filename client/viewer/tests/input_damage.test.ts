@@ -2,8 +2,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
-import { openDropped } from '../src/input/drop';
 import { InputError } from '../src/input/source';
+import { openDropped } from './open_dropped';
 
 const SAMPLES = ['appended_raw_bigendian.vtu', 'appended_raw_zlib_u64.vtp', 'inline_base64_zlib.vtp', 'polydata_v51_binary.vtk',
   'ugrid_v42_binary.vtk', 'frame_deflate.npz', 'pos_f4_fortran.npy', 'dump.elem.xyz', 'dump.atom', 'dump.custom.unwrapped_scaled'];

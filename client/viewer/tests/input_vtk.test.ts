@@ -3,9 +3,9 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { deflateSync } from 'node:zlib';
-import { openDropped } from '../src/input/drop';
 import { InputError } from '../src/input/source';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const data = (name: string) => new File([readFileSync(new URL(`../../../../tests/data/formats/${name}`, import.meta.url))], name);
