@@ -1,6 +1,6 @@
 import { identityColour, mix, packed, theme } from '../draw/colours';
 import { attributeOf, DEFAULT_LOOK, type Look } from '../draw/look';
-import { chosenRange, type Range, rampTexels, rangeOf } from '../draw/ramp';
+import { chosenRange, type Range, rampTexels, widened } from '../draw/ramp';
 import { type Legend, legendOf } from '../draw/scene';
 import { Tracking } from '../draw/selection';
 import type { Size } from '../draw/view';
@@ -259,10 +259,7 @@ export class SpaceScene {
     const name = attributeOf(this.look);
     if (name === null || !this.shown) return;
     for (const values of [this.shown.channels.get(name), this.shown.frame.particleAttributes?.get(name)]) {
-      const range = values && rangeOf(values);
-      if (!range) continue;
-      this.range = this.range
-        ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) } : range;
+      if (values) this.range = widened(this.range, values);
     }
   }
 
