@@ -57,7 +57,7 @@ type Scalars = NonNullable<Particles['scalars']>;
 /** The attributes that the server accepts: with printable names and finite numbers. Throws InputError for wrong sizes. */
 function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: string): Scalars {
   const count = positions.length / particleBytes(positionFormat);
-  const checked = scalars.map((scalar) => {
+  const all = scalars.map((scalar) => {
     const components = Math.max(scalar.components, 1);
     if (components > 3) throw new InputError(`${name} is damaged: a scalar has more than three components.`);
     const due = 4 * components * count;
@@ -66,7 +66,7 @@ function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: 
     }
     return { name: scalar.name, values: scalar.values, components };
   });
-  return checked.filter((scalar) => SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
+  return all.filter((scalar) => SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
 }
 
 /** Location of a frame: a block and a message in it. */
@@ -91,15 +91,15 @@ export class RecordingSource implements FrameSource {
     if (!isRecording(bytes)) throw new InputError(`${name} is not a recording.`);
     const { blocks, isWhole } = blocksOf(bytes);
     if (blocks.length < 2) throw new InputError(`${name} is truncated in its header. No frame of it is whole.`);
-    const header = fromBinary(RecordingHeaderSchema, messagesOf(unpack(bytes, blocks, 0, name))[0]);
+    const [first] = unpack(bytes, blocks, 0, name);
+    const header = checked(name, () => fromBinary(RecordingHeaderSchema, first));
     const source = new RecordingSource(bytes, blocks, header.title || name, header.spacing ?? null);
     for (let block = 1; block + 1 < blocks.length; ++block) {
-      const messages = messagesOf(unpack(bytes, blocks, block, name));
-      messages.forEach((_, message) => source.locations.push({ block, message }));
+      unpack(bytes, blocks, block, name).forEach((_, message) => source.locations.push({ block, message }));
     }
     if (source.count === 0) throw new InputError(`${name} has no ${isWhole ? '' : 'whole '}frame.`);
-    const first = scalarsOf(source.read(0), `${name}, frame 0,`);
-    source.scalars.push(...first.slice(0, MOST_SCALARS).map((scalar) => scalar.name));
+    const scalars = scalarsOf(source.read(0), `${name}, frame 0,`);
+    source.scalars.push(...scalars.slice(0, MOST_SCALARS).map((scalar) => scalar.name));
     if (!isWhole) source.notice = `${name} is truncated. Its first ${source.count} frames are whole, and later ones are lost.`;
     return source;
   }
@@ -142,10 +142,10 @@ export class RecordingSource implements FrameSource {
   private read(index: number): ParticleFrame {
     const { block, message } = this.locations[index];
     if (this.unpacked?.block !== block) {
-      const messages = messagesOf(unpack(this.bytes, this.blocks, block, this.title));
-      this.unpacked = { block, messages };
+      this.unpacked = { block, messages: unpack(this.bytes, this.blocks, block, this.title) };
     }
-    return fromBinary(ParticleFrameSchema, this.unpacked.messages[message]);
+    const bytes = this.unpacked.messages[message];
+    return checked(this.title, () => fromBinary(ParticleFrameSchema, bytes));
   }
 }
 
@@ -164,9 +164,15 @@ function blocksOf(bytes: Uint8Array): { blocks: number[]; isWhole: boolean } {
   return { blocks, isWhole: false };
 }
 
-function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array {
+/** The messages of a block. Throws InputError. */
+function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array[] {
+  return checked(name, () => messagesOf(decompress(bytes.subarray(blocks[block], blocks[block + 1]))));
+}
+
+/** Reads a part of a recording. Throws InputError if it is damaged. */
+function checked<T>(name: string, read: () => T): T {
   try {
-    return decompress(bytes.subarray(blocks[block], blocks[block + 1]));
+    return read();
   } catch {
     throw new InputError(`${name} is damaged. The command line can read the frames before the damage.`);
   }
