@@ -17,7 +17,7 @@
 #include "client/c/errors.h"
 #include "client/c/particles.h"
 #include "client/c/structs.h"
-#include "client/library/seconds.h"
+#include "client/library/adapters/seconds.h"
 #include "partiemc/c/partiemc.h"
 #include "partiemc/client/latest_sender.h"
 #include "partiemc/client/local_stream.h"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/library/seconds.h"
+#include "client/library/adapters/seconds.h"
 #include "client/python/errors.h"
 #include "partiemc/client/parameter_names.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "client/library/seconds.h"
+#include "client/library/adapters/seconds.h"
 #include "partiemc/client/credentials.h"
 
 namespace partiemc::python {

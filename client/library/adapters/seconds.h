@@ -1,4 +1,4 @@
-// Converts times in seconds, as C and Python give them.
+// Converts times in seconds, as C, Python and flags give them.
 #pragma once
 
 #include <algorithm>
