@@ -17,10 +17,12 @@
 #include "client/c/errors.h"
 #include "client/c/particles.h"
 #include "client/c/structs.h"
+#include "client/library/adapters/seconds.h"
 #include "partiemc/c/partiemc.h"
 #include "partiemc/client/latest_sender.h"
 #include "partiemc/client/local_stream.h"
 #include "partiemc/client/parameter_names.h"
+#include "partiemc/status.h"
 
 using partiemc::client::Event;
 using partiemc::client::FrameStream;
@@ -48,10 +50,25 @@ std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
 // Converts `seconds`; `otherwise` for 0 and NaN. Negative times become 0.
 std::chrono::milliseconds Milliseconds(double seconds, std::chrono::milliseconds otherwise) {
-  constexpr double kLongest = 1e9;  // About thirty years, to prevent overflow of time points.
   if (seconds == 0 || seconds != seconds) return otherwise;
-  return std::chrono::milliseconds(
-      static_cast<std::int64_t>(1000 * std::clamp(seconds, 0.0, kLongest)));
+  return client::ToMilliseconds(seconds);
+}
+
+// Refuses negative times, except for `give_up_after`, where they have a meaning.
+absl::Status CheckTimes(const partiemc_options& options) {
+  const std::pair<const char*, double> times[] = {{"connect_timeout", options.connect_timeout},
+                                                  {"deadline", options.deadline},
+                                                  {"send_timeout", options.send_timeout},
+                                                  {"part_timeout", options.part_timeout}};
+  for (const auto& [name, seconds] : times) {
+    if (!(seconds < 0)) continue;
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {.reason = std::string(kReasonOutOfRange),
+                           .field = name,
+                           .value = absl::StrCat(seconds),
+                           .rule = "must be 0 or more seconds"});
+  }
+  return absl::OkStatus();
 }
 
 // For options where 0 means the default: a negative number stands for the value 0.
@@ -201,6 +218,7 @@ client::StreamOptions StreamOptionsOf(const partiemc_options& options,
 }
 
 absl::Status Open(const char* address, const partiemc_options& options, partiemc_stream& opened) {
+  if (absl::Status status = CheckTimes(options); !status.ok()) return status;
   const auto parameters = ParametersOf(options);
   if (!parameters.ok()) return parameters.status();
   client::Coordinates coordinates = client::Coordinates::kFloat64;

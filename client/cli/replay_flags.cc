@@ -311,16 +311,12 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
 
 void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Output";
-  std::string formats;
-  for (const FrameFormat format : AllFrameFormats()) {
-    AppendAll(formats, formats.empty() ? "" : ",", Name(format));
-  }
   app.add_option("--output-dir", flags.output_dir, "Write DIR/frame_000000.EXT for every frame")
       ->type_name("DIR")
       ->group(kGroup);
-  app.add_option(
-         "--format", flags.format,
-         "Formats of these files, from " + formats + " (default: geojson; with --surface ply)")
+  app.add_option("--format", flags.format,
+                 "Formats of these files, from " + Names(AllFrameFormats()) +
+                     " (default: geojson; with --surface ply)")
       ->type_name("LIST")
       ->group(kGroup);
   AddCompressGlbFlag(app, flags.compress_glb)->group(kGroup);

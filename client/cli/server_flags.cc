@@ -3,6 +3,8 @@
 #include <cstdlib>
 
 #include "CLI/CLI.hpp"
+#include "client/library/adapters/seconds.h"
+#include "partiemc/client/parameter_names.h"
 
 namespace partiemc::client {
 
@@ -62,13 +64,9 @@ CLI::Option* AddCoordinatesFlag(CLI::App& app, std::string& coordinates) {
 }
 
 Coordinates CoordinatesOf(std::string_view name) {
-  if (name == "compact") return Coordinates::kCompact;
-  return name == "float32" ? Coordinates::kRelativeFloat32 : Coordinates::kFloat64;
-}
-
-std::chrono::milliseconds ToMilliseconds(double seconds) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(seconds));
+  Coordinates coordinates = Coordinates::kFloat64;
+  SetByName(name, coordinates).IgnoreError();  // The flag admits only valid names.
+  return coordinates;
 }
 
 std::chrono::milliseconds QueryFlags::Deadline() const { return ToMilliseconds(deadline_seconds); }

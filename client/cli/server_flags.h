@@ -29,8 +29,6 @@ CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string
 CLI::Option* AddCoordinatesFlag(CLI::App& app, std::string& coordinates);
 Coordinates CoordinatesOf(std::string_view name);
 
-std::chrono::milliseconds ToMilliseconds(double seconds);
-
 /// The flags of a verb that sends one request and prints the response.
 struct QueryFlags {
   ServerFlags server;

@@ -14,6 +14,7 @@
 #include "client/cli/console.h"
 #include "client/cli/frame_outputs.h"
 #include "client/cli/stream_recorder.h"
+#include "client/library/adapters/seconds.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
 #include "common/text.h"
@@ -259,17 +260,13 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
                    "Timeout for opening the watch, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
-  std::string formats;
-  for (const FrameFormat format : AllFrameFormats()) {
-    AppendAll(formats, formats.empty() ? "" : ",", Name(format));
-  }
   auto* const output_dir =
       verb->add_option(
               "--output-dir", flags.output_dir,
               "Write DIR/frame_000000.EXT for every frame, with the numbers of the producer")
           ->type_name("DIR");
   verb->add_option("--format", flags.format,
-                   "Formats of these files, from " + formats +
+                   "Formats of these files, from " + Names(AllFrameFormats()) +
                        " (default: geojson; for streams of surfaces ply)")
       ->needs(output_dir)
       ->type_name("LIST");

@@ -153,11 +153,13 @@ absl::StatusOr<bool> WatchCall::WaitUntilOpened(TimePoint until) {
 
 absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
                                             std::optional<std::chrono::milliseconds> wait) {
+  std::optional<TimePoint> until;
+  if (wait) until = clock_.Now() + *wait;
   absl::StatusOr<Received> received = Received::kNothingYet;
-  Message message = TakeNext(wait, received);
+  Message message = TakeNext(until, received);
   while (message != nullptr && message->has_ended()) {
     end_ = {message->ended().reason(), message->ended().message(), message->ended().dropped()};
-    message = TakeNext(wait, received);  // The status of the call follows.
+    message = TakeNext(until, received);  // The status of the call follows.
   }
   if (message == nullptr) return received;
   const absl::Status status = Decode(*message, frame);
@@ -175,14 +177,13 @@ absl::StatusOr<Received> WatchCall::Receive(WatchedFrame& frame,
   return Received::kEvent;
 }
 
-WatchCall::Message WatchCall::TakeNext(std::optional<std::chrono::milliseconds> wait,
+WatchCall::Message WatchCall::TakeNext(std::optional<TimePoint> until,
                                        absl::StatusOr<Received>& received) {
-  const auto until = clock_.Now() + wait.value_or(std::chrono::milliseconds(0));
   const MutexLock lock(mutex_);
   while (!HasNews()) {
-    if (!wait) {
+    if (!until) {
       changed_.Wait(mutex_);
-    } else if (!clock_.WaitUntil(changed_, mutex_, until) && !HasNews()) {
+    } else if (!clock_.WaitUntil(changed_, mutex_, *until) && !HasNews()) {
       received = Received::kNothingYet;
       return nullptr;
     }

@@ -71,10 +71,10 @@ class WatchCall {
   bool HasNews() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     return cancelled_ || !ready_.empty() || status_;
   }
-  /// Takes the next message. Returns null if no message arrives in time, or after an error or the
-  /// end; then `received` holds the error or the end.
-  Message TakeNext(std::optional<std::chrono::milliseconds> wait,
-                   absl::StatusOr<Received>& received) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Takes the next message. Returns null if no message arrives before `until` (absent: no limit),
+  /// or after an error or the end; then `received` holds the error or the end.
+  Message TakeNext(std::optional<TimePoint> until, absl::StatusOr<Received>& received)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
   absl::Status Broken(const char* what) const;

@@ -38,7 +38,8 @@ enum class FrameFormat : std::uint8_t {
   /// VTK XML PolyData, only in builds with VTK: rings as closed lines, triangles as polygons. Cell
   /// data: "class" (0 boundary and 1 interior triangle, 2 outer ring, 3 hole) and "ring" (-1 for
   /// triangles). Point data: the attributes; for an outline that touches a wall also `wetted` and
-  /// `contact_angle` (see kCsv; NaN where no outline meets a wall). Field data: TimeValue.
+  /// `contact_angle` (see kCsv; NaN where no outline meets a wall). Field data: TimeValue. Here and
+  /// in CSV, attributes with one of these two names get a "_" at the end.
   /// A surface: triangles as polygons. Cell data: "shell" and "body". Point data also has the
   /// normals.
   kVtp,

@@ -52,6 +52,15 @@ std::optional<double> SecondsLeft(std::uint64_t done, std::uint64_t total, doubl
   return seconds / static_cast<double>(done) * static_cast<double>(total - done);
 }
 
+// The first characters of `text` in at most `size` bytes, so in at most `size` columns. Requires:
+// UTF-8.
+std::string_view CutAtCharacter(std::string_view text, std::size_t size) {
+  if (text.size() <= size) return text;
+  const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
+  while (size > 0 && continues(text[size])) --size;
+  return text.substr(0, size);
+}
+
 }  // namespace
 
 Progress::Options Progress::ForStandardError() {
@@ -106,7 +115,8 @@ void Progress::ShowLine(std::string_view line) {
   }
   // The line is cut: a line as wide as the terminal would wrap, and then it could not be redrawn.
   const std::size_t columns = std::max<std::size_t>(options_.columns(), 2);
-  options_.write(Concat(kRestartLine, line.substr(0, columns - 1)));
+  line_ = CutAtCharacter(line, columns - 1);
+  options_.write(Concat(kRestartLine, line_));
 }
 
 std::string Progress::Bar(double seconds) const {
@@ -124,13 +134,18 @@ std::string Progress::Bar(double seconds) const {
   const std::string after =
       absl::StrFormat(" %3d %%  %s  %s", static_cast<int>(100 * share), rate,
                       left ? Concat("ETA ", Duration(*left)) : Duration(seconds));
-  const std::size_t used = before.size() + after.size() + 3;
   const std::size_t columns = options_.columns();
+  std::size_t used = before.size() + after.size() + 3;
   if (columns < used + kShortestBar) return Concat(before, after);
+  std::string detail;
+  if (!detail_.empty() && columns >= used + kShortestBar + 2 + detail_.size()) {
+    detail = Concat("  ", detail_);
+    used += detail.size();
+  }
   const std::size_t length = std::min(kLongestBar, columns - used);
   const auto full = static_cast<std::size_t>(share * static_cast<double>(length));
   return Concat(before, "[", std::string(full, '='), full < length ? ">" : "",
-                std::string(length - std::min(full + 1, length), ' '), "]", after);
+                std::string(length - std::min(full + 1, length), ' '), "]", after, detail);
 }
 
 std::string Progress::Line(double seconds) const {
@@ -140,13 +155,14 @@ std::string Progress::Line(double seconds) const {
   }
   const auto left = SecondsLeft(done_, *options_.total, seconds);
   return Concat(done_, " of ", *options_.total, " frames, ", rate,
-                left ? Concat(", ", Duration(*left), " left") : "");
+                left ? Concat(", ", Duration(*left), " left") : "", detail_.empty() ? "" : ", ",
+                detail_);
 }
 
 void Progress::Note(std::string_view line) {
-  const bool torn = options_.terminal && shown_done_ && !finished_ && !options_.quiet;
+  const bool torn = !line_.empty() && !finished_;
   options_.write(Concat(torn ? kRestartLine : "", line, "\n"));
-  if (torn) Show();
+  if (torn) options_.write(Concat(kRestartLine, line_));
 }
 
 void Progress::Finish() {

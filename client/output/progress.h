@@ -35,7 +35,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   /// `done`: number of frames completed since the start. `detail`: text about the last frame, shown
-  /// only if `total` is absent.
+  /// unless it does not fit beside a bar.
   void Update(std::uint64_t done, std::string detail = {});
 
   /// Shows `text` instead of the progress, while no frame can arrive. Call it repeatedly until the
@@ -62,6 +62,7 @@ class Progress {
   std::uint64_t done_ = 0;
   std::string detail_;
   std::optional<std::uint64_t> shown_done_;
+  std::string line_;  // The line that the terminal shows now.
   bool finished_ = false;
 };
 

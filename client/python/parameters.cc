@@ -3,16 +3,16 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdint>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "client/library/adapters/seconds.h"
 #include "client/python/errors.h"
 #include "partiemc/client/parameter_names.h"
 
@@ -52,25 +52,22 @@ void TakeNamed(py::dict& arguments, const char* field, Value& value) {
   }
 }
 
-// Reads a time in seconds.
-void TakeTime(py::dict& arguments, const char* name, std::chrono::milliseconds& time) {
-  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
-  if (const auto seconds = Take<double>(arguments, name)) {
-    if (!(*seconds >= 0)) {
-      Raise(
-          Invalid(kReasonOutOfRange, name, ShortestNumber(*seconds), "must be 0 or more seconds"));
-    }
-    time =
-        std::chrono::milliseconds(static_cast<std::int64_t>(1000 * std::min(*seconds, kLongest)));
+// Reads a time in seconds. `time` may be optional.
+template <typename Time>
+void TakeTime(py::dict& arguments, const char* name, Time& time) {
+  const auto seconds = Take<double>(arguments, name);
+  if (!seconds) return;
+  if (!(*seconds >= 0)) {
+    Raise(Invalid(kReasonOutOfRange, name, ShortestNumber(*seconds), "must be 0 or more seconds"));
   }
+  time = client::ToMilliseconds(*seconds);
 }
 
-void TakeTime(py::dict& arguments, const char* name,
-              std::optional<std::chrono::milliseconds>& time) {
-  if (!arguments.contains(name)) return;
-  std::chrono::milliseconds given{0};
-  TakeTime(arguments, name, given);
-  time = given;
+// The index of the axis "x", "y" or "z"; empty for other texts.
+std::optional<std::size_t> AxisOf(std::string_view name) {
+  const std::size_t axis = std::string_view("xyz").find(name);
+  if (name.size() != 1 || axis == std::string_view::npos) return std::nullopt;
+  return axis;
 }
 
 // Removes the argument `slice`: an axis and a coordinate such as ("z", 0.5), or a point and a
@@ -87,12 +84,12 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
     const auto pair = given->cast<std::pair<py::object, py::object>>();
     slice.emplace();
     if (py::isinstance<py::str>(pair.first)) {
-      const auto axis = std::string_view("xyz").find(pair.first.cast<std::string>());
-      if (axis == std::string_view::npos) return refuse();
+      const auto axis = AxisOf(pair.first.cast<std::string>());
+      if (!axis) return refuse();
       slice->normal = {};
-      slice->origin[axis] = pair.second.cast<double>();
+      slice->origin[*axis] = pair.second.cast<double>();
       // The normal points along -y, so that results have the axes x and z in this order.
-      slice->normal[axis] = axis == 1 ? -1 : 1;
+      slice->normal[*axis] = *axis == 1 ? -1 : 1;
     } else {
       slice->origin = pair.first.cast<std::array<double, 3>>();
       slice->normal = pair.second.cast<std::array<double, 3>>();
@@ -113,18 +110,6 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
   }
   box = BoxOf(*given);
   box->wraps = wraps;
-}
-
-py::object ToPython(const std::optional<PeriodicBox>& box) {
-  if (!box) return py::none();
-  py::dict dict;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto& axis = box->axes[k];
-    if (!axis) continue;
-    dict[py::str(std::string(1, "xyz"[k]))] =
-        py::make_tuple(axis->origin, axis->origin + axis->length);
-  }
-  return dict;
 }
 
 // Reads dicts of the values that differ.
@@ -165,7 +150,6 @@ void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
 void TakeWallPlanes(py::dict& arguments, std::vector<WallPlane>& planes) {
   const auto given = Take<std::vector<py::object>>(arguments, "wall_planes");
   if (!given) return;
-  constexpr std::string_view kAxes = "xyz";
   for (std::size_t k = 0; k < given->size(); ++k) {
     const std::string field = "wall_planes[" + std::to_string(k) + "]";
     const auto refuse = [&] {
@@ -175,12 +159,11 @@ void TakeWallPlanes(py::dict& arguments, std::vector<WallPlane>& planes) {
     };
     if (!py::isinstance<py::dict>((*given)[k])) refuse();
     py::dict dict = (*given)[k].cast<py::dict>().attr("copy")();
-    const auto axis = Take<std::string>(dict, "axis");
+    const auto axis = AxisOf(Take<std::string>(dict, "axis").value_or(""));
     const auto position = Take<double>(dict, "position");
     const std::string side = Take<std::string>(dict, "side").value_or("above");
-    const bool is_axis = axis && axis->size() == 1 && kAxes.find(*axis) != kAxes.npos;
-    if (!is_axis || !position || (side != "above" && side != "below") || !dict.empty()) refuse();
-    planes.push_back({static_cast<int>(kAxes.find(*axis)), *position, side == "above"});
+    if (!axis || !position || (side != "above" && side != "below") || !dict.empty()) refuse();
+    planes.push_back({static_cast<int>(*axis), *position, side == "above"});
   }
 }
 
@@ -197,22 +180,32 @@ py::object ToPython(const std::optional<SlicePlane>& slice) {
 PeriodicBox BoxOf(const py::dict& given) {
   PeriodicBox box;
   for (const auto& [key, value] : given) {
-    std::size_t axis = std::string_view::npos;
+    std::optional<std::size_t> axis;
     std::pair<double, double> bounds;
     try {
-      const auto name = key.cast<std::string>();
-      if (name.size() == 1) axis = std::string_view("xyz").find(name);
       bounds = value.cast<std::pair<double, double>>();
+      axis = AxisOf(key.cast<std::string>());
     } catch (const py::cast_error&) {
-      axis = std::string_view::npos;
     }
-    if (axis == std::string_view::npos) {
+    if (!axis) {
       Raise(Invalid("UNSUPPORTED", "box", py::repr(given).cast<std::string>(),
                     "must be a dict of periodic axes with their bounds, {\"x\": (0, 10)} say"));
     }
-    box.axes[axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
+    box.axes[*axis] = PeriodicAxis{bounds.first, bounds.second - bounds.first};
   }
   return box;
+}
+
+py::object ToPython(const std::optional<PeriodicBox>& box) {
+  if (!box) return py::none();
+  py::dict dict;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& axis = box->axes[k];
+    if (!axis) continue;
+    dict[py::str(std::string(1, "xyz"[k]))] =
+        py::make_tuple(axis->origin, axis->origin + axis->length);
+  }
+  return dict;
 }
 
 ReconstructionParameters TakeParameters(py::dict arguments) {
@@ -261,10 +254,11 @@ client::Credentials TakeCredentials(py::dict arguments) {
   TakeInto(arguments, "ca_file", credentials.ca_file);
   TakeInto(arguments, "cert_file", credentials.cert_file);
   TakeInto(arguments, "key_file", credentials.key_file);
-  if (arguments.contains("token_file"))
+  if (auto file = Take<std::string>(arguments, "token_file")) {
+    credentials.token_file = *std::move(file);
     credentials.token.clear();  // Replaces the token of the environment.
+  }
   TakeInto(arguments, "token", credentials.token);
-  TakeInto(arguments, "token_file", credentials.token_file);
   credentials.tls |= !credentials.ca_file.empty() || !credentials.cert_file.empty();
   TakeInto(arguments, "tls", credentials.tls);
   return credentials;

@@ -4,6 +4,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include <optional>
+
 #include "partiemc/client/stream.h"
 #include "partiemc/client/watcher.h"
 #include "partiemc/parameters.h"
@@ -17,6 +19,8 @@ ReconstructionParameters TakeParameters(pybind11::dict arguments);
 /// Converts a dict of periodic axes with their bounds: {"x": (0, 10)}. Raises partiemc.Error for
 /// another dict.
 PeriodicBox BoxOf(const pybind11::dict& given);
+/// The reverse of BoxOf; None without a box.
+pybind11::object ToPython(const std::optional<PeriodicBox>& box);
 /// Takes tls, ca_file, cert_file, key_file, token and token_file. The defaults come from the
 /// environment. ca_file and cert_file enable TLS, unless `tls` is False.
 client::Credentials TakeCredentials(pybind11::dict arguments);

@@ -17,6 +17,7 @@
 
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
+#include "client/python/parameters.h"
 #include "client/python/parts.h"
 #include "client/python/surface_view.h"
 #include "partiemc/doubt.h"
@@ -303,6 +304,28 @@ const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& resul
   return result.sections;
 }
 
+// The axes of a box as origins and lengths, which keep their bits. Empty without a box.
+using BoxState = std::vector<std::optional<std::pair<double, double>>>;
+
+BoxState BoxToState(const std::optional<PeriodicBox>& box) {
+  BoxState state;
+  if (!box) return state;
+  for (const auto& axis : box->axes) {
+    auto& entry = state.emplace_back();
+    if (axis) entry.emplace(axis->origin, axis->length);
+  }
+  return state;
+}
+
+std::optional<PeriodicBox> BoxFromState(const BoxState& state) {
+  if (state.size() != 3) return std::nullopt;
+  PeriodicBox box;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (state[k]) box.axes[k] = PeriodicAxis{state[k]->first, state[k]->second};
+  }
+  return box;
+}
+
 // Returns the state that pickle stores: the result as a message of the protocol, and the values
 // that the message cannot hold.
 py::tuple ToState(PythonResult& result) {
@@ -336,7 +359,8 @@ py::tuple ToState(PythonResult& result) {
                                                one.values.size() * sizeof(float))));
   }
   return py::make_tuple(py::bytes(bytes), sections, particles, result.dropped, result.gap,
-                        result.rejoined, result.in_space, attributes);
+                        result.rejoined, result.in_space, attributes,
+                        BoxToState(result.particle_box));
 }
 
 AttributeValues AttributeFromState(const py::handle& state) {
@@ -353,13 +377,15 @@ AttributeValues AttributeFromState(const py::handle& state) {
 }
 
 std::shared_ptr<PythonResult> FromState(const py::tuple& state) {
-  // States of older versions have 6 entries (before surfaces) or 7 (before particle attributes).
-  if (state.size() < 6 || state.size() > 8) {
+  // States of older versions have 6 entries (before surfaces), 7 (before particle attributes) or 8
+  // (before boxes of frames).
+  if (state.size() < 6 || state.size() > 9) {
     throw py::value_error("pickle: not the state of a partiemc Result");
   }
   auto result = std::make_shared<PythonResult>();
   result->in_space = state.size() >= 7 && state[6].cast<bool>();
-  if (state.size() == 8) {
+  if (state.size() >= 9) result->particle_box = BoxFromState(state[8].cast<BoxState>());
+  if (state.size() >= 8) {
     for (const py::handle& attribute : state[7]) {
       result->particle_attributes.push_back(AttributeFromState(attribute));
     }
@@ -490,6 +516,10 @@ void DefineResults(py::module_& module) {
           },
           "Attributes of `particles`, by name: (N,) or (N, k) float32. Empty unless the producer "
           "sends attributes and echoes its particles.")
+      .def_property_readonly(
+          "particle_box", [](const PythonResult& r) { return ToPython(r.particle_box); },
+          "Watched frames: the periodic box that the producer sent with the frame, as the argument "
+          "`box` of Stream.send. None without one, and unless the producer echoes its particles.")
       .def_property_readonly(
           "level_error",
           [](const PythonResult& r) {

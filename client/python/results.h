@@ -13,6 +13,7 @@
 #include "common/mutex.h"
 #include "partiemc/client/frame_stream.h"
 #include "partiemc/doubt.h"
+#include "partiemc/parameters.h"
 #include "partiemc/surface_level.h"
 
 namespace partiemc::python {
@@ -29,6 +30,7 @@ struct PythonResult {
   std::optional<SurfaceLevel> level;
   std::vector<double> particles;
   std::vector<AttributeValues> particle_attributes;
+  std::optional<PeriodicBox> particle_box;
   std::uint64_t dropped = 0, gap = 0;
   std::string rejoined;
   /// Sections as Python objects. The first access moves them here from `frame`.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "client/library/adapters/seconds.h"
 #include "partiemc/client/credentials.h"
 
 namespace partiemc::python {
@@ -14,11 +15,8 @@ using client::Received;
 using std::chrono::milliseconds;
 
 std::optional<std::chrono::steady_clock::time_point> Until(std::optional<double> seconds) {
-  constexpr double kLongest = 1e9;  // About thirty years, which clocks can still add.
   if (!seconds) return std::nullopt;
-  return std::chrono::steady_clock::now() +
-         std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-             std::chrono::duration<double>(std::min(std::max(*seconds, 0.0), kLongest)));
+  return std::chrono::steady_clock::now() + client::ToMilliseconds(*seconds);
 }
 
 // Keeps gRPC initialized until the process ends. Otherwise gRPC shuts down with the last stream.

@@ -64,6 +64,7 @@ class Watch {
     result->level = frame.level;
     result->particles = std::move(frame.particles);
     result->particle_attributes = std::move(frame.particle_attributes);
+    result->particle_box = frame.particle_box;
     result->dropped = frame.dropped;
     result->gap = frame.gap;
     result->rejoined = std::move(frame.rejoined);

@@ -1,5 +1,6 @@
 #include "client/recording/block.h"
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -52,6 +53,10 @@ BlockPacker::BlockPacker(int compression_level) : context_(ZSTD_createCCtx()) {
 }
 
 absl::StatusOr<std::string_view> BlockPacker::Pack(std::string_view block) {
+  if (block.size() > kMaxBlockBytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("a frame has more than ", kMaxBlockBytes, " bytes, which no recording holds"));
+  }
   packed_.resize(ZSTD_compressBound(block.size()));
   const std::size_t size =
       ZSTD_compress2(context_.get(), packed_.data(), packed_.size(), block.data(), block.size());
@@ -62,16 +67,20 @@ absl::StatusOr<std::string_view> BlockPacker::Pack(std::string_view block) {
   return std::string_view(packed_).substr(0, size);
 }
 
-BlockReader::BlockReader(std::ifstream file, double max_expansion)
-    : file_(std::move(file)), context_(ZSTD_createDCtx()), max_expansion_(max_expansion) {}
+BlockReader::BlockReader(std::ifstream file, double max_expansion, std::size_t max_block_bytes)
+    : file_(std::move(file)),
+      context_(ZSTD_createDCtx()),
+      max_expansion_(max_expansion),
+      max_block_bytes_(max_block_bytes) {}
 
-absl::StatusOr<BlockReader> BlockReader::Open(const std::string& path, double max_expansion) {
+absl::StatusOr<BlockReader> BlockReader::Open(const std::string& path, double max_expansion,
+                                              std::size_t max_block_bytes) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     return absl::Status(absl::ErrnoToStatusCode(errno),
                         absl::StrCat("cannot be read: ", std::strerror(errno)));
   }
-  BlockReader reader(std::move(file), max_expansion);
+  BlockReader reader(std::move(file), max_expansion, max_block_bytes);
   const std::string_view bytes = reader.Peek(kMarkBytes);
   const auto version =
       bytes.size() == kMarkBytes ? ParseMark(bytes, kFileTag) : std::optional<std::uint64_t>();
@@ -128,8 +137,8 @@ absl::StatusOr<BlockReader::Piece> BlockReader::Unpack(std::string_view& block) 
   while (left != 0) {
     if (position_ == input_.size() && !Fill()) return Piece::kTruncated;
     if (block_.size() - used < ZSTD_DStreamOutSize()) {
-      if (used > kMaxBlockBytes) return absl::DataLossError("a block is larger than 1 GiB");
-      block_.resize(2 * block_.size() + ZSTD_DStreamOutSize());
+      // One byte more than allowed shows that a block is too large.
+      block_.resize(std::min(2 * block_.size() + ZSTD_DStreamOutSize(), max_block_bytes_ + 1));
     }
     ZSTD_inBuffer in{input_.data(), input_.size(), position_};
     ZSTD_outBuffer out{block_.data(), block_.size(), used};
@@ -137,6 +146,10 @@ absl::StatusOr<BlockReader::Piece> BlockReader::Unpack(std::string_view& block) 
     position_ = in.pos;
     used = out.pos;
     if (ZSTD_isError(left)) return absl::DataLossError(ZSTD_getErrorName(left));
+    if (used > max_block_bytes_) {
+      return absl::DataLossError(
+          absl::StrCat("a block is larger than ", max_block_bytes_, " bytes"));
+    }
     if (input::ExpandsTooMuch(unpacked_ + used, read_, max_expansion_)) {
       return absl::ResourceExhaustedError(input::ExpansionRule(max_expansion_));
     }

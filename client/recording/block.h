@@ -18,8 +18,8 @@
 
 namespace partiemc::client::recording {
 
-/// Limit on a decompressed block: enough for a frame of 2^24 particles with all arrays. A larger
-/// block is refused, at the latest at twice this size.
+/// Limit on a decompressed block: enough for a frame of 2^24 particles with all arrays. Larger
+/// blocks are neither written nor read.
 inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
 
 inline constexpr std::string_view kFileTag = "PEMCFILE";
@@ -58,10 +58,11 @@ class BlockReader {
   };
 
   /// Reads the first mark. `max_expansion` limits the decompressed bytes of all blocks
-  /// (input::ExpandsTooMuch). Errors: kNotFound, kPermissionDenied, kUnimplemented (another
-  /// version), kDataLoss (not a recording).
+  /// (input::ExpandsTooMuch), `max_block_bytes` those of each block. Errors: kNotFound,
+  /// kPermissionDenied, kUnimplemented (another version), kDataLoss (not a recording).
   static absl::StatusOr<BlockReader> Open(const std::string& path,
-                                          double max_expansion = input::kMaxExpansion);
+                                          double max_expansion = input::kMaxExpansion,
+                                          std::size_t max_block_bytes = kMaxBlockBytes);
 
   /// Reads the next piece. `block` is valid until the next call. Errors: kDataLoss;
   /// kResourceExhausted if blocks expand too much.
@@ -75,7 +76,7 @@ class BlockReader {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
   };
 
-  BlockReader(std::ifstream file, double max_expansion);
+  BlockReader(std::ifstream file, double max_expansion, std::size_t max_block_bytes);
   bool Fill();  // Returns false at the end of the file.
   std::string_view Peek(std::size_t size);
   absl::StatusOr<Piece> Unpack(std::string_view& block);
@@ -84,6 +85,7 @@ class BlockReader {
   std::ifstream file_;
   std::unique_ptr<ZSTD_DCtx, Free> context_;
   double max_expansion_;
+  std::size_t max_block_bytes_;
   std::uint64_t read_ = 0;      // Bytes read from the file.
   std::uint64_t unpacked_ = 0;  // Decompressed bytes of the earlier blocks.
   std::string input_;           // Buffered bytes of the file.

@@ -400,9 +400,7 @@ CLI::App* AddLoad(CLI::App& app, LoadFlags& flags) {
 }
 
 int Load(const LoadFlags& flags) {
-  Shared shared{
-      .flags = flags,
-      .frames = flags.surface ? LoadFramesInSpace(flags.particles) : LoadFrames(flags.particles)};
+  Shared shared{.flags = flags, .frames = LoadFrames(flags.particles, flags.surface ? 3 : 2)};
   const std::size_t particles = shared.frames[0].size() / (flags.surface ? 3 : 2);
   for (std::size_t k = 0; !flags.no_ids && k < particles; ++k) shared.ids.push_back(k);
   if (!flags.metrics.empty()) {

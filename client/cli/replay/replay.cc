@@ -13,6 +13,7 @@
 #include "client/cli/replay/looped_input.h"
 #include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
+#include "client/library/adapters/seconds.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
 #include "common/printable.h"

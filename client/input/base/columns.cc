@@ -153,7 +153,7 @@ absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
     }
     if (next == found.size()) {
       plan.positions = chosen;
-      plan.scaled = IsScaled(family);
+      plan.scaled = request.is_lammps_dump && IsScaled(family);
       return absl::OkStatus();
     }
   }
@@ -162,12 +162,19 @@ absl::Status PlanAskedPositions(const Names& names, const Names& canonical,
   return absl::OkStatus();
 }
 
-absl::Status PlanRecognisedPositions(const Names& names, const Names& canonical, ColumnPlan& plan) {
+absl::Status PlanRecognisedPositions(const Names& names, const Names& canonical,
+                                     const ColumnRequest& request, ColumnPlan& plan) {
   for (const Family family : kFamilies) {
     const Axes axes = FindFamily(canonical, family);
     if (CountFound(axes) < 2) continue;
     plan.positions = axes;
     plan.scaled = IsScaled(family);
+    if (plan.scaled && !request.is_lammps_dump) {
+      return absl::FailedPreconditionError(
+          Concat("the only positions among ", List(names),
+                 " are fractions of the box of a LAMMPS dump (xs,ys); name other columns with "
+                 "--columns"));
+    }
     if (family == Family::kPlain || family == Family::kScaled) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         plan.images[axis] = FindFirst(canonical, {Concat("i", "xyz"[axis])});
@@ -298,7 +305,7 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
   if (request.needs_diameters) plan.per_volume = 4 / std::numbers::pi;
   if (request.needs_diameters || (request.needs_sizes && !plan.volume)) PlanSizes(canonical, plan);
   const absl::Status positions = request.columns.empty()
-                                     ? PlanRecognisedPositions(names, canonical, plan)
+                                     ? PlanRecognisedPositions(names, canonical, request, plan)
                                      : PlanAskedPositions(names, canonical, request, plan);
   if (!positions.ok()) return positions;
   if (absl::Status status = PlanConditions(names, canonical, request, plan); !status.ok()) {

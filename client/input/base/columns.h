@@ -34,6 +34,7 @@ struct ColumnRequest {
   std::vector<std::string> columns;      ///< SequenceOptions::columns, split; empty: by names.
   double max_expansion = kMaxExpansion;  ///< SequenceOptions::max_expansion.
   bool tag_is_id = true;                 ///< Whether a column "tag" can hold the ids.
+  bool is_lammps_dump = false;           ///< Whether columns "xs" are fractions of a box.
   bool needs_sizes = false;              ///< SequenceOptions::needs_sizes.
   bool in_space = false;                 ///< SequenceOptions::in_space.
   bool needs_diameters = false;          ///< SequenceOptions::needs_diameters.
@@ -83,7 +84,9 @@ struct ColumnPlan {
 /// vx, Vel:0, velocity_x, id, idp, particle_id, volume, vol, area and similar names, in upper or
 /// lower case, with any of " _.:-" between the parts and an optional unit in brackets. An attribute
 /// is a column with its name, or an array NAME:0, NAME:1 or NAME_x, NAME_y; "velocity" means the
-/// velocities. Errors: kFailedPrecondition without positions or without a requested column.
+/// velocities. Errors: kFailedPrecondition without positions or without a requested column, and if
+/// the positions would be fractions of a box (xs ys) outside of a LAMMPS dump; there
+/// ColumnRequest::columns takes them as they are.
 absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& names,
                                             const ColumnRequest& request);
 

@@ -1,29 +1,13 @@
 #include "client/input/base/number_text.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <system_error>
 
+#include "absl/strings/numbers.h"
 #include "common/text.h"
 
 namespace partiemc::client::input {
-namespace {
-
-// Converts a number that is out of range, which std::from_chars does not: overflow gives infinity,
-// underflow zero. Requires: `text` is a well-formed number.
-double OutOfRange(std::string_view text) {
-  const bool negative = text.front() == '-';
-  const std::size_t exponent = text.find_first_of("eE");
-  const bool small = exponent == std::string_view::npos
-                         ? text.find_first_of("123456789") > std::min(text.find('.'), text.size())
-                         : text.substr(exponent + 1, 1) == "-";
-  const double magnitude = small ? 0.0 : std::numeric_limits<double>::infinity();
-  return negative ? -magnitude : magnitude;
-}
-
-}  // namespace
 
 std::optional<double> ParseNumber(std::string_view text) {
   if (!text.empty() && text.front() == '+') {
@@ -34,8 +18,12 @@ std::optional<double> ParseNumber(std::string_view text) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, number);
   if (stop != end || text.empty()) return std::nullopt;
-  if (error == std::errc::result_out_of_range) return OutOfRange(text);
-  if (error != std::errc()) return std::nullopt;
+  if (error == std::errc()) return number;
+  // Out of range, which leaves `number` unchanged. SimpleAtod gives infinity or zero.
+  if (error != std::errc::result_out_of_range ||
+      !absl::SimpleAtod({text.data(), text.size()}, &number)) {
+    return std::nullopt;
+  }
   return number;
 }
 

@@ -73,7 +73,9 @@ Box BoxOfEdges(const std::array<std::vector<double>, 3>& lines) {
 class LammpsDumpReader final : public FrameReader {
  public:
   LammpsDumpReader(std::unique_ptr<InputStream> stream, const ColumnRequest& request)
-      : stream_(std::move(stream)), request_(request) {}
+      : stream_(std::move(stream)), request_(request) {
+    request_.is_lammps_dump = true;
+  }
 
   absl::StatusOr<bool> Next(ParticleRows* rows) override {
     head_ = FrameHead();
@@ -293,7 +295,7 @@ class LammpsDumpReader final : public FrameReader {
   }
 
   std::unique_ptr<InputStream> stream_;
-  const ColumnRequest& request_;
+  ColumnRequest request_;
   std::size_t frame_ = 0;
   FrameHead head_;
   std::optional<ColumnPlan> plan_;

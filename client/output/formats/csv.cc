@@ -17,9 +17,9 @@ std::string Cell(const std::string& text) {
 }
 
 void AppendAttributeNames(std::string& out, const AttributeValues& attribute) {
+  const std::string name = NameBesideWalls(attribute.name);
   for (int k = 0; k < attribute.components; ++k) {
-    AppendAll(out, ",",
-              Cell(attribute.components == 1 ? attribute.name : Concat(attribute.name, ":", k)));
+    AppendAll(out, ",", Cell(attribute.components == 1 ? name : Concat(name, ":", k)));
   }
 }
 
@@ -32,7 +32,7 @@ std::string EncodeCsv(const FrameRecord& frame) {
     AppendAttributeNames(out, attribute);
   }
   const WallValues walls = WallValuesOf(rings);
-  if (!walls.wetted.empty()) out += ",wetted,contact_angle";
+  if (!walls.wetted.empty()) AppendAll(out, ",", kWetted, ",", kContactAngle);
   out += '\n';
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {

@@ -59,7 +59,7 @@ void AddPoints(const FileMesh& mesh, vtkPolyData* data) {
   }
   for (const AttributeValues& one : mesh.attributes()) {
     // VTK replaces an array by another one with the same name.
-    std::string name = one.name;
+    std::string name = mesh.surface() ? one.name : NameBesideWalls(one.name);
     if (mesh.surface() && name == kNormals) name += '_';
     data->GetPointData()->AddArray(FloatArray(name, one.components, one.values));
   }
@@ -107,12 +107,12 @@ void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
   const WallValues values = WallValuesOf(mesh.rings());
   if (values.wetted.empty()) return;
   vtkNew<vtkUnsignedCharArray> wetted;
-  wetted->SetName("wetted");
+  wetted->SetName(kWetted);
   wetted->SetNumberOfTuples(static_cast<vtkIdType>(mesh.PointCount()));
   wetted->Fill(0);
   std::ranges::copy(values.wetted, wetted->GetPointer(mesh.first_of_rings()));
   vtkNew<vtkFloatArray> angles;
-  angles->SetName("contact_angle");
+  angles->SetName(kContactAngle);
   angles->SetNumberOfTuples(static_cast<vtkIdType>(mesh.PointCount()));
   angles->Fill(std::numeric_limits<float>::quiet_NaN());
   std::ranges::copy(values.contact_angles, angles->GetPointer(mesh.first_of_rings()));

@@ -5,11 +5,21 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "partiemc/result.h"
 
 namespace partiemc::client {
+
+inline constexpr const char* kWetted = "wetted";
+inline constexpr const char* kContactAngle = "contact_angle";
+
+/// The name of an attribute in a file where these two names belong to the values of walls. The same
+/// in all frames, whether they touch a wall or not.
+inline std::string NameBesideWalls(const std::string& name) {
+  return name == kWetted || name == kContactAngle ? name + '_' : name;
+}
 
 /// One value for each point of the rings. Empty if the rings touch no wall and have no contact.
 struct WallValues {

@@ -9,6 +9,7 @@ __version__: str
 
 Vector = Tuple[float, float, float]
 Slice = Union[Tuple[str, float], Tuple[Vector, Vector]]
+Box = Dict[str, Tuple[float, float]]
 Section = Dict[str, Union[Slice, float, None]]
 Positions = Union[ArrayLike, Tuple[NDArray[Any], NDArray[Any]],
                   Tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]
@@ -149,6 +150,8 @@ class Result:
     @property
     def particle_attributes(self) -> Dict[str, NDArray[np.float32]]: ...
     @property
+    def particle_box(self) -> Optional[Box]: ...
+    @property
     def level_error(self) -> Optional[float]: ...
     @property
     def level_digest(self) -> Optional[int]: ...
@@ -174,7 +177,7 @@ class Reconstructor:
         phase_attribute: str = ...,
         thinning_distance: Optional[float] = ..., max_drop_particles: Optional[int] = ...,
         simplify: Optional[float] = ..., min_component_volume: Optional[float] = ...,
-        box: Optional[Dict[str, Tuple[float, float]]] = ...,
+        box: Optional[Box] = ...,
         wrap: bool = ...,
         noise_filter: Optional[float] = ...,
         walls: Optional[Sequence[ArrayLike]] = ...,
@@ -186,7 +189,8 @@ class Reconstructor:
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
         velocities: Optional[Positions] = ...,
-        attributes: Optional[Mapping[str, Positions]] = ...) -> Result: ...
+        attributes: Optional[Mapping[str, Positions]] = ...,
+        box: Optional[Box] = ...) -> Result: ...
     def reset(self) -> None: ...
     @property
     def parameters(self) -> Dict[str, Any]: ...
@@ -201,7 +205,8 @@ class Stream:
         self, positions: Positions, time: Optional[float] = ..., *,
         volumes: Optional[ArrayLike] = ..., ids: Optional[ArrayLike] = ...,
         velocities: Optional[Positions] = ...,
-        attributes: Optional[Mapping[str, Positions]] = ...) -> Optional[int]: ...
+        attributes: Optional[Mapping[str, Positions]] = ...,
+        box: Optional[Box] = ...) -> Optional[int]: ...
     def receive(self, wait: Optional[float] = ...) -> Optional[Result]: ...
     def map(
         self, frames: Iterable[Union[Positions, Dict[str, Any]]],
@@ -255,7 +260,7 @@ def reconstruct(
     phase_attribute: str = ...,
     thinning_distance: Optional[float] = ..., max_drop_particles: Optional[int] = ...,
     simplify: Optional[float] = ..., min_component_volume: Optional[float] = ...,
-    box: Optional[Dict[str, Tuple[float, float]]] = ...,
+    box: Optional[Box] = ...,
     wrap: bool = ...,
     noise_filter: Optional[float] = ...,
     walls: Optional[Sequence[ArrayLike]] = ...,

@@ -1,10 +1,13 @@
-import { PositionFormat } from '@proto/v1/reconstruction_pb';
+import { create, type MessageInitShape, toBinary } from '@bufbuild/protobuf';
+import { BinaryWriter } from '@bufbuild/protobuf/wire';
+import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
+import { ParticleFrameSchema, PositionFormat } from '@proto/v1/reconstruction_pb';
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { planNamedColumns } from '../src/input/columns';
 import { parseTimes } from '../src/input/csv';
-import { inspectFiles, openDropped } from '../src/input/drop';
+import { inspectFiles } from '../src/input/drop';
 import { parseLammpsFrame } from '../src/input/lammps';
 import { naturalOrder } from '../src/input/natural_order';
 import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices } from '../src/input/options';
@@ -15,6 +18,7 @@ import { nearPlane } from '../src/input/space';
 import { parseTable } from '../src/input/table';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
 import type { Particles } from '../src/protocol/particles';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const recording = new URL('../../../recordings/dam_break.pemc', import.meta.url);
@@ -186,6 +190,45 @@ test('a recording reads frames in any order', async () => {
   assert.equal(first.positionFormat, PositionFormat.FLOAT32_2);
   assert.ok(last.time > first.time);
   assert.deepEqual((await source.frame(74)).positions, last.positions);
+});
+
+/** A recording of one block with these frames, whose zstd frames store their bytes raw. */
+function recordingOf(...frames: MessageInitShape<typeof ParticleFrameSchema>[]): File {
+  const mark = (tag: string) => [0x50, 0x2a, 0x4d, 0x18, 16, 0, 0, 0, ...Buffer.from(tag), ...new Uint8Array(8)];
+  const block = (...messages: Uint8Array[]) => {
+    const writer = new BinaryWriter();
+    for (const message of messages) writer.bytes(message);
+    const bytes = writer.finish();
+    const size = new Uint8Array(Uint32Array.of(bytes.length).buffer);
+    const header = bytes.length << 3 | 1;
+    return [0x28, 0xb5, 0x2f, 0xfd, 0xa0, ...size, header & 255, header >> 8 & 255, header >> 16, ...bytes];
+  };
+  return new File([Uint8Array.from([
+    ...mark('PEMCFILE'), ...block(toBinary(RecordingHeaderSchema, create(RecordingHeaderSchema, { title: 'made' }))),
+    ...block(...frames.map((frame) => toBinary(ParticleFrameSchema, create(ParticleFrameSchema, frame)))), ...mark('PEMCTAIL'),
+  ])], 'made.pemc');
+}
+
+test('a recording has the attributes of its first frame', async () => {
+  const positions = bytesOf(Float32Array.of(0, 0, 1, 0));
+  const p = { name: 'p', values: bytesOf(Float32Array.of(5, 6)) };
+  const force = { name: 'force', values: bytesOf(Float32Array.of(1, 2, 3, 4)), components: 2 };
+  const frameOf = (...scalars: { name: string; values: Uint8Array; components?: number }[]) =>
+    ({ positionFormat: PositionFormat.FLOAT32_2, positions, scalars });
+  const broken = { name: 'broken', values: bytesOf(Float32Array.of(NaN, 1)) };
+  const whole = recordingOf(frameOf(p, { ...p, name: 'ρ' }, force, broken), frameOf({ ...p, name: 'late' }, p));
+  const source = await openDropped([whole]);
+  assert.deepEqual([source.count, source.scalars], [2, ['p', 'force']]);
+  const scalarsAt = async (index: number) => ((await source.frame(index)).scalars ?? [])
+    .map(({ name, values, components }) => [name, components, ...arrayOf(Float32Array, values)]);
+  assert.deepEqual(await scalarsAt(0), [['p', 1, 5, 6], ['force', 2, 1, 2, 3, 4]]);
+  assert.deepEqual(await scalarsAt(1), [['p', 1, 5, 6]]);
+  for (const [scalar, message] of [
+    [{ ...p, components: 4 }, /more than three components/], [{ ...p, components: 2 }, /8 bytes where 16 are due/],
+  ] as const) {
+    await assert.rejects(openDropped([recordingOf(frameOf(scalar))]),
+      (error) => error instanceof InputError && message.test(error.message));
+  }
 });
 
 test('a truncated recording keeps its whole blocks', async () => {

@@ -3,11 +3,12 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { deflateRawSync, gzipSync } from 'node:zlib';
-import { inspectFiles, openDropped } from '../src/input/drop';
+import { inspectFiles } from '../src/input/drop';
 import { parseNpyHeader, parsePython } from '../src/input/npy';
 import { NO_OPTIONS } from '../src/input/options';
 import { InputError } from '../src/input/source';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const data = (name: string) => new File([readFileSync(new URL(`../../../../tests/data/formats/${name}`, import.meta.url))], name);
@@ -119,6 +120,8 @@ test('damaged and unknown arrays are refused', async () => {
   await refused('a.npy', npy("'|O'", '(2,)', new Uint8Array(0)), /pickled Python objects/);
   await refused('a.npy', npy("'<c16'", '(2, 2)', new Uint8Array(0)), /type '<c16'/);
   await refused('a.npy', npy("'<f8'", '(2, 2, 2, 2)', Float64Array.from({ length: 16 }, () => 0)), /shape \(2, 2, 2, 2\)/);
+  await refused('a.npy', npy("'<f8'", '(0, 1000000000)', new Uint8Array(0)), /shape \(0, 1000000000\)/);
+  await refused('a.npy', npy("'<f8'", '(3, 0, 1000000000)', new Uint8Array(0)), /shape \(3, 0, 1000000000\)/);
   await refused('a.npy', npy("'<f8'", '(1, 2, 2)', Float64Array.of(1, 2, 3, 4), 'True'), /ascontiguousarray/);
   const archive = zip({ x: whole, y: whole }, true);
   await refused('a.npz', archive.slice(0, -30), /truncated or damaged/);

@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
-import { openDropped } from '../src/input/drop';
 import { InputError } from '../src/input/source';
+import { openDropped } from './open_dropped';
 
 const SAMPLES = ['appended_raw_bigendian.vtu', 'appended_raw_zlib_u64.vtp', 'inline_base64_zlib.vtp', 'polydata_v51_binary.vtk',
-  'ugrid_v42_binary.vtk', 'frame_deflate.npz', 'pos_f4_fortran.npy', 'dump.elem.xyz', 'dump.atom', 'dump.custom.unwrapped_scaled'];
+  'ugrid_v42_binary.vtk', 'frame_deflate.npz', 'pos_f4_fortran.npy', 'dump.elem.xyz', 'dump.atom', 'dump.custom.unwrapped_scaled', 'ellipse.pemc'];
 /** Damaged copies of each sample. */
 const COPIES = 40;
 
@@ -22,7 +22,8 @@ function random(seed: number): () => number {
 
 for (const name of SAMPLES) {
   test(`${name}, damaged, is read or refused`, async () => {
-    const whole = readFileSync(new URL(`../../../../tests/data/formats/${name}`, import.meta.url));
+    const folder = name.endsWith('.pemc') ? 'recordings' : 'formats';
+    const whole = readFileSync(new URL(`../../../../tests/data/${folder}/${name}`, import.meta.url));
     const next = random(name.length);
     for (let copy = 0; copy < COPIES; ++copy) {
       let bytes = new Uint8Array(whole);

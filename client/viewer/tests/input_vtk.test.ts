@@ -3,9 +3,9 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { deflateSync } from 'node:zlib';
-import { openDropped } from '../src/input/drop';
 import { InputError } from '../src/input/source';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
+import { openDropped } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const data = (name: string) => new File([readFileSync(new URL(`../../../../tests/data/formats/${name}`, import.meta.url))], name);
@@ -60,6 +60,13 @@ const LEGACY = ['# vtk DataFile Version 3.0', 'title', 'ASCII', 'DATASET POLYDAT
 test('legacy VTK is read as text', async () => {
   await isTheFrame(file('a.vtk', LEGACY));
   await isTheFrame(file('b.vtk', LEGACY.replace('VERTICES 2 4\n1 0\n1 1', 'VERTICES 3 2\nOFFSETS vtktypeint64\n0 1 2\nCONNECTIVITY vtktypeint64\n0 1')));
+});
+
+test('a legacy VTK name that is not UTF-8 stays encoded', async () => {
+  for (const [written, name] of [['p%20q', 'p q'], ['100%', '100%'], ['a%FFb', 'a%FFb']]) {
+    const source = await openDropped([file('a.vtk', LEGACY.replace('SCALARS p', `SCALARS ${written}`))]);
+    assert.deepEqual(source.scalars, [name]);
+  }
 });
 
 test('files of VTK have the same particles in every encoding', async () => {

@@ -1,7 +1,7 @@
 // Tests of the picture of surfaces: camera, keys, picking, axes, selection, sections, look.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { DEFAULT_LOOK } from '../src/draw/look';
+import { DEFAULT_LOOK, type Look } from '../src/draw/look';
 import { decodeSurface } from '../src/protocol/surface';
 import type { Frame } from '../src/protocol/frame';
 import { inPlane, inSpace } from '../src/protocol/sections';
@@ -297,6 +297,37 @@ test('particles are coloured only by numbers of each of them', () => {
     assert.equal(states[0].values?.points?.length, 6);
     assert.equal(states[0].values?.particles !== null, isColoured, `${count} numbers for 3 particles`);
   }
+});
+
+test('a look recomputes only the tints and sections it changes', () => {
+  const scene = new SpaceScene(hiddenCanvas);
+  let [tints, sections] = [0, 0];
+  const drawing = { show() {}, setTints: () => { ++tints; }, setSections: () => { ++sections; }, draw() {}, destroy() {} };
+  scene.attach(drawing satisfies SpaceDrawing);
+  scene.show(spaceFrameOf(frame(1), surfaceAt([0, 0, 0])), []);
+  const isSet = (look: Partial<Look>, spaceLook: Partial<SpaceLook>, ofTints: number, ofSections: number) => {
+    [tints, sections] = [0, 0];
+    scene.setLook({ ...DEFAULT_LOOK, ...look }, { ...DEFAULT_SPACE_LOOK, ...spaceLook });
+    assert.deepEqual([tints, sections], [ofTints, ofSections]);
+  };
+  isSet({}, { clipAxis: 'x', clipAt: 0.3 }, 0, 0);
+  isSet({ edges: true, lineWidth: 3 }, { clipAxis: 'x', clipAt: 0.4 }, 0, 0);
+  isSet({ colour: 'identity' }, {}, 1, 0);
+  isSet({ colour: 'identity', hidden: [1] }, {}, 0, 1);
+  isSet({ colour: 'identity', sections: false }, { hasPlanes: true }, 0, 1);
+  isSet({ colour: 'identity', sections: false, dark: true }, { hasPlanes: true }, 1, 1);
+});
+
+test('a drawing does not read the canvas from the page', () => {
+  Object.assign(globalThis, { devicePixelRatio: 1 });
+  let reads = 0;
+  const canvas = { get clientWidth() { ++reads; return 80; }, clientHeight: 60 } as HTMLCanvasElement;
+  const scene = new SpaceScene(canvas);
+  scene.resize();
+  reads = 0;
+  scene.draw();
+  scene.fitExtent();
+  assert.deepEqual([reads, scene.size], [0, { width: 80, height: 60 }]);
 });
 
 test('a section with other points than its rings is refused', () => {

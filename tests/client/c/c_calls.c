@@ -223,6 +223,15 @@ static void try_refusals(const char* address) {
   stream = NULL;
   EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT && stream == NULL);
   EXPECT(strstr(partiemc_last_error()->message, "sections: NULL; must be an array") != NULL);
+
+  double* const times[4] = {&options.connect_timeout, &options.deadline, &options.send_timeout,
+                            &options.part_timeout};
+  for (int k = 0; k < 4; ++k) {
+    partiemc_options_init(&options, sizeof options);
+    *times[k] = -1;
+    EXPECT(partiemc_open(address, &options, &stream) == PARTIEMC_INVALID_ARGUMENT);
+    EXPECT(strcmp(partiemc_last_error()->reason, "OUT_OF_RANGE") == 0);
+  }
 }
 
 /* Every frame that is offered is sent, skipped or refused, and those that are sent are answered. */

@@ -10,8 +10,9 @@ namespace {
 using Names = std::vector<std::string>;
 
 ColumnPlan Plan(const Names& names, const std::string& columns = "") {
-  const auto request = ParseColumnRequest({}, columns);
+  auto request = ParseColumnRequest({}, columns);
   EXPECT_TRUE(request.ok()) << request.status();
+  request->is_lammps_dump = true;
   const auto plan = PlanNamedColumns(names, *request);
   EXPECT_TRUE(plan.ok()) << plan.status();
   return plan.value_or(ColumnPlan());
@@ -35,6 +36,17 @@ TEST(Columns, WrappedPositionsArePreferredToUnwrappedAndTheseToScaled) {
   EXPECT_EQ(Plan({"xs", "ys", "xu", "yu"}).positions[0], 2u);
   EXPECT_TRUE(Plan({"id", "xs", "ys"}).scaled);
   EXPECT_FALSE(Plan({"xs", "ys", "xu", "yu"}).scaled);
+}
+
+TEST(Columns, FractionsOfABoxAreRefusedOutsideOfDumps) {
+  for (const Names& names : {Names{"id", "xs", "ys"}, Names{"xsu", "ysu"}}) {
+    ExpectRefused(PlanNamedColumns(names, {}).status(), absl::StatusCode::kFailedPrecondition,
+                  {"LAMMPS", "--columns"});
+  }
+  const auto plan = PlanNamedColumns({"id", "xs", "ys"}, *ParseColumnRequest({}, "xs,ys"));
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(plan->positions[0], 1u);
+  EXPECT_FALSE(plan->scaled);
 }
 
 TEST(Columns, WhatTheCallerNamesGoesBeforeWhatIsRecognised) {

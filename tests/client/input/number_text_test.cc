@@ -30,6 +30,10 @@ TEST(NumberText, BeyondTheRangeOfDoubleLieInfinityAndZero) {
   EXPECT_EQ(ParseNumber("1e-400"), 0.0);
   EXPECT_EQ(ParseNumber("0." + std::string(400, '0') + "1"), 0.0);
   EXPECT_EQ(ParseNumber(std::string(400, '9')), std::numeric_limits<double>::infinity());
+  // The exponent does not decide alone.
+  EXPECT_EQ(ParseNumber(std::string(400, '9') + "e-5"), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(ParseNumber("-0." + std::string(400, '0') + "1e5"), 0.0);
+  EXPECT_TRUE(std::signbit(ParseNumber("-1e-400").value()));
 }
 
 TEST(NumberText, ALocaleWithCommasChangesNothing) {

@@ -17,7 +17,8 @@ void AppendRaw(std::string& bytes, T value) {
 
 }  // namespace
 
-FakeServer::FakeServer(Script script) : script_(std::move(script)) {
+FakeServer::FakeServer(Script script, WatchScript watch_script)
+    : script_(std::move(script)), watch_script_(std::move(watch_script)) {
   grpc::ServerBuilder builder;
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
   builder.RegisterService(this);
@@ -32,6 +33,10 @@ std::string FakeServer::address() const { return "127.0.0.1:" + std::to_string(p
 
 grpc::Status FakeServer::Reconstruct(grpc::ServerContext* context, Rpc* rpc) {
   return script_(*context, *rpc);
+}
+
+grpc::Status FakeServer::WatchStream(grpc::ServerContext* context, WatchRpc* rpc) {
+  return watch_script_(*context, *rpc);
 }
 
 grpc::Status FakeServer::GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*,

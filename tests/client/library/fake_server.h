@@ -1,4 +1,4 @@
-// A server whose stream follows a test's script, valid or not.
+// A server whose streams and watches follow a test's script, valid or not.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -16,19 +16,23 @@ class FakeServer final : private v1::ReconstructionService::Service {
  public:
   using Rpc = grpc::ServerReaderWriter<v1::ReconstructResponse, v1::ReconstructRequest>;
   using Script = std::function<grpc::Status(grpc::ServerContext&, Rpc&)>;
+  using WatchRpc = grpc::ServerReaderWriter<v1::WatchStreamResponse, v1::WatchStreamRequest>;
+  using WatchScript = std::function<grpc::Status(grpc::ServerContext&, WatchRpc&)>;
 
-  /// Listens on a free loopback port; `script` handles each stream.
-  explicit FakeServer(Script script);
+  /// Listens on a free loopback port; `script` handles each stream, `watch_script` each watch.
+  explicit FakeServer(Script script, WatchScript watch_script = {});
   ~FakeServer() override;
 
   std::string address() const;
 
  private:
   grpc::Status Reconstruct(grpc::ServerContext* context, Rpc* rpc) override;
+  grpc::Status WatchStream(grpc::ServerContext* context, WatchRpc* rpc) override;
   grpc::Status GetServerInfo(grpc::ServerContext* context, const v1::GetServerInfoRequest* request,
                              v1::GetServerInfoResponse* response) override;
 
   const Script script_;
+  const WatchScript watch_script_;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -12,6 +12,7 @@
 #include "client/library/fake_server.h"
 #include "partiemc/client/server_info.h"
 #include "partiemc/client/stream.h"
+#include "partiemc/client/watcher.h"
 
 namespace partiemc::client {
 namespace {
@@ -313,6 +314,27 @@ TEST(StreamFailure, AServerWithoutFrameBoxesGetsNone) {
   ExpectOneLine(refused.status());
   const auto sent = (*stream)->Send({.positions = std::span(positions)}, 0);
   EXPECT_EQ(sent.value(), 1u) << "the stream continues";
+}
+
+TEST(WatchFailure, WaitsOnceForTheStatusAfterTheEnd) {
+  constexpr std::chrono::milliseconds kWait(2000), kUntilTheEnd(1500);
+  const FakeServer server(AnswerAll, [&](grpc::ServerContext& context, FakeServer::WatchRpc& rpc) {
+    v1::WatchStreamResponse response;
+    response.mutable_opened()->set_stream_id("fake");
+    rpc.Write(response);
+    std::this_thread::sleep_for(kUntilTheEnd);
+    response.mutable_ended()->set_reason("FINISHED");
+    rpc.Write(response);
+    return WaitForCancel(context);
+  });
+  const auto watcher = Watcher::Open(server.address(), "fake", {});
+  ASSERT_TRUE(watcher.ok()) << watcher.status();
+  const auto start = std::chrono::steady_clock::now();
+  WatchedFrame frame;
+  const auto received = (*watcher)->Receive(frame, kWait);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, kWait + kUntilTheEnd);
+  ASSERT_TRUE(received.ok()) << received.status();
+  EXPECT_EQ(*received, Received::kNothingYet);
 }
 
 }  // namespace

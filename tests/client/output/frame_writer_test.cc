@@ -87,6 +87,19 @@ TEST(Vtp, HasPointDataOfWalls) {
               Not(HasSubstr("wetted")));
 }
 
+TEST(Walls, AttributesWithTheirNamesGetOthers) {
+  Result result = SquareOnFloor();
+  result.attributes = {{.name = "wetted", .components = 1, .values = {5, 6, 7, 8}}};
+  EXPECT_THAT(Encode(FrameFormat::kCsv, {.result = result}),
+              HasSubstr("ring,index,x,y,nx,ny,wetted_,wetted,contact_angle\n"
+                        "0,0,0,0,,,5,1,90\n"));
+  const auto formats = AllFrameFormats();
+  if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) return;
+  const std::string vtp = Encode(FrameFormat::kVtp, {.result = result});
+  EXPECT_THAT(vtp, HasSubstr("Name=\"wetted_\""));
+  EXPECT_THAT(vtp, HasSubstr("Name=\"wetted\""));
+}
+
 TEST(Obj, SharesVerticesOfFacesAndRings) {
   const Result result = SquareWithHoleAndIsland();
   const auto lines = ObjLines(Encode(FrameFormat::kObj, {.result = result}));

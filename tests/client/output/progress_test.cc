@@ -158,6 +158,40 @@ TEST_F(ProgressTest, NotesDoNotBreakTheBar) {
   EXPECT_EQ(shown_[2], bar);
 }
 
+TEST_F(ProgressTest, NotesDoNotBreakALineOfWaiting) {
+  Progress progress(Options(true, 10));
+  progress.Wait("lost it");
+  progress.Note("frame 3: refused");
+  EXPECT_THAT(shown_,
+              ElementsAre("\r\x1b[Klost it", "\r\x1b[Kframe 3: refused\n", "\r\x1b[Klost it"));
+}
+
+TEST_F(ProgressTest, ShowsDetailsOfAKnownNumberOfFramesIfTheyFit) {
+  for (const bool terminal : {true, false}) {
+    for (columns_ = 40; columns_ <= 80; columns_ += 40) {
+      shown_.clear();
+      Progress progress(Options(terminal, 200));
+      now_ += std::chrono::seconds(10);
+      progress.Update(100, "sequence 7, 3 rings");
+      const bool fits = !terminal || columns_ == 80;
+      EXPECT_EQ(shown_[0].find("sequence 7, 3 rings") != std::string::npos, fits) << shown_[0];
+      EXPECT_THAT(shown_[0], HasSubstr("0:10"));
+    }
+  }
+}
+
+TEST_F(ProgressTest, CutsBetweenCharacters) {
+  Progress progress(Options(true, 10));
+  for (columns_ = 2; columns_ <= 8; ++columns_) {
+    now_ += std::chrono::seconds(1);
+    progress.Wait("a\u00e9\u20ac");  // 1, 2 and 3 bytes.
+  }
+  const std::string start = "\r\x1b[K";
+  EXPECT_THAT(shown_,
+              ElementsAre(start + "a", start + "a", start + "a\u00e9", start + "a\u00e9",
+                          start + "a\u00e9", start + "a\u00e9\u20ac", start + "a\u00e9\u20ac"));
+}
+
 TEST_F(ProgressTest, AcceptsMoreFramesThanExpected) {
   Progress progress(Options(true, 10));
   now_ += std::chrono::seconds(1);

@@ -44,7 +44,7 @@ def assert_equal(case, one, other, but=()):
     """`one` equals `other` in every public property, except for those named in `but`."""
     for name in ("sequence", "time", "area", "perimeter", "volume", "spacing", "cell_size", "doubts",
                  "times", "particle_count", "rings_digest", "mesh_digest", "surface_digest", "level_error",
-                 "level_digest", "dropped", "gap", "rejoined"):
+                 "level_digest", "particle_box", "dropped", "gap", "rejoined"):
         if name not in but:
             case.assertEqual(getattr(one, name), getattr(other, name), name)
     of_all = "points normals area centroids particle_counts identities parents parent_offsets outer_of"

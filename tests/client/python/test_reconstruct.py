@@ -577,7 +577,8 @@ class Errors(unittest.TestCase):
             with self.assertRaises(partiemc.Error) as caught:
                 partiemc.Reconstructor(spacing=1).reconstruct(block(), time)
             self.assertEqual((caught.exception.reason, caught.exception.field), ("NOT_FINITE", "time"))
-        self.assert_refused("UNSUPPORTED", "slice", slice=("w", 1))
+        for axis in ("w", "", "xy"):
+            self.assert_refused("UNSUPPORTED", "slice", slice=(axis, 1))
         self.assert_refused("UNSUPPORTED", "slice", slice=((0, 0), (0, 0, 1)))
         self.assert_refused("UNSUPPORTED", "slice", slice=3)
         self.assert_refused("UNSUPPORTED", "sections[1]", sections=[{}, {"isovalues": 1}])

@@ -14,7 +14,7 @@ import warnings
 import numpy
 import partiemc
 
-from scenes import Server, ball, block, digests, digests_of_replay, readme
+from scenes import Server, assert_equal, ball, block, digests, digests_of_replay, readme
 
 
 class Streams(unittest.TestCase):
@@ -237,6 +237,30 @@ class Streams(unittest.TestCase):
             time.sleep(0.8)  # Longer than a sender waits for a first receiver.
             self.assertEqual(len(list(stream)), 3 * stream.window - 1)
             sender.join()
+
+    def test_a_send_timeout_of_none_waits(self):
+        with partiemc.connect(self.address, spacing=1, send_timeout=None) as stream:
+            def send():
+                try:
+                    for k in range(3 * stream.window):
+                        stream.send(block(0.1 * k))
+                finally:
+                    stream.finish()
+
+            sender = threading.Thread(target=send)
+            sender.start()
+            stream.receive()
+            time.sleep(0.3)  # The window is full, so the sender waits.
+            self.assertEqual(len(list(stream)), 3 * stream.window - 1)
+            sender.join()
+
+    def test_a_token_file_of_none_keeps_the_token(self):
+        self.addCleanup(os.environ.pop, "PARTIEMC_TOKEN")
+        os.environ["PARTIEMC_TOKEN"] = "not a token"
+        for options in ({}, {"token_file": None}):
+            with self.assertRaises(partiemc.Error) as caught:
+                partiemc.connect(self.address, spacing=1, **options)
+            self.assertEqual(caught.exception.field, "token")
 
     def test_time_must_be_finite(self):
         for latest in (False, True):
@@ -481,6 +505,17 @@ class Streams(unittest.TestCase):
                 stream.finish()
                 self.assertEqual(list(watch), [])
                 self.assertEqual(watch.end, "FINISHED")
+
+    def test_watchers_see_the_box_of_a_frame(self):
+        with partiemc.connect(self.address, spacing=1, name="boxed", box={"x": (0, 40)},
+                              echo_particles=True) as stream, \
+                partiemc.watch(self.address, "boxed", mode="every") as watch:
+            for box in (None, {"x": (-0.5, 40.25)}):
+                stream.send(block(2), box=box)
+                self.assertIsNone(stream.receive().particle_box)
+                seen = next(watch)
+                self.assertEqual(seen.particle_box, box)
+                assert_equal(self, pickle.loads(pickle.dumps(seen)), seen)
 
     def test_a_watcher_goes_back_to_what_is_held(self):
         with partiemc.connect(self.address, spacing=1, name="held") as stream:

@@ -297,6 +297,25 @@ TEST_F(Recording, RefusesBlocksThatExpandTooMuch) {
   for (std::size_t k = 0; k < frames.size(); ++k) ASSERT_TRUE(*(*trusting)->Next(frame)) << k;
 }
 
+TEST_F(Recording, RefusesABlockOneByteAboveTheLimit) {
+  RecordedFrame frame;
+  frame.positions.assign(std::size_t{1} << 16, 0.0);
+  Write(Path(), {frame});
+  // Reads the header and the block of the frame.
+  const auto read = [&](std::size_t limit) -> absl::StatusOr<std::size_t> {
+    auto reader = recording::BlockReader::Open(Path(), 1e9, limit);
+    std::string_view block;
+    auto piece = reader->Next(block);
+    if (piece.ok()) piece = reader->Next(block);
+    if (!piece.ok()) return piece.status();
+    return block.size();
+  };
+  const auto size = read(recording::kMaxBlockBytes);
+  ASSERT_TRUE(size.ok()) << size.status();
+  EXPECT_EQ(read(*size).value_or(0), *size);
+  EXPECT_EQ(read(*size - 1).status().code(), absl::StatusCode::kDataLoss);
+}
+
 TEST_F(Recording, BytesBehindTheEndAreDamage) {
   Write(Path(), RandomFrames(2));
   WriteBytes(Path(), Bytes(Path()) + "x");

@@ -93,7 +93,8 @@ typedef struct partiemc_options {
   const char* key_file;
   const char* token_file; /* File whose first word is the bearer token. */
   const char* token;      /* The token itself, instead of a file. */
-  double connect_timeout; /* Seconds to reach the server; 0: 2. */
+  double connect_timeout; /* Seconds to reach the server; 0: 2. Of the times only `give_up_after`
+                             may be negative. */
   double deadline;        /* Seconds for each response; 0: 30. */
   double give_up_after;   /* Seconds to reconnect before the stream ends; 0: 300, with `latest`
                              30. Negative: do not reconnect. */

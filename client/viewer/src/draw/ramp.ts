@@ -82,3 +82,10 @@ export function rangeOf(values: Float32Array): Range | null {
   }
   return min <= max ? { min, max } : null;
 }
+
+/** A range with the finite numbers of more values. Null: a range without numbers. */
+export function widened(range: Range | null, values: Float32Array): Range | null {
+  const more = rangeOf(values);
+  if (!range || !more) return range ?? more;
+  return { min: Math.min(more.min, range.min), max: Math.max(more.max, range.max) };
+}

@@ -2,7 +2,7 @@ import { channelLabel } from '../protocol/channels';
 import type { Frame } from '../protocol/frame';
 import { attributeOf, DEFAULT_LOOK, type Look } from './look';
 import { RingIndex } from './pick';
-import { chosenRange, type Range, rampStops, rangeOf } from './ramp';
+import { chosenRange, type Range, rampStops, widened } from './ramp';
 import { Selection } from './selection';
 import { SvgDrawing } from './svg_drawing';
 import { type Drawing, Renderer } from './webgl/renderer';
@@ -200,13 +200,7 @@ export class Scene {
   /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
   private widenRange(restart: boolean): void {
     if (restart) this.range = null;
-    for (const values of this.attributes()) {
-      const range = rangeOf(values);
-      if (!range) continue;
-      this.range = this.range
-        ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) }
-        : range;
-    }
+    for (const values of this.attributes()) this.range = widened(this.range, values);
   }
 
   private readonly onLost = (event: Event): void => {

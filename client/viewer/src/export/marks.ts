@@ -6,6 +6,7 @@ import { axisMarks } from '../ui/axes';
 import { number } from '../ui/format';
 import type { Point } from '../ui/measure';
 import type { Overlaid } from '../ui/overlay';
+import { short } from './paths';
 
 type Align = 'left' | 'centre' | 'right';
 
@@ -163,10 +164,6 @@ export function drawMarks(context: CanvasRenderingContext2D, marks: readonly Mar
     }
   }
   context.setTransform(1, 0, 0, 1, 0, 0);
-}
-
-function short(pixels: number): string {
-  return String(Math.round(pixels * 100) / 100);
 }
 
 function escaped(text: string): string {

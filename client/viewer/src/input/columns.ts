@@ -25,7 +25,7 @@ const IDS = ['id', 'ids', 'idp', 'particleid', 'particleids', 'originalid', 'pid
 const VOLUMES = ['volume', 'volumes', 'vol', 'area', 'areas', 'particlevolume', 'particlearea',
   'volumetricmeasure'];
 /** Limit, because every scalar is sent to the server. */
-const MOST_SCALARS = 8;
+export const MOST_SCALARS = 8;
 
 /** Removes units, separators and case from a name: "Pos.x [m]" -> "posx". */
 function canonical(name: string): string {

@@ -5,7 +5,7 @@ import { LammpsReader } from './lammps';
 import { naturalOrder } from './natural_order';
 import { NpyReader } from './npy';
 import { NpzReader } from './npz';
-import { type FileFacts, type FileOptions, NO_OPTIONS } from './options';
+import type { FileFacts, FileOptions } from './options';
 import { isRecording, RecordingSource } from './recording';
 import { InputError, type FrameSource } from './source';
 import { factsOf, ReaderChain, type TableReader, TableSource } from './table_source';
@@ -145,9 +145,4 @@ async function inspectCollection(collection: File, opened: readonly File[]): Pro
     readers.push(reader);
   }
   return inputOf(collection.name, readers, new Map(members.map(({ time }, k) => [k, time])));
-}
-
-/** Opens dropped files as frames. Throws InputError. */
-export async function openDropped(dropped: File[], options: FileOptions = NO_OPTIONS): Promise<FrameSource> {
-  return (await inspectFiles(dropped)).open(options);
 }

@@ -6,6 +6,8 @@ import type { FrameTable, TableReader } from './table_source';
 
 /** Arrays with more components than this are no columns of particles. */
 export const MOST_COMPONENTS = 16;
+/** Largest number of columns of a plain NPY file. More columns indicate a transposed array. */
+const MOST_COLUMNS = 4096;
 /** Largest header. numpy.load has a limit of 10,000 bytes. */
 const MOST_HEADER_BYTES = 65_536;
 
@@ -187,7 +189,8 @@ export class NpyReader implements TableReader {
     }
     const { shape, isStructured, isFortran } = header;
     const holdsFrames = shape.length === (isStructured ? 2 : 3);
-    if (!holdsFrames && shape.length !== (isStructured ? 1 : 2)) {
+    const isTable = holdsFrames || shape.length === (isStructured ? 1 : 2);
+    if (!isTable || (!isStructured && shape[shape.length - 1] > MOST_COLUMNS)) {
       throw new InputError(`${name} has the shape (${shape.join(', ')}). Save an array of the shape (particles, 2 or 3), ` +
         'or (frames, particles, 2 or 3).');
     }

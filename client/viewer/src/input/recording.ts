@@ -2,11 +2,13 @@
 import { fromBinary } from '@bufbuild/protobuf';
 import { BinaryReader } from '@bufbuild/protobuf/wire';
 import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
-import { ParticleFrameSchema } from '@proto/v1/reconstruction_pb';
+import { type ParticleFrame, ParticleFrameSchema } from '@proto/v1/reconstruction_pb';
 import { decompress } from 'fzstd';
 import { arrayOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
+import { particleBytes } from '../protocol/positions';
 import type { SectionPlane } from '../protocol/sections';
+import { MOST_SCALARS } from './columns';
 import {
   checkSpacing, CHOOSE_SPACE, FieldError, type FileFacts, type FileOptions, NO_OPTIONS, NOT_IN_SPACE, parseSlices, parseSpacing,
 } from './options';
@@ -16,6 +18,8 @@ import { axesOf, hasThreeCoordinates, middlePlane, spacingOf } from './space';
 const MARK_BYTES = 24;
 const SKIPPABLE_MAGIC = 0x184d2a50;
 const FILE_TAG = 'PEMCFILE';
+/** Names that the server accepts. */
+const SCALAR_NAME = /^[ -~]{1,64}$/;
 
 export function isRecording(head: Uint8Array): boolean {
   return head.length >= 16 && new TextDecoder('latin1').decode(head.subarray(8, 16)) === FILE_TAG;
@@ -48,6 +52,23 @@ function messagesOf(block: Uint8Array): Uint8Array[] {
   return messages;
 }
 
+type Scalars = NonNullable<Particles['scalars']>;
+
+/** The attributes that the server accepts: with printable names and finite numbers. Throws InputError for wrong sizes. */
+function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: string): Scalars {
+  const count = positions.length / particleBytes(positionFormat);
+  const all = scalars.map((scalar) => {
+    const components = Math.max(scalar.components, 1);
+    if (components > 3) throw new InputError(`${name} is damaged: a scalar has more than three components.`);
+    const due = 4 * components * count;
+    if (scalar.values.length !== due) {
+      throw new InputError(`${name} is damaged: a scalar has ${scalar.values.length} bytes where ${due} are due.`);
+    }
+    return { name: scalar.name, values: scalar.values, components };
+  });
+  return all.filter((scalar) => SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
+}
+
 /** Location of a frame: a block and a message in it. */
 interface Location { block: number; message: number }
 
@@ -70,13 +91,15 @@ export class RecordingSource implements FrameSource {
     if (!isRecording(bytes)) throw new InputError(`${name} is not a recording.`);
     const { blocks, isWhole } = blocksOf(bytes);
     if (blocks.length < 2) throw new InputError(`${name} is truncated in its header. No frame of it is whole.`);
-    const header = fromBinary(RecordingHeaderSchema, messagesOf(unpack(bytes, blocks, 0, name))[0]);
+    const [first] = unpack(bytes, blocks, 0, name);
+    const header = checked(name, () => fromBinary(RecordingHeaderSchema, first));
     const source = new RecordingSource(bytes, blocks, header.title || name, header.spacing ?? null);
     for (let block = 1; block + 1 < blocks.length; ++block) {
-      const messages = messagesOf(unpack(bytes, blocks, block, name));
-      messages.forEach((_, message) => source.locations.push({ block, message }));
+      unpack(bytes, blocks, block, name).forEach((_, message) => source.locations.push({ block, message }));
     }
     if (source.count === 0) throw new InputError(`${name} has no ${isWhole ? '' : 'whole '}frame.`);
+    const scalars = scalarsOf(source.read(0), `${name}, frame 0,`);
+    source.scalars.push(...scalars.slice(0, MOST_SCALARS).map((scalar) => scalar.name));
     if (!isWhole) source.notice = `${name} is truncated. Its first ${source.count} frames are whole, and later ones are lost.`;
     return source;
   }
@@ -108,16 +131,21 @@ export class RecordingSource implements FrameSource {
   get count(): number { return this.locations.length; }
 
   async frame(index: number): Promise<Particles> {
-    const { block, message } = this.locations[index];
-    if (this.unpacked?.block !== block) {
-      const messages = messagesOf(unpack(this.bytes, this.blocks, block, this.title));
-      this.unpacked = { block, messages };
-    }
-    const recorded = fromBinary(ParticleFrameSchema, this.unpacked.messages[message]);
+    const recorded = this.read(index);
     const { time, positionFormat, positions, ids, volumes, velocities } = recorded;
-    const frame: Particles = { time, positionFormat, positions, ids, volumes };
+    const scalars = scalarsOf(recorded, `${this.title}, frame ${index},`).filter(({ name }) => this.scalars.includes(name));
+    const frame: Particles = { time, positionFormat, positions, ids, volumes, scalars };
     if (arrayOf(Float32Array, velocities).every(Number.isFinite)) frame.velocities = velocities;
     return frame;
+  }
+
+  private read(index: number): ParticleFrame {
+    const { block, message } = this.locations[index];
+    if (this.unpacked?.block !== block) {
+      this.unpacked = { block, messages: unpack(this.bytes, this.blocks, block, this.title) };
+    }
+    const bytes = this.unpacked.messages[message];
+    return checked(this.title, () => fromBinary(ParticleFrameSchema, bytes));
   }
 }
 
@@ -136,9 +164,15 @@ function blocksOf(bytes: Uint8Array): { blocks: number[]; isWhole: boolean } {
   return { blocks, isWhole: false };
 }
 
-function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array {
+/** The messages of a block. Throws InputError. */
+function unpack(bytes: Uint8Array, blocks: number[], block: number, name: string): Uint8Array[] {
+  return checked(name, () => messagesOf(decompress(bytes.subarray(blocks[block], blocks[block + 1]))));
+}
+
+/** Reads a part of a recording. Throws InputError if it is damaged. */
+function checked<T>(name: string, read: () => T): T {
   try {
-    return decompress(bytes.subarray(blocks[block], blocks[block + 1]));
+    return read();
   } catch {
     throw new InputError(`${name} is damaged. The command line can read the frames before the damage.`);
   }

@@ -25,6 +25,15 @@ export class VtkLegacyReader implements TableReader {
   }
 }
 
+/** VTK writes bytes of a name that are not printable as %XX. A name whose bytes are not UTF-8 stays encoded. */
+function decodedName(name: string): string {
+  try {
+    return decodeURIComponent(name.replace(/%(?![0-9A-F]{2})/g, '%25'));
+  } catch {
+    return name;
+  }
+}
+
 class Parser {
   points: VtkArray | null = null;
   readonly arrays: VtkArray[] = [];
@@ -113,7 +122,7 @@ class Parser {
     const type = TYPES[typeName.toLowerCase()];
     const count = components * rows;
     if (!type || !Number.isInteger(count) || count < 0) throw this.damaged(`the array ${name} has the type ${typeName}`);
-    const title = decodeURIComponent(name.replace(/%(?![0-9A-F]{2})/g, '%25'));
+    const title = decodedName(name);
     if (this.isBinary) {
       const end = this.at + count * sizeOf(type);
       if (end > this.bytes.length) throw this.damaged('it is truncated');

@@ -32,7 +32,8 @@ export interface SurfaceNumbers {
   surface_digest: string;
 }
 
-const orNaN = (value: number | null) => value ?? NaN;
+/** A number of the report, which writes null for one that is not finite. */
+export const orNaN = (value: number | null) => value ?? NaN;
 
 export function surfaceSummary(numbers: SurfaceNumbers): Summary {
   return {

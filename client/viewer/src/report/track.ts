@@ -11,7 +11,7 @@ import type { Method, Track } from '../stream/track';
 import { count } from '../ui/format';
 import { decodeGeometry } from './geometry';
 import type { SpacePart } from './space_part';
-import { surfaceFrame, type SurfaceNumbers, surfaceOmissions, surfaceSummary } from './surfaces';
+import { orNaN, surfaceFrame, type SurfaceNumbers, surfaceOmissions, surfaceSummary } from './surfaces';
 
 /** Numbers of a frame, written by client/output/report.cc. Null: not finite. */
 export interface FrameNumbers {
@@ -60,8 +60,6 @@ const RATE = 12;
 const LARGEST_FRAME = 3;
 
 const isSurface = (numbers: FrameNumbers | SurfaceNumbers): numbers is SurfaceNumbers => 'bodies' in numbers;
-
-const orNaN = (value: number | null) => value ?? NaN;
 
 /** The frames of a report. Frame k has the sequence k + 1. Geometry is decoded on demand. */
 export class ReportTrack implements Track {

@@ -5,7 +5,7 @@ import { hex, theme } from '../draw/colours';
 import type { Frame } from '../protocol/frame';
 import type { Surface, SurfaceMessage } from '../protocol/surface';
 import type { Outline } from '../protocol/sections';
-import { make, setText } from '../ui/dom';
+import { make, makeSvg, setText } from '../ui/dom';
 import { count, number } from '../ui/format';
 import { ScaleBar } from '../ui/scale_bar';
 import { axesDrawing, type AxesDrawing } from './axes';
@@ -33,7 +33,6 @@ export interface SpaceSource {
 
 /** Margin of a shell's box, as a share of the box, for a selected point that rounding puts outside it. */
 const ROUNDING = 1e-3;
-const SVG = 'http://www.w3.org/2000/svg';
 
 /** The picture of surfaces in a pane. It decodes frames one at a time; a newer frame replaces a waiting one. */
 export class SpacePicture {
@@ -45,7 +44,7 @@ export class SpacePicture {
   /** Why the browser cannot draw, and why the frame cannot be shown; or empty. */
   private drawingProblem = '';
   private frameProblem = '';
-  private readonly axes = document.createElementNS(SVG, 'svg');
+  private readonly axes = makeSvg('svg', { class: 'overlay', 'aria-hidden': 'true' });
   private readonly readout = make('div', { class: 'readout' });
   private readonly scaleBar = new ScaleBar();
   private readonly isDragging: () => boolean;
@@ -62,8 +61,6 @@ export class SpacePicture {
 
   /** `scrolls`: as of attachGestures. */
   constructor(private readonly events: SpaceEvents, private readonly source: SpaceSource, scrolls = false) {
-    this.axes.setAttribute('class', 'overlay');
-    this.axes.setAttribute('aria-hidden', 'true');
     this.element = make('div', { class: 'space' }, this.canvas, this.axes, this.scaleBar.element, this.readout);
     this.isDragging = attachSpaceNavigation(this.canvas, this.scene, () => {
       this.isFree = false;
@@ -212,6 +209,7 @@ export class SpacePicture {
   }
 
   private resized(): void {
+    this.scene.resize();
     if (this.scene.size.width > 0) this.keepInView();
     this.dirty = true;
   }
@@ -251,15 +249,9 @@ export class SpacePicture {
 
   private drawAxes(): void {
     const { lines, texts } = this.axesNow();
-    const element = (name: string, attributes: Record<string, string | number>, content = '') => {
-      const one = document.createElementNS(SVG, name);
-      for (const [key, value] of Object.entries(attributes)) one.setAttribute(key, String(value));
-      one.textContent = content;
-      return one;
-    };
     this.axes.replaceChildren(
-      ...lines.map(([x1, y1, x2, y2]) => element('line', { class: 'axis', x1, y1, x2, y2 })),
-      ...texts.map(({ x, y, text }) => element('text', { x, y, 'text-anchor': 'middle' }, text)));
+      ...lines.map(([x1, y1, x2, y2]) => makeSvg('line', { class: 'axis', x1, y1, x2, y2 })),
+      ...texts.map(({ x, y, text }) => makeSvg('text', { x, y, 'text-anchor': 'middle' }, text)));
   }
 
   private updateReadout(): void {

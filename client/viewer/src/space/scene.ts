@@ -1,6 +1,6 @@
 import { identityColour, mix, packed, theme } from '../draw/colours';
 import { attributeOf, DEFAULT_LOOK, type Look } from '../draw/look';
-import { chosenRange, type Range, rampTexels, rangeOf } from '../draw/ramp';
+import { chosenRange, type Range, rampTexels, widened } from '../draw/ramp';
 import { type Legend, legendOf } from '../draw/scene';
 import { Tracking } from '../draw/selection';
 import type { Size } from '../draw/view';
@@ -59,6 +59,8 @@ function themeOf(dark: boolean): SpaceTheme {
 /** A canvas that shows one surface after another. Only `draw` draws. */
 export class SpaceScene {
   view: SpaceView = { ...DEFAULT_VIEW };
+  /** The canvas in CSS pixels at the last `resize`. Reading it from the page in each drawing would cost a layout. */
+  size: Size = { width: 0, height: 0 };
   /** Called after each drawing, in the same task. */
   drawn: (() => void) | null = null;
   /** The box around all frames so far. */
@@ -78,9 +80,10 @@ export class SpaceScene {
     ({ sequence, identities, parents: measures.parents }),
   (before, chosen, after) => shellsByPlace(before.surface, chosen, after.surface));
 
-  constructor(readonly canvas: HTMLCanvasElement) {}
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.resize();
+  }
 
-  get size(): Size { return { width: this.canvas.clientWidth, height: this.canvas.clientHeight }; }
   get frame(): SpaceFrame | null { return this.shown; }
   get camera(): Camera { return { view: this.view, isPerspective: this.spaceLook.isPerspective, size: this.size }; }
   /** Whether `draw` draws: space.js is loaded. */
@@ -113,13 +116,16 @@ export class SpaceScene {
 
   setLook(look: Look, spaceLook: SpaceLook): void {
     const isOtherColour = look.colour !== this.look.colour;
-    const isOtherMap = look.map !== this.look.map || look.dark !== this.look.dark || this.texels.length === 0;
+    const isOtherTheme = look.dark !== this.look.dark;
+    const isOtherMap = look.map !== this.look.map || isOtherTheme || this.texels.length === 0;
+    const hasOtherSections = look.sections !== this.look.sections || look.hidden !== this.look.hidden ||
+      spaceLook.hasPlanes !== this.spaceLook.hasPlanes;
     this.look = { ...look };
     this.spaceLook = { ...spaceLook };
     if (isOtherMap) this.texels = rampTexels(MAP_COLOURS, look);
-    this.widenRange(isOtherColour);
-    this.tint();
-    this.showSections();
+    if (isOtherColour) this.widenRange(true);
+    if (isOtherColour || isOtherTheme) this.tint();
+    if (isOtherTheme || hasOtherSections) this.showSections();
   }
 
   /** Shows everything from the same direction. */
@@ -135,7 +141,10 @@ export class SpaceScene {
     if (this.extent) this.view = fitBox(this.camera, this.extent);
   }
 
-  resize(): void {}
+  /** Adopts the size of the canvas on the page. */
+  resize(): void {
+    this.size = { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
+  }
 
   draw(): void {
     const begin = performance.now();
@@ -250,10 +259,7 @@ export class SpaceScene {
     const name = attributeOf(this.look);
     if (name === null || !this.shown) return;
     for (const values of [this.shown.channels.get(name), this.shown.frame.particleAttributes?.get(name)]) {
-      const range = values && rangeOf(values);
-      if (!range) continue;
-      this.range = this.range
-        ? { min: Math.min(range.min, this.range.min), max: Math.max(range.max, this.range.max) } : range;
+      if (values) this.range = widened(this.range, values);
     }
   }
 

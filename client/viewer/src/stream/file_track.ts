@@ -15,12 +15,12 @@ import { particleChannels, type Particles } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
 import { CallError, describe, mayRetry, sentence, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
-import { type DrawnParticles, HISTORY_BYTES, type Method, type Track, type TrackState } from './track';
+import {
+  type DrawnParticles, hasCapacityFor, HISTORY_BYTES, KEPT_BEHIND, type Method, type Track, type TrackState,
+} from './track';
 
 /** Frames per second at speed 1. */
 const RATE = 30;
-/** Frames kept before the player's position if the history is full. */
-const KEPT_BEHIND = 8;
 
 /**
  * Dropped files, sent to the server as a stream. Frame k of the source has the sequence k + 1. Users see
@@ -148,7 +148,7 @@ export class FileTrack implements Track {
   /** Waits for capacity for the result, then reads the particles of the next frame. */
   private async next(sequence: number, producer: Producer): Promise<Particles | null> {
     if (sequence > this.source.count) return null;
-    while (producer === this.producer && !this.hasCapacityFor(sequence)) {
+    while (producer === this.producer && !hasCapacityFor(this.history, sequence, this.player.sequence ?? 1)) {
       await new Promise<void>((wake) => { this.wakeSender = wake; });
     }
     try {
@@ -158,13 +158,6 @@ export class FileTrack implements Track {
       this.state = { kind: 'failed', text: error.message };
       return null;
     }
-  }
-
-  private hasCapacityFor(sequence: number): boolean {
-    const first = this.history.first;
-    if (!first || this.history.bytes < 0.9 * HISTORY_BYTES) return true;
-    const position = this.player.sequence ?? 1;
-    return first.sequence < position - KEPT_BEHIND || sequence <= position + 1;
   }
 
   private frame(frame: ReconstructedFrame, message: Uint8Array): void {

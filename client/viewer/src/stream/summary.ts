@@ -16,16 +16,20 @@ export function reductionOf({ triangles, trianglesGrid }: Pick<Summary, 'triangl
 }
 
 /** Rings and holes, by the sign of their areas; bodies and cavities, by the sign of their volumes. */
-export function ringCounts(areas: readonly number[]): { rings: number; holes: number } {
-  const holes = areas.filter((area) => area < 0).length;
-  return { rings: areas.length - holes, holes };
+export function ringCounts(areas: Iterable<number>): { rings: number; holes: number } {
+  let [rings, holes] = [0, 0];
+  for (const area of areas) {
+    if (area < 0) ++holes;
+    else ++rings;
+  }
+  return { rings, holes };
 }
 
 /** Computes the figures of a frame outside the history: a frame with other settings, or a section. */
 export function summaryOf({ statistics, rings, surface }: Frame): Summary {
   const { area, triangles, trianglesGrid, milliseconds } = statistics;
   return {
-    area, ...ringCounts([...surface?.measures.volume ?? rings.area]), volume: statistics.volume, triangles, trianglesGrid, milliseconds,
+    area, ...ringCounts(surface?.measures.volume ?? rings.area), volume: statistics.volume, triangles, trianglesGrid, milliseconds,
     stages: STAGES.map(() => NaN), received: NaN, drawn: NaN, dropped: NaN, latency: NaN,
   };
 }

@@ -10,6 +10,16 @@ import type { Counts } from './summary';
 
 /** Limit of a track's history, in bytes of messages. */
 export const HISTORY_BYTES = 64 << 20;
+/** Share of the history from which on frames wait for the player. */
+const FULL_SHARE = 0.9;
+/** Frames kept before the player's position if the history is full. */
+export const KEPT_BEHIND = 8;
+
+/** Whether a history has room for a frame: it is not full, or can evict frames well before `position`, or needs the frame next. */
+export function hasCapacityFor({ first, bytes }: Pick<History, 'first' | 'bytes'>, sequence: number, position: number): boolean {
+  if (!first || bytes < FULL_SHARE * HISTORY_BYTES) return true;
+  return first.sequence < position - KEPT_BEHIND || sequence <= position + 1;
+}
 
 export interface TrackState {
   /** `lost`: retrying; `failed`: the user must act. */

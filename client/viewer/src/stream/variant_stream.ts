@@ -12,14 +12,12 @@ import { parseResult, Producer } from './producer';
 import { outputsFor, parametersOf, type Settings } from './settings';
 import { CallError, describe, mayRetry, sentence, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
-import { HISTORY_BYTES, type CurveSource, type Track } from './track';
+import { type CurveSource, hasCapacityFor, HISTORY_BYTES, KEPT_BEHIND, type Track } from './track';
 
 /** Number of frames computed before the first one shown, so that its rings are steady and tracked. */
 const WARM_UP = 25;
 /** Frames that the variant may be behind before it skips some. */
 const MOST_BEHIND = 300;
-/** Frames kept before the player's position if the history is full. */
-const KEPT_BEHIND = 8;
 /** Time that the player must stay at an earlier frame before the stream starts again there. */
 const REST_MS = 200;
 
@@ -209,13 +207,7 @@ export class VariantStream implements CurveSource {
     const { track, last, target } = this;
     const end = track.range()?.last ?? 0;
     const next = track.kind === 'watch' ? nextOf(track.history, last, target) : last < end ? last + 1 : null;
-    return next !== null && this.hasCapacityFor(next) ? next : null;
-  }
-
-  private hasCapacityFor(sequence: number): boolean {
-    const { first, bytes } = this.history;
-    if (!first || bytes < 0.9 * HISTORY_BYTES) return true;
-    return first.sequence < this.target - KEPT_BEHIND || sequence <= this.target + 1;
+    return next !== null && hasCapacityFor(this.history, next, target) ? next : null;
   }
 
   private take(result: ReconstructedFrame, message: Uint8Array): void {

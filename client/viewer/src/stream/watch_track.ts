@@ -55,6 +55,8 @@ export class WatchTrack implements Track {
   private isPastMissing = false;
   private requested: number | null = null;
   private nextFetch = 0;
+  /** The last message parsed, so that a frame shown soon after its arrival is parsed once. */
+  private parsed: { message: Uint8Array; frame: ReconstructedFrame } | null = null;
 
   constructor(private readonly gateway: Gateway, readonly title: string) {
     this.player = new Player(this, true);
@@ -213,6 +215,7 @@ export class WatchTrack implements Track {
 
   private forget(): void {
     this.history.clear();
+    this.parsed = null;
     this.clock.reset();
     this.newest = -Infinity;
     this.backfill?.close();
@@ -235,8 +238,8 @@ export class WatchTrack implements Track {
       else this.clock.passed(sequence);
     }
     const keepFrom = this.player.mode === 'live' ? Infinity : this.player.sequence ?? Infinity;
-    const parse = () => parseWatchedFrame(message);
-    return this.history.insert({
+    const parse = () => this.frameOf(message);
+    const isKept = this.history.insert({
       sequence,
       time: frame.time,
       receivedAt: now,
@@ -245,6 +248,13 @@ export class WatchTrack implements Track {
       message: parse,
       frame: () => decodeResult(parse(), this.parameters?.output, this.parameters?.plane ?? 0),
     }, keepFrom);
+    if (isKept && live) this.parsed = { message, frame };
+    return isKept;
+  }
+
+  private frameOf(message: Uint8Array): ReconstructedFrame {
+    if (this.parsed?.message !== message) this.parsed = { message, frame: parseWatchedFrame(message) };
+    return this.parsed.frame;
   }
 
   private ended(status: CallStatus, end: WatchEnded | null): void {

@@ -1,4 +1,5 @@
 import { button } from './dom';
+import { store, stored } from './storage';
 
 const KEY = 'partiemc-side';
 /** Widest screen of the layout for phones, as in page.css. */
@@ -22,10 +23,10 @@ export class Layout {
     document.body.classList.toggle('embed', isEmbedded(location.search));
     button('fold').addEventListener('click', () => {
       this.fold(!document.body.classList.contains('folded'));
-      if (!this.phone.matches) store(document.body.classList.contains('folded') ? 'folded' : 'open');
+      if (!this.phone.matches) store(KEY, document.body.classList.contains('folded') ? 'folded' : 'open');
     });
-    this.phone.addEventListener('change', () => this.fold(foldsAtFirst(this.phone.matches, stored())));
-    this.fold(foldsAtFirst(this.phone.matches, stored()));
+    this.phone.addEventListener('change', () => this.fold(foldsAtFirst(this.phone.matches, stored(KEY))));
+    this.fold(foldsAtFirst(this.phone.matches, stored(KEY)));
   }
 
   /** On a phone, folds the side panel. Call it after the user has chosen a picture there. */
@@ -39,22 +40,5 @@ export class Layout {
   private fold(isFolded: boolean): void {
     document.body.classList.toggle('folded', isFolded);
     button('fold').setAttribute('aria-expanded', String(!isFolded));
-  }
-}
-
-/** Browsers may refuse storage. */
-function stored(): string | null {
-  try {
-    return localStorage.getItem(KEY);
-  } catch {
-    return null;
-  }
-}
-
-function store(text: string): void {
-  try {
-    localStorage.setItem(KEY, text);
-  } catch {
-    // The choice lasts until the page closes.
   }
 }

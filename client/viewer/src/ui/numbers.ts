@@ -18,7 +18,7 @@ function outerAndHoles({ rings: { outerOf } }: Frame): string {
 }
 
 function shellCounts({ surface, shells }: Frame): string {
-  const { rings: bodies, holes: cavities } = ringCounts([...surface?.measures.volume ?? []]);
+  const { rings: bodies, holes: cavities } = ringCounts(surface?.measures.volume ?? []);
   return `${count(shells?.bodies ?? bodies)}, ${count(shells?.cavities ?? cavities)}`;
 }
 

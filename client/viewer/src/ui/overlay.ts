@@ -1,23 +1,15 @@
 import type { ContactMark } from '../draw/contacts';
 import { toCss, type Size, type View } from '../draw/view';
 import { axisMarks } from './axes';
+import { makeSvg } from './dom';
 import type { Point } from './measure';
-
-const SPACE = 'http://www.w3.org/2000/svg';
-
-function element(name: string, attributes: Record<string, string | number>, text = ''): SVGElement {
-  const one = document.createElementNS(SPACE, name);
-  for (const [key, value] of Object.entries(attributes)) one.setAttribute(key, String(value));
-  one.textContent = text;
-  return one;
-}
 
 /** Marks over the picture: axes, contacts with walls, and a measurement with its result. */
 export interface Overlaid { axes: boolean; contacts: readonly ContactMark[]; points: readonly Point[]; text: string }
 
 /** Draws the marks over the picture. */
 export class Overlay {
-  readonly element = element('svg', { class: 'overlay', 'aria-hidden': 'true' });
+  readonly element = makeSvg('svg', { class: 'overlay', 'aria-hidden': 'true' });
   /** The state of the last drawing, as JSON. */
   private drawn = '';
 
@@ -34,8 +26,8 @@ export class Overlay {
 }
 
 function contact({ x, y, text }: ContactMark): SVGElement[] {
-  const circle = element('circle', { class: 'contact', cx: x, cy: y, r: 4 });
-  return text === '' ? [circle] : [circle, element('text', { class: 'angle', x: x + 8, y: y + 18 }, text)];
+  const circle = makeSvg('circle', { class: 'contact', cx: x, cy: y, r: 4 });
+  return text === '' ? [circle] : [circle, makeSvg('text', { class: 'angle', x: x + 8, y: y + 18 }, text)];
 }
 
 function axisElements(view: View, size: Size): SVGElement[] {
@@ -44,12 +36,12 @@ function axisElements(view: View, size: Size): SVGElement[] {
   const bottom = size.height;
   return [
     ...x.flatMap(({ at, text }) => [
-      element('line', { class: 'axis', x1: at, y1: bottom, x2: at, y2: bottom - 7 }),
-      element('text', { x: at, y: bottom - 11, 'text-anchor': 'middle' }, text),
+      makeSvg('line', { class: 'axis', x1: at, y1: bottom, x2: at, y2: bottom - 7 }),
+      makeSvg('text', { x: at, y: bottom - 11, 'text-anchor': 'middle' }, text),
     ]),
     ...y.flatMap(({ at, text }) => [
-      element('line', { class: 'axis', x1: 0, y1: at, x2: 7, y2: at }),
-      element('text', { x: 11, y: at + 4 }, text),
+      makeSvg('line', { class: 'axis', x1: 0, y1: at, x2: 7, y2: at }),
+      makeSvg('text', { x: 11, y: at + 4 }, text),
     ]),
   ];
 }
@@ -59,8 +51,8 @@ function measured(view: View, size: Size, { points, text }: Overlaid): SVGElemen
   if (places.length === 0) return [];
   const [x, y] = places[places.length - 1];
   return [
-    element('polyline', { class: 'measure', points: places.map((place) => place.join()).join(' ') }),
-    ...places.map(([cx, cy]) => element('circle', { class: 'measure', cx, cy, r: 3 })),
-    element('text', { class: 'result', x: x + 8, y: y - 8 }, text),
+    makeSvg('polyline', { class: 'measure', points: places.map((place) => place.join()).join(' ') }),
+    ...places.map(([cx, cy]) => makeSvg('circle', { class: 'measure', cx, cy, r: 3 })),
+    makeSvg('text', { class: 'result', x: x + 8, y: y - 8 }, text),
   ];
 }

@@ -444,7 +444,7 @@ export class Pane {
     if (this.space) this.space.element.hidden = !isSpace;
     const ofOutlines = [this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout];
     for (const element of ofOutlines) element.toggleAttribute('hidden', isSpace);
-    if (!isSpace) this.scene.resize();
+    (isSpace ? this.space?.scene : this.scene)?.resize();
   }
 
   private newSpacePicture(make: Pane['pictureOfSpace']): SpacePicture | null {
