@@ -50,8 +50,8 @@ NodeShift ShiftOf(const KnownShell& shell, double cells) {
   return {rounded(x), rounded(y), rounded(z)};
 }
 
-/// Moves the bodies of the last frame forward by their velocities, unless both frames have ids
-/// (`by_samples`), and the bodies of this frame backward by their velocities.
+/// Moves the bodies of the last frame forward by their velocities, unless samples move them, and
+/// the bodies of this frame backward by their velocities.
 void ShiftByVelocities(const ShellHistory& previous, const ShellsNow& now, bool by_samples,
                        ShellRelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;
