@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <set>
 
+#include "space/lattice.h"
 #include "support/random.h"
+#include "vertices/hierarchical_grid.h"
 
 namespace partiemc {
 namespace {
@@ -71,6 +75,59 @@ TEST(Lattice, AClearedDirectoryForgetsItsTiles) {
   EXPECT_EQ(directory.size(), 1u);
   EXPECT_EQ(directory.Find({7, 7}), 0u);
   EXPECT_EQ(directory.Find({3, -3}), kNoTile);
+}
+
+// Counts the slots that keys occupy in a table of kSlots. The keys are chosen: in the table with
+// the hash `known`, which an attacker knows, all of them had the same slot.
+constexpr std::size_t kSlots = 4096, kChosen = 1024;
+
+template <typename Known, typename Hash>
+std::size_t SlotsOfChosen(const Known& known, const Hash& hash) {
+  std::set<std::size_t> slots;
+  std::size_t chosen = 0;
+  for (std::uint64_t key = 0; chosen < kChosen; ++key) {
+    const auto a = static_cast<std::int32_t>(key % 4096), b = static_cast<std::int32_t>(key / 4096);
+    if (known(a, b) % kSlots != 0) continue;
+    ++chosen;
+    slots.insert(hash(a, b) % kSlots);
+  }
+  return slots.size();
+}
+
+TEST(Lattice, ChosenCoordinatesDoNotCollide) {
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;
+  const auto pair = [](std::int32_t a, std::int32_t b) {
+    return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
+  };
+  const auto known_tile = [&](std::int32_t y, std::int32_t x) {
+    const std::uint64_t key = pair(y, x) * kGolden;
+    return key ^ key >> 29;
+  };
+  const auto known_brick = [](std::int32_t y, std::int32_t x) {
+    const std::uint64_t key =
+        (static_cast<std::uint64_t>(x) * kGolden + static_cast<std::uint64_t>(y)) * kGolden *
+        kGolden;
+    return key ^ key >> 29;
+  };
+  const auto known_cell = [&](std::int32_t row, std::int32_t column) {
+    return HierarchicalGrid::Key(1, column, row) * kGolden >> 32;
+  };
+  // Of 4,096 slots, 1,024 random ones are 906 different ones.
+  EXPECT_GT(SlotsOfChosen(known_tile,
+                          [](std::int32_t y, std::int32_t x) {
+                            return TileDirectory::HashOf({y, x});
+                          }),
+            800u);
+  EXPECT_GT(SlotsOfChosen(known_brick,
+                          [](std::int32_t y, std::int32_t x) {
+                            return space::BrickDirectory::HashOf({0, y, x});
+                          }),
+            800u);
+  EXPECT_GT(SlotsOfChosen(known_cell,
+                          [](std::int32_t row, std::int32_t column) {
+                            return SlotOf(HierarchicalGrid::Key(1, column, row), kSlots);
+                          }),
+            800u);
 }
 
 TEST(Lattice, APlaceOutsideATileIsFoundInItsNeighbour) {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <tuple>
 
 #include "support/reconstruct.h"
@@ -121,6 +123,19 @@ TEST(Normals, PreviousNormalsOfInactiveCellsHaveNoEffect) {
   second.Run(support::Disc(9.7), {.spacing = 1.0}, elsewhere);
   for (std::size_t k = 0; k < first.planes.size(); ++k) {
     EXPECT_EQ(second.planes[k].normal_x, first.planes[k].normal_x);
+  }
+}
+
+TEST(Normals, PreviousNormalOfFarthestCellHidesNoOthers) {
+  constexpr std::int32_t kLowest = std::numeric_limits<std::int32_t>::min();
+  Stages first, second;
+  first.Run(support::Disc(9.7), {.spacing = 1.0});
+  std::vector<CellNormal> previous = Reversed(first.next_normals);
+  previous.insert(previous.begin(), {kLowest, kLowest, 1, 0});
+  second.Run(support::Disc(9.7), {.spacing = 1.0}, previous);
+  for (std::size_t k = 0; k < first.planes.size(); ++k) {
+    if (CellOf(first, k).IsSaddle()) continue;
+    EXPECT_EQ(second.planes[k].normal_x, -first.planes[k].normal_x);
   }
 }
 

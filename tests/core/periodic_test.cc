@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <set>
 #include <utility>
@@ -420,7 +421,7 @@ TEST(ImageSets, OffsetsAddUpAlongLinks) {
 }
 
 TEST(RunPeriods, WrappedRunsCoverEachNodeOnce) {
-  for (const double period : {7.0, 7.3, 7.5, 7.9}) {
+  for (const double period : {5.5, 7.0, 7.3, 7.5, 7.9}) {
     for (std::int64_t first = -30; first < 30; ++first) {
       std::vector<std::int64_t> nodes;
       ForEachWrapped(period, first, first + 5, [&](std::int32_t low, std::int32_t high) {
@@ -433,6 +434,23 @@ TEST(RunPeriods, WrappedRunsCoverEachNodeOnce) {
         EXPECT_GE(nodes[k], 0 - 1);
         EXPECT_LE(nodes[k], 8);
       }
+    }
+  }
+}
+
+TEST(RunPeriods, RunOfManyPeriodsIsOnePeriod) {
+  // An untrusted state may hold such a run.
+  constexpr std::int64_t kFirst = std::numeric_limits<std::int32_t>::min(),
+                         kLast = std::numeric_limits<std::int32_t>::max();
+  for (const double period : {12.0, 12.3, 12.5, 1e9}) {
+    for (const std::int64_t first : {kFirst, kFirst + 5, std::int64_t{-1}}) {
+      std::int64_t parts = 0, nodes = 0;
+      ForEachWrapped(period, first, kLast, [&](std::int32_t low, std::int32_t high) {
+        ++parts;
+        nodes += std::int64_t{high} - low + 1;
+      });
+      EXPECT_LE(parts, 3);
+      EXPECT_EQ(nodes, static_cast<std::int64_t>(std::ceil(period)));
     }
   }
 }

@@ -1,4 +1,4 @@
-// Small functions of numbers that are inlined, and the invalid index kNoIndex.
+// Small functions of numbers that are inlined, a hash for tables, and the invalid index kNoIndex.
 #pragma once
 
 #include <cmath>
@@ -24,6 +24,25 @@ inline double Floor(double value) {
   if (!(value >= -kMostExact && value < kMostExact)) return std::floor(value);
   const auto whole = static_cast<double>(static_cast<std::int32_t>(value));
   return whole - static_cast<double>(whole > value);  // Without a branch.
+}
+
+/// Its address is random if the system loads programs at random addresses.
+inline constexpr char kAtRandomAddress = 0;
+
+/// Hashes 128 bits for a hash table whose keys come from an untrusted client. All bits of the hash
+/// are usable. Hashes differ from process to process, so a client cannot choose keys that collide.
+/// Results must not depend on them.
+///
+/// The high and the low half of a product are combined, as in wyhash. The seed is an address, as in
+/// Abseil's hash, because the core has no source of random numbers.
+inline std::uint64_t TableHash(std::uint64_t key, std::uint64_t more = 0) {
+  __extension__ using Product = unsigned __int128;
+  // Of an address, bits 12 to 39 are random.
+  const std::uint64_t seed =
+      reinterpret_cast<std::uintptr_t>(&kAtRandomAddress) << 24 ^ 0xc2b2ae3d27d4eb4fu;
+  const Product product =
+      Product{(key * 0x9e3779b97f4a7c15u) ^ seed} * Product{(more * 0xbf58476d1ce4e5b9u) ^ seed};
+  return static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64);
 }
 
 }  // namespace partiemc

@@ -13,6 +13,8 @@
 #include <span>
 #include <vector>
 
+#include "base/bits.h"
+
 namespace partiemc {
 
 inline constexpr int kTileShift = 5;
@@ -38,8 +40,7 @@ class TileDirectory {
   /// Removes all tiles; keeps the memory.
   void Clear();
 
-  /// Adds a tile if it does not exist. Returns its index, in insertion order. Cost: constant unless
-  /// coordinates are chosen so that their hashes collide.
+  /// Adds a tile if it does not exist. Returns its index, in insertion order.
   std::uint32_t Insert(TileCoordinate tile);
 
   /// Sorts the tiles. The index of a tile is then its position in the sorted order. Insert appends
@@ -57,6 +58,12 @@ class TileDirectory {
   /// Index of a tile, or kNoTile.
   std::uint32_t Find(TileCoordinate tile) const;
 
+  /// The hash of a tile in the table of tiles.
+  static std::uint64_t HashOf(TileCoordinate tile) {
+    return TableHash(std::uint64_t{static_cast<std::uint32_t>(tile.y)} << 32 |
+                     static_cast<std::uint32_t>(tile.x));
+  }
+
  private:
   std::size_t Slot(TileCoordinate tile) const;
   void Grow();
@@ -67,13 +74,8 @@ class TileDirectory {
 };
 
 inline std::size_t TileDirectory::Slot(TileCoordinate tile) const {
-  // Fibonacci hashing of the pair; neighbouring tiles go to distant slots.
-  const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.x));
-  const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(tile.y));
-  std::uint64_t key = (y << 32 | x) * 0x9e3779b97f4a7c15u;
-  key ^= key >> 29;
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = key & mask;
+  std::size_t slot = HashOf(tile) & mask;
   while (slots_[slot] != kNoTile && tiles_[slots_[slot]] != tile) slot = (slot + 1) & mask;
   return slot;
 }

@@ -43,8 +43,8 @@ CellShift ShiftOf(double cells_x, double cells_y) {
           static_cast<std::int64_t>(std::floor(cells_y + 0.5))};
 }
 
-// Moves the rings of the last frame forward, unless samples move them, and the rings of this frame
-// backward.
+// Moves the rings of the last frame forward, unless both frames have ids (`by_samples`), and the
+// rings of this frame backward.
 void ShiftByVelocities(const RingHistory& previous, const RingsNow& now, bool by_samples,
                        RelationScratch& s) {
   if (!previous.time || !std::isfinite(now.time) || !(now.time > *previous.time)) return;

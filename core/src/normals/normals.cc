@@ -14,9 +14,11 @@
 namespace partiemc {
 namespace {
 
-// A key that orders cells by row, then column: the order of State::normals.
+// A key that orders cells by row, then column: the order of State::normals. For each row and
+// column of 32 bits it is in range.
 std::int64_t KeyOf(const CellNormal& normal) {
-  return (std::int64_t{normal.row} << 32) + normal.column;
+  constexpr std::int64_t kColumns = std::int64_t{1} << 32;
+  return normal.row * kColumns + (normal.column + kColumns / 2);
 }
 
 // The position of a cell, without a normal.

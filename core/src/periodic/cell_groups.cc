@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "base/bits.h"
 #include "base/cancellation.h"
 
 namespace partiemc {
@@ -16,12 +17,9 @@ bool AreEqual(const GridCell& a, const GridCell& b) {
 }
 
 std::uint64_t HashOf(const GridCell& cell) {
-  std::uint64_t hash = 0;
-  for (const std::int32_t at : cell) {
-    hash = (hash ^ static_cast<std::uint32_t>(at)) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 32;
-  }
-  return hash;
+  return TableHash(std::uint64_t{static_cast<std::uint32_t>(cell[0])} << 32 |
+                       static_cast<std::uint32_t>(cell[1]),
+                   static_cast<std::uint32_t>(cell[2]));
 }
 
 // Resizes without the surplus of growth by doubling.

@@ -30,12 +30,15 @@ inline std::int64_t WrapOf(double period, std::int64_t at) {
 }
 
 /// Splits the run [first, last] at faces of boxes. Calls visit(first, last) for each wrapped part.
+/// A longer run than a period counts as one period, so there are at most three parts: runs of an
+/// untrusted state may have any length.
 template <typename Visit>
 void ForEachWrapped(double period, std::int64_t first, std::int64_t last, const Visit& visit) {
   if (period == 0) {
     visit(static_cast<std::int32_t>(first), static_cast<std::int32_t>(last));
     return;
   }
+  last = std::min(last, first + static_cast<std::int64_t>(std::ceil(period)) - 1);
   while (first <= last) {
     const double image = std::floor(static_cast<double>(first) / period);
     // The last node below the upper face of this box.

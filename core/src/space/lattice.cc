@@ -5,13 +5,8 @@
 namespace partiemc::space {
 
 std::size_t BrickDirectory::Slot(BrickCoordinate brick) const {
-  std::uint64_t key = static_cast<std::uint32_t>(brick.x);
-  key = key * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(brick.y);
-  key = key * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(brick.z);
-  key *= 0x9e3779b97f4a7c15u;
-  key ^= key >> 29;
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = key & mask;
+  std::size_t slot = HashOf(brick) & mask;
   while (slots_[slot] != kNoIndex && bricks_[slots_[slot]] != brick) slot = (slot + 1) & mask;
   return slot;
 }
@@ -61,16 +56,26 @@ void BrickDirectory::Seal() {
   alone.fill(kNoIndex);
   neighbours_.assign(bricks_.size(), alone);
   constexpr int kMiddle = 13;
+  // Links to the neighbours that come earlier in the order; links are mutual. They lie in this row
+  // and in four others. Bricks are sorted, so the searches in these rows only move forward.
+  constexpr std::array<std::array<int, 2>, 4> kRows = {{{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}}};
+  std::array<std::uint32_t, kRows.size()> first{};
   for (std::uint32_t brick = 0; brick < bricks_.size(); ++brick) {
-    neighbours_[brick][kMiddle] = brick;
-    // Finds the neighbours that come earlier in the order. Links are mutual, so later ones follow.
-    for (int place = 0; place < kMiddle; ++place) {
-      const BrickCoordinate& at = bricks_[brick];
-      const std::uint32_t other =
-          Find({at.z + place / 9 - 1, at.y + place / 3 % 3 - 1, at.x + place % 3 - 1});
-      if (other == kNoIndex) continue;
-      neighbours_[brick][place] = other;
-      neighbours_[other][2 * kMiddle - place] = brick;
+    const BrickCoordinate at = bricks_[brick];
+    const auto link = [&](std::uint32_t to) {
+      const BrickCoordinate& other = bricks_[to];
+      const int place = ((other.z - at.z + 1) * 3 + other.y - at.y + 1) * 3 + other.x - at.x + 1;
+      neighbours_[brick][place] = to;
+      neighbours_[to][2 * kMiddle - place] = brick;
+    };
+    link(brick);
+    if (brick > 0 && bricks_[brick - 1] == BrickCoordinate{at.z, at.y, at.x - 1}) link(brick - 1);
+    for (std::size_t row = 0; row < kRows.size(); ++row) {
+      const std::int32_t z = at.z + kRows[row][0], y = at.y + kRows[row][1];
+      while (bricks_[first[row]] < BrickCoordinate{z, y, at.x - 1}) ++first[row];
+      for (std::uint32_t k = first[row]; bricks_[k] <= BrickCoordinate{z, y, at.x + 1}; ++k) {
+        link(k);
+      }
     }
   }
 }

@@ -52,6 +52,13 @@ class BrickDirectory {
   /// The index of a brick, or kNoIndex.
   std::uint32_t Find(BrickCoordinate brick) const;
 
+  /// The hash of a brick in the table of bricks.
+  static std::uint64_t HashOf(BrickCoordinate brick) {
+    return TableHash(std::uint64_t{static_cast<std::uint32_t>(brick.y)} << 32 |
+                         static_cast<std::uint32_t>(brick.x),
+                     static_cast<std::uint32_t>(brick.z));
+  }
+
   /// The brick at a distance of (dx, dy, dz) bricks from `brick`, or kNoIndex.
   std::uint32_t At(std::uint32_t brick, int dx, int dy, int dz) const;
 

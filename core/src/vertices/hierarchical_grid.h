@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/bits.h"
 #include "base/box.h"
 
 namespace partiemc {
@@ -65,10 +66,9 @@ class HierarchicalGrid {
   std::array<double, kGridLevels> per_length_;  // By level: 1 / size of its cells.
 };
 
-/// The slot of a key in a table of `slot_count` slots, a power of two. Fibonacci hashing: the high
-/// bits of the product depend on all bits of the key.
+/// The slot of a key in a table of `slot_count` slots, a power of two.
 inline std::size_t SlotOf(std::uint64_t cell, std::size_t slot_count) {
-  return static_cast<std::size_t>((cell * 0x9e3779b97f4a7c15u) >> 32) & (slot_count - 1);
+  return TableHash(cell) & (slot_count - 1);
 }
 
 }  // namespace partiemc
