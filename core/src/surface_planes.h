@@ -31,8 +31,10 @@ inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
 /// The periodic box of a frame with copies. Infinite along axes without copies. World units.
 struct CopiedBox {
-  space::ClipBox faces;     ///< The faces of the box.
-  space::ClipBox complete;  ///< Bodies within these planes are complete.
+  space::ClipBox faces;  ///< The faces of the box.
+  /// Planes beyond the faces, kCopyEnd kernel radii before the end of the copies. A body within
+  /// them is as if the copies had no end.
+  space::ClipBox complete;
   bool any = false;         ///< Any axis has copies.
   std::array<bool, 3> has_copies{};
 };

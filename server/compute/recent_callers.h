@@ -13,7 +13,7 @@ class RecentCallers {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// Records that `caller` was active at `now`, which never decreases.
+  /// Records that `caller` was active at `now`. Requires: `now` never decreases.
   void Came(const CallerAccount* caller, TimePoint now) {
     if (!last_.came || last_.caller != caller) other_ = last_;
     last_ = {caller, now, true};

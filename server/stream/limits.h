@@ -137,8 +137,9 @@ struct ServerLimits {
   /// Maximum size of a serialised `open`: a checkpoint plus 64 KiB for the other fields.
   std::uint64_t MaxOpenBytes() const { return MaxCheckpointBytes() + kQuickOpenBytes; }
 
-  /// Size of a frame with the usual data of a particle (three float64, id, volume, velocity: 44
-  /// bytes) plus some reserve. Frames with more attributes need a larger limit.
+  /// Size of a frame with the usual data of a particle plus 4 KiB for other fields. The usual data
+  /// are three float64, id, volume and three float32 of velocity: 48 bytes. Frames with more
+  /// attributes need a larger limit.
   static constexpr std::uint64_t DefaultFrameBytes(std::uint64_t max_particles) {
     return 48 * max_particles + 4096;
   }

@@ -113,7 +113,8 @@ class LevelQueue final : public Dispatched {
   /// or is about to begin.
   bool Withdraw(const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Ends the thread. LevelDone is not called for the remaining requests.
+  /// Cancels the running level and ends the thread. Requests in the queue get no LevelDone. Those
+  /// of the running level and of finished levels may get it after Stop.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Number of levels that were computed, and of requests that another request's level has served.

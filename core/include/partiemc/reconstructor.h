@@ -42,9 +42,10 @@ class MemoryGuard {
   virtual ~MemoryGuard() = default;
 
   /// Returns whether workspace and result may grow to `bytes` in total; if not, Reconstruct returns
-  /// RESOURCE_EXHAUSTED. Reconstruct calls this on its caller's thread, about twice per outline.
-  /// The first call follows the sorting of particles, with a lower bound from the number of tiles;
-  /// memory for tiles is allocated afterwards. The second call includes the length of the outline.
+  /// RESOURCE_EXHAUSTED. Called on Reconstruct's thread, several times per frame, each time before
+  /// this memory is allocated: for filtered or copied particles, if there are any; for each outline
+  /// after its particles are sorted, with a lower bound from the number of tiles, and again when
+  /// its length is known. For surfaces see SurfaceReconstructor.
   virtual bool Reserve(std::uint64_t bytes) = 0;
 };
 

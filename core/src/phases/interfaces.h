@@ -60,10 +60,10 @@ void CollectArcs(const TileDirectory& directory, const PhaseMap& map, const Poin
                  std::span<const PhaseRings> phases, Interfaces& interfaces);
 
 /// Smooths the arcs as steps 2 and 3 of the default placement smooth rings (core/METHOD.md),
-/// without supports. An open arc is smoothed as the ring that runs along it and back. Such a ring
-/// would move a bent end towards the middle of its circle, so a bent end continues as its mirror
-/// image across a normal of its curve (arc_curve.h). Arcs whose ring is shorter than
-/// VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
+/// without supports. A closed arc is smoothed as a ring. An open arc continues beyond a straight
+/// end as itself, backwards. Beyond a bent end this would move the end towards the middle of its
+/// circle, so there it continues as its mirror image across a normal of its curve (arc_curve.h).
+/// Arcs whose ring is shorter than VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
 void SmoothInterfaces(const Scale& scale, const VirtualPlaneConstants& constants,
                       Interfaces& interfaces, SharedPoints& points);
 

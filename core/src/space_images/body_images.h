@@ -18,8 +18,8 @@ namespace partiemc::space {
 struct BodyImageInput {
   const LiftedFrame& lifted;
   const SpaceBins& bins;
-  /// The planes, as corners of a box. Bodies within them are complete. Infinite along axes without
-  /// copies. World units.
+  /// The planes, as corners of a box. A body within them is as if the copies of particles had no
+  /// end. Infinite along axes without copies. World units.
   Vec3 low, high;
   double spacing, cell_size;  ///< World units.
   bool wraps = false;         ///< PeriodicBox::wraps.

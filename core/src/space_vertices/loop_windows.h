@@ -1,5 +1,5 @@
-// The window of a loop: the loops within a distance of it that links connect with it through loops
-// within this distance.
+// The window of a loop: all loops that a walk along links reaches from it without leaving a given
+// distance around it.
 //
 // A loop is the index of a vertex in a cell, minus `edge_count`. Two loops are linked if a curve on
 // a face belongs to both.

@@ -52,7 +52,7 @@ const textOfBytes = (bytes: Uint8Array) => String.fromCharCode(...bytes);
 
 const isTimes = (file: File) => plainName(file) === 'times.csv';
 
-/** A file format with tables: how its files are recognised, and their reader. `name` is in lower case. */
+/** A file format with tables: how its files are recognised, and their reader. `name` is in lower case, without .gz or .zst; `head` is as in the file. */
 interface Kind {
   matches(name: string, head: string): boolean;
   open(file: File): Promise<TableReader> | TableReader;
