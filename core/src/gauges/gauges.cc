@@ -183,6 +183,7 @@ absl::StatusOr<Gauge> ParseGauge(std::string_view text) {
   Gauge gauge{.name = std::string(text.substr(0, equals))};
   std::string_view rest = text.substr(equals + 1);
   const std::string_view kind = rest.substr(0, rest.find(':'));
+  const bool has_numbers = kind.size() < rest.size();
   rest.remove_prefix(std::min(rest.size(), kind.size() + 1));
   const auto traits = std::ranges::find(Table(), kind, &GaugeTraits::name);
   if (traits == Table().end()) {
@@ -191,12 +192,15 @@ absl::StatusOr<Gauge> ParseGauge(std::string_view text) {
     return bad("must have one of the kinds " + Listed(names));
   }
   gauge.kind = traits->kind;
-  while (!rest.empty()) {
+  for (bool has_next = has_numbers; has_next;) {
     const std::string_view number = rest.substr(0, rest.find(','));
+    has_next = number.size() < rest.size();
     double value = 0;
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
     if (error != std::errc() || end != number.data() + number.size()) {
-      return bad(absl::StrCat("must have numbers after ", std::string(kind), ":"));
+      return bad(traits->numbers.empty()
+                     ? absl::StrCat("must have nothing after ", std::string(kind))
+                     : absl::StrCat("must have numbers after ", std::string(kind), ":"));
     }
     gauge.numbers.push_back(value);
     rest.remove_prefix(std::min(rest.size(), number.size() + 1));
