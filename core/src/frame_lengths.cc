@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "base/bits.h"
 #include "bins/resolution.h"
 #include "bins/spacing_doubt.h"
 #include "frame/calibration.h"
@@ -142,7 +143,7 @@ absl::StatusOr<SizeRange> RangeOfSizes(const Frame& frame,
   const double spacing = lengths.spacing;
   const bool is_in_space = parameters.slice.has_value();
   const auto size_of = [is_in_space](double volume) {
-    return is_in_space ? std::cbrt(volume) : std::sqrt(volume);
+    return is_in_space ? CubeRoot(volume) : std::sqrt(volume);
   };
   const SizeRange sizes{size_of(*least) / spacing, size_of(*most) / spacing};
   constexpr double kRatio = ReconstructionParameters::kMostSizeRatio;

@@ -8,18 +8,13 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "base/cancellation.h"
-#include "bins/cell_mask.h"
 #include "bins/resolution.h"
 #include "core/internal/research.h"
-#include "field/slice_field.h"
 #include "frame/frame_view.h"
 #include "frame/in_stage.h"
-#include "frame/placement_traits.h"
 #include "frame_lengths.h"
 #include "frame_memory.h"
-#include "mesh/touched_cells.h"
 #include "outline_stages.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
@@ -325,6 +320,10 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
         frame, state.surface, b.surface, result.surface,
         {.observer = control.observer, .memory = &memory, .cancelled = control.cancelled});
     if (!status.ok()) return status;
+    // Filtered positions are float64.
+    if (prepared.is_filtered && AreCoarse(given, *parameters_.spacing)) {
+      result.surface.statistics.doubts.Add(Doubt::kPositionsCoarse);
+    }
     SummariseSurface(parameters_, given, result);
   } else {
     CommitState(b.next_states[0], state);

@@ -157,6 +157,24 @@ Violations CoreIsPlain(const SourceTree& tree) {
   return violations;
 }
 
+Violations CoreMathIsExact(const SourceTree& tree) {
+  static const std::regex kInexact(
+      R"(\b((?:a?(?:cos|sin|tan)h?|atan2|cbrt|pow|hypot|exp|exp2|expm1|log|log2|log10|log1p|)"
+      R"(erfc?|[lt]gamma|fma)[fl]?)\s*\()");
+  static const std::set<std::string> kExempt = {"core/src/gauges/angles.cc: acos",
+                                                "core/src/gauges/angles.cc: atan",
+                                                "core/src/gauges/disc_area.cc: atan2"};
+  Violations violations;
+  for (const auto& [path, text] : tree) {
+    if (Room(path) != "core" || !IsCxx(path)) continue;
+    for (const std::string& name : Matches(WithoutComments(text, Literals::kBlank), kInexact)) {
+      if (kExempt.contains(path + ": " + name)) continue;
+      violations.push_back(path + ": calls " + name + ", whose bits depend on the machine");
+    }
+  }
+  return violations;
+}
+
 Violations TasksStartInOneFile(const SourceTree& tree) {
   static const std::string kDoor = "core/src/base/parallel.cc";
   static const std::regex kTasks("(oneapi/)?tbb/(?!global_control\\.h).*");

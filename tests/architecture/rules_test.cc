@@ -77,6 +77,18 @@ TEST(Architecture, TheEnvironmentReadInTheCoreIsSeen) {
   EXPECT_THAT(CoreIsPlain(tree), Contains(HasSubstr("uses getenv")));
 }
 
+TEST(Architecture, TheMathOfTheCoreIsExact) { EXPECT_THAT(CoreMathIsExact(Project()), IsEmpty()); }
+
+TEST(Architecture, AnInexactFunctionInTheCoreIsSeen) {
+  const std::string path = "core/src/base/status.cc";
+  for (const std::string name : {"std::cbrt", "pow", "std::log2", "::sinf", "std::fma"}) {
+    const SourceTree tree = {{path, "auto x = " + name + "(2.0);\n"}};
+    EXPECT_THAT(CoreMathIsExact(tree), Contains(HasSubstr(path))) << name;
+  }
+  const SourceTree exact = {{path, "auto x = std::sqrt(CubeRoot(2));\n"}};
+  EXPECT_THAT(CoreMathIsExact(exact), IsEmpty());
+}
+
 TEST(Architecture, TasksStartInOneFile) { EXPECT_THAT(TasksStartInOneFile(Project()), IsEmpty()); }
 
 TEST(Architecture, ASecondStartOfTasksIsSeen) {

@@ -337,10 +337,27 @@ TEST(GaugesTest, ParsesNamesKindsAndNumbers) {
 }
 
 TEST(GaugesTest, RefusesTextsThatAreNoGauges) {
-  for (const char* text :
-       {"", "height:1", "=height:1", "a b=height:1", "a=depth:1", "a=height", "a=height:1,2",
-        "a=height:x", "a=height:nan", "a=height:1e99", "a=front:0,0", "a=wetted:1,1,1,1",
-        "a=box:0,0,0,1", "a=contact:0,0,0,0,1", "a=contact:0,0,1,0,0", "a=repose:1"}) {
+  for (const char* text : {"",
+                           "height:1",
+                           "=height:1",
+                           "a b=height:1",
+                           "a=depth:1",
+                           "a=height",
+                           "a=height:1,2",
+                           "a=height:x",
+                           "a=height:nan",
+                           "a=height:1e99",
+                           "a=front:0,0",
+                           "a=wetted:1,1,1,1",
+                           "a=box:0,0,0,1",
+                           "a=contact:0,0,0,0,1",
+                           "a=contact:0,0,1,0,0",
+                           "a=repose:1",
+                           "a=height:0.5,",
+                           "a=height:,0.5",
+                           "a=box:0,0,,1,1",
+                           "a=height:",
+                           "a=repose:"}) {
     const auto gauge = ParseGauge(text);
     EXPECT_EQ(gauge.status().code(), absl::StatusCode::kInvalidArgument) << text;
     EXPECT_TRUE(FindViolation(gauge.status()).has_value()) << text;

@@ -57,6 +57,7 @@ test('a wrong gauge says what is wrong', () => {
     ['height:1', /form NAME=KIND:NUMBERS/], ['a b=height:1', /1 to 40 of letters/], ['a=depth:1', /one of height, front/],
     ['a=height', /height must have the numbers x\./], ['a=height:1,2', /numbers x\./], ['a=height:one', /numbers x\./],
     ['a=repose:1', /repose has no numbers/], ['a=front:0,0', /direction must not be zero/],
+    ['a=repose:', /repose has no numbers/], ['a=height:1,', /numbers x\./], ['a=height:', /numbers x\./],
     ['a=wetted:1,1,1,1', /ends must differ/], ['a=box:1,1,0,2', /max_x and max_y/], ['a=contact:0,0,0,0,1', /direction/],
     ['a=contact:0,0,1,0,0', /reach must be above 0/], ['a=toString:1', /one of height/],
   ];

@@ -282,7 +282,7 @@ absl::Status CheckMeasures(const Surface& surface) {
       size = std::max({size, Length(a), Length(b), Length(c)});
     }
     const ShellMeasures& said = surface.measures[shell];
-    if (std::abs(said.area - area) > kTolerance * area) {
+    if (!(std::abs(said.area - area) <= kTolerance * area)) {
       return Broken("S5: shell ", shell, " has area ", ShortestNumber(area), ", not ",
                     ShortestNumber(said.area));
     }
@@ -293,9 +293,9 @@ absl::Status CheckMeasures(const Surface& surface) {
     }
     const Vec3 centroid{said.centroid_x, said.centroid_y, said.centroid_z};
     const Vec3 error = volume * (centroid - origin) - moment;
-    // The squares of these products would overflow for large spacings.
+    // The squares of these products would overflow for large spacings. std::max may skip a NaN.
     const double most = std::max({std::abs(error.x), std::abs(error.y), std::abs(error.z)});
-    if (!(most == 0 || most * Length((1 / most) * error) <= bound * size))
+    if (!(error == Vec3{} || most * Length((1 / most) * error) <= bound * size))
       return Broken("S5: shell ", shell, " has another centroid");
   }
   return absl::OkStatus();

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 #include "frame/near_ring.h"
 #include "frame/neighbour_tree.h"
@@ -78,7 +79,7 @@ struct InDimension<Vec3> {
       {0, -0.8, -0.6}, {-0.6, 0, -0.8}, {0.8, -0.6, 0}, {0, 0.8, -0.6},  {-0.6, 0, 0.8},
       {-0.8, 0.6, 0},  {0, -0.8, 0.6},  {0.6, 0, -0.8}, {-0.8, -0.6, 0}, {0, 1, 0},
       {0, 0, 1},       {0, -1, 0},      {0, 0, -1}};
-  static double RootOf(double measure) { return std::cbrt(measure); }
+  static double RootOf(double measure) { return CubeRoot(measure); }
   static Vec3 Moved(const Vec3& at, double by, const Vec3& direction) {
     return at + by * direction;
   }

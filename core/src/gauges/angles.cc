@@ -22,6 +22,8 @@ constexpr double kFlankFrom = 0.2, kFlankTo = 0.8;
 
 constexpr double kPi = 3.141592653589793;
 
+double LengthOf(const Point& p) { return std::sqrt(p.x * p.x + p.y * p.y); }
+
 double Degrees(double radians) { return radians * (180 / kPi); }
 
 // The outer ring with the largest area.
@@ -53,18 +55,21 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
   for (const Point& p : arc) {
     if (p.y <= lowest + rounded && first * p.x < first * side.x) side = p;
   }
-  std::erase_if(arc,
-                [&](const Point& p) { return std::hypot(p.x - side.x, p.y - side.y) > reach; });
+  std::erase_if(arc, [&](const Point& p) {
+    return LengthOf({p.x - side.x, p.y - side.y}) > reach;
+  });
   const std::optional<Circle> circle = FitCircle(arc);
   if (!circle || std::abs(circle->centre.y) > circle->radius) return {};
   // The wall cuts the circle at +-radius sin(angle). For a drop, the centre is on the body's side
   // of the contact, and cos(angle) = -height of the centre / radius. For a meniscus, the centre is
   // on the other side, and the angle is the supplement.
-  const double angle = std::acos(-circle->centre.y / circle->radius);
+  const double cosine = -circle->centre.y / circle->radius;
+  const double angle = std::acos(cosine);
   const bool is_meniscus = first * (circle->centre.x - side.x) < 0;
   const int toward_contact = is_meniscus ? first : -first;
-  return {.place = circle->centre.x + toward_contact * circle->radius * std::sin(angle),
-          .angle = Degrees(is_meniscus ? kPi - angle : angle)};
+  return {
+      .place = circle->centre.x + toward_contact * circle->radius * std::sqrt(1 - cosine * cosine),
+      .angle = Degrees(is_meniscus ? kPi - angle : angle)};
 }
 
 }  // namespace
@@ -72,7 +77,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
 std::vector<double> ContactAngles(const Result& result, const WallLine& wall) {
   const std::optional<std::size_t> ring = LargestRing(result.rings);
   if (!ring) return {NAN, NAN, NAN, NAN};
-  const double length = std::hypot(wall.direction.x, wall.direction.y);
+  const double length = LengthOf(wall.direction);
   const Point along{wall.direction.x / length, wall.direction.y / length};
   const std::span<const double> coordinates = result.rings.RingPoints(*ring);
   std::vector<Point> points(coordinates.size() / 2);

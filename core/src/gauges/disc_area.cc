@@ -46,7 +46,7 @@ double DiscAreaInBox(const Point& centre, double radius, const Point& min, const
   if (inner >= radius) return kPi * radius * radius;
   // The distance of the box from the centre of the disc, along each axis.
   const double x = std::max({low.x, -high.x, 0.0}), y = std::max({low.y, -high.y, 0.0});
-  if (std::hypot(x, y) >= radius) return 0;
+  if (std::sqrt(x * x + y * y) >= radius) return 0;
   const std::array<Point, 4> corners = {low, {high.x, low.y}, high, {low.x, high.y}};
   double area = 0;
   for (std::size_t k = 0; k < corners.size(); ++k) {

@@ -68,7 +68,7 @@ std::string FieldOf(const Gauge& gauge, std::string_view number) {
 }
 
 absl::Status CheckDirection(const Gauge& gauge, double x, double y, std::string_view rule) {
-  if (std::hypot(x, y) >= kMinLength) return absl::OkStatus();
+  if (std::sqrt(x * x + y * y) >= kMinLength) return absl::OkStatus();
   return Bad(kReasonOutOfRange, FieldOf(gauge, ""), ShortestNumber(x) + ", " + ShortestNumber(y),
              std::string(rule));
 }
@@ -109,7 +109,7 @@ std::vector<double> MeasureHeight(const Rings& rings, double x) {
 }
 
 std::vector<double> MeasureFront(const Rings& rings, const Point& direction) {
-  const double length = std::hypot(direction.x, direction.y);
+  const double length = std::sqrt(direction.x * direction.x + direction.y * direction.y);
   std::vector<double> values = {NAN, NAN, NAN};
   for (std::size_t k = 0; k < rings.PointCount(); ++k) {
     const Point p = PointAt(rings.points, k);
@@ -126,7 +126,7 @@ double MeasureWetted(const Rings& rings, const Point& from, const Point& to) {
   for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) {
     inside += std::clamp(crossings[k + 1], 0.0, 1.0) - std::clamp(crossings[k], 0.0, 1.0);
   }
-  return inside * std::hypot(line.x, line.y);
+  return inside * std::sqrt(line.x * line.x + line.y * line.y);
 }
 
 std::vector<double> MeasurePacking(const Rings& rings, const Point& min, const Point& max,
@@ -183,6 +183,7 @@ absl::StatusOr<Gauge> ParseGauge(std::string_view text) {
   Gauge gauge{.name = std::string(text.substr(0, equals))};
   std::string_view rest = text.substr(equals + 1);
   const std::string_view kind = rest.substr(0, rest.find(':'));
+  const bool has_numbers = kind.size() < rest.size();
   rest.remove_prefix(std::min(rest.size(), kind.size() + 1));
   const auto traits = std::ranges::find(Table(), kind, &GaugeTraits::name);
   if (traits == Table().end()) {
@@ -191,12 +192,15 @@ absl::StatusOr<Gauge> ParseGauge(std::string_view text) {
     return bad("must have one of the kinds " + Listed(names));
   }
   gauge.kind = traits->kind;
-  while (!rest.empty()) {
+  for (bool has_next = has_numbers; has_next;) {
     const std::string_view number = rest.substr(0, rest.find(','));
+    has_next = number.size() < rest.size();
     double value = 0;
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
     if (error != std::errc() || end != number.data() + number.size()) {
-      return bad(absl::StrCat("must have numbers after ", std::string(kind), ":"));
+      return bad(traits->numbers.empty()
+                     ? absl::StrCat("must have nothing after ", std::string(kind))
+                     : absl::StrCat("must have numbers after ", std::string(kind), ":"));
     }
     gauge.numbers.push_back(value);
     rest.remove_prefix(std::min(rest.size(), number.size() + 1));

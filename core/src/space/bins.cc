@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "base/bits.h"
 #include "base/parallel.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"
@@ -122,7 +123,7 @@ void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   size.resize(frame.volumes.size());
   float largest = 0;
   for (std::size_t p = 0; p < size.size(); ++p) {
-    size[p] = static_cast<float>(std::cbrt(double{frame.volumes[p]}) / world);
+    size[p] = static_cast<float>(CubeRoot(double{frame.volumes[p]}) / world);
     largest = std::max(largest, size[p]);
   }
   std::array<SizeClass, kMostClasses> classes;
@@ -142,9 +143,11 @@ void FindClasses(const Frame& frame, const Scale& scale, SpaceBins& bins) {
   for (int k = 0; k < kMostClasses; ++k) {
     if (classes[k].most == 0) continue;
     place[k] = bins.classes.size();
-    // Cells are about as wide as the largest particle of the class.
-    const double cells = std::log2(double{classes[k].most} * scale.spacing);
-    classes[k].shift = std::clamp(static_cast<int>(std::lround(cells)), 0, kBrickShift);
+    // Cells are about as wide as the largest particle of the class: 2^shift, while the particle is
+    // wider than 2^(shift - 1/2).
+    const double width = double{classes[k].most} * scale.spacing;
+    int& shift = classes[k].shift;
+    for (shift = 0; shift < kBrickShift && width * width >= PowerOfTwo(2 * shift + 1);) ++shift;
     bins.classes.push_back(classes[k]);
   }
   constexpr std::uint64_t kPosition = (std::uint64_t{1} << kClassShift) - 1;

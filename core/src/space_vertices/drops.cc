@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "base/bits.h"
 #include "base/cancellation.h"
 
 namespace partiemc::space {
@@ -28,7 +29,7 @@ constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
 constexpr double kPi = 3.14159265358979323846;
 
 /// The radius of a ball with a volume.
-double RadiusOf(double volume) { return std::cbrt(3 / (4 * kPi) * volume); }
+double RadiusOf(double volume) { return CubeRoot(3 / (4 * kPi) * volume); }
 
 /// A polyhedron with its corners on the unit sphere.
 struct Polyhedron {
@@ -190,7 +191,7 @@ bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
   const double determinant = a * d * f;
   if (!(determinant > 0) || !std::isfinite(determinant)) return false;
   const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / scale.spacing);
-  const double factor = std::cbrt(drop.volume / (determinant * of.volume));
+  const double factor = CubeRoot(drop.volume / (determinant * of.volume));
   if (!(drop.volume > kLeastFilling * (4 * kPi / 3) * determinant)) return false;
   // A lower bound of its shortest half axis, in cells. Rounding must not fold the triangles.
   const double shortest = factor * determinant / (xx + yy + zz);

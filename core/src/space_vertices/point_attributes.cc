@@ -51,7 +51,8 @@ struct Around {
           visit(p, own * within * within * within, to, 1.0);
         } else {
           const double size = bins.size[p], within = 1 - Dot(to, to) / (size * size);
-          if (within > 0) visit(p, std::pow(size * within, 3), to, size);
+          const double edge = size * within;
+          if (within > 0) visit(p, edge * edge * edge, to, size);
         }
       }
     });

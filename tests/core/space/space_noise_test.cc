@@ -142,6 +142,20 @@ TEST(SpaceNoiseFilter, WeightOneKeepsBitsAndSectionsAreThoseOfSlices) {
   }
 }
 
+TEST(SpaceNoiseFilter, CoarsePositionsAreReported) {
+  Random random(4);
+  const Numbered ball = BallAt({4e6, 0, 0}, 6, 0, random);
+  const std::vector<float> coarse(ball.particles.xyz.begin(), ball.particles.xyz.end());
+  Frame frame = ball.AsFrame();
+  frame.positions = std::span<const float>(coarse);
+  Stream surfaces(Filtering());
+  for (int k = 0; k < 2; ++k) {
+    const Result& result = surfaces.Next(frame);
+    EXPECT_TRUE(result.statistics.doubts.Has(Doubt::kPositionsCoarse));
+    EXPECT_EQ(result.surface.statistics.doubts, result.statistics.doubts);
+  }
+}
+
 TEST(SpaceNoiseFilter, OrderAndThreadsChangeNoBit) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 5);
   Random random(5);

@@ -237,6 +237,8 @@ TEST(SurfaceChecks, FindsWrongSizesNormalsMeasures) {
   spoil([](Surface& surface) { surface.measures[1].volume *= -1; });
   spoil([](Surface& surface) { surface.measures[0].centroid_y += .01; });
   spoil([](Surface& surface) { surface.measures[0].volume = std::nan(""); });
+  spoil([](Surface& surface) { surface.measures[0].area = std::nan(""); });
+  spoil([](Surface& surface) { surface.measures[0].centroid_y = std::nan(""); });
   spoil([](Surface& surface) { surface.cuts = {0}; });  // Its area counts it.
   spoil([](Surface& surface) { surface.cuts = {1, 0}; });
   spoil([](Surface& surface) { surface.cuts = {0xffffffff}; });

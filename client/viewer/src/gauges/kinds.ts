@@ -38,7 +38,7 @@ export function parseGauge(text: string): Gauge {
   if (name === undefined) throw new Error('A gauge has the form NAME=KIND:NUMBERS, such as level=height:0.5.');
   if (!/^\w{1,40}$/.test(name)) throw new Error('The name must have 1 to 40 of letters, digits and _.');
   if (!Object.hasOwn(KINDS, kind)) throw new Error(`The kind must be one of ${Object.keys(KINDS).join(', ')}.`);
-  const gauge = { name, kind: kind as KindName, numbers: (rest ? rest.split(',') : []).map(numberOf) };
+  const gauge = { name, kind: kind as KindName, numbers: (rest === undefined ? [] : rest.split(',')).map(numberOf) };
   const wanted = kindOf(gauge).numbers;
   if (gauge.numbers.length !== wanted.length || gauge.numbers.some((value) => !Number.isFinite(value))) {
     throw new Error(wanted.length === 0 ? `${kind} has no numbers.` : `${kind} must have the numbers ${wanted.join(',')}.`);
