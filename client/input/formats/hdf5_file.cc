@@ -197,7 +197,7 @@ absl::Status CheckStoredNumbers(hid_t dataset, const Hdf5Array& array, const std
 herr_t AddMember(hid_t /*group*/, const char* name, const H5L_info_t* /*info*/, void* members) {
   auto& names = *static_cast<std::vector<std::string>*>(members);
   names.emplace_back(name);
-  return names.size() == kMaxHdf5Members ? 1 : 0;
+  return names.size() > kMaxHdf5Members ? 1 : 0;
 }
 
 }  // namespace
@@ -221,7 +221,7 @@ Hdf5File::~Hdf5File() {
   H5Fclose(id_);
 }
 
-std::vector<std::string> Hdf5File::Members(const std::string& group) const {
+absl::StatusOr<std::vector<std::string>> Hdf5File::Members(const std::string& group) const {
   const MutexLock lock(LibraryMutex());
   Silence();
   std::vector<std::string> names;
@@ -229,6 +229,10 @@ std::vector<std::string> Hdf5File::Members(const std::string& group) const {
   const Handle opened(H5Gopen2(id_, group.empty() ? "/" : group.c_str(), H5P_DEFAULT), H5Gclose);
   if (!opened.ok()) return names;
   H5Literate(opened.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, AddMember, &names);
+  if (names.size() > kMaxHdf5Members) {
+    return absl::DataLossError(Concat(path_, ": the group '", group, "' has more than ",
+                                      kMaxHdf5Members, " members; divide the file"));
+  }
   std::sort(names.begin(), names.end(), NaturalLess);
   return names;
 }

@@ -32,8 +32,8 @@ class Hdf5File {
   const std::string& path() const { return path_; }
 
   /// Names of the members of a group, "" for the root, in natural order. Empty if there is no such
-  /// group.
-  std::vector<std::string> Members(const std::string& group) const;
+  /// group. Errors: kDataLoss if it has more than 2^20 members.
+  absl::StatusOr<std::vector<std::string>> Members(const std::string& group) const;
 
   bool IsGroup(const std::string& path) const;
 

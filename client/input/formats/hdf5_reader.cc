@@ -78,9 +78,10 @@ class Hdf5Survey {
     if (file_.IsGroup("particles") && file_.IsGroup("solver_data")) return TakePysph();
     if (NamesDatasets()) return TakeNamedGroups();
     if (file_.IsGroup("VTKHDF")) return TakeVtk();
-    const std::vector<std::string> members = file_.Members("");
+    const auto members = file_.Members("");
+    if (!members.ok()) return members.status();
     std::vector<std::string> kinds;
-    for (const std::string& name : members) {
+    for (const std::string& name : *members) {
       if (name.starts_with("Step#")) AddGroup(name, NumberAtEnd(name));
       if (name.starts_with("PartType")) kinds.push_back(name);
     }
@@ -118,8 +119,9 @@ class Hdf5Survey {
   }
 
   absl::Status TakePysph() {
-    std::vector<std::string> arrays = file_.Members("particles");
-    const auto array = ChoosePysphArray(arrays, content_.request, file_.path());
+    const auto arrays = file_.Members("particles");
+    if (!arrays.ok()) return arrays.status();
+    const auto array = ChoosePysphArray(*arrays, content_.request, file_.path());
     if (!array.ok()) return array.status();
     content_.pysph = true;
     const std::string group = Concat("particles/", *array, "/arrays");
@@ -160,7 +162,9 @@ class Hdf5Survey {
         if (part != "*") next.push_back(JoinPath(group, part));
         if (part != "*") continue;
         // Names are limited, because hard links can repeat a group any number of times.
-        for (const std::string& name : file_.Members(group)) {
+        const auto names = file_.Members(group);
+        if (!names.ok()) return names.status();
+        for (const std::string& name : *names) {
           next.push_back(JoinPath(group, name));
           bytes += sizeof(std::string) + next.back().size();
           if (bytes > kMaxFrameListBytes)
@@ -191,17 +195,20 @@ class Hdf5Survey {
   // Adds the groups data/ITERATION/particles/SPECIES. Refuses several species.
   absl::Status TakeOpenPmd() {
     std::string species;
-    for (const std::string& iteration : file_.Members("data")) {
+    const auto iterations = file_.Members("data");
+    if (!iterations.ok()) return iterations.status();
+    for (const std::string& iteration : *iterations) {
       const std::string particles = Concat("data/", iteration, "/particles");
-      const std::vector<std::string> names = file_.Members(particles);
-      if (names.empty()) continue;
-      if (species.empty()) species = names.front();
-      if (names.size() > 1) {
-        return Refuse(Concat("has the species ", absl::StrJoin(names, ", "),
+      const auto names = file_.Members(particles);
+      if (!names.ok()) return names.status();
+      if (names->empty()) continue;
+      if (species.empty()) species = names->front();
+      if (names->size() > 1) {
+        return Refuse(Concat("has the species ", absl::StrJoin(*names, ", "),
                              "; choose one by --columns 'data/*/particles/", species,
                              "/position'"));
       }
-      AddGroup(JoinPath(particles, names.front()), ParseNumber(iteration));
+      AddGroup(JoinPath(particles, names->front()), ParseNumber(iteration));
     }
     return absl::OkStatus();
   }
@@ -211,7 +218,9 @@ class Hdf5Survey {
   // or a range of each array for each step.
   absl::Status TakeVtk() {
     std::vector<Hdf5Column> columns = {{"Points", "VTKHDF/Points"}};
-    for (const std::string& name : file_.Members("VTKHDF/PointData")) {
+    const auto arrays = file_.Members("VTKHDF/PointData");
+    if (!arrays.ok()) return arrays.status();
+    for (const std::string& name : *arrays) {
       columns.push_back({name, Concat("VTKHDF/PointData/", name)});
     }
     const auto steps = file_.Attribute("VTKHDF/Steps", "NSteps");
@@ -319,7 +328,9 @@ class Hdf5Survey {
       if (std::ranges::count(queue[k], '/') > kMostLevels) continue;
       if (!queue[k].empty() && file_.Describe(queue[k])) found.push_back(queue[k]);
       if (found.size() == kMaxListed) return Concat(absl::StrJoin(found, ", "), ", ...");
-      for (const std::string& name : file_.Members(queue[k])) {
+      const auto names = file_.Members(queue[k]);
+      if (!names.ok()) continue;
+      for (const std::string& name : *names) {
         queue.push_back(JoinPath(queue[k], name));
       }
     }
@@ -369,7 +380,10 @@ class Hdf5Reader final : public FrameReader {
                                        std::vector<StoredArray>& arrays) const {
     std::vector<Candidate> candidates;
     for (const Hdf5Column& column : frame.columns) AddDataset(column, candidates);
-    if (frame.columns.empty()) AddGroup(frame.group, "", candidates);
+    if (frame.columns.empty()) {
+      absl::Status status = AddGroup(frame.group, "", candidates);
+      if (!status.ok()) return status;
+    }
     std::vector<StoredArray> all;
     for (const Candidate& candidate : candidates) {
       all.push_back({.name = candidate.column.name, .components = candidate.array.components});
@@ -411,9 +425,11 @@ class Hdf5Reader final : public FrameReader {
 
   // Adds the datasets of `group` and of the groups in it to `candidates`. The name of openPMD's
   // dataset position/x becomes position:x.
-  void AddGroup(const std::string& group, const std::string& prefix,
-                std::vector<Candidate>& candidates) const {
-    for (const std::string& name : file_->Members(group)) {
+  absl::Status AddGroup(const std::string& group, const std::string& prefix,
+                        std::vector<Candidate>& candidates) const {
+    const auto names = file_->Members(group);
+    if (!names.ok()) return names.status();
+    for (const std::string& name : *names) {
       const std::string path = JoinPath(group, name);
       if (name == "positionOffset") continue;
       const std::size_t before = candidates.size();
@@ -430,9 +446,11 @@ class Hdf5Reader final : public FrameReader {
         AddOffset(group, name, constant);
         candidates.push_back(std::move(constant));
       } else if (prefix.empty() && file_->IsGroup(path)) {
-        AddGroup(path, Concat(name, ":"), candidates);
+        absl::Status status = AddGroup(path, Concat(name, ":"), candidates);
+        if (!status.ok()) return status;
       }
     }
+    return absl::OkStatus();
   }
 
   // In openPMD a position is the sum of position and positionOffset, each in a unit that the file

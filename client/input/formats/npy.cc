@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "client/input/base/little_endian.h"
 #include "client/input/base/number_text.h"
 #include "client/input/base/text.h"
 
@@ -211,15 +212,12 @@ absl::Status ReadNpyHeaderText(ByteSource& source, const std::string& name,
   if (!std::string_view(bytes.data(), 8).starts_with("\x93NUMPY")) {
     return DamagedNpy(name, "is no NPY array");
   }
-  // The length has two bytes in version 1 and four in later versions, little-endian.
+  // The length has two bytes in version 1 and four in later versions.
   const std::size_t length_bytes = bytes[6] == 1 ? 2 : 4;
   if (absl::Status status = ReadNpyBytes(source, length_bytes, name, bytes); !status.ok()) {
     return status;
   }
-  std::size_t length = 0;
-  for (std::size_t k = length_bytes; k-- > 0;) {
-    length = (length << 8) | static_cast<unsigned char>(bytes[k]);
-  }
+  const std::uint64_t length = LittleEndian({bytes.data(), length_bytes}, 0, length_bytes);
   if (length > kMaxHeaderBytes) return DamagedNpy(name, "the NPY header is over 64 KiB");
   return ReadNpyBytes(source, length, name, bytes);
 }

@@ -292,7 +292,9 @@ absl::StatusOr<std::unique_ptr<FrameReader>> OpenVtk(const std::string& path,
                                       "truncated or damaged"));
   }
   const bool legacy = head->starts_with("# vtk DataFile");
-  const bool unstructured = Contains(*head, "UnstructuredGrid");
+  // Arrays may have any name, so only the type in <VTKFile ...> decides.
+  const std::string_view element = head->substr(std::min(head->find("<VTKFile"), head->size()));
+  const bool unstructured = Contains(element.substr(0, element.find('>')), "UnstructuredGrid");
   return std::make_unique<VtkReader>(path, legacy, unstructured, request);
 }
 

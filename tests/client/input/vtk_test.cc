@@ -52,6 +52,13 @@ TEST(Vtk, PointsAreSelectedByTheirArrays) {
                 {"--columns", "VTK"});
 }
 
+TEST(Vtk, AnArrayMayHaveTheNameOfAnotherKindOfFile) {
+  const support::TemporaryFolder directory;
+  const RecordedFrame frame = ReadOne(directory.Write(
+      "a.vtp", Vtp("2", "1 2 0 3 4 0", Array("UnstructuredGrid", "Int32", "1", "1 2"))));
+  EXPECT_THAT(frame.positions, ElementsAre(1, 2, 3, 4));
+}
+
 TEST(Vtk, AFileWithoutPointsIsAFrameWithoutParticles) {
   const support::TemporaryFolder directory;
   const std::string path = directory.Write("a.vtp", Vtp("0", ""));
