@@ -47,42 +47,43 @@ inline std::uint64_t TableHash(std::uint64_t key, std::uint64_t more = 0) {
   const Product product =
       Product{(key * 0x9e3779b97f4a7c15u) ^ seed} * Product{(more * 0xbf58476d1ce4e5b9u) ^ seed};
   return static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64);
+}
 
-  /// 2^exponent. Requires: a normal double, from 2^-1022 to 2^1023.
-  constexpr double PowerOfTwo(int exponent) {
-    return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + exponent) << 52);
-  }
+/// 2^exponent. Requires: a normal double, from 2^-1022 to 2^1023.
+constexpr double PowerOfTwo(int exponent) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + exponent) << 52);
+}
 
-  /// The cube root. Its bits are the same on every machine, while std::cbrt differs between
-  /// versions of libm. Correctly rounded, except if the exact root is within 2^-100 of its size
-  /// from the middle between two doubles. Cubes have exact roots.
-  inline double CubeRoot(double value) {
-    if (value == 0 || !std::isfinite(value)) return value;
-    // |value| = scaled * 8^third with `scaled` in [1/8, 1). Products with powers of two are exact.
-    int exponent = 0;
-    const double fraction = std::frexp(std::abs(value), &exponent);
-    const int third = exponent > 0 ? (exponent + 2) / 3 : exponent / 3;
-    const double scaled = fraction * PowerOfTwo(exponent - 3 * third);
-    // A parabola with a relative error of 2 %, and two steps of Halley's method.
-    double root = .3916 + scaled * (.9964 - .3771 * scaled);
-    for (int step = 0; step < 2; ++step) {
-      const double cube = root * root * root;
-      root *= (cube + 2 * scaled) / (2 * cube + scaled);
-    }
-    // A step of Newton's method, with the residual in twice the precision.
-    const Rounded square = TwoProduct(root, root);
-    const Rounded cube = TwoProduct(square.value, root);
-    const double rest = ((scaled - cube.value) - cube.error) - square.error * root;
-    root += rest / (3 * square.value);
-    return std::copysign(root * PowerOfTwo(third), value);
+/// The cube root. Its bits are the same on every machine, while std::cbrt differs between
+/// versions of libm. Correctly rounded, except if the exact root is within 2^-100 of its size
+/// from the middle between two doubles. Cubes have exact roots.
+inline double CubeRoot(double value) {
+  if (value == 0 || !std::isfinite(value)) return value;
+  // |value| = scaled * 8^third with `scaled` in [1/8, 1). Products with powers of two are exact.
+  int exponent = 0;
+  const double fraction = std::frexp(std::abs(value), &exponent);
+  const int third = exponent > 0 ? (exponent + 2) / 3 : exponent / 3;
+  const double scaled = fraction * PowerOfTwo(exponent - 3 * third);
+  // A parabola with a relative error of 2 %, and two steps of Halley's method.
+  double root = .3916 + scaled * (.9964 - .3771 * scaled);
+  for (int step = 0; step < 2; ++step) {
+    const double cube = root * root * root;
+    root *= (cube + 2 * scaled) / (2 * cube + scaled);
   }
+  // A step of Newton's method, with the residual in twice the precision.
+  const Rounded square = TwoProduct(root, root);
+  const Rounded cube = TwoProduct(square.value, root);
+  const double rest = ((scaled - cube.value) - cube.error) - square.error * root;
+  root += rest / (3 * square.value);
+  return std::copysign(root * PowerOfTwo(third), value);
+}
 
-  /// The number of the set of an element in a union-find structure: the element that is its own
-  /// parent. `parent(element)` is a reference to the parent of an element. Halves the path.
-  template <typename Parent>
-  std::uint32_t RootOf(std::uint32_t element, const Parent& parent) {
-    while (parent(element) != element) element = parent(element) = parent(parent(element));
-    return element;
-  }
+/// The number of the set of an element in a union-find structure: the element that is its own
+/// parent. `parent(element)` is a reference to the parent of an element. Halves the path.
+template <typename Parent>
+std::uint32_t RootOf(std::uint32_t element, const Parent& parent) {
+  while (parent(element) != element) element = parent(element) = parent(parent(element));
+  return element;
+}
 
 }  // namespace partiemc
