@@ -191,10 +191,10 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b) {
 
 // The certificate and the cuts of the quads change the volumes of small bodies. So the volumes of
 // bodies with a larger relative error than kVolumeTolerance are corrected again afterwards, at most
-// kVolumeRounds times. kVolumeLimit: longest offset in spacings.
+// kVolumeRounds times.
 constexpr int kVolumeRounds = 4;
 constexpr double kVolumeTolerance = .001;
-constexpr double kVolumeLimit = .4;
+constexpr space::VirtualPlaneConstants kConstants;
 
 void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
   for (std::size_t v = 0; v < b.positions.size(); ++v) {
@@ -229,7 +229,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
     space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);
     b.virtual_plane.volumes.sizes.clear();
   } else {
-    space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, {}, b.anchors,
+    space::PlaceOnPlanes({b.bins, b.field, b.crossings, b.bodies, scale}, kConstants, b.anchors,
                          b.virtual_plane, b.positions, b.normals);
   }
   KeepFixedVertices(b);
@@ -251,7 +251,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
     if (round == 0) {
       space::FindBodyOfNodes(bricks, b.crossings, b.virtual_plane.volumes.body_of, b.certificate);
     }
-    if (!CorrectVolumes(scale, round < kVolumeRounds ? kVolumeLimit : 0, b)) break;
+    if (!CorrectVolumes(scale, round < kVolumeRounds ? kConstants.volume_limit : 0, b)) break;
   }
   return absl::OkStatus();
 }
@@ -468,7 +468,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       if (!lightest.ok()) return lightest.status();
     }
     scale = MakeScale(in_space_, h, cell_size, *lightest, sizes);
-    checked = space::FindBricks(frame, scale, limits_, b.bins);
+    const std::span<const std::uint32_t> originals(b.images.originals);
+    checked = space::FindBricks(frame, scale, limits_, b.bins,
+                                parameters_.wall_planes.empty() ? originals.first(0) : originals);
     size.bricks = bricks.size();
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);

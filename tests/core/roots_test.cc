@@ -64,8 +64,6 @@ Point Clamped(const Stages& stages, std::uint32_t segment, Point point, Clamping
 Point BareCrossing(const Stages& stages, const Segment& segment) {
   const ActiveCell& cell = stages.crossings.cells[segment.cell];
   const std::array<double, 4> f = stages.CornerValues(cell);
-  constexpr int kCornerX[4] = {0, 1, 1, 0};
-  constexpr int kCornerY[4] = {0, 0, 1, 1};
   const int a = segment.entry, b = (segment.entry + 1) % 4;
   const double t = f[a] / (f[a] - f[b]);
   const Point origin = CellOrigin(stages.bins.tiles, cell);

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 
 #include "base/expansion.h"
 
@@ -20,6 +21,9 @@ constexpr int CountBits(std::uint32_t bits) {
   bits = (bits + (bits >> 4)) & 0x0f0f0f0fu;
   return static_cast<int>(bits * 0x01010101u >> 24);
 }
+
+/// Whether more than one bit is set.
+constexpr bool HasSeveral(std::uint32_t bits) { return (bits & (bits - 1)) != 0; }
 
 /// Equals std::floor, but -0 becomes 0. Without a processor instruction for it, std::floor is a
 /// library call, while this function is inlined.
@@ -78,11 +82,16 @@ inline double CubeRoot(double value) {
   return std::copysign(root * PowerOfTwo(third), value);
 }
 
-/// The number of the set of an element in a union-find structure: the element that is its own
-/// parent. `parent(element)` is a reference to the parent of an element. Halves the path.
-template <typename Parent>
-std::uint32_t RootOf(std::uint32_t element, const Parent& parent) {
-  while (parent(element) != element) element = parent(element) = parent(parent(element));
+/// The root of the set of an element in a union-find structure: the element that is its own parent.
+/// `parent`: projection of an entry to the parent. Halves the path.
+template <typename Entries, typename Parent = std::identity>
+std::uint32_t RootOf(Entries& entries, std::uint32_t element, Parent parent = {}) {
+  const auto parent_of = [&](std::uint32_t of) -> std::uint32_t& {
+    return std::invoke(parent, entries[of]);
+  };
+  while (parent_of(element) != element) {
+    element = parent_of(element) = parent_of(parent_of(element));
+  }
   return element;
 }
 

@@ -20,6 +20,9 @@
 
 namespace partiemc {
 
+/// The corners of a cell, relative to its first one.
+inline constexpr int kCornerX[4] = {0, 1, 1, 0}, kCornerY[4] = {0, 0, 1, 1};
+
 struct ActiveCell {
   std::uint32_t tile = 0;
   std::uint8_t i = 0, j = 0;

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <optional>
 
+#include "base/bits.h"
+
 namespace partiemc {
 namespace {
 
@@ -73,10 +75,7 @@ void SetWanted(Areas& a) {
   std::vector<std::uint32_t>& body = a.s.body;
   body.resize(count);
   std::iota(body.begin(), body.end(), 0u);
-  const auto root = [&](std::uint32_t region) {
-    while (body[region] != region) region = body[region] = body[body[region]];
-    return region;
-  };
+  const auto root = [&](std::uint32_t region) { return RootOf(body, region); };
   for (const PhaseArc& arc : a.interfaces.arcs) {
     const std::uint32_t x = root(a.LeftOf(arc)), y = root(a.RightOf(arc));
     body[std::max(x, y)] = std::min(x, y);

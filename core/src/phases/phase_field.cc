@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bits.h"
 #include "base/parallel.h"
 
 namespace partiemc {
@@ -14,8 +15,6 @@ constexpr double kDensitySlope = 4.66, kDistanceSlope = 2.8;
 
 // g of a phase without particles.
 constexpr double kAbsent = -1e30;
-
-bool HasSeveral(std::uint32_t bits) { return (bits & (bits - 1)) != 0; }
 
 }  // namespace
 

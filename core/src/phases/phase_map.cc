@@ -9,8 +9,6 @@
 namespace partiemc {
 namespace {
 
-bool HasSeveral(std::uint32_t bits) { return (bits & (bits - 1)) != 0; }
-
 template <typename Items>
 std::uint32_t IndexOf(const Items& items, std::uint64_t key) {
   const auto at =

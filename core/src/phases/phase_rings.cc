@@ -6,8 +6,6 @@
 namespace partiemc {
 namespace {
 
-constexpr int kCornerX[4] = {0, 1, 1, 0}, kCornerY[4] = {0, 0, 1, 1};
-
 // Traces one phase.
 struct Tracing {
   const TileDirectory& directory;

@@ -5,13 +5,10 @@
 #include <numeric>
 #include <utility>
 
+#include "base/bits.h"
+
 namespace partiemc {
 namespace {
-
-std::uint32_t RootOf(std::uint32_t component, std::vector<std::uint32_t>& set) {
-  while (set[component] != component) component = set[component] = set[set[component]];
-  return component;
-}
 
 // Joins the components that share a particle.
 void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
@@ -42,11 +39,11 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
       of_given = of_copy;  // Further copies join this component.
       ++c.total[of_copy];
     }
-    const std::uint32_t a = RootOf(of_copy, c.set), b = RootOf(of_given, c.set);
+    const std::uint32_t a = RootOf(c.set, of_copy), b = RootOf(c.set, of_given);
     c.set[std::max(a, b)] = std::min(a, b);
   }
   for (std::uint32_t component = 0; component < components; ++component) {
-    c.has_copies[RootOf(component, c.set)] |= c.has_copies[component];
+    c.has_copies[RootOf(c.set, component)] |= c.has_copies[component];
   }
 }
 
@@ -70,7 +67,7 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.largest.assign(components, 0);
   for (std::uint32_t component = 0; component < components; ++component) {
-    const std::uint32_t root = RootOf(component, c.set);
+    const std::uint32_t root = RootOf(c.set, component);
     const std::uint32_t outer = topology.outer_ring[component];
     // Particles that have a component only by their copies are in `total` already.
     c.total[root] += std::exchange(c.total[component], 0) + c.given_count[component];
@@ -86,7 +83,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   c.best.assign(components, kNoComponent);
   for (std::uint32_t component = 0; component < components; ++component) {
     const std::uint32_t outer = topology.outer_ring[component];
-    const std::uint32_t root = RootOf(component, c.set);
+    const std::uint32_t root = RootOf(c.set, component);
     if (outer == kNoRing || !c.has_copies[root] || !IsWhole(input, topology, outer)) continue;
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent || c.given_count[component] > c.given_count[best]) best = component;
@@ -124,7 +121,7 @@ void DecideFates(const BodyChoiceInput& input, RingTopology& topology, BodyChoic
   c.fates.resize(components);
   c.bodies.resize(components);
   for (std::uint32_t component = 0; component < components; ++component) {
-    const std::uint32_t root = RootOf(component, c.set);
+    const std::uint32_t root = RootOf(c.set, component);
     c.fates[component] = FateOf(input, c, component, root);
     c.bodies[component] = c.fates[component] == Fate::kCut ? root : component;
     if (root == component && IsSpray(input, c, root)) ++topology.dropped_spray;

@@ -60,8 +60,6 @@ struct EdgeNodes {
 
 EdgeNodes EntryNodes(const TileDirectory& directory, const Crossings& crossings,
                      std::uint32_t segment) {
-  constexpr int kCornerX[4] = {0, 1, 1, 0};
-  constexpr int kCornerY[4] = {0, 0, 1, 1};
   const Segment& here = crossings.segments[segment];
   const ActiveCell& cell = crossings.cells[here.cell];
   const auto node = [&](int corner) {

@@ -81,9 +81,10 @@ struct SpaceBins {
 /// Finds the bricks and the size classes of a frame. A brick exists if one of its nodes may be
 /// within the kernel radius plus one cell of a particle. Requires: CheckFrame has passed the frame
 /// as for a slice, with three components. Errors with a Violation: INVALID_ARGUMENT for coordinates
-/// beyond 2^30 cells; RESOURCE_EXHAUSTED for more than `max_tiles` bricks.
+/// beyond 2^30 cells; RESOURCE_EXHAUSTED for more than `max_tiles` bricks. `originals`: if the
+/// frame was derived from the caller's frame, the caller's number of each particle, for errors.
 absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                        SpaceBins& bins);
+                        SpaceBins& bins, std::span<const std::uint32_t> originals = {});
 
 /// Sorts the particles into cells. Requires: FindBricks for the same frame.
 void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);

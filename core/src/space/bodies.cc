@@ -5,6 +5,8 @@
 #include <bit>
 #include <limits>
 
+#include "base/bits.h"
+
 namespace partiemc::space {
 namespace {
 
@@ -58,10 +60,7 @@ bool AreJoined(const BrickBits& low, const BrickBits& high, int axis) {
 }
 
 std::uint32_t RootOf(std::vector<Bodies::Part>& parts, std::uint32_t part) {
-  while (parts[part].body != part) {
-    part = parts[part].body = parts[parts[part].body].body;
-  }
-  return part;
+  return partiemc::RootOf(parts, part, &Bodies::Part::body);
 }
 
 void JoinParts(const BrickDirectory& bricks, Bodies& bodies) {

@@ -14,7 +14,6 @@ constexpr CellLoops Trace(unsigned corners) {
   for (int face = 0; face < 6; ++face) {
     const std::array<int, 4> at = CornersOfFace(face);
     const auto is_inside = [&](int k) { return (corners >> at[k & 3] & 1) != 0; };
-    int curves = 0;
     for (int first = 0; first < 4; ++first) {
       if (!is_inside(first) || is_inside(first + 3)) continue;
       int last = first;
@@ -22,9 +21,7 @@ constexpr CellLoops Trace(unsigned corners) {
       const int start = EdgeBetween(at[first], at[(first + 3) & 3]);
       next[start] = EdgeBetween(at[last & 3], at[(last + 1) & 3]);
       face_of[start] = face;
-      ++curves;
     }
-    if (curves == 2) loops.ambiguous_faces |= static_cast<std::uint8_t>(1 << face);
   }
   int step = 0;
   for (int start = 0; start < kMostCrossings; ++start) {

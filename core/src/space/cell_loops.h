@@ -25,8 +25,6 @@ struct CellLoops {
   std::array<std::uint8_t, kMostCrossings> edge{}, face{};
   std::array<std::uint8_t, kMostCrossings> loop_of{};       ///< By step.
   std::array<std::uint8_t, kMostCrossings> loop_of_edge{};  ///< By edge, if it is crossed.
-  /// One bit for each face: whether all four edges of the face are crossed.
-  std::uint8_t ambiguous_faces = 0;
 
   int Steps() const { return first[loops]; }
   /// The step after `step` in its loop.

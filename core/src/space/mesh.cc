@@ -2,17 +2,14 @@
 
 #include <algorithm>
 
+#include "base/bits.h"
+
 namespace partiemc::space {
 namespace {
 
 // Triangles between the crossings of a longer loop could intersect, so marching cubes uses the
 // vertex in its middle.
 constexpr int kLongestFlatLoop = 6;
-
-std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t vertex) {
-  while (parent[vertex] != vertex) vertex = parent[vertex] = parent[parent[vertex]];
-  return vertex;
-}
 
 /// Sets shell_of for the vertices of triangles, kNoIndex for others. Returns the number of shells.
 std::uint32_t FindShells(std::uint32_t vertices, MeshScratch& scratch) {

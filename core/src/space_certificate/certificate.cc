@@ -218,7 +218,6 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   });
     });
     if (!is_refused) break;
-    ++certificate.rounds;
     FindMovedBricks(certificate);
     if (!MoveBack(bricks, crossings, anchors, positions, certificate)) return false;
   }
@@ -254,7 +253,7 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
   MovedNodes& nodes = certificate.nodes;
   FindMovedNodes(bricks, crossings, nodes);
   certificate.modes.assign(crossings.cells.size(), {});
-  certificate.rounds = certificate.returned = 0;
+  certificate.returned = 0;
   certificate.setbacks.assign(positions.size(), 0);
   certificate.is_bad.assign(positions.size() + nodes.count, 0);
   ClearMarks(count, certificate);

@@ -33,7 +33,6 @@ enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 struct Certificate {
   /// By active cell: the mode of the quad on its upper face along each axis.
   std::vector<std::array<QuadMode, 3>> modes;
-  std::uint32_t rounds = 0;    ///< Rounds with refused faces since Certify.
   std::uint32_t returned = 0;  ///< First setbacks of vertices since Certify.
 
   MovedNodes nodes;

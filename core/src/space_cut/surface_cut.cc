@@ -112,11 +112,6 @@ void ReturnToPlanes(const SurfaceCutInput& input, CutMesh& mesh) {
   }
 }
 
-std::uint32_t RootOf(std::vector<std::uint32_t>& parent, std::uint32_t point) {
-  while (parent[point] != point) point = parent[point] = parent[parent[point]];
-  return point;
-}
-
 /// Writes the new surface: the shells that are not cut, and the connected parts of the mesh.
 class Assembly {
  public:

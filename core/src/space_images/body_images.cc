@@ -6,6 +6,7 @@
 #include <limits>
 #include <variant>
 
+#include "base/bits.h"
 #include "space/crossings.h"
 
 namespace partiemc::space {
@@ -14,10 +15,7 @@ namespace {
 using Image = BodyImageScratch::Image;
 
 std::uint32_t RootOf(std::vector<Image>& images, std::uint32_t body) {
-  while (images[body].set != body) {
-    body = images[body].set = images[images[body].set].set;
-  }
-  return body;
+  return partiemc::RootOf(images, body, &Image::set);
 }
 
 /// Extends the box of an image by its nodes in one brick. `origin`: the brick's lowest node.

@@ -150,11 +150,10 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
   ShareMeasures(bodies, volumes);
 }
 
-bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+void MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions) {
   const double per_unit = 1 / (step.unit * step.unit * step.unit);
   volumes.offsets.assign(bodies.bodies.size(), 0);
-  bool has_moved = false;
   for (std::size_t body = 0; body < bodies.bodies.size(); ++body) {
     const BodyMeasure& measure = volumes.measures[body];
     const double wanted = bodies.bodies[body].volume * per_unit;
@@ -163,13 +162,11 @@ bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
     const double missing = wanted - measure.volume;
     if (std::abs(missing) <= step.tolerance * wanted) continue;
     volumes.offsets[body] = std::clamp(missing / measure.area, -step.limit, step.limit);
-    has_moved = true;
   }
   ParallelFor(static_cast<std::uint32_t>(positions.size()), [&](std::uint32_t v) {
     const double offset = volumes.offsets[volumes.body_of[v]] * volumes.SizeOf(v);
     positions[v] = positions[v] + offset * normals[v];
   });
-  return has_moved;
 }
 
 void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {

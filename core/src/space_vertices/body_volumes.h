@@ -79,9 +79,8 @@ struct VolumeStep {
 
 /// Moves the vertices of each body along their normals by one offset, times their local sizes. The
 /// offset is (volume of its particles - its volume) / area, at most `limit`. Bodies without
-/// particles stay. Returns whether a body has moved. Requires: MeasureBodies of `positions`, or
-/// MeasureTriangles for `unit` 1.
-bool MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
+/// particles stay. Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
+void MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);
 
 /// Starts a search: clears `best`.

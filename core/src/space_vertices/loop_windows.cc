@@ -243,7 +243,6 @@ class ChunkSearch {
 void FindWindows(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                  std::span<const Vec3> centres, double reach, LoopWindows& windows,
                  std::span<const float> sizes) {
-  windows.loop_count = crossings.loop_count;
   LinkLoops(bricks, crossings, windows);
   SplitLoops(crossings, windows);
   ParallelFor(windows.chunk_count, [&](std::size_t index) {

@@ -37,7 +37,6 @@ struct LoopWindows {
   };
   std::vector<Chunk> chunks;  ///< The first `chunk_count` are in use; others keep their memory.
   std::size_t chunk_count = 0;
-  std::size_t loop_count = 0;
 
   std::vector<std::uint32_t> links;  ///< By step of SpaceCrossings: the loop across its face.
 };

@@ -63,10 +63,6 @@ class WallLines {
   std::span<const WallEdge> EdgesOfLoop(std::size_t loop) const {
     return std::span(edges_).subspan(loops_[loop].first, loops_[loop].last - loops_[loop].first);
   }
-  std::span<const WallEdge> EdgesOfSolid(std::size_t solid) const {
-    return std::span(edges_).subspan(solids_[solid].first,
-                                     solids_[solid].last - solids_[solid].first);
-  }
   /// Whether the solid is bounded by one endless line.
   bool IsEndless(std::size_t solid) const { return edges_[solids_[solid].first].is_endless; }
   /// If true, the points inside of an odd number of its closed loops are solid, else all others.

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -357,6 +358,20 @@ TEST(SurfaceWalls, DropsAndBodiesKeepTheirIdentities) {
     EXPECT_NE(identities[1], 0u);
     for (std::size_t k = 0; k < particles.xyz.size(); k += 3) particles.xyz[k] += .2;
   }
+}
+
+TEST(SurfaceWalls, FarParticleIsNamedByItsOwnNumber) {
+  const auto reconstructor = Reconstructor::Create(
+      {.output = Output::kSurface, .spacing = 1.0, .wall_planes = {{0, 0, true}}});
+  ASSERT_TRUE(reconstructor.ok());
+  const std::vector<double> xyz = {-9, 0, 0, 1, 0, 0, 1, 1e12, 0};  // The first one is dropped.
+  State state;
+  Workspace workspace;
+  Result result;
+  const absl::Status status = reconstructor->Reconstruct(
+      {.positions = std::span<const double>(xyz), .components = 3}, state, workspace, result);
+  ASSERT_TRUE(FindViolation(status).has_value()) << status;
+  EXPECT_EQ(FindViolation(status)->field, "positions[2].y");
 }
 
 TEST(SurfaceWalls, WrongWallsAreRefused) {
