@@ -50,6 +50,12 @@ std::string Reason(const grpc::Status& status) {
   return text.empty() ? "no answer" : text;
 }
 
+std::string ReasonOf(const grpc::ClientContext& context) {
+  const auto& metadata = context.GetServerTrailingMetadata();
+  const auto found = metadata.find("partiemc-reason");
+  return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
+}
+
 absl::Status CheckAddress(const std::string& address, const Credentials& credentials) {
   const auto parsed = ParseTarget(address);
   if (!parsed.ok()) return parsed.status();

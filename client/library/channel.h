@@ -46,6 +46,10 @@ absl::Status NotAccepted(const std::string& address, const char* call,
 /// remote host: Connection refused". "no answer" for an empty message.
 std::string Reason(const grpc::Status& status);
 
+/// The reason of the server in the trailing metadata of a call that has ended (proto/PROTOCOL.md);
+/// empty if there is none.
+std::string ReasonOf(const grpc::ClientContext& context);
+
 /// Converts the status of a call to one line that names the server. OK stays OK.
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address);
 

@@ -18,18 +18,12 @@ namespace experimental = grpc::experimental;
 
 constexpr std::size_t kMaxTokenBytes = 512;  // The server's limit.
 
-absl::Status Wrong(std::string field, std::string value, std::string rule) {
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
-}
-
 absl::StatusOr<std::string> ReadPem(const std::string& field, const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   std::string pem = std::move(text).str();
   if (pem.find("-----BEGIN ") == std::string::npos) {
-    return Wrong(field, path, "must be a PEM file that can be read");
+    return InvalidOption(field, path, "must be a PEM file that can be read");
   }
   return pem;
 }
@@ -43,7 +37,7 @@ bool IsToken(const std::string& text) {
 absl::StatusOr<std::string> TokenOf(const Credentials& credentials) {
   if (!credentials.token.empty()) {
     if (IsToken(credentials.token)) return credentials.token;
-    return Wrong("token", "(not shown)", "must be at most 512 visible ASCII characters");
+    return InvalidOption("token", "(not shown)", "must be at most 512 visible ASCII characters");
   }
   std::ifstream file(credentials.token_file);
   for (std::string line; std::getline(file, line);) {
@@ -51,8 +45,8 @@ absl::StatusOr<std::string> TokenOf(const Credentials& credentials) {
     std::string word;
     if (words >> word && word.front() != '#' && IsToken(word)) return word;
   }
-  return Wrong("token_file", credentials.token_file,
-               "must be a file that can be read and holds a token");
+  return InvalidOption("token_file", credentials.token_file,
+                       "must be a file that can be read and holds a token");
 }
 
 class TokenSender final : public experimental::Interceptor {
@@ -93,20 +87,26 @@ std::string Variable(const char* name) {
 
 }  // namespace
 
+absl::Status InvalidOption(std::string field, std::string value, std::string rule) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
+}
+
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeChannelCredentials(
     const Credentials& credentials) {
   if (!credentials.tls) {
     for (const auto& [field, path] : {std::pair("ca_file", &credentials.ca_file),
                                       std::pair("cert_file", &credentials.cert_file),
                                       std::pair("key_file", &credentials.key_file)}) {
-      if (!path->empty()) return Wrong(field, *path, "goes with `tls`");
+      if (!path->empty()) return InvalidOption(field, *path, "goes with `tls`");
     }
     return grpc::InsecureChannelCredentials();
   }
   if (credentials.cert_file.empty() != credentials.key_file.empty()) {
     return credentials.cert_file.empty()
-               ? Wrong("key_file", credentials.key_file, "goes with cert_file")
-               : Wrong("cert_file", credentials.cert_file, "goes with key_file");
+               ? InvalidOption("key_file", credentials.key_file, "goes with cert_file")
+               : InvalidOption("cert_file", credentials.cert_file, "goes with key_file");
   }
   grpc::SslCredentialsOptions options;
   for (const auto& [field, path, pem] :
@@ -127,9 +127,9 @@ absl::StatusOr<std::unique_ptr<experimental::ClientInterceptorFactoryInterface>>
   if (credentials.token.empty() && credentials.token_file.empty()) return sender;
   if (const auto token = TokenOf(credentials); !token.ok()) return token.status();
   if (!credentials.tls && !address.IsLocal()) {
-    return Wrong(credentials.token.empty() ? "token_file" : "token", "(not shown)",
-                 absl::StrCat("would travel to ", address.ToString(),
-                              " in the clear; must go over TLS, or within this machine"));
+    return InvalidOption(credentials.token.empty() ? "token_file" : "token", "(not shown)",
+                         absl::StrCat("would travel to ", address.ToString(),
+                                      " in the clear; must go over TLS, or within this machine"));
   }
   sender = std::make_unique<TokenSenderFactory>(credentials);
   return sender;

@@ -14,6 +14,9 @@
 
 namespace partiemc::client {
 
+/// INVALID_ARGUMENT with a Violation (OUT_OF_RANGE) for an option of a stream or watch.
+absl::Status InvalidOption(std::string field, std::string value, std::string rule);
+
 /// Returns gRPC's credentials for the connection; without `tls` the connection is not encrypted.
 /// Errors: INVALID_ARGUMENT, which names the field of Credentials, for a file that cannot be read
 /// or is not PEM, for a file without `tls`, and for a certificate without a key or the reverse.

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/library/answer.h"
 #include "client/library/channel.h"
+#include "client/library/credentials.h"
 #include "client/library/frame_request.h"
 #include "client/library/gather.h"
 #include "partiemc/status.h"
@@ -76,26 +77,20 @@ CallPurpose LossPurpose(const StreamOptions& options) {
   return options.parts.part > 0 ? CallPurpose::kJoin : CallPurpose::kOpen;
 }
 
-absl::Status InvalidParts(std::string field, std::string value, std::string rule) {
-  return ViolationError(
-      absl::StatusCode::kInvalidArgument,
-      {std::string(kReasonOutOfRange), std::move(field), std::move(value), std::move(rule)});
-}
-
 absl::Status CheckParts(const StreamOptions& options) {
   const FrameParts& parts = options.parts;
   if (parts.part >= std::max(parts.parts, 1u)) {
-    return InvalidParts("part", absl::StrCat(parts.part), "must be below parts");
+    return InvalidOption("part", absl::StrCat(parts.part), "must be below parts");
   }
   if (parts.parts == 0) return absl::OkStatus();
   if (options.name.empty()) {
-    return InvalidParts("name", "\"\"", "must be given if frames come in parts");
+    return InvalidOption("name", "\"\"", "must be given if frames come in parts");
   }
   const std::chrono::milliseconds most =
       std::min<std::chrono::milliseconds>(options.deadline, std::chrono::minutes(10));
   if (parts.timeout < std::chrono::milliseconds(1) || parts.timeout > most) {
-    return InvalidParts("timeout", absl::StrCat(parts.timeout.count(), " ms"),
-                        absl::StrCat("must be 1 ms to ", most.count(), " ms"));
+    return InvalidOption("timeout", absl::StrCat(parts.timeout.count(), " ms"),
+                         absl::StrCat("must be 1 ms to ", most.count(), " ms"));
   }
   return absl::OkStatus();
 }

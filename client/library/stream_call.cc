@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/library/answer.h"
+#include "client/library/channel.h"
 #include "wire/message_bytes.h"
 
 namespace partiemc::client {
@@ -92,11 +93,7 @@ void StreamCall::Recycle(Response response) {
   ReadNext();
 }
 
-std::string StreamCall::reason() const {
-  const auto& metadata = context_.GetServerTrailingMetadata();
-  const auto found = metadata.find("partiemc-reason");
-  return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
-}
+std::string StreamCall::reason() const { return ReasonOf(context_); }
 
 void StreamCall::WriteNext() {
   if (writing_ || reads_over_ || half_closed_) return;

@@ -121,9 +121,7 @@ void WatchCall::Run(v1::WatchStreamRequest open) {
   const grpc::Status status = rpc_->Finish();
   const MutexLock lock(mutex_);
   status_ = status;
-  const auto& metadata = context_.GetServerTrailingMetadata();
-  const auto reason = metadata.find("partiemc-reason");
-  if (reason != metadata.end()) reason_.assign(reason->second.data(), reason->second.size());
+  reason_ = ReasonOf(context_);
   changed_.NotifyAll();
 }
 
