@@ -35,7 +35,7 @@ struct CopiedBox {
   /// Planes beyond the faces, kCopyEnd kernel radii before the end of the copies. A body within
   /// them is as if the copies had no end.
   space::ClipBox complete;
-  bool any = false;         ///< Any axis has copies.
+  bool any = false;  ///< Any axis has copies.
   std::array<bool, 3> has_copies{};
 };
 

@@ -14,8 +14,8 @@ using Violations = std::vector<std::string>;
 /// The core uses no gRPC, Protobuf, logging, file, stream, clock or environment, and no other room.
 Violations CoreIsPlain(const SourceTree& tree);
 
-/// The core calls only those functions of libm whose results are exact or correctly rounded, such as
-/// sqrt and floor: others differ between versions of libm. fma is forbidden, because it is slow
+/// The core calls only those functions of libm whose results are exact or correctly rounded, such
+/// as sqrt and floor: others differ between versions of libm. fma is forbidden, because it is slow
 /// without an instruction. Exempt: angles and arcs of gauges, which no outline depends on.
 Violations CoreMathIsExact(const SourceTree& tree);
 
