@@ -55,6 +55,16 @@ std::string TextOf(const SlicePlane& slice) {
   return Concat(NumberList(slice.origin), ",", NumberList(slice.normal));
 }
 
+// The recording holds the box of each frame, so its axes suffice.
+std::string PeriodicFlagsOf(const PeriodicBox& box) {
+  std::string flags;
+  for (std::size_t k = 0; k < box.axes.size(); ++k) {
+    if (box.axes[k])
+      AppendAll(flags, flags.empty() ? " --periodic " : ",", std::string(1, "xyz"[k]));
+  }
+  return box.wraps ? flags + " --wrap" : flags;
+}
+
 std::optional<RecordedBox> RecordedBoxOf(const std::optional<PeriodicBox>& box) {
   if (!box) return std::nullopt;
   RecordedBox recorded;
@@ -107,15 +117,6 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   AddFlag(flags, "--min-area", parameters.min_component_area, defaults.min_component_area);
   AddFlag(flags, "--min-particles", parameters.min_component_particles,
           defaults.min_component_particles);
-  if (parameters.box) {
-    // The recording holds the box of each frame.
-    std::string axes;
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (parameters.box->axes[k])
-        AppendAll(axes, axes.empty() ? "" : ",", std::string(1, "xyz"[k]));
-    }
-    AppendAll(flags, " --periodic ", axes, parameters.box->wraps ? " --wrap" : "");
-  }
   if (parameters.noise_filter) {
     AppendAll(flags, " --noise-filter ", ShortestNumber(*parameters.noise_filter));
   }
@@ -148,7 +149,6 @@ StreamRecorder::StreamRecorder(std::string path, const ReconstructionParameters&
                                std::unique_ptr<RecordingWriter> writer)
     : path_(std::move(path)),
       flags_(ReplayFlagsOf(parameters)),
-      box_(parameters.box),
       has_isovalue_(parameters.isovalue.has_value()),
       writer_(std::move(writer)) {
   if (parameters.output == Output::kSurface) frame_.components = 3;
@@ -178,6 +178,7 @@ absl::Status StreamRecorder::Add(WatchedFrame& frame) {
     for (const AttributeValues& one : attributes) {
       AppendAll(attributes_, attributes_.empty() ? " --attributes " : ",", Quoted(one.name));
     }
+    if (frame.particle_box) AppendAll(flags_, PeriodicFlagsOf(*frame.particle_box));
   }
   missed_ += frame.dropped + frame.gap;
   frame_.index = writer_->frame_count();
@@ -187,7 +188,7 @@ absl::Status StreamRecorder::Add(WatchedFrame& frame) {
   frame_.ids.swap(frame.particle_ids);
   frame_.volumes.swap(frame.particle_volumes);
   frame_.velocities.swap(frame.particle_velocities);
-  frame_.box = RecordedBoxOf(frame.particle_box ? frame.particle_box : box_);
+  frame_.box = RecordedBoxOf(frame.particle_box);
   frame_.attributes.resize(frame.particle_attributes.size());
   for (std::size_t k = 0; k < frame_.attributes.size(); ++k) {
     const auto& [name, components, values] = frame.particle_attributes[k];

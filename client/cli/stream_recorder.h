@@ -42,9 +42,8 @@ class StreamRecorder {
                  std::unique_ptr<RecordingWriter> writer);
 
   std::string path_;
-  std::string flags_;               // For `partiemc replay`.
-  std::string attributes_;          // The flag with the attributes of the results, or empty.
-  std::optional<PeriodicBox> box_;  // Of the stream.
+  std::string flags_;       // For `partiemc replay`.
+  std::string attributes_;  // The flag with the attributes of the results, or empty.
   bool has_isovalue_;
   std::unique_ptr<RecordingWriter> writer_;
   RecordedFrame frame_;

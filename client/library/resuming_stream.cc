@@ -180,7 +180,6 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   const auto start = monitor_.Now();
   const MutexLock lock(monitor_.mutex);
   AssertShared();
-  if (has_box && !info_.frame_boxes) return BoxesNotSupported();
   if (auto ready = WaitToSend(start, 0); !ready.ok()) return ready;
   const std::uint64_t sequence = resend_.end();
   absl::StatusOr<grpc::ByteBuffer> request;
@@ -190,6 +189,7 @@ absl::StatusOr<std::uint64_t> ResumingStream::SendRows(const wire::FrameRows& fr
   }
   if (!request.ok()) return request.status();
   if (auto ready = WaitToSend(start, request->Length()); !ready.ok()) return ready;
+  if (has_box && !frame_boxes_) return BoxesNotSupported();
   if (all_answered()) due_since_ = monitor_.Now();
   sends_boxes_ = sends_boxes_ || has_box;
   resend_.Add(*request);
@@ -468,6 +468,7 @@ std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened)
 // Resends unanswered frames through the opened call and makes it the stream's call.
 void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
   token_ = opened.message.stream_token();
+  frame_boxes_ = opened.message.frame_boxes();
   next_of_call_ = FirstToSend(opened);
   over_below_ = next_of_call_;
   AssertShared();

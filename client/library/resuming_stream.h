@@ -118,7 +118,9 @@ class ResumingStream final : public Stream {
   // When the oldest unanswered frame was sent, and when call_ was opened: deadlines start then.
   TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);
   TimePoint adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
-  bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;     // FinishSending was called.
+  bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // FinishSending was called.
+  // Whether the server of the last call uses boxes of frames.
+  bool frame_boxes_ ABSL_GUARDED_BY(monitor_.mutex) = true;
   bool sends_boxes_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // A frame had a box of its own.
   absl::Status failure_ ABSL_GUARDED_BY(monitor_.mutex);      // Status that ended the stream.
 };

@@ -14,9 +14,10 @@ namespace {
 // former call may release its name, its slot or the memory of its state, and another server's
 // version or keys may accept the checkpoint.
 constexpr std::string_view kDraining = "DRAINING";
-constexpr std::array<std::string_view, 8> kRetryableWhileResuming = {
-    "NAME_IN_USE",  "TOO_MANY_STREAMS",    "TOO_MANY_OPENING",     "CALLER_STREAMS",
-    "CALLER_CALLS", "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE", "MEMORY_BUDGET"};
+constexpr std::array<std::string_view, 9> kRetryableWhileResuming = {
+    "NAME_IN_USE",          "TOO_MANY_STREAMS", "TOO_MANY_OPENING",
+    "CALLER_STREAMS",       "CALLER_CALLS",     "CHECKPOINT_MISMATCH",
+    "CHECKPOINT_SIGNATURE", "MEMORY_BUDGET",    "CALLER_BYTES"};
 
 constexpr std::array<std::string_view, 4> kRetryableWhileJoining = {
     "NO_SUCH_STREAM", "LEADER_GONE", "TOO_MANY_OPENING", "CALLER_CALLS"};

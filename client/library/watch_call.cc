@@ -58,7 +58,10 @@ void TakeParticles(const Frame& echoed, const ReconstructionParameters& paramete
   Project(echoed.velocities, components, axes, frame.particle_velocities);
   frame.particle_ids.assign(echoed.ids.begin(), echoed.ids.end());
   frame.particle_volumes.assign(echoed.volumes.begin(), echoed.volumes.end());
-  frame.particle_box = echoed.box;
+  const std::optional<PeriodicBox>& box = echoed.box ? echoed.box : parameters.box;
+  if (!box) return;
+  frame.particle_box.emplace().wraps = parameters.box && parameters.box->wraps;
+  for (std::size_t k = 0; k < axes.size(); ++k) frame.particle_box->axes[k] = box->axes[axes[k]];
 }
 
 // Copies the attributes of particles that have values; of several with the same name the first.

@@ -117,7 +117,10 @@ class RecordingWriter::Impl {
     if (!box || box->is_tilted) return;
     PeriodicBox periodic;
     for (std::size_t k = 0; k < periodic.axes.size(); ++k) {
-      if (box->is_periodic[k]) periodic.axes[k] = PeriodicAxis{box->low[k], box->length[k]};
+      // A dump of 2D data may have a periodic axis without extent.
+      if (box->is_periodic[k] && box->length[k] > 0) {
+        periodic.axes[k] = PeriodicAxis{box->low[k], box->length[k]};
+      }
     }
     *message_.mutable_box() = wire::ToWire(periodic);
   }

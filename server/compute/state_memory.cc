@@ -15,7 +15,11 @@ absl::Status StateMemory::Account::Grow(std::uint64_t bytes) {
   if (more > 0) {
     const MutexLock lock(memory_->mutex_);
     FairShare& share = memory_->share_;
-    if (share.Fits(caller_.get(), more, QuotaOf(caller_.get())) != FairShare::Fit::kYes) {
+    const std::uint64_t all = share.held_by(caller_.get()) + more;
+    if (all > QuotaOf(caller_.get())) return TooManyBytesOfCaller(more);
+    // FairShare alone would let the first state take all: it is made for memory that is given back
+    // soon.
+    if (all > share.room() / 2 || share.Fits(caller_.get(), more) != FairShare::Fit::kYes) {
       return ViolationError(
           absl::StatusCode::kResourceExhausted,
           {std::string(kReasonMemoryBudget), "frame",

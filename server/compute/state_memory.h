@@ -13,8 +13,8 @@
 namespace partiemc::server {
 
 /// Counts the states of streams against a capacity that no frame can use. Callers share it
-/// (FairShare) within their quotas. The first `free_bytes` of each state are not counted.
-/// Thread-safe.
+/// (FairShare) within their quotas; one caller has at most half. The first `free_bytes` of each
+/// state are not counted. Thread-safe.
 class StateMemory {
  public:
   /// The share of one stream. Its destructor gives the bytes back.
@@ -33,7 +33,7 @@ class StateMemory {
     }
 
     /// Allows a state of `bytes` in addition to the smaller one that exists.
-    /// Errors: RESOURCE_EXHAUSTED (MEMORY_BUDGET); the account is then unchanged.
+    /// Errors: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES); the account is then unchanged.
     absl::Status Grow(std::uint64_t bytes);
     /// The state has only `bytes` now.
     void Shrink(std::uint64_t bytes);

@@ -14,11 +14,11 @@ void WorkerMemory::BeginFrame(std::uint64_t message_bytes) {
   counted_ += more;
 }
 
-bool WorkerMemory::Reserve(std::uint64_t bytes, std::size_t particles) {
+bool WorkerMemory::Reserve(std::uint64_t bytes, std::size_t particles, std::uint64_t state_bytes) {
   if (budget_ == nullptr) return true;
   if (bytes > kWorkerBytes + counted_) {
     const std::uint64_t more = bytes - kWorkerBytes - counted_;
-    const bool is_usual = bytes <= kWorkerBytes + kWorkerBytesPerParticle * particles;
+    const bool is_usual = bytes <= kWorkerBytes + state_bytes + kWorkerBytesPerParticle * particles;
     if (budget_->TryTake(more) != FairShare::Fit::kYes &&
         !(is_usual && budget_->TryTakeBeyond(more, this))) {
       return false;

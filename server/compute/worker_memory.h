@@ -39,7 +39,8 @@ class WorkerMemory {
   /// use kWorkerBytes and the bytes reserved before. More is granted if MemoryBudget::TryTake or
   /// TryTakeBeyond grants it. TryTakeBeyond is tried only if `bytes` are at most kWorkerBytes plus
   /// kWorkerBytesPerParticle for each particle.
-  bool Reserve(std::uint64_t bytes, std::size_t particles);
+  /// `state_bytes`: the part of `bytes` for states of the stream, which its former frames decide.
+  bool Reserve(std::uint64_t bytes, std::size_t particles, std::uint64_t state_bytes = 0);
   /// Gives back reserved bytes that no frame has used since the buffers were last freed.
   void EndFrame();
 

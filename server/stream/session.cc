@@ -19,7 +19,7 @@ class FrameMemory final : public MemoryGuard {
       : account_(account), particles_(particles), state_bytes_(state_bytes) {}
   bool Reserve(std::uint64_t bytes) override {
     // Worker::next_state, and the copy of it that becomes the stream's state.
-    return account_.Reserve(bytes + 2 * state_bytes_, particles_);
+    return account_.Reserve(bytes + 2 * state_bytes_, particles_, 2 * state_bytes_);
   }
 
  private:

@@ -42,6 +42,7 @@ TEST(StateMemory, CountsTheBytesAboveTheFreeOnesUntilTheStreamEnds) {
 TEST(StateMemory, RefusesWhatDoesNotFitAndStaysAsItWas) {
   StateMemory memory(1000, kFree);
   StateMemory::Account account(memory, Caller());
+  EXPECT_FALSE(account.Grow(501 + kFree).ok()) << "more than half";
   EXPECT_TRUE(account.Grow(500 + kFree).ok()) << "half of the memory";
   const absl::Status refused = account.Grow(501 + kFree);
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
@@ -64,7 +65,7 @@ TEST(StateMemory, LeavesRoomForOtherCallersAndKeepsQuotas) {
   EXPECT_TRUE(other.Grow(300).ok());
   const auto poor = std::make_shared<CallerAccount>(CallerQuota{.bytes = 50});
   StateMemory::Account small(memory, poor);
-  EXPECT_FALSE(small.Grow(kFree + 51).ok());
+  EXPECT_EQ(FindViolation(small.Grow(kFree + 51))->reason, "CALLER_BYTES");
   EXPECT_TRUE(small.Grow(kFree + 50).ok());
 }
 

@@ -52,6 +52,13 @@ TEST(WorkerMemory, GrantsWhatParticlesNeedHoweverSmallTheBudgetIs) {
   EXPECT_FALSE(memory.Reserve(most + 2, kParticles));
 }
 
+TEST(WorkerMemory, StatesOfFormerFramesAreUsual) {
+  MemoryBudget budget(1);
+  WorkerMemory memory(&budget);
+  EXPECT_FALSE(memory.Reserve(kWorkerBytes + 80 * kMib, 1000));
+  EXPECT_TRUE(memory.Reserve(kWorkerBytes + 80 * kMib, 1000, 80 * kMib));
+}
+
 TEST(WorkerMemory, WithoutABudgetGrantsEverything) {
   WorkerMemory memory;
   EXPECT_TRUE(memory.Reserve(~std::uint64_t{0}, 0));

@@ -209,20 +209,24 @@ function recordingOf(...frames: MessageInitShape<typeof ParticleFrameSchema>[]):
   ])], 'made.pemc');
 }
 
-test('a recording has the attributes of its first frame', async () => {
+test('a recording has the attributes that all frames have', async () => {
   const positions = bytesOf(Float32Array.of(0, 0, 1, 0));
   const p = { name: 'p', values: bytesOf(Float32Array.of(5, 6)) };
   const force = { name: 'force', values: bytesOf(Float32Array.of(1, 2, 3, 4)), components: 2 };
   const frameOf = (...scalars: { name: string; values: Uint8Array; components?: number }[]) =>
     ({ positionFormat: PositionFormat.FLOAT32_2, positions, scalars });
   const broken = { name: 'broken', values: bytesOf(Float32Array.of(NaN, 1)) };
-  const whole = recordingOf(frameOf(p, { ...p, name: 'ρ' }, force, broken), frameOf({ ...p, name: 'late' }, p));
+  const early = { ...p, name: 'early' };
+  const twice = { ...p, values: bytesOf(Float32Array.of(7, 8)) };
+  const empty = { ...frameOf(), positions: new Uint8Array(0) };
+  const whole = recordingOf(frameOf(p, { ...p, name: 'ρ' }, force, broken, early, twice),
+    frameOf({ ...p, name: 'late' }, force, p, { ...early, values: broken.values }), empty);
   const source = await openDropped([whole]);
-  assert.deepEqual([source.count, source.scalars], [2, ['p', 'force']]);
+  assert.deepEqual([source.count, source.scalars], [3, ['p', 'force']]);
   const scalarsAt = async (index: number) => ((await source.frame(index)).scalars ?? [])
     .map(({ name, values, components }) => [name, components, ...arrayOf(Float32Array, values)]);
   assert.deepEqual(await scalarsAt(0), [['p', 1, 5, 6], ['force', 2, 1, 2, 3, 4]]);
-  assert.deepEqual(await scalarsAt(1), [['p', 1, 5, 6]]);
+  assert.deepEqual(await scalarsAt(1), [['force', 2, 1, 2, 3, 4], ['p', 1, 5, 6]]);
   for (const [scalar, message] of [
     [{ ...p, components: 4 }, /more than three components/], [{ ...p, components: 2 }, /8 bytes where 16 are due/],
   ] as const) {
@@ -362,4 +366,9 @@ test('particles beside a plane have its coordinates', async () => {
   const [x, z] = doubles(near.positions.subarray(16 * 49));
   assert.deepEqual([x, z], [0.9, 0.4]);
   assert.equal(arrayOf(BigUint64Array, near.ids ?? new Uint8Array()).length, 50);
+});
+
+test('fractions of a box are positions in LAMMPS dumps only', async () => {
+  const file = new File(['id,xs,ys\n1,.5,.5\n2,.25,.5\n'], 'fractions.csv');
+  await assert.rejects(openDropped([file]), /fractions of the box of a LAMMPS dump/);
 });

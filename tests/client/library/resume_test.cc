@@ -304,6 +304,26 @@ TEST(Resume, AReplicaThatIgnoresBoxesOfFramesIsPassedOver) {
   ExpectPassedOver([](v1::StreamOpened& opened) { opened.clear_frame_boxes(); }, {}, frame);
 }
 
+TEST(Resume, AnOlderServerGetsNoBoxAfterALoss) {
+  FakeServer first([](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 1);
+    AnswerSome(rpc, 1, 1);
+    return Lost(grpc::StatusCode::UNAVAILABLE);
+  });
+  FakeServer older([](grpc::ServerContext&, FakeServer::Rpc& rpc) {
+    AcceptResumable(rpc, 2, [](v1::StreamOpened& opened) { opened.clear_frame_boxes(); });
+    AnswerSome(rpc, 100, 2);
+    return grpc::Status::OK;
+  });
+  const auto stream = Stream::Open(first.address(), Options(&older));
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_THAT(Exchange(**stream, 2), ElementsAre(1, 2));
+  Frame frame = kFrame;
+  frame.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
+  EXPECT_EQ((*stream)->Send(frame, 2).status().code(), absl::StatusCode::kUnimplemented);
+  EXPECT_TRUE((*stream)->Send(kFrame, 2).ok());
+}
+
 TEST(Resume, GivesUpInTimeWithTheLastError) {
   std::optional<FakeServer> server;
   server.emplace([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -418,15 +419,38 @@ TEST_F(Recording, HoldsOrthogonalPeriodicBoxes) {
   EXPECT_FALSE(read.frames[3].box.has_value());
 }
 
+TEST_F(Recording, AxesWithoutExtentAreNotPeriodic) {
+  std::vector<RecordedFrame> frames = RandomFrames(1);
+  frames[0].box = RecordedBox{.length = {5, 0, -1}, .is_periodic = {true, true, true}};
+  Write(Path(), frames);
+  const WhatWasRead read = Read(Path());
+  ASSERT_THAT(read.frames, SizeIs(1)) << read.status;
+  EXPECT_THAT(read.frames[0].box->is_periodic, ElementsAre(true, false, false));
+}
+
+// A frame with the format 1 and a box with the length `length` along x.
 TEST_F(Recording, BoxesWithoutALengthAreDamage) {
+  using namespace std::string_literals;
+  const auto read_box_of = [&](double length) {
+    std::string bytes(sizeof(length), '\0');
+    std::memcpy(bytes.data(), &length, sizeof(length));
+    const std::string box = "\x0a\x09\x11" + bytes;
+    const std::string frame = "\x18\x01\x4a" + std::string(1, static_cast<char>(box.size())) + box;
+    recording::BlockPacker packer(1);
+    std::string file = recording::MakeMark(recording::kFileTag, recording::kVersion);
+    file += *packer.Pack("\0"s);
+    file += *packer.Pack(std::string(1, static_cast<char>(frame.size())) + frame);
+    file += recording::MakeMark(recording::kTailTag, 1);
+    std::ofstream(Path(), std::ios::binary) << file;
+    return Read(Path());
+  };
+  const WhatWasRead whole = read_box_of(7);
+  ASSERT_THAT(whole.frames, SizeIs(1)) << whole.status;
+  EXPECT_EQ(whole.frames[0].box->length[0], 7);
   for (const double length : {0., -1., std::nan(""), HUGE_VAL}) {
-    std::vector<RecordedFrame> frames = RandomFrames(2);
-    frames[1].box = RecordedBox{.length = {length}, .is_periodic = {true}};
-    Write(Path(), frames);
-    const WhatWasRead read = Read(Path());
+    const WhatWasRead read = read_box_of(length);
     EXPECT_EQ(read.status.code(), absl::StatusCode::kDataLoss) << length;
     EXPECT_THAT(std::string(read.status.message()), HasSubstr("length of the box"));
-    EXPECT_THAT(read.frames, SizeIs(1));
   }
 }
 

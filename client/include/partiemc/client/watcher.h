@@ -95,7 +95,7 @@ struct WatchedFrame {
   /// The attributes that the producer sends with its echoed particles, such as phases: `components`
   /// values per particle, distinct names.
   std::vector<AttributeValues> particle_attributes;
-  /// The periodic box that the producer sent with the frame. Absent: the box of the stream.
+  /// The periodic box of the frame, along the axes of `particles`. Absent without particles.
   std::optional<PeriodicBox> particle_box;
   std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
   /// Set for the first frame after a loss: one line with the lost address, the cause, the address

@@ -66,7 +66,8 @@ function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: 
     }
     return { name: scalar.name, values: scalar.values, components };
   });
-  return all.filter((scalar) => SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
+  const isFirst = (name: string, k: number) => all.findIndex((scalar) => scalar.name === name) === k;
+  return all.filter((scalar, k) => isFirst(scalar.name, k) && SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
 }
 
 /** Location of a frame: a block and a message in it. */
@@ -98,8 +99,7 @@ export class RecordingSource implements FrameSource {
       unpack(bytes, blocks, block, name).forEach((_, message) => source.locations.push({ block, message }));
     }
     if (source.count === 0) throw new InputError(`${name} has no ${isWhole ? '' : 'whole '}frame.`);
-    const scalars = scalarsOf(source.read(0), `${name}, frame 0,`);
-    source.scalars.push(...scalars.slice(0, MOST_SCALARS).map((scalar) => scalar.name));
+    source.scalars.push(...source.commonScalars(name).slice(0, MOST_SCALARS));
     if (!isWhole) source.notice = `${name} is truncated. Its first ${source.count} frames are whole, and later ones are lost.`;
     return source;
   }
@@ -137,6 +137,19 @@ export class RecordingSource implements FrameSource {
     const frame: Particles = { time, positionFormat, positions, ids, volumes, scalars };
     if (arrayOf(Float32Array, velocities).every(Number.isFinite)) frame.velocities = velocities;
     return frame;
+  }
+
+  /** Names of the scalars that all frames have: the server refuses a frame that lacks a requested one. */
+  private commonScalars(name: string): string[] {
+    let common: string[] | null = null;
+    for (let index = 0; index < this.count; ++index) {
+      const frame = this.read(index);
+      if (frame.positions.length === 0) continue;
+      const own = new Set(scalarsOf(frame, `${name}, frame ${index},`).map((scalar) => scalar.name));
+      common = common?.filter((one) => own.has(one)) ?? [...own];
+      if (common.length === 0) break;
+    }
+    return common ?? [];
   }
 
   private read(index: number): ParticleFrame {

@@ -76,9 +76,13 @@ export class TableSource implements FrameSource {
   }
 }
 
-function planOf({ names, columnCount, name }: FrameTable, request: ColumnRequest): ColumnPlan {
+function planOf({ names, columnCount, name, place }: FrameTable, request: ColumnRequest): ColumnPlan {
   try {
-    return planColumns(names, columnCount, request);
+    const plan = planColumns(names, columnCount, request);
+    if (plan.scaled && !place && request.columns.length === 0) {
+      throw new FieldError('columns', 'The only positions are fractions of the box of a LAMMPS dump (xs, ys). Name other columns.');
+    }
+    return plan;
   } catch (error) {
     if (error instanceof FieldError) throw new FieldError(error.field, `${name}: ${error.message}`);
     throw error;
@@ -98,7 +102,7 @@ export async function factsOf(reader: TableReader): Promise<FileFacts> {
   };
   let plan: ColumnPlan;
   try {
-    plan = planColumns(names, columnCount, ALL_COLUMNS);
+    plan = planOf(table, ALL_COLUMNS);
   } catch (error) {
     if (error instanceof FieldError) return facts;
     throw error;
