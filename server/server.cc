@@ -85,7 +85,7 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
 IntakeGuard::Process WatchedProcess(const ServerOptions& options, const MemoryBudget& budget,
                                     const StateMemory& states, const WatchRegistry& watchers,
                                     const LevelQueue& levels) {
-  const std::uint64_t own_states = options.limits.max_streams * options.limits.OwnStateBytes();
+  const std::uint64_t own_states = options.limits.max_streams * ServerLimits::kOwnStateBytes;
   const std::uint64_t outside = ResidentBytes() + options.threads * kWorkerBytes +
                                 options.limits.AllHistoryBytes() +
                                 KeptBytesBeyondHistories(options.limits) + own_states;
@@ -165,7 +165,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                                                       options.advertised_address)),
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
-      states_(options.limits.SharedStateBytes(), options.limits.OwnStateBytes()),
+      states_(options.limits.SharedStateBytes(), ServerLimits::kOwnStateBytes),
       pool_(options.threads, kWarmTime, metrics_.get(), &budget_),
       levels_(std::make_shared<LevelQueue>(
           dispatcher_,

@@ -90,15 +90,16 @@ struct ServerLimits {
   /// The budget without the histories.
   std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
 
+  /// The part of the memory for states that each stream has for itself. Ordinary states are
+  /// smaller.
+  static constexpr std::uint64_t kOwnStateBytes = 64 << 10;
   /// Maximum size of the states of all streams between their frames, outside of the budget: a
-  /// quarter of it.
-  std::uint64_t StateBytes() const { return memory_budget / 4; }
-  /// The part of StateBytes that each stream has for itself. Ordinary states are smaller.
-  std::uint64_t OwnStateBytes() const {
-    return std::min<std::uint64_t>(64 << 10, StateBytes() / 2 / std::max(1u, max_streams));
+  /// quarter of it, but at least kOwnStateBytes for each stream.
+  std::uint64_t StateBytes() const {
+    return std::max<std::uint64_t>(memory_budget / 4, max_streams * kOwnStateBytes);
   }
   /// The part of StateBytes that larger states share.
-  std::uint64_t SharedStateBytes() const { return StateBytes() - max_streams * OwnStateBytes(); }
+  std::uint64_t SharedStateBytes() const { return StateBytes() - max_streams * kOwnStateBytes; }
 
   /// An idle stream costs little memory except for its state, but it occupies a name and a slot.
   IdleLimits idle{.opening = std::chrono::seconds(30), .streaming = std::chrono::hours(1)};

@@ -231,6 +231,20 @@ TEST_F(FrameRefused, COUNT) {
   messages_.Expect(std::string(status.message()));
 }
 
+TEST_F(FrameRefused, MEMORY_BUDGET) {
+  StateMemory memory(100, 0);
+  Session session = *Session::Open({.spacing = kBlobSpacing}, {}, {memory, nullptr});
+  Worker worker;
+  const std::vector<double> positions = MovingBlob(1, 0);
+  const Frame frame{.positions = std::span<const double>(positions)};
+  const auto status =
+      session.Answer(1, frame, worker, [](auto&, auto&) { return absl::OkStatus(); });
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(FindViolation(status)->reason, "MEMORY_BUDGET");
+  messages_.Expect(std::string(status.message()));
+  EXPECT_EQ(session.next_sequence(), 2u);
+}
+
 TEST_F(FrameRefused, OUT_OF_MEMORY) {
   Session session = *Session::Open({.spacing = 1}, {});
   Worker worker;

@@ -39,8 +39,14 @@ SurfaceParameters In(const PeriodicBox& box,
   return {.placement = placement, .box = box};
 }
 
+// The first surface of a stream, with identities.
 Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
-  return testing::SurfaceOf(particles, parameters);
+  SurfaceStream stream(parameters);
+  const absl::Status status = stream.Try(particles.AsFrame());
+  EXPECT_TRUE(status.ok()) << status;
+  const absl::Status valid = Validate(stream.surface());
+  EXPECT_TRUE(valid.ok()) << valid;
+  return stream.surface();
 }
 
 SpaceParticles BallAt(const Vec3& centre, double radius) {

@@ -141,15 +141,13 @@ export class RecordingSource implements FrameSource {
 
   /** Names of the scalars that all frames have: the server refuses a frame that lacks a requested one. */
   private commonScalars(name: string): string[] {
-    let common: string[] | null = null;
+    const all: Set<string>[] = [];
     for (let index = 0; index < this.count; ++index) {
       const frame = this.read(index);
       if (frame.positions.length === 0) continue;
-      const own = new Set(scalarsOf(frame, `${name}, frame ${index},`).map((scalar) => scalar.name));
-      common = common?.filter((one) => own.has(one)) ?? [...own];
-      if (common.length === 0) break;
+      all.push(new Set(scalarsOf(frame, `${name}, frame ${index},`).map((scalar) => scalar.name)));
     }
-    return common ?? [];
+    return [...all[0] ?? []].filter((one) => all.every((own) => own.has(one)));
   }
 
   private read(index: number): ParticleFrame {
