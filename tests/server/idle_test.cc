@@ -37,6 +37,16 @@ class Idle : public ::testing::Test {
     EXPECT_EQ(violation->value, value);
   }
 
+  // Opens a stream and sends two frames. The only worker is busy until `go` is set.
+  void SendTwoThatWaitFor(std::promise<void>& go) {
+    pool_.Submit([future = go.get_future().share()](Worker&) { future.wait(); });
+    transport_.Open();
+    ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
+    transport_.Send(1, MovingBlob(1, 0));
+    transport_.Send(2, MovingBlob(1, 1));
+    transport_.WaitUntilRead(2);  // So the machine has accepted the first one.
+  }
+
   ComputePool pool_{1};
   MemoryTransport transport_{pool_, 2, BlobParameters(), kLimits};
 };
@@ -74,12 +84,7 @@ TEST_F(Idle, AClientThatTakesNoAnswersIsCut) {
 
 TEST_F(Idle, WaitingForAWorkerDoesNotCount) {
   std::promise<void> go;
-  pool_.Submit([future = go.get_future().share()](Worker&) { future.wait(); });
-  transport_.Open();
-  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
-  transport_.Send(1, MovingBlob(1, 0));
-  transport_.Send(2, MovingBlob(1, 1));
-  transport_.WaitUntilRead(2);  // So the machine has accepted the first one.
+  SendTwoThatWaitFor(go);
   EndIfIdle(minutes(100));
   go.set_value();
   EXPECT_EQ(transport_.Receive()->sequence, 1u);
@@ -90,12 +95,7 @@ TEST_F(Idle, WaitingForAWorkerDoesNotCount) {
 
 TEST_F(Idle, TheTimeToTakeAnAnswerBeginsWithItsWrite) {
   std::promise<void> go;
-  pool_.Submit([future = go.get_future().share()](Worker&) { future.wait(); });
-  transport_.Open();
-  ASSERT_EQ(transport_.Receive()->what, Outgoing::kOpened);
-  transport_.Send(1, MovingBlob(1, 0));
-  transport_.Send(2, MovingBlob(1, 1));
-  transport_.WaitUntilRead(2);
+  SendTwoThatWaitFor(go);
   const auto before_answer = steady_clock::now();
   go.set_value();
   while (transport_.machine().counts().frames < 2) std::this_thread::yield();
