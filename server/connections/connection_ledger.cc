@@ -38,6 +38,8 @@ constexpr milliseconds kHeaderTime(100);
 // blocks.
 constexpr std::chrono::seconds kSlowHeaderTime(10);
 
+constexpr std::uint64_t kSuspectPart = 6;
+
 std::uint64_t OnTheWire(std::uint64_t bytes) {
   return bytes + bytes / kOverheadPart + kMessageOverhead;
 }
@@ -106,6 +108,13 @@ std::optional<Flood> ConnectionLedger::Examine(const Counts& counts,
   if (rules_.unaccounted_bytes == 0) return std::nullopt;
   if (excess_ > rules_.unaccounted_bytes) return Flood::kUnaccountedBytes;
   return ExamineHeaders(counts, reading, now);
+}
+
+bool ConnectionLedger::IsSuspect() const {
+  const auto exceeds = [](std::uint64_t value, std::uint64_t limit) {
+    return limit > 0 && value > limit / kSuspectPart;
+  };
+  return exceeds(excess_, rules_.unaccounted_bytes) || exceeds(streams_, rules_.max_streams);
 }
 
 // Updates the debt. Adds received bytes before it subtracts credits: the debt never becomes

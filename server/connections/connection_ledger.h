@@ -91,6 +91,9 @@ class ConnectionLedger {
   /// The larger of two numbers at the last reading with `has_streams`: open streams, and streams
   /// that have not become calls.
   std::uint64_t streams() const { return streams_; }
+  /// Whether `excess` or `streams` exceeds a sixth of its limit. A usual client stays below: before
+  /// the server begins its first call, it can send at most 64 KiB (the initial window of HTTP/2).
+  bool IsSuspect() const;
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }
   /// Whether an open stream was not a call, at the last reading with `has_streams`. If so, the

@@ -316,6 +316,20 @@ void ConnectionWatch::ExamineTogether(Clock::time_point now) {
     Cut(std::next(connections_.begin(), static_cast<std::ptrdiff_t>(excess->index)), excess->flood,
         now);
   }
+  CutSuspects(now);
+}
+
+// Cuts the suspects of the addresses that flood. Otherwise an address could flood on several
+// connections, each below its own limit.
+void ConnectionWatch::CutSuspects(Clock::time_point now) {
+  if (flooding_.empty()) return;
+  for (auto next = connections_.begin(); next != connections_.end();) {
+    const auto connection = next++;
+    const auto found = flooding_.find(connection->peer.address);
+    if (found == flooding_.end() || !connection->tracked->ledger.IsSuspect()) continue;
+    Cut(connection, found->second, now);
+  }
+  flooding_.clear();
 }
 
 void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::time_point now) {
@@ -323,6 +337,7 @@ void ConnectionWatch::Cut(Connections::iterator connection, Flood flood, Clock::
   Abort(cut.socket.get());
   ++counters_.floods[static_cast<std::size_t>(flood)];
   counts_.OnFlood(cut.peer.address, cut.tracked->admission, now);
+  if (counts_.bans()) flooding_[cut.peer.address] = flood;
   if (log_limit_.Allow(now)) {
     LogEvent(spdlog::level::warn, "connection cut",
              {{"peer", cut.peer.name.empty() ? cut.peer.address : cut.peer.name},

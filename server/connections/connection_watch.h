@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -15,6 +16,7 @@
 
 #include "common/mutex.h"
 #include "server/base/rate_limit.h"
+#include "server/connections/connection_ledger.h"
 #include "server/connections/connection_limits.h"
 #include "server/connections/connection_table.h"
 #include "server/connections/flood_guard.h"
@@ -109,6 +111,7 @@ class ConnectionWatch {
   bool CountStreams(Connection& connection, Clock::time_point now)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void ExamineTogether(Clock::time_point now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void CutSuspects(Clock::time_point now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Cut(Connections::iterator connection, Flood flood, Clock::time_point now)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Remove(Connections::iterator connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -131,6 +134,8 @@ class ConnectionWatch {
   std::size_t turn_ ABSL_GUARDED_BY(mutex_) = 0;
   // Number of connections whose streams may still be counted in this period.
   std::size_t counts_left_ ABSL_GUARDED_BY(mutex_) = 0;
+  // Addresses of connections that were cut in this period, and the kind of their flood.
+  std::map<std::string, Flood> flooding_ ABSL_GUARDED_BY(mutex_);
   Clock::time_point examine_at_ ABSL_GUARDED_BY(mutex_){};
   Clock::time_point all_at_ ABSL_GUARDED_BY(mutex_){};
   Clock::time_point forget_at_ ABSL_GUARDED_BY(mutex_){};

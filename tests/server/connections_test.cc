@@ -53,6 +53,22 @@ TEST_F(Ledger, BytesWithoutACallAreAFlood) {
   EXPECT_EQ(Examine(), Flood::kUnaccountedBytes);
 }
 
+TEST_F(Ledger, ASuspectExceedsASixthOfALimit) {
+  Receive(kMiB / 6);
+  EXPECT_EQ(Examine(), std::nullopt);
+  EXPECT_FALSE(ledger_.IsSuspect());
+  Receive(1'000);
+  EXPECT_EQ(Examine(milliseconds(0)), std::nullopt);
+  EXPECT_TRUE(ledger_.IsSuspect());
+  EXPECT_EQ(Examine(milliseconds(20'000)), std::nullopt);
+  Streams(16, 16);
+  EXPECT_EQ(Examine(), std::nullopt);
+  EXPECT_FALSE(ledger_.IsSuspect());
+  Streams(17, 17);
+  EXPECT_EQ(Examine(milliseconds(0)), std::nullopt);
+  EXPECT_TRUE(ledger_.IsSuspect());
+}
+
 TEST_F(Ledger, SlowBytesWithoutACallAreAFloodToo) {
   std::uint64_t received = 0;
   while (received < 3 * kMiB) {

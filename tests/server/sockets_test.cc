@@ -133,6 +133,37 @@ TEST(Connections, TheLastDescriptorEvictsAnIdleConnection) {
   EXPECT_EQ(watch.count(), 1u);
 }
 
+// Sends bytes that belong to no call on three connections of one address: more than the limit, more
+// than a sixth of it, and less. Returns the number of connections that were cut.
+std::uint64_t CutOfThree(const ConnectionLimits& limits) {
+  constexpr ConnectionRules kRules{.unaccounted_bytes = 30'000};
+  const Loopback flood, suspect, usual;
+  ConnectionTable table;
+  ConnectionWatch watch(limits, kRules, table);
+  std::vector<Descriptor> handed_over;
+  const auto add = [&](const Loopback& connection, std::size_t bytes) {
+    const std::vector<char> sent(bytes);
+    EXPECT_EQ(send(connection.client.get(), sent.data(), bytes, 0), static_cast<ssize_t>(bytes));
+    watch.Add(Descriptor(dup(connection.accepted.get())),
+              [&](Descriptor one) { handed_over.push_back(std::move(one)); });
+  };
+  add(suspect, 10'000);
+  add(usual, 1'000);
+  add(flood, 40'000);
+  watch.Start(nullptr);
+  const auto& cut = watch.counters().floods[static_cast<std::size_t>(Flood::kUnaccountedBytes)];
+  EXPECT_TRUE(Eventually([&] { return cut > 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(watch.count(), 3 - cut);
+  return cut;
+}
+
+TEST(Connections, AFloodAlsoCutsTheSuspectsOfItsAddress) { EXPECT_EQ(CutOfThree({}), 2u); }
+
+TEST(Connections, BehindAProxyAFloodCutsNoOtherConnection) {
+  EXPECT_EQ(CutOfThree({.new_of_address = 0}), 1u);
+}
+
 TEST(Connections, NoneIsHandedOverWhenTheAcceptorIsGone) {
   ConnectionTable table;
   // The second connection of an address may only make health checks, so its hand-over is delayed.
