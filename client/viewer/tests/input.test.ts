@@ -1,7 +1,4 @@
-import { create, type MessageInitShape, toBinary } from '@bufbuild/protobuf';
-import { BinaryWriter } from '@bufbuild/protobuf/wire';
-import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
-import { ParticleFrameSchema, PositionFormat } from '@proto/v1/reconstruction_pb';
+import { PositionFormat } from '@proto/v1/reconstruction_pb';
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
@@ -18,7 +15,7 @@ import { nearPlane } from '../src/input/space';
 import { parseTable } from '../src/input/table';
 import { arrayOf, bytesOf } from '../src/protocol/arrays';
 import type { Particles } from '../src/protocol/particles';
-import { openDropped } from './open_dropped';
+import { openDropped, recordingOf } from './open_dropped';
 
 const doubles = (bytes: Uint8Array) => [...arrayOf(Float64Array, bytes)];
 const recording = new URL('../../../recordings/dam_break.pemc', import.meta.url);
@@ -192,23 +189,6 @@ test('a recording reads frames in any order', async () => {
   assert.deepEqual((await source.frame(74)).positions, last.positions);
 });
 
-/** A recording of one block with these frames, whose zstd frames store their bytes raw. */
-function recordingOf(...frames: MessageInitShape<typeof ParticleFrameSchema>[]): File {
-  const mark = (tag: string) => [0x50, 0x2a, 0x4d, 0x18, 16, 0, 0, 0, ...Buffer.from(tag), ...new Uint8Array(8)];
-  const block = (...messages: Uint8Array[]) => {
-    const writer = new BinaryWriter();
-    for (const message of messages) writer.bytes(message);
-    const bytes = writer.finish();
-    const size = new Uint8Array(Uint32Array.of(bytes.length).buffer);
-    const header = bytes.length << 3 | 1;
-    return [0x28, 0xb5, 0x2f, 0xfd, 0xa0, ...size, header & 255, header >> 8 & 255, header >> 16, ...bytes];
-  };
-  return new File([Uint8Array.from([
-    ...mark('PEMCFILE'), ...block(toBinary(RecordingHeaderSchema, create(RecordingHeaderSchema, { title: 'made' }))),
-    ...block(...frames.map((frame) => toBinary(ParticleFrameSchema, create(ParticleFrameSchema, frame)))), ...mark('PEMCTAIL'),
-  ])], 'made.pemc');
-}
-
 test('a recording has the attributes that all frames have', async () => {
   const positions = bytesOf(Float32Array.of(0, 0, 1, 0));
   const p = { name: 'p', values: bytesOf(Float32Array.of(5, 6)) };
@@ -306,6 +286,7 @@ test('the defaults of options come from the file', async () => {
   const flat = await inspectFiles([file('flat.csv', block(1))]);
   assert.deepEqual(flat.facts, {
     spacing: '', columns: 'x,y,z', names: ['id', 'type', 'x', 'y', 'z', 'p'], filters: ['type=1', 'type=2'], slice: '',
+    hasBox: false,
   });
   const { facts } = await inspectFiles([file('block.csv', block(5))]);
   assert.equal(facts.slice, 'z=0.2');
@@ -314,7 +295,7 @@ test('the defaults of options come from the file', async () => {
   assert.deepEqual([unknown.facts.columns, unknown.facts.names], ['', ['a', 'b', 'c']]);
   await assert.rejects(unknown.open(NO_OPTIONS), isAbout('columns', /a\.csv: No position columns in a, b, c/));
   const whole = await inspectFiles([new File([readFileSync(recording)], 'dam_break.pemc')]);
-  assert.deepEqual(whole.facts, { spacing: '0.0303', columns: '', names: [], filters: [], slice: '' });
+  assert.deepEqual(whole.facts, { spacing: '0.0303', columns: '', names: [], filters: [], slice: '', hasBox: false });
 });
 
 test('options choose columns, particles, spacing and plane', async () => {
@@ -354,7 +335,7 @@ test('a wrong option is refused by its field', async () => {
 });
 
 test('options are kept in a link', () => {
-  const given = options({ spacing: '0.02', slice: 'z=0.5;y=1' });
+  const given = options({ spacing: '0.02', slice: 'z=0.5;y=1', periodic: 'x,y' });
   assert.deepEqual(parseOptions(optionsText(given)), given);
   assert.equal(optionsText(NO_OPTIONS), '');
 });

@@ -1,5 +1,6 @@
 // LAMMPS text dumps of the styles atom and custom. A frame has sections that start with "ITEM:".
 import type { Place } from './particles';
+import type { RecordedBox } from './periodic';
 import { TextRows } from './rows';
 import { InputError } from './source';
 import { splitAtBlanks } from './table';
@@ -7,6 +8,16 @@ import type { FrameTable, TableReader } from './table_source';
 
 /** A position in the box is origin + sum over axes of (fraction * edge). */
 interface Box { origin: number[]; edges: number[][] }
+
+/** `flags`: the rest of the line "ITEM: BOX BOUNDS": "pp pp ff", "xy xz yz pp pp pp", or nothing. */
+function recordedBox({ origin, edges }: Box, flags: string): RecordedBox {
+  // Other words name tilts. A boundary has two letters of p, f, s, m.
+  const boundaries = splitAtBlanks(flags).filter((word) => /^[pfsm]{2}$/.test(word));
+  return {
+    axes: [0, 1, 2].map((k) => boundaries[k] === 'pp' ? { origin: origin[k], length: edges[k][k] } : undefined),
+    isTilted: edges.some((edge, k) => edge.some((part, axis) => axis !== k && part !== 0)),
+  };
+}
 
 /** Parses lower and upper bounds. A triclinic box has tilts xy, xz, yz, which widen the bounds. */
 function boxOf(lines: string[]): Box {
@@ -64,12 +75,14 @@ export function parseLammpsFrame(text: string, index: number, name: string): Fra
   let step: number | undefined;
   let atoms = -1;
   let box: Box | null = null;
+  let flags = '';
   for (let k = 0; k < lines.length; ++k) {
     const line = lines[k];
     if (line.startsWith('ITEM: NUMBER OF ATOMS')) {
       atoms = Number(lines[++k]);
     } else if (line.startsWith('ITEM: BOX BOUNDS')) {
       box = (line.includes('abc') ? boxOfEdges : boxOf)(lines.slice(k + 1, k + 4));
+      flags = line.slice('ITEM: BOX BOUNDS'.length);
       k += 3;
     } else if (line.startsWith('ITEM: TIMESTEP')) {
       step = Number(lines[++k]);
@@ -83,7 +96,7 @@ export function parseLammpsFrame(text: string, index: number, name: string): Fra
       }
       return {
         names, columnCount: names.length, rows: new TextRows(rows, where), time, step, index, name: where,
-        place: placeIn(box, where),
+        place: placeIn(box, where), box: box ? recordedBox(box, flags) : undefined,
       };
     }
   }

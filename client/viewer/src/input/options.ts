@@ -2,13 +2,13 @@
 import type { SectionPlane } from '../protocol/sections';
 import { InputError } from './source';
 
-export const FILE_FIELDS = ['spacing', 'columns', 'select', 'slice'] as const;
+export const FILE_FIELDS = ['spacing', 'columns', 'select', 'slice', 'periodic'] as const;
 export type FileField = typeof FILE_FIELDS[number];
 
 /** Empty: the default. */
 export type FileOptions = Record<FileField, string>;
 
-export const NO_OPTIONS: Readonly<FileOptions> = { spacing: '', columns: '', select: '', slice: '' };
+export const NO_OPTIONS: Readonly<FileOptions> = { spacing: '', columns: '', select: '', slice: '', periodic: '' };
 
 /** Facts of files, which are the defaults of their options. */
 export interface FileFacts {
@@ -22,6 +22,8 @@ export interface FileFacts {
   filters: string[];
   /** A plane through the middle of 3D particles. Empty: the particles are 2D. */
   slice: string;
+  /** Whether the first frame has a box with a periodic boundary. */
+  hasBox: boolean;
 }
 
 /** Error of one option. */

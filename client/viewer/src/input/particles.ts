@@ -3,6 +3,7 @@ import { bytesOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
 import type { ColumnPlan } from './columns';
 import { CHOOSE_SPACE, FieldError, NOT_IN_SPACE } from './options';
+import { boxAlong, type RecordedBox } from './periodic';
 import type { Rows } from './rows';
 
 /** An axis with an extent below this share of the largest one is flat. Above the rounding of six-digit text. */
@@ -78,6 +79,7 @@ export interface ParticleTable {
   /** For errors. */
   name: string;
   place?: Place;
+  box?: RecordedBox;
 }
 
 /** The coordinates of the particles, by axis. */
@@ -88,10 +90,10 @@ export function positionsOf({ rows, place }: ParticleTable, plan: ColumnPlan): A
   return axes;
 }
 
-/** Converts table rows to a frame. `inSpace`: keeps three coordinates. Throws InputError. */
-export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace = false): Particles {
+/** Converts table rows to a frame. `inSpace`: keeps three coordinates. `periodic`: axes of its box. Throws InputError. */
+export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace: boolean, periodic: readonly number[]): Particles {
   const rows = table.rows.where(plan.conditions);
-  const { time, step, index, name } = table;
+  const { time, step, index, name, box } = table;
   const axes = positionsOf({ ...table, rows }, plan);
   if (inSpace && axes.some((axis) => axis === null)) {
     throw new FieldError('slice', `${name} ${NOT_IN_SPACE}`);
@@ -106,6 +108,9 @@ export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace = fa
     positions: bytesOf(positions),
     scalars: [],
   };
+  if (periodic.length > 0) {
+    frame.box = boxAlong(periodic, box && { ...box, axes: chosen.map((axis) => box.axes[axis]) }, name);
+  }
   const ids = plan.id === null ? null : idsOf(rows, plan.id);
   if (ids) frame.ids = bytesOf(ids);
   const volumes = plan.volume === null ? null : floatsOf(rows, plan.volume, true);

@@ -2,7 +2,7 @@
 import { fromBinary } from '@bufbuild/protobuf';
 import { BinaryReader } from '@bufbuild/protobuf/wire';
 import { RecordingHeaderSchema } from '@proto/recording/v1/recording_pb';
-import { type ParticleFrame, ParticleFrameSchema } from '@proto/v1/reconstruction_pb';
+import { type ParticleFrame, ParticleFrameSchema, type PeriodicBox } from '@proto/v1/reconstruction_pb';
 import { decompress } from 'fzstd';
 import { arrayOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
@@ -12,6 +12,7 @@ import { MOST_SCALARS } from './columns';
 import {
   checkSpacing, CHOOSE_SPACE, FieldError, type FileFacts, type FileOptions, NO_OPTIONS, NOT_IN_SPACE, parseSlices, parseSpacing,
 } from './options';
+import { boxAlong, parsePeriodic, type RecordedBox, withOwnBox } from './periodic';
 import { InputError, type FrameSource } from './source';
 import { axesOf, hasThreeCoordinates, middlePlane, spacingOf } from './space';
 
@@ -70,6 +71,17 @@ function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: 
   return all.filter((scalar, k) => isFirst(scalar.name, k) && SCALAR_NAME.test(scalar.name) && arrayOf(Float32Array, scalar.values).every(Number.isFinite));
 }
 
+/** Throws InputError for a damaged box. */
+function recordedBox({ box }: ParticleFrame, name: string): RecordedBox | undefined {
+  const axes = [box?.x, box?.y, box?.z];
+  for (const axis of axes) {
+    if (axis && !(axis.length > 0 && Number.isFinite(axis.origin) && Number.isFinite(axis.origin + axis.length))) {
+      throw new InputError(`${name} is damaged: a length of the box is not positive and finite.`);
+    }
+  }
+  return box && { axes };
+}
+
 /** Location of a frame: a block and a message in it. */
 interface Location { block: number; message: number }
 
@@ -83,6 +95,8 @@ export class RecordingSource implements FrameSource {
   notice = '';
   slices: readonly SectionPlane[] = [];
   isSurface = false;
+  box?: PeriodicBox;
+  periodic: readonly number[] = [];
 
   private constructor(private readonly bytes: Uint8Array, private readonly blocks: number[],
                       readonly title: string, public spacing: number | null) {}
@@ -106,7 +120,10 @@ export class RecordingSource implements FrameSource {
 
   /** Whether the particles have three coordinates, and the defaults of the options. */
   async facts(): Promise<FileFacts> {
-    const facts: FileFacts = { spacing: this.spacing === null ? '' : String(this.spacing), columns: '', names: [], filters: [], slice: '' };
+    const facts: FileFacts = {
+      spacing: this.spacing === null ? '' : String(this.spacing), columns: '', names: [], filters: [], slice: '',
+      hasBox: this.read(0).box !== undefined,
+    };
     const first = await this.frame(0);
     if (!hasThreeCoordinates(first.positionFormat)) return facts;
     const axes = axesOf(first);
@@ -120,21 +137,29 @@ export class RecordingSource implements FrameSource {
     for (const field of ['columns', 'select'] as const) {
       if (options[field] !== '') throw new FieldError(field, 'A recording has no columns. Leave this field empty.');
     }
+    const periodic = parsePeriodic(options.periodic, choice.isSurface);
     const spacing = parseSpacing(options.spacing) ?? this.spacing;
     const inSpace = hasThreeCoordinates((await this.frame(0)).positionFormat);
     if (inSpace && !isOfSpace) throw new FieldError('slice', `${this.title} is 3D. ${CHOOSE_SPACE}`);
     if (!inSpace && isOfSpace) throw new FieldError('slice', `${this.title} ${NOT_IN_SPACE}`);
     checkSpacing(choice, spacing);
-    return Object.assign(Object.create(RecordingSource.prototype) as RecordingSource, this, { spacing, ...choice });
+    const source = Object.assign(Object.create(RecordingSource.prototype) as RecordingSource, this, { spacing, periodic, ...choice });
+    source.box = source.frameWithBox(0).box;
+    return source;
   }
 
   get count(): number { return this.locations.length; }
 
-  async frame(index: number): Promise<Particles> {
+  async frame(index: number): Promise<Particles> { return withOwnBox(this.frameWithBox(index), this.box); }
+
+  private frameWithBox(index: number): Particles {
     const recorded = this.read(index);
     const { time, positionFormat, positions, ids, volumes, velocities } = recorded;
-    const scalars = scalarsOf(recorded, `${this.title}, frame ${index},`).filter(({ name }) => this.scalars.includes(name));
+    const name = `${this.title}, frame ${index},`;
+    const scalars = scalarsOf(recorded, name).filter((scalar) => this.scalars.includes(scalar.name));
     const frame: Particles = { time, positionFormat, positions, ids, volumes, scalars };
+    const box = recordedBox(recorded, name);
+    if (this.periodic.length > 0) frame.box = boxAlong(this.periodic, box, name);
     if (arrayOf(Float32Array, velocities).every(Number.isFinite)) frame.velocities = velocities;
     return frame;
   }

@@ -1,3 +1,4 @@
+import type { PeriodicBox } from '@proto/v1/reconstruction_pb';
 import type { Particles } from '../protocol/particles';
 import type { SectionPlane } from '../protocol/sections';
 
@@ -12,11 +13,13 @@ export interface FrameSource {
   readonly isSurface: boolean;
   /** Planes that cut 3D particles. The first is the picture, unless `isSurface`. Empty for 2D particles. */
   readonly slices: readonly SectionPlane[];
+  /** The periodic box of the first frame, which is that of the stream. Absent: no axis is periodic. */
+  readonly box?: PeriodicBox;
   /** Names of scalars that every frame has. */
   readonly scalars: string[];
   /** A warning about the files for the user, such as their truncation; empty without one. */
   readonly notice: string;
-  /** Reads frame `index`, starting at 0. Throws InputError. */
+  /** Reads frame `index`, starting at 0. It has a box if this differs from the box of the stream. Throws InputError. */
   frame(index: number): Promise<Particles>;
 }
 

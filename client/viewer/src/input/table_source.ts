@@ -1,4 +1,5 @@
 // Files that hold tables of particles, as frames.
+import type { PeriodicBox } from '@proto/v1/reconstruction_pb';
 import type { Particles } from '../protocol/particles';
 import type { SectionPlane } from '../protocol/sections';
 import { type ColumnPlan, namesOfUnnamed, planColumns } from './columns';
@@ -7,6 +8,7 @@ import {
   parseSpacing, type SpaceChoice,
 } from './options';
 import { isInSpace, type ParticleTable, particlesOf, positionsOf } from './particles';
+import { parsePeriodic, withOwnBox } from './periodic';
 import { InputError, type FrameSource } from './source';
 import { middlePlane, spacingOf } from './space';
 
@@ -43,11 +45,12 @@ export class ReaderChain implements TableReader {
 export class TableSource implements FrameSource {
   readonly notice = '';
   readonly scalars: string[] = [];
+  box?: PeriodicBox;
 
   private constructor(
     readonly title: string, private readonly reader: TableReader, private readonly times: Map<number, number>,
     private readonly request: ColumnRequest, readonly spacing: number | null,
-    private readonly choice: SpaceChoice,
+    private readonly choice: SpaceChoice, private readonly periodic: readonly number[],
   ) {}
 
   /** Reads the first frame, whose scalars all frames have. Throws InputError, and FieldError for an option. */
@@ -55,12 +58,14 @@ export class TableSource implements FrameSource {
                     options: FileOptions): Promise<TableSource> {
     const spacing = parseSpacing(options.spacing);
     const choice = parseSlices(options.slice);
-    const source = new TableSource(title, reader, times, parseRequest(options), spacing, choice);
+    const periodic = parsePeriodic(options.periodic, choice.isSurface);
+    const source = new TableSource(title, reader, times, parseRequest(options), spacing, choice, periodic);
     const first = await source.frame(0);
     if (first.positions.length === 0 && source.request.conditions.length > 0) {
       throw new FieldError('select', `No particle of the first frame has ${options.select}.`);
     }
     checkSpacing(choice, spacing);
+    source.box = first.box;
     source.scalars.push(...(first.scalars ?? []).map(({ name }) => name));
     return source;
   }
@@ -72,7 +77,8 @@ export class TableSource implements FrameSource {
   async frame(index: number): Promise<Particles> {
     const table = await this.reader.table(index);
     const time = this.times.get(index) ?? table.time;
-    return particlesOf({ ...table, time }, planOf(table, this.request), this.isSurface || this.slices.length > 0);
+    const inSpace = this.isSurface || this.slices.length > 0;
+    return withOwnBox(particlesOf({ ...table, time }, planOf(table, this.request), inSpace, this.periodic), this.box);
   }
 }
 
@@ -97,7 +103,7 @@ export async function factsOf(reader: TableReader): Promise<FileFacts> {
   const table = await reader.table(0);
   const { names, columnCount, rows } = table;
   const facts: FileFacts = {
-    spacing: '', columns: '', slice: '', filters: [],
+    spacing: '', columns: '', slice: '', filters: [], hasBox: table.box?.axes.some(Boolean) ?? false,
     names: names.length > 0 ? names : Array.from({ length: columnCount }, (_, k) => String(k + 1)),
   };
   let plan: ColumnPlan;

@@ -1,4 +1,4 @@
-import type { PositionFormat } from '@proto/v1/reconstruction_pb';
+import type { PeriodicBox, PositionFormat } from '@proto/v1/reconstruction_pb';
 import { AttributeChannels, type Channels } from './channels';
 import { particleBytes } from './positions';
 
@@ -11,6 +11,8 @@ export interface Particles {
   volumes?: Uint8Array;
   velocities?: Uint8Array;
   scalars?: { name: string; values: Uint8Array; components?: number }[];
+  /** The periodic box of this frame. Absent: the box of the stream. */
+  box?: PeriodicBox;
 }
 
 /** Numbers of the particles to colour by: their scalars and their velocity. */

@@ -9,7 +9,7 @@ import { History, type Entry } from './history';
 import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
 import { type Outline, outlinesOf } from '../protocol/sections';
-import { methodOf, outputsFor, parametersOf, type Settings, withSpace } from './settings';
+import { methodOf, outputsFor, parametersOf, type Settings, withSource } from './settings';
 import { decodeResult } from '../protocol/decode';
 import { particleChannels, type Particles } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
@@ -121,16 +121,15 @@ export class FileTrack implements Track {
 
   private open(): void {
     const producer: Producer = new Producer(this.gateway, {
-      parameters: withSpace(parametersOf(this.settings, null, this.source.spacing), this.source),
+      parameters: withSource(parametersOf(this.settings, null, this.source.spacing), this.source),
       outputs: outputsFor(this.hasAttributes ? this.source.scalars : [], this.source.isSurface),
       labels: { from: 'viewer' },
     }, {
       opened: (opened) => this.opened(opened),
       next: (sequence) => this.next(sequence, producer),
-      frame: (frame, message) => this.frame(frame, message),
-      error: (error) => {
-        const sequence = Number(error.sequence);
-        this.refusals.set(sequence, `Frame ${this.labelOf(sequence)} is refused: ${sentence(error.message)}`);
+      frame: (sequence, frame, message) => this.frame(sequence, frame, message),
+      error: (sequence, message) => {
+        this.refusals.set(sequence, `Frame ${this.labelOf(sequence)} is refused: ${sentence(message)}`);
         this.answered(sequence);
       },
       ended: (status) => this.ended(status),
@@ -139,6 +138,11 @@ export class FileTrack implements Track {
   }
 
   private opened(opened: StreamOpened): void {
+    if (this.source.box && !opened.parameters?.box) {
+      this.close();
+      this.state = { kind: 'failed', text: 'The server does not support periodic boxes: use a newer one.' };
+      return;
+    }
     this.parameters = opened.parameters ?? null;
     this.streamId = opened.streamId;
     this.backoff.reset();
@@ -160,16 +164,17 @@ export class FileTrack implements Track {
     }
   }
 
-  private frame(frame: ReconstructedFrame, message: Uint8Array): void {
+  private frame(sequence: number, frame: ReconstructedFrame, message: Uint8Array): void {
     this.counts.received++;
-    const sequence = Number(frame.sequence);
     this.history.insert({
       sequence,
       time: frame.time,
       receivedAt: performance.now(),
       bytes: message.length,
       summary: summarise(frame, this.counts),
-      frame: () => decodeResult(parseResult(message), this.source.isSurface ? Output.SURFACE : undefined, 0),
+      frame: () => ({
+        ...decodeResult(parseResult(message), this.source.isSurface ? Output.SURFACE : undefined, 0), sequence: BigInt(sequence),
+      }),
     }, Math.max(1, (this.player.sequence ?? 1) - KEPT_BEHIND));
     this.answered(sequence);
   }

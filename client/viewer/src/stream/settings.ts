@@ -3,7 +3,7 @@ import {
   Boundary, CoordinateFormat, Fill, Output, OutputsSchema, Placement, ReconstructionParametersSchema,
   SectionSchema, Sizes, SlicePlaneSchema, WallSchema, type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
-import type { SpaceChoice } from '../input/options';
+import type { FrameSource } from '../input/source';
 import type { Method } from './track';
 
 /** Settings of a reconstruction. Null and UNSPECIFIED: the value of the stream. Lengths in spacings. */
@@ -153,8 +153,9 @@ export function methodWith(method: Method | null, { placement, fill }: Settings)
   };
 }
 
-/** Chooses surfaces of 3D particles, or the plane of their outline. The other planes are sections. */
-export function withSpace(parameters: ReconstructionParameters, { isSurface, slices }: SpaceChoice) {
+/** Sets the box. Chooses surfaces of 3D particles, or the plane of their outline. The other planes are sections. */
+export function withSource(parameters: ReconstructionParameters, { isSurface, slices, box }: FrameSource) {
+  parameters.box = box;
   const planes = slices.map(({ origin, normal }) => create(SlicePlaneSchema, {
     originX: origin[0], originY: origin[1], originZ: origin[2],
     normalX: normal[0], normalY: normal[1], normalZ: normal[2],

@@ -4,7 +4,9 @@ import { decodeResult } from '../protocol/decode';
 import type { Frame } from '../protocol/frame';
 import { particleChannels } from '../protocol/particles';
 import type { Gateway } from './gateway';
+import { NO_FRAME_BOXES } from './producer';
 import { outputsFor, parametersOf, settingsText, type Settings } from './settings';
+import { sentence } from './status';
 import type { Track } from './track';
 import { NO_PARTICLES } from './variant_stream';
 
@@ -53,6 +55,9 @@ export class Variant {
     const particles = await track.particlesOf(sequence);
     if (!particles) {
       throw new Error(NO_PARTICLES);
+    }
+    if (particles.box && !(await this.gateway.info()).capabilities.includes('frame-boxes')) {
+      throw new Error(sentence(NO_FRAME_BOXES));
     }
     const chosen = shareOf(particles, settings.share);
     const spacing = track.entryAt(sequence)?.frame().statistics.spacing ?? null;

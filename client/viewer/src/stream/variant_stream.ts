@@ -53,7 +53,7 @@ export class VariantStream implements CurveSource {
   /** Why the stream cannot go on, or empty. */
   private problem = '';
   private refusals = new Map<number, string>();
-  /** The track's sequences of sent frames, and the last one chosen. */
+  /** The track's sequences of frames given to the producer, and the last one chosen. */
   private sent: number[] = [];
   private last = 0;
   private first = 0;
@@ -158,10 +158,10 @@ export class VariantStream implements CurveSource {
           this.backoff.reset();
         },
         next: () => this.next(producer),
-        frame: (frame, message) => this.take(frame, message),
-        error: (error) => {
-          const sequence = this.sent[Number(error.sequence) - 1];
-          this.refusals.set(sequence, `Frame ${this.labelOf(sequence)} is refused: ${sentence(error.message)}`);
+        frame: (asked, frame, message) => this.take(this.sent[asked - 1], frame, message),
+        error: (asked, message) => {
+          const sequence = this.sent[asked - 1];
+          this.refusals.set(sequence, `Frame ${this.labelOf(sequence)} is refused: ${sentence(message)}`);
         },
         ended: (status) => { if (producer === this.producer) this.ended(status); },
       });
@@ -210,9 +210,8 @@ export class VariantStream implements CurveSource {
     return next !== null && hasCapacityFor(this.history, next, target) ? next : null;
   }
 
-  private take(result: ReconstructedFrame, message: Uint8Array): void {
+  private take(sequence: number, result: ReconstructedFrame, message: Uint8Array): void {
     this.counts.received++;
-    const sequence = this.sent[Number(result.sequence) - 1];
     const frame = () => ({
       ...decodeFrame(parseResult(message), this.track.parameters?.plane ?? 0), sequence: BigInt(sequence),
     });

@@ -89,7 +89,7 @@ export class WatchTrack implements Track {
 
   async particlesOf(sequence: number): Promise<Particles | null> {
     const frame = this.entryAt(sequence)?.message();
-    return frame && frame.particles.length > 0 ? echoedParticles(frame) : null;
+    return frame && frame.particles.length > 0 ? { ...echoedParticles(frame), box: frame.particleBox } : null;
   }
 
   refresh(): void {

@@ -5,7 +5,7 @@ import { button, byId, input, setText } from './dom';
 const fieldOf = (field: FileField) => input(`file-${field}`);
 const errorOf = (field: FileField) => byId(`file-${field}-error`, HTMLElement);
 
-/** The options of a file: spacing, columns, filter and plane, with the defaults that the file shows. */
+/** The options of a file: spacing, columns, filter, plane and periodic axes, with the defaults that the file shows. */
 export class FileForm {
   private readonly details = byId('file-details', HTMLDetailsElement);
   private file: FileInput | null = null;
@@ -39,9 +39,12 @@ export class FileForm {
     fieldOf('slice').placeholder = facts.slice || 'z=0';
     button('file-surface').hidden = facts.slice === '';
     byId('file-filters', HTMLDataListElement).replaceChildren(...facts.filters.map((filter) => new Option(filter, filter)));
+    const isNeeded: Partial<Record<FileField, boolean>> = {
+      spacing: true, slice: facts.slice !== '' || facts.columns === '', periodic: facts.hasBox,
+    };
     for (const field of FILE_FIELDS) {
       fieldOf(field).value = options[field];
-      const isOffered = field === 'spacing' || (field === 'slice' ? facts.slice !== '' || facts.columns === '' : !isRecording);
+      const isOffered = isNeeded[field] ?? !isRecording;
       for (const label of fieldOf(field).labels ?? []) label.hidden = !isOffered;
       fieldOf(field).hidden = !isOffered;
     }
