@@ -163,7 +163,8 @@ void ImportedStream::DeliverUpTo(std::uint64_t number) {
 void ImportedStream::Deliver(Published published) {
   if (published.number < next_number_) return;
   next_number_ = published.number + 1;
-  published.follows_loss = delivered_ != 0 && published.number != delivered_ + 1;
+  if (delivered_ != 0 && published.number != delivered_ + 1) last_loss_ = published.number;
+  published.last_loss = last_loss_;
   delivered_ = published.number;
   broadcaster_->PublishNumbered(std::move(published));
 }

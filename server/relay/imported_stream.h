@@ -90,6 +90,7 @@ class ImportedStream {
   std::vector<Ready> await_;
   std::uint64_t next_number_ = 0;  // Number of the next result to deliver; 0: unknown.
   std::uint64_t delivered_ = 0;    // Number of the last delivered result; 0: none.
+  std::uint64_t last_loss_ = 0;    // Published::last_loss of the last delivered result.
   std::map<std::uint64_t, Published> waiting_;
   std::size_t waiting_bytes_ = 0;
   relay::v1::Fetch fetch_;  // The latest fetch.

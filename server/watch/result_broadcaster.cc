@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace partiemc::server {
@@ -46,8 +47,9 @@ void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* forme
 
 std::vector<Published> ResultBroadcaster::HandOver() {
   std::vector<Published> frames;
+  std::vector<Published> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  Collect();
+  dropped = Collect();
   if (!history_) return frames;
   frames.reserve(history_->size());
   for (std::size_t k = 0; k < history_->size(); ++k) frames.push_back(history_->at(k));
@@ -68,8 +70,9 @@ bool ResultBroadcaster::Post(Published published) {
   mailbox_.Put(std::move(published));
   // If another thread holds the lock, that thread or the next call of Publish collects this frame.
   if (mutex_.TryLock()) {
+    std::vector<Published> dropped;  // Freed without the lock.
     const MutexLock lock(mutex_, std::adopt_lock);
-    Collect();
+    dropped = Collect();
   }
   // Reads the count again: a watcher that joined after the check above may have found the mailbox
   // empty, so the caller must call Announce.
@@ -95,12 +98,13 @@ void ResultBroadcaster::End(WatchEnd end) {
 ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMachine> watcher,
                                                   std::optional<std::uint64_t> from) {
   Joined joined;
+  std::vector<Published> dropped;  // Freed without the lock.
   {
     const MutexLock lock(mutex_);
     // Counts the watcher first: from now on, all published results are offered to watchers.
     ++watcher_count_;
     watchers_.push_back(std::move(watcher));
-    Collect();
+    dropped = Collect();
     joined.last_number = collected_;
     if (newest_.frame != nullptr) {
       joined.held = {.any = true, .oldest = oldest_sequence(), .newest = newest_.sequence};
@@ -118,7 +122,7 @@ ResultBroadcaster::Joined ResultBroadcaster::Join(std::shared_ptr<WatchStateMach
 
 void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   std::shared_ptr<WatchStateMachine> left;  // Released after the lock, like the frames.
-  std::vector<Published> news;
+  std::vector<Published> news, dropped;
   Published newest;
   const MutexLock lock(mutex_);
   const auto found = std::ranges::find_if(
@@ -129,42 +133,47 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   if (--watcher_count_ != 0) return;
   news = TakeNews();
   newest = newest_;
-  Collect();
+  dropped = Collect();
 }
 
 Published ResultBroadcaster::Held(std::uint64_t number) {
+  std::vector<Published> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  if (number > collected_) Collect();  // The dispatcher may not have collected it yet.
+  if (number > collected_) dropped = Collect();  // The dispatcher may not have collected it yet.
   const Published* const held = history_ ? history_->FromNumber(number) : nullptr;
   return held != nullptr ? *held : Published();
 }
 
 Published ResultBroadcaster::HeldFrom(std::uint64_t sequence) {
+  std::vector<Published> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  Collect();
+  dropped = Collect();
   const Published* const held = history_ ? history_->FromSequence(sequence) : nullptr;
   if (held != nullptr) return *held;
   return newest_.frame != nullptr && newest_.sequence >= sequence ? newest_ : Published();
 }
 
 Published ResultBroadcaster::Newest() {
+  std::vector<Published> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  Collect();
+  dropped = Collect();
   return newest_;
 }
 
 std::uint64_t ResultBroadcaster::LastNumber() {
+  std::vector<Published> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  Collect();
+  dropped = Collect();
   return collected_;
 }
 
-void ResultBroadcaster::Collect() {
-  mailbox_.Take([this](Published published) {
+std::vector<Published> ResultBroadcaster::Collect() {
+  std::vector<Published> dropped;
+  mailbox_.Take([&](Published published) {
     mutex_.AssertHeld();
     collected_ = published.number;
     if (history_) history_->Add(published);
-    if (!watchers_.empty()) AddNews(published);
+    if (!watchers_.empty()) AddNews(published, dropped);
     newest_ = std::move(published);
   });
   const bool is_in_history = history_ && !history_->empty();
@@ -173,11 +182,12 @@ void ResultBroadcaster::Collect() {
     newest_ = {};
   }
   NoteOldest();
+  return dropped;
 }
 
-void ResultBroadcaster::AddNews(const Published& published) {
+void ResultBroadcaster::AddNews(const Published& published, std::vector<Published>& dropped) {
   if (!news_.empty() && news_bytes_ + published.pending_bytes() > limits_.mailbox_bytes) {
-    TakeNews();
+    std::ranges::move(TakeNews(), std::back_inserter(dropped));
   }
   news_.push_back(published);
   news_bytes_ += published.pending_bytes();
@@ -193,13 +203,13 @@ void ResultBroadcaster::NoteOldest() {
 }
 
 void ResultBroadcaster::Serve() {
-  std::vector<Published> news;
+  std::vector<Published> news, dropped;
   std::vector<std::shared_ptr<WatchStateMachine>> watchers;
   std::optional<WatchEnd> end;
   {
     const MutexLock lock(mutex_);
     if (history_) history_->Shrink();
-    Collect();
+    dropped = Collect();
     news = TakeNews();
     watchers = watchers_;
     end = end_;

@@ -105,9 +105,13 @@ class ResultBroadcaster final : public Dispatched {
   [[nodiscard]] bool Post(Published published) ABSL_LOCKS_EXCLUDED(mutex_);
   void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  void Collect() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Adds a frame to news_. Drops the older ones if they exceed `mailbox_bytes` together with it.
-  void AddNews(const Published& published) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Takes the frames of the mailbox. Returns the frames that were dropped from news_. The caller
+  // frees them without the lock, because they may be large.
+  [[nodiscard]] std::vector<Published> Collect() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Adds a frame to news_. Moves the older ones to `dropped` if they exceed `mailbox_bytes`
+  // together with it.
+  void AddNews(const Published& published, std::vector<Published>& dropped)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::vector<Published> TakeNews() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void NoteOldest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   template <typename Action>

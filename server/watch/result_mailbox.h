@@ -37,7 +37,10 @@ struct Published {
   std::shared_ptr<const WatchFrame> frame;
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< Sequence number of the producer's frame.
-  bool follows_loss = false;   ///< Results before it were lost on their way between servers.
+  /// Number of the newest result, up to this one, directly before which results were lost on their
+  /// way between servers. 0: none were lost. Later results repeat it, so that a watcher finds the
+  /// loss even if the result after the loss is dropped.
+  std::uint64_t last_loss = 0;
 
   /// Bytes that count while the result waits for its delivery. Requires: `frame` is not null.
   std::size_t pending_bytes() const { return frame->bytes() + kPublishedBytes; }

@@ -138,6 +138,7 @@ void WatchStateMachine::Offer(std::span<const Published> frames) {
 void WatchStateMachine::Take(const Published& published) {
   if (offered_ == 0) next_told_ = published.number;
   const std::uint64_t missed = offered_ == 0 ? 0 : published.number - offered_ - 1;
+  const bool is_lost = missed > 0 && published.last_loss > offered_;
   offered_ = published.number;
   counts_.dropped += missed;
   const std::size_t bytes = published.pending_bytes();
@@ -150,7 +151,7 @@ void WatchStateMachine::Take(const Published& published) {
   } else if (missed > 0 || held_bytes_ + bytes > max_bytes_) {
     if (missed == 0 && LeaveToHistory(published)) return;
     ++counts_.dropped;
-    if (missed > 0 && published.follows_loss) {
+    if (is_lost) {
       state_.phase = Phase::kEnding;
       end_ = WatchEnd::ResultsLost(missed);
       return;

@@ -65,5 +65,20 @@ TEST_F(Imported, IgnoresNumbersWithoutASuccessor) {
   EXPECT_TRUE(stream_.ended());
 }
 
+TEST_F(Imported, ResultsRepeatTheNumberOfTheLastLoss) {
+  const auto last_loss = [&] {
+    dispatcher_.Flush();
+    return stream_.broadcaster()->Newest().last_loss;
+  };
+  Receive(7);
+  EXPECT_EQ(last_loss(), 0u);
+  Receive(9);  // The owner's history begins with this result.
+  EXPECT_EQ(last_loss(), 9u);
+  Receive(10);
+  EXPECT_EQ(last_loss(), 9u);
+  Receive(13);
+  EXPECT_EQ(last_loss(), 13u);
+}
+
 }  // namespace
 }  // namespace partiemc::server
