@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/cancellation.h"
+#include "bins/bins.h"
 #include "bins/resolution.h"
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
@@ -93,6 +94,10 @@ absl::Status PrepareWalls(const Frame& given, const ReconstructionParameters& pa
   if (!prepared.lengths) return absl::OkStatus();
   const double spacing = prepared.lengths->spacing;
   // Checks the frame as given, so that errors name the caller's numbers of particles.
+  Scale scale;
+  scale.cell_size = prepared.lengths->cell_size;
+  status = CheckDistances(given, parameters.plane, scale);
+  if (!status.ok()) return status;
   Doubts of_volumes;
   if (auto lightest = LightestVolume(given, spacing * spacing, of_volumes); !lightest.ok()) {
     return lightest.status();

@@ -369,6 +369,19 @@ TEST(Walls, CoarsePositionsOfFluidAndWallsAreRefused) {
   EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange) << status;
 }
 
+TEST(Walls, DistantFluidAndWallsAreNamedByTheGivenIndex) {
+  Particles particles = support::Lattice(26, 17, -2.5, -1.5);
+  for (std::size_t k = 0; k < particles.size(); ++k) particles.phases.push_back(k % 2 ? 2 : 1);
+  const ReconstructionParameters parameters{.spacing = 1.0, .wall_phases = {2}};
+  for (const std::size_t distant : {301u, 200u}) {
+    particles.xy[2 * distant + 1] = -2e9;
+    const auto violation = support::RefusalOf(parameters, particles);
+    ASSERT_TRUE(violation.has_value());
+    EXPECT_EQ(violation->field, "positions[" + std::to_string(distant) + "].y");
+    EXPECT_EQ(violation->value, "-2e+09");
+  }
+}
+
 TEST(Walls, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
   for (const std::uint64_t seed : {3u, 8u, 21u}) {
     Random random(seed);

@@ -6,7 +6,9 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -228,22 +230,7 @@ void SetOffsets(ParticleBins& bins) {
 // The error of a frame that cannot be binned: its first particle too far from the origin, else too
 // many tiles.
 absl::Status Refusal(const Frame& frame, Plane plane, const Scale& scale, std::size_t max_tiles) {
-  const double units_per_world = UnitsPerWorld(scale);
-  const Axes axes = AxesOf(frame, plane);
-  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
-    const Point position = PositionOf(frame, plane, k);
-    for (const auto& [axis, value] :
-         {std::pair(axes.first, position.x), std::pair(axes.second, position.y)}) {
-      if (IsNearOrigin(value * units_per_world)) continue;
-      // In the caller's frame, a particle of a slab has another index and other axes, so neither is
-      // named.
-      return InvalidFrame(kReasonOutOfRange,
-                          scale.is_slice ? "positions" : CoordinateField("positions", k, axis),
-                          ShortestNumber(value),
-                          absl::StrCat("must be within 2^30 cells of ",
-                                       ShortestNumber(scale.cell_size), " from the origin"));
-    }
-  }
+  if (absl::Status status = CheckDistances(frame, plane, scale); !status.ok()) return status;
   return ViolationError(
       absl::StatusCode::kResourceExhausted,
       {std::string(kReasonTooManyTiles), "positions",
@@ -273,6 +260,34 @@ void ParticleBins::Clear() {
   weight.clear();
   height.clear();
   size.clear();
+}
+
+absl::Status CheckDistances(const Frame& frame, Plane plane, const Scale& scale) {
+  const double units_per_world = UnitsPerWorld(scale);
+  const auto find_far = [&](const auto& reader) -> std::optional<std::size_t> {
+    for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
+      const Point position = reader[k];
+      if (!IsNearOrigin(position.x * units_per_world) ||
+          !IsNearOrigin(position.y * units_per_world)) {
+        return k;
+      }
+    }
+    return std::nullopt;
+  };
+  const std::optional<std::size_t> far = VisitPositions(frame, plane, find_far);
+  if (!far) return absl::OkStatus();
+  const Axes axes = AxesOf(frame, plane);
+  const Point position = PositionOf(frame, plane, *far);
+  const bool is_first = !IsNearOrigin(position.x * units_per_world);
+  // In the caller's frame, a particle of a slab has another index and other axes, so neither is
+  // named.
+  return InvalidFrame(kReasonOutOfRange,
+                      scale.is_slice
+                          ? "positions"
+                          : CoordinateField("positions", *far, is_first ? axes.first : axes.second),
+                      ShortestNumber(is_first ? position.x : position.y),
+                      absl::StrCat("must be within 2^30 cells of ", ShortestNumber(scale.cell_size),
+                                   " from the origin"));
 }
 
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,

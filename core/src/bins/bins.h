@@ -68,10 +68,14 @@ struct ParticleBins {
   void Clear();
 };
 
+/// Checks that all particles are within 2^30 cells of the origin. `scale`: `cell_size` and
+/// `is_slice` are set. Errors: INVALID_ARGUMENT with a Violation that names the first other
+/// particle. Cost: linear, serial.
+absl::Status CheckDistances(const Frame& frame, Plane plane, const Scale& scale);
+
 /// Sorts the particles of a checked frame by tile, in the order of the frame within a tile.
 /// Parallel over stretches of the frame: count, prefix sum, fill. Deterministic. Cost: linear.
-/// Errors with a Violation: INVALID_ARGUMENT (a particle more than 2^30 cells from the origin),
-/// RESOURCE_EXHAUSTED (more tiles than allowed).
+/// Errors with a Violation: as CheckDistances; RESOURCE_EXHAUSTED (more tiles than allowed).
 absl::Status BinParticles(const Frame& frame, Plane plane, const Scale& scale,
                           const FrameLimits& limits, ParticleBins& bins);
 
