@@ -1,8 +1,8 @@
 #include "fuzz/readers.h"
 
 #include "absl/strings/match.h"
+#include "client/input/base/pickle.h"
 #include "client/input/formats/formats.h"
-#include "client/input/formats/pickle.h"
 #include "client/input/plane.h"
 #include "fuzz/choices.h"
 #include "fuzz/memory_file.h"

@@ -202,6 +202,15 @@ herr_t AddMember(hid_t /*group*/, const char* name, const H5L_info_t* /*info*/, 
 
 }  // namespace
 
+std::string JoinPath(std::string_view group, std::string_view name) {
+  return group.empty() ? std::string(name) : Concat(group, "/", name);
+}
+
+std::string ParentOf(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
 absl::StatusOr<std::shared_ptr<const Hdf5File>> Hdf5File::Open(const std::string& path,
                                                                double max_expansion) {
   const auto file = OpenFile(path);

@@ -6,12 +6,18 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "client/input/base/particle_rows.h"
 
 namespace partiemc::client::input {
+
+/// The path of a member of a group, "" for the root.
+std::string JoinPath(std::string_view group, std::string_view name);
+/// The group of a path.
+std::string ParentOf(const std::string& path);
 
 /// A dataset of numbers with one or two extents.
 struct Hdf5Array {

@@ -6,9 +6,9 @@
 
 #include "absl/strings/str_join.h"
 #include "client/input/base/little_endian.h"
+#include "client/input/base/pickle.h"
 #include "client/input/base/text.h"
 #include "client/input/formats/npy.h"
-#include "client/input/formats/pickle.h"
 
 namespace partiemc::client::input {
 namespace {

@@ -2,9 +2,9 @@
 // files of the programs' own libraries.
 #include <cstring>
 
+#include "client/input/base/pickle.h"
 #include "client/input/collection.h"
 #include "client/input/fixtures.h"
-#include "client/input/formats/pickle.h"
 
 namespace partiemc::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/input/formats/pickle.h"
+#include "client/input/base/pickle.h"
 
 #include <algorithm>
 #include <bit>
