@@ -194,10 +194,16 @@ absl::Status CheckStoredNumbers(hid_t dataset, const Hdf5Array& array, const std
                                     "; write smaller chunks"));
 }
 
+struct MemberList {
+  std::size_t most = 0;
+  std::vector<std::string> names;
+};
+
 herr_t AddMember(hid_t /*group*/, const char* name, const H5L_info_t* /*info*/, void* members) {
-  auto& names = *static_cast<std::vector<std::string>*>(members);
-  names.emplace_back(name);
-  return names.size() > kMaxHdf5Members ? 1 : 0;
+  auto& list = *static_cast<MemberList*>(members);
+  if (list.names.size() >= list.most) return 1;
+  list.names.emplace_back(name);
+  return 0;
 }
 
 }  // namespace
@@ -231,19 +237,26 @@ Hdf5File::~Hdf5File() {
 }
 
 absl::StatusOr<std::vector<std::string>> Hdf5File::Members(const std::string& group) const {
-  const MutexLock lock(LibraryMutex());
-  Silence();
-  std::vector<std::string> names;
-  if (KindOf(id_, group) != H5O_TYPE_GROUP) return names;
-  const Handle opened(H5Gopen2(id_, group.empty() ? "/" : group.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!opened.ok()) return names;
-  H5Literate(opened.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, AddMember, &names);
-  if (names.size() > kMaxHdf5Members) {
+  Hdf5Members members = FirstMembers(group, kMaxHdf5Members + 1);
+  if (members.names.size() > kMaxHdf5Members) {
     return absl::DataLossError(Concat(path_, ": the group '", group, "' has more than ",
                                       kMaxHdf5Members, " members; divide the file"));
   }
-  std::sort(names.begin(), names.end(), NaturalLess);
-  return names;
+  return std::move(members.names);
+}
+
+Hdf5Members Hdf5File::FirstMembers(const std::string& group, std::size_t most) const {
+  const MutexLock lock(LibraryMutex());
+  Silence();
+  if (KindOf(id_, group) != H5O_TYPE_GROUP) return {};
+  const Handle opened(H5Gopen2(id_, group.empty() ? "/" : group.c_str(), H5P_DEFAULT), H5Gclose);
+  H5G_info_t info;
+  if (!opened.ok() || H5Gget_info(opened.id(), &info) < 0) return {};
+  MemberList list{.most = most};
+  H5Literate(opened.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, AddMember, &list);
+  std::sort(list.names.begin(), list.names.end(), NaturalLess);
+  const std::uint64_t count = std::max<std::uint64_t>(list.names.size(), info.nlinks);
+  return {std::move(list.names), count};
 }
 
 bool Hdf5File::IsGroup(const std::string& path) const {

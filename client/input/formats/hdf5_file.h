@@ -2,6 +2,7 @@
 // one lock.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -26,6 +27,12 @@ struct Hdf5Array {
   std::size_t components = 1;
 };
 
+/// Some members of a group.
+struct Hdf5Members {
+  std::vector<std::string> names;  ///< In natural order.
+  std::uint64_t count = 0;         ///< Number of all members of the group.
+};
+
 /// A file. Paths have the form "group/dataset". Only hard links are followed, and virtual datasets
 /// and external data are refused, so no other file is read.
 class Hdf5File {
@@ -40,6 +47,10 @@ class Hdf5File {
   /// Names of the members of a group, "" for the root, in natural order. Empty if there is no such
   /// group. Errors: kDataLoss if it has more than 2^20 members.
   absl::StatusOr<std::vector<std::string>> Members(const std::string& group) const;
+
+  /// The first `most` members of a group in the order of the file, "" for the root. Empty if there
+  /// is no such group.
+  Hdf5Members FirstMembers(const std::string& group, std::size_t most) const;
 
   bool IsGroup(const std::string& path) const;
 

@@ -289,21 +289,34 @@ class Hdf5Survey {
                Listed()));
   }
 
-  // Lists the first datasets of numbers of the file, for messages.
+  // Lists the first datasets of numbers of the file, for messages. If a group has too many members
+  // to visit them all, says how many more it has.
   std::string Listed() const {
     std::vector<std::string> found, queue = {""};
-    for (std::size_t k = 0; k < queue.size() && queue.size() < kMaxVisited; ++k) {
+    std::optional<std::string> large;
+    Hdf5Members of_large;
+    for (std::size_t k = 0; k < queue.size() && found.size() < kMaxListed; ++k) {
+      const std::string path = queue[k];
       // The depth is limited, because hard links can form cycles.
-      if (std::ranges::count(queue[k], '/') > kMostLevels) continue;
-      if (!queue[k].empty() && file_.Describe(queue[k])) found.push_back(queue[k]);
-      if (found.size() == kMaxListed) return Concat(absl::StrJoin(found, ", "), ", ...");
-      const auto names = file_.Members(queue[k]);
-      if (!names.ok()) continue;
-      for (const std::string& name : *names) {
-        queue.push_back(JoinPath(queue[k], name));
+      if (std::ranges::count(path, '/') > kMostLevels) continue;
+      if (!path.empty() && file_.Describe(path)) {
+        found.push_back(path);
+        continue;
       }
+      Hdf5Members members = file_.FirstMembers(path, kMaxVisited - queue.size());
+      for (const std::string& name : members.names) queue.push_back(JoinPath(path, name));
+      if (large || members.count < kMaxVisited) continue;
+      large = path;
+      of_large = std::move(members);
     }
-    return found.empty() ? "none" : absl::StrJoin(found, ", ");
+    std::string text = found.empty() ? "none" : absl::StrJoin(found, ", ");
+    if (found.size() == kMaxListed) text += ", ...";
+    if (!large) return text;
+    const auto listed = static_cast<std::uint64_t>(std::ranges::count(found, *large, ParentOf));
+    if (found.empty()) text += Concat(" of the first ", of_large.names.size(), " members");
+    const std::uint64_t seen = found.empty() ? of_large.names.size() : listed;
+    const std::string group = large->empty() ? "the root group" : Concat("the group ", *large);
+    return Concat(text, "; ", group, " has ", of_large.count - seen, " more members");
   }
 
   const Hdf5File& file_;

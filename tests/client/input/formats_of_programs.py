@@ -314,6 +314,24 @@ class Formats(unittest.TestCase):
         self.assertEqual(refused.returncode, 3)
         self.assertIn("PartType0/Coordinates", refused.stderr)
 
+    def test_members_of_a_large_hdf5_group_are_listed_in_part(self):
+        def listed(group, others):
+            with h5py.File(self.folder / "a.h5", "w", libver="latest") as file:
+                file["other/sizes"] = [1.0, 2.0]
+                file.require_group(group)
+                for k in range(others):
+                    file[group][f"p{k}"] = file["other/sizes"]  # A hard link.
+            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local", "--columns", "g/x,g/y"],
+                                 capture_output=True, text=True, preexec_fn=limit_memory)
+            self.assertEqual(ran.returncode, 3, ran.stderr)
+            return ran.stderr.splitlines()[-1].split("the datasets are ")[1]
+
+        self.assertEqual(listed("/", 2), "p0, p1, other/sizes")
+        many = listed("/", 12_000)
+        self.assertRegex(many, r"^p\d+(, p\d+){11}, \.\.\.; the root group has 11989 more members$")
+        nested = listed("many", 12_000)
+        self.assertRegex(nested, r"^many/p\d+(, many/p\d+){11}, \.\.\.; the group many has 11988 more members$")
+
     def test_hdf5_that_leads_out_of_the_file_or_lies(self):
         hidden = self.folder / "hidden.h5"
         with h5py.File(hidden, "w") as file:
