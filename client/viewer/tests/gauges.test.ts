@@ -62,6 +62,14 @@ test('a wrong gauge says what is wrong', () => {
     ['a=contact:0,0,1,0,0', /reach must be above 0/], ['a=toString:1', /one of height/],
   ];
   for (const [text, message] of wrong) assert.throws(() => parseGauge(text), message, text);
+  for (const number of ['0x10', ' 1', '1 ', '+1', '1e', '.', 'inf', 'nan', '1e400', '1e-400', '1.1e69', '']) {
+    assert.throws(() => parseGauge(`a=height:${number}`), /height must have the numbers x\./, number);
+  }
+  for (const [number, value] of [['-1.5e3', -1500], ['5.', 5], ['.5', 0.5], ['1E5', 1e5], ['1e39', 1e39], ['-1e69', -1e69], ['0e9', 0]] as const) {
+    assert.deepEqual(parseGauge(`a=height:${number}`).numbers, [value]);
+  }
+  assert.throws(() => parseGauge('a=front:1e-61,0'), /direction must not be zero/);
+  assert.throws(() => parseGauge(' a=height:1'), /1 to 40 of letters/);
   assert.deepEqual(columnsOf(parseGauge('a=wetted:0,0,1,0')), ['a']);
   assert.deepEqual(columnsOf(parseGauge('a=repose')), ['a_left_angle', 'a_right_angle']);
 });

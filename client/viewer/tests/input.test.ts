@@ -7,7 +7,7 @@ import { parseTimes } from '../src/input/csv';
 import { inspectFiles } from '../src/input/drop';
 import { parseLammpsFrame } from '../src/input/lammps';
 import { naturalOrder } from '../src/input/natural_order';
-import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices } from '../src/input/options';
+import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices, parseSpacing } from '../src/input/options';
 import { RecordingSource } from '../src/input/recording';
 import { shareOf } from '../src/input/share';
 import { InputError } from '../src/input/source';
@@ -80,7 +80,10 @@ test('3D particles are read as surfaces, with planes as sections', async () => {
   assert.deepEqual(parseSlices('surface'), { isSurface: true, slices: [] });
   const both = parseSlices('z=1; surface');
   assert.deepEqual([both.isSurface, both.slices.map(({ origin }) => origin)], [true, [[0, 0, 1]]]);
-  assert.throws(() => parseSlices('surfaces'), FieldError);
+  for (const wrong of ['surfaces', 'z= 1', 'z=0x10', 'z=1e70', 'z=', '0,0,0,0,0,1e-61', '0,0,0,0,0, 1', '0,0,0,0,0x1,1']) {
+    assert.throws(() => parseSlices(wrong), /Write a plane as x=C/, wrong);
+  }
+  assert.deepEqual(parseSlices('0,0,-1e69,0,0,.5').slices, [{ origin: [0, 0, -1e69], normal: [0, 0, 0.5] }]);
   const ball = file('a.csv', 'x,y,z\n0,1,2\n3,4,0\n');
   const source = await openDropped([ball], { ...NO_OPTIONS, slice: 'surface', spacing: '1' });
   assert.ok(source.isSurface);
@@ -89,6 +92,13 @@ test('3D particles are read as surfaces, with planes as sections', async () => {
   await assert.rejects(openDropped([ball], { ...NO_OPTIONS, slice: 'surface' }), fieldOf('spacing'));
   const flat = openDropped([file('a.csv', 'x,y\n0,1\n')], { ...NO_OPTIONS, slice: 'surface', spacing: '1' });
   await assert.rejects(flat, fieldOf('slice'));
+});
+
+test('a spacing is a decimal number that the server accepts', () => {
+  for (const wrong of ['0x10', ' 1', '0', '-1', '1e61', '1e-61', 'wide']) {
+    assert.throws(() => parseSpacing(wrong), /must be a positive length/, wrong);
+  }
+  assert.deepEqual(['', ' ', '1e39', '.5'].map(parseSpacing), [null, null, 1e39, 0.5]);
 });
 
 test('duplicate ids are dropped, text in numbers is refused', async () => {

@@ -97,8 +97,10 @@ test('walls and sizes of the settings replace those of the stream', () => {
   assert.deepEqual([parameters.sizes, parameters.boundary], [Sizes.OWN, Boundary.GRAINS]);
   assert.equal(parametersOf({ ...AS_STREAMED, sizes: 'equal' }, base, 1).sizes, Sizes.EQUAL);
   assert.equal(parametersOf(AS_STREAMED, base, 1).sizes, Sizes.OWN);
-  for (const wrong of ['1,2,3', '1,2,3,4,5', '1,2,3,x', '1,2']) assert.throws(() => parseWalls(wrong), /two points or more/);
+  for (const wrong of ['1,2,3', '1,2,3,4,5', '1,2,3,x', '1,2', '1,2,3,0x10', '0,0,1,', '0,0,1,1e61', '0,0,1,1e-61']) assert.throws(() => parseWalls(wrong), /two points or more/);
   assert.equal(parseWalls('  '), null);
+  assert.deepEqual(parseWalls('-1e60,0,.5,1e39'), [[-1e60, 0, 0.5, 1e39]]);
+  assert.deepEqual(parseSettings('kernel:0x3;cell: 1'), AS_STREAMED);
   assert.deepEqual(parseSettings('walls:1,2;sizes:large'), AS_STREAMED);
 });
 

@@ -1,4 +1,5 @@
 // Kinds of gauges and their text form, as in core/GAUGES.md.
+import { LEAST_LENGTH, MOST_OF_PLANES, parseDecimal } from '../input/number_text';
 
 interface Kind {
   numbers: readonly string[];
@@ -34,25 +35,25 @@ export function columnsOf(gauge: Gauge): string[] {
 
 /** Parses `level=height:0.5`. Throws an Error that names the rule. */
 export function parseGauge(text: string): Gauge {
-  const [, name, kind, rest] = /^([^=]*)=([^:]*)(?::(.*))?$/.exec(text.trim()) ?? [];
+  const [, name, kind, rest] = /^([^=]*)=([^:]*)(?::(.*))?$/.exec(text) ?? [];
   if (name === undefined) throw new Error('A gauge has the form NAME=KIND:NUMBERS, such as level=height:0.5.');
   if (!/^\w{1,40}$/.test(name)) throw new Error('The name must have 1 to 40 of letters, digits and _.');
   if (!Object.hasOwn(KINDS, kind)) throw new Error(`The kind must be one of ${Object.keys(KINDS).join(', ')}.`);
-  const gauge = { name, kind: kind as KindName, numbers: (rest === undefined ? [] : rest.split(',')).map(numberOf) };
+  const gauge = { name, kind: kind as KindName, numbers: (rest === undefined ? [] : rest.split(',')).map(parseDecimal) };
   const wanted = kindOf(gauge).numbers;
-  if (gauge.numbers.length !== wanted.length || gauge.numbers.some((value) => !Number.isFinite(value))) {
+  if (gauge.numbers.length !== wanted.length || !gauge.numbers.every((value) => Math.abs(value) <= MOST_OF_PLANES)) {
     throw new Error(wanted.length === 0 ? `${kind} has no numbers.` : `${kind} must have the numbers ${wanted.join(',')}.`);
   }
   checkShape(gauge);
   return gauge;
 }
 
-const numberOf = (text: string) => (text.trim() === '' ? NaN : Number(text));
+const isShort = (x: number, y: number) => !(Math.sqrt(x * x + y * y) >= LEAST_LENGTH);
 
 function checkShape({ kind, numbers: [a, b, c, d, reach] }: Gauge): void {
-  if (kind === 'front' && a === 0 && b === 0) throw new Error('The direction must not be zero.');
-  if (kind === 'wetted' && a === c && b === d) throw new Error('The ends must differ.');
+  if (kind === 'front' && isShort(a, b)) throw new Error('The direction must not be zero.');
+  if (kind === 'wetted' && isShort(c - a, d - b)) throw new Error('The ends must differ.');
   if (kind === 'box' && !(a < c && b < d)) throw new Error('max_x and max_y must be above min_x and min_y.');
-  if (kind === 'contact' && c === 0 && d === 0) throw new Error('The direction must not be zero.');
+  if (kind === 'contact' && isShort(c, d)) throw new Error('The direction must not be zero.');
   if (kind === 'contact' && !(reach > 0)) throw new Error('reach must be above 0.');
 }

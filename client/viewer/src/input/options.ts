@@ -1,5 +1,6 @@
 // The options of opening files: the same texts as the options of `partiemc replay`.
 import type { SectionPlane } from '../protocol/sections';
+import { LEAST_LENGTH, MOST_OF_PLANES, MOST_OF_WALLS, parseDecimal } from './number_text';
 import { InputError } from './source';
 
 export const FILE_FIELDS = ['spacing', 'columns', 'select', 'slice', 'periodic'] as const;
@@ -31,7 +32,7 @@ export class FieldError extends InputError {
   constructor(readonly field: FileField, message: string) { super(message); }
 }
 
-/** A condition on a column. */
+/** A condition on a column. `number`: NaN if the text is no number. */
 export interface Condition { column: string; text: string; number: number }
 
 /** The options that choose columns and rows. */
@@ -52,7 +53,7 @@ export function parseRequest({ columns, select }: FileOptions): ColumnRequest {
       if (at < 1 || column === '' || value === '') {
         throw new FieldError('select', 'Write a column and its value, for example type=1.');
       }
-      return { column, text: value, number: Number(value) };
+      return { column, text: value, number: parseDecimal(value.replace(/^\+(?!-)/, '')) };
     }),
   };
 }
@@ -64,8 +65,8 @@ function listOf(text: string): string[] {
 /** A length in world units; null for the default. Throws FieldError. */
 export function parseSpacing(text: string): number | null {
   if (text.trim() === '') return null;
-  const value = Number(text);
-  if (!(Number.isFinite(value) && value > 0)) {
+  const value = parseDecimal(text);
+  if (!(value >= LEAST_LENGTH && value <= MOST_OF_WALLS)) {
     throw new FieldError('spacing', 'The spacing must be a positive length, for example 0.02.');
   }
   return value;
@@ -100,19 +101,24 @@ export function checkSpacing({ isSurface, slices }: SpaceChoice, spacing: number
 }
 
 function planeOf(text: string): SectionPlane | null {
-  const [, axis, at] = /^([xyz])\s*=\s*(\S+)$/.exec(text) ?? [];
+  const [, axis, at] = /^([xyz])=(.*)$/.exec(text) ?? [];
   if (axis) {
     const k = 'xyz'.indexOf(axis);
     const place = [0, 0, 0];
-    place[k] = Number(at);
+    place[k] = parseDecimal(at);
     // With this sign of the normal, the picture has the two other axes in alphabetical order.
     const normal = [0, 0, 0];
     normal[k] = axis === 'y' ? -1 : 1;
-    return Number.isFinite(place[k]) ? { origin: triple(place), normal: triple(normal) } : null;
+    return isOfPlanes(place[k]) ? { origin: triple(place), normal: triple(normal) } : null;
   }
-  const numbers = text.split(',').map((part) => part.trim() === '' ? NaN : Number(part));
-  const isPlane = numbers.length === 6 && numbers.every(Number.isFinite) && numbers.slice(3).some((part) => part !== 0);
+  const numbers = text.split(',').map(parseDecimal);
+  const isPlane = numbers.length === 6 && numbers.every(isOfPlanes) &&
+    numbers.slice(3).some((part) => Math.abs(part) >= LEAST_LENGTH);
   return isPlane ? { origin: triple(numbers), normal: triple(numbers.slice(3)) } : null;
+}
+
+function isOfPlanes(value: number): boolean {
+  return Math.abs(value) <= MOST_OF_PLANES;
 }
 
 function triple([x, y, z]: number[]): [number, number, number] {

@@ -3,6 +3,7 @@ import {
   Boundary, CoordinateFormat, Fill, Output, OutputsSchema, Placement, ReconstructionParametersSchema,
   SectionSchema, Sizes, SlicePlaneSchema, WallSchema, type ReconstructionParameters,
 } from '@proto/v1/reconstruction_pb';
+import { LEAST_LENGTH, MOST_OF_WALLS, parseDecimal } from '../input/number_text';
 import type { FrameSource } from '../input/source';
 import type { Method } from './track';
 
@@ -67,11 +68,11 @@ export function wallsText(walls: readonly number[][] | null): string {
 
 /** The inverse of wallsText; null without walls. Throws if a wall does not have two points or more. */
 export function parseWalls(text: string): number[][] | null {
-  const walls = text.split(/\s+/).filter((wall) => wall !== '').map((wall) => wall.split(',').map(numberOf));
-  if (walls.some((points) => points.length < 4 || points.length % 2 !== 0 || points.includes(null))) {
+  const walls = text.split(/\s+/).filter((wall) => wall !== '').map((wall) => wall.split(',').map(parseDecimal));
+  if (walls.some((points) => points.length < 4 || points.length % 2 !== 0 || !points.every(isOfWalls))) {
     throw new Error('Each wall must have two points or more: 0,0,1,0 is the line through (0, 0) and (1, 0).');
   }
-  return walls.length > 0 ? walls as number[][] : null;
+  return walls.length > 0 ? walls : null;
 }
 
 /** Name of a placement or fill on the command line. */
@@ -101,8 +102,14 @@ export function settingsText(settings: Settings): string {
 }
 
 function numberOf(text: string | undefined): number | null {
-  const value = text ? Number(text) : NaN;
-  return Number.isFinite(value) ? value : null;
+  const value = parseDecimal(text ?? '');
+  return Number.isNaN(value) ? null : value;
+}
+
+/** Whether a point of a wall may have this coordinate. NaN: no. */
+function isOfWalls(value: number): boolean {
+  const magnitude = Math.abs(value);
+  return magnitude === 0 || (magnitude >= LEAST_LENGTH && magnitude <= MOST_OF_WALLS);
 }
 
 /** Settings for the user: `placement qef, fill none`. */
