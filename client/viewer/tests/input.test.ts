@@ -94,6 +94,17 @@ test('3D particles are read as surfaces, with planes as sections', async () => {
   await assert.rejects(flat, fieldOf('slice'));
 });
 
+test('columns with names that the server refuses are no scalars', async () => {
+  const long = 'n'.repeat(65);
+  const source = await openDropped([file('a.csv', `x,y,Größe,${long},p,p,q\n0,0,1,1,2,3,4\n1,0,1,1,2,3,4\n`)]);
+  assert.deepEqual(source.scalars, ['p', 'q']);
+  const { scalars } = await source.frame(0);
+  assert.deepEqual(scalars?.map(({ name }) => name), ['p', 'q']);
+  assert.deepEqual(new Float32Array(scalars?.[0].values.slice().buffer ?? new ArrayBuffer(0)), new Float32Array([2, 2]));
+  const chosen = await openDropped([file('a.csv', 'x,y,Größe\n0,0,1\n1,0,2\n')], { ...NO_OPTIONS, select: 'Größe=2' });
+  assert.equal((await chosen.frame(0)).positions.length, 16);
+});
+
 test('a spacing is a decimal number that the server accepts', () => {
   for (const wrong of ['0x10', ' 1', '0', '-1', '1e61', '1e-61', 'wide']) {
     assert.throws(() => parseSpacing(wrong), /must be a positive length/, wrong);

@@ -7,7 +7,7 @@ export interface ColumnPlan {
   velocities: (number | null)[];
   id: number | null;
   volume: number | null;
-  /** All other columns. */
+  /** All other columns with a name that the server accepts; of equal names the first. */
   scalars: { name: string; column: number }[];
   /** Positions are fractions of the box (LAMMPS xs, ys, zs). */
   scaled: boolean;
@@ -26,6 +26,8 @@ const VOLUMES = ['volume', 'volumes', 'vol', 'area', 'areas', 'particlevolume', 
   'volumetricmeasure'];
 /** Limit, because every scalar is sent to the server. */
 export const MOST_SCALARS = 8;
+/** Names that the server accepts for scalars (core/src/frame/frame_attributes.cc). Columns with other names are not sent. */
+export const SCALAR_NAME = /^[ -~]{1,64}$/;
 
 /** Removes units, separators and case from a name: "Pos.x [m]" -> "posx". */
 function canonical(name: string): string {
@@ -125,7 +127,8 @@ export function planNamedColumns(given: string[], request: ColumnRequest = ALL_C
   const volume = find(names, VOLUMES);
   const used = new Set([...positions, ...velocities, id, volume]);
   const scalars = given.map((name, column) => ({ name, column }))
-    .filter(({ column }) => !used.has(column)).slice(0, MOST_SCALARS);
+    .filter(({ name, column }) => !used.has(column) && SCALAR_NAME.test(name))
+    .filter(({ name }, k, all) => all.findIndex((other) => other.name === name) === k).slice(0, MOST_SCALARS);
   const conditions = request.conditions.map((condition) => {
     const column = findAsked(given, names, condition.column);
     if (column === null) {

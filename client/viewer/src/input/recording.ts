@@ -8,7 +8,7 @@ import { arrayOf } from '../protocol/arrays';
 import type { Particles } from '../protocol/particles';
 import { particleBytes } from '../protocol/positions';
 import type { SectionPlane } from '../protocol/sections';
-import { MOST_SCALARS } from './columns';
+import { MOST_SCALARS, SCALAR_NAME } from './columns';
 import {
   checkSpacing, CHOOSE_SPACE, FieldError, type FileFacts, type FileOptions, NO_OPTIONS, NOT_IN_SPACE, parseSlices, parseSpacing,
 } from './options';
@@ -19,8 +19,6 @@ import { axesOf, hasThreeCoordinates, middlePlane, spacingOf } from './space';
 const MARK_BYTES = 24;
 const SKIPPABLE_MAGIC = 0x184d2a50;
 const FILE_TAG = 'PEMCFILE';
-/** Names that the server accepts. */
-const SCALAR_NAME = /^[ -~]{1,64}$/;
 
 export function isRecording(head: Uint8Array): boolean {
   return head.length >= 16 && new TextDecoder('latin1').decode(head.subarray(8, 16)) === FILE_TAG;
