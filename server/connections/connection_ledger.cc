@@ -38,6 +38,7 @@ constexpr milliseconds kHeaderTime(100);
 // blocks.
 constexpr std::chrono::seconds kSlowHeaderTime(10);
 
+// A connection above 1/kSuspectPart of a limit is a suspect.
 constexpr std::uint64_t kSuspectPart = 6;
 
 std::uint64_t OnTheWire(std::uint64_t bytes) {
@@ -114,7 +115,8 @@ bool ConnectionLedger::IsSuspect() const {
   const auto exceeds = [](std::uint64_t value, std::uint64_t limit) {
     return limit > 0 && value > limit / kSuspectPart;
   };
-  return exceeds(excess_, rules_.unaccounted_bytes) || exceeds(streams_, rules_.max_streams);
+  return (excess_ > rules_.usual_bytes && exceeds(excess_, rules_.unaccounted_bytes)) ||
+         exceeds(streams_, rules_.max_streams);
 }
 
 // Updates the debt. Adds received bytes before it subtracts credits: the debt never becomes

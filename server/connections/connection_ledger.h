@@ -22,6 +22,10 @@ struct ConnectionRules {
   /// calls, such as streams that the client resets at once. Their count decays by `max_streams` in
   /// five seconds. Each stream needs 10 to 22 kB. 0: no limit.
   std::uint64_t max_streams = 1'000;
+  /// Unaccounted bytes up to which a connection is never a suspect. Before the server begins the
+  /// first call of a usual client, the client can send 64 KiB (the initial window of HTTP/2) and
+  /// its headers.
+  std::uint64_t usual_bytes = std::uint64_t{80} << 10;
 };
 
 /// Measurements of a connection by the operating system and gRPC. All values except `streams_open`
@@ -91,8 +95,8 @@ class ConnectionLedger {
   /// The larger of two numbers at the last reading with `has_streams`: open streams, and streams
   /// that have not become calls.
   std::uint64_t streams() const { return streams_; }
-  /// Whether `excess` or `streams` exceeds a sixth of its limit. A usual client stays below: before
-  /// the server begins its first call, it can send at most 64 KiB (the initial window of HTTP/2).
+  /// Whether `excess` or `streams` exceeds a sixth of its limit. An `excess` of at most
+  /// `usual_bytes` is no suspicion.
   bool IsSuspect() const;
   std::uint64_t calls_open() const { return calls_open_.load(std::memory_order_relaxed); }
   std::uint64_t calls_begun() const { return calls_begun_.load(std::memory_order_relaxed); }

@@ -320,13 +320,18 @@ void ConnectionWatch::ExamineTogether(Clock::time_point now) {
 }
 
 // Cuts the suspects of the addresses that flood. Otherwise an address could flood on several
-// connections, each below its own limit.
+// connections, each below its own limit. Spares connections that may only make health checks: they
+// hold little, and OnFlood would refuse the next health check of their address.
 void ConnectionWatch::CutSuspects(Clock::time_point now) {
   if (flooding_.empty()) return;
   for (auto next = connections_.begin(); next != connections_.end();) {
     const auto connection = next++;
     const auto found = flooding_.find(connection->peer.address);
-    if (found == flooding_.end() || !connection->tracked->ledger.IsSuspect()) continue;
+    const TrackedConnection& tracked = *connection->tracked;
+    if (found == flooding_.end() || tracked.admission == Admission::kHealthOnly ||
+        !tracked.ledger.IsSuspect()) {
+      continue;
+    }
     Cut(connection, found->second, now);
   }
   flooding_.clear();

@@ -69,6 +69,18 @@ TEST_F(Ledger, ASuspectExceedsASixthOfALimit) {
   EXPECT_TRUE(ledger_.IsSuspect());
 }
 
+TEST(SmallLedger, TheBytesOfAUsualClientAreNotSuspect) {
+  const ConnectionRules rules{.unaccounted_bytes = 128 << 10};
+  const Clock::time_point now{};
+  ConnectionLedger ledger(rules, now);
+  ConnectionReading reading{.bytes_received = 80 << 10, .bytes_read = 80 << 10};
+  EXPECT_EQ(ledger.Examine(ledger.Take(), reading, now), std::nullopt);
+  EXPECT_FALSE(ledger.IsSuspect());
+  ++reading.bytes_received;
+  EXPECT_EQ(ledger.Examine(ledger.Take(), reading, now), std::nullopt);
+  EXPECT_TRUE(ledger.IsSuspect());
+}
+
 TEST_F(Ledger, SlowBytesWithoutACallAreAFloodToo) {
   std::uint64_t received = 0;
   while (received < 3 * kMiB) {

@@ -133,28 +133,45 @@ TEST(Connections, TheLastDescriptorEvictsAnIdleConnection) {
   EXPECT_EQ(watch.count(), 1u);
 }
 
-// Sends bytes that belong to no call on three connections of one address: more than the limit, more
-// than a sixth of it, and less. Returns the number of connections that were cut.
-std::uint64_t CutOfThree(const ConnectionLimits& limits) {
-  constexpr ConnectionRules kRules{.unaccounted_bytes = 30'000};
-  const Loopback flood, suspect, usual;
-  ConnectionTable table;
-  ConnectionWatch watch(limits, kRules, table);
-  std::vector<Descriptor> handed_over;
-  const auto add = [&](const Loopback& connection, std::size_t bytes) {
+// A watch of connections on which clients send bytes that belong to no call.
+class SentBytes {
+ public:
+  explicit SentBytes(const ConnectionLimits& limits)
+      : watch(limits, {.unaccounted_bytes = 30'000, .usual_bytes = 2'000}, table_) {}
+
+  void Add(const Loopback& connection, std::size_t bytes) {
     const std::vector<char> sent(bytes);
     EXPECT_EQ(send(connection.client.get(), sent.data(), bytes, 0), static_cast<ssize_t>(bytes));
     watch.Add(Descriptor(dup(connection.accepted.get())),
-              [&](Descriptor one) { handed_over.push_back(std::move(one)); });
-  };
-  add(suspect, 10'000);
-  add(usual, 1'000);
-  add(flood, 40'000);
-  watch.Start(nullptr);
-  const auto& cut = watch.counters().floods[static_cast<std::size_t>(Flood::kUnaccountedBytes)];
-  EXPECT_TRUE(Eventually([&] { return cut > 0; }));
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  EXPECT_EQ(watch.count(), 3 - cut);
+              [&](Descriptor one) { handed_over_.push_back(std::move(one)); });
+  }
+  // Waits for floods. Returns the number of connections that were cut.
+  std::uint64_t Cut() {
+    const auto& cut = watch.counters().floods[static_cast<std::size_t>(Flood::kUnaccountedBytes)];
+    EXPECT_TRUE(Eventually([&] { return cut > 0; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    return cut;
+  }
+
+ private:
+  ConnectionTable table_;
+  std::vector<Descriptor> handed_over_;
+
+ public:
+  ConnectionWatch watch;
+};
+
+// Sends more than the limit, more than a sixth of it, and less, on connections of one address.
+// Returns the number of connections that were cut.
+std::uint64_t CutOfThree(const ConnectionLimits& limits) {
+  const Loopback flood, suspect, usual;
+  SentBytes sent(limits);
+  sent.Add(suspect, 10'000);
+  sent.Add(usual, 1'000);
+  sent.Add(flood, 40'000);
+  sent.watch.Start(nullptr);
+  const std::uint64_t cut = sent.Cut();
+  EXPECT_EQ(sent.watch.count(), 3 - cut);
   return cut;
 }
 
@@ -162,6 +179,19 @@ TEST(Connections, AFloodAlsoCutsTheSuspectsOfItsAddress) { EXPECT_EQ(CutOfThree(
 
 TEST(Connections, BehindAProxyAFloodCutsNoOtherConnection) {
   EXPECT_EQ(CutOfThree({.new_of_address = 0}), 1u);
+}
+
+TEST(Connections, AFloodCutsAndRefusesNoHealthCheckOfItsAddress) {
+  const Loopback flood, check, later;
+  // The second connection of an address may only make health checks.
+  SentBytes sent({.connections = 10, .of_address = 1, .new_of_address = 10});
+  sent.Add(flood, 40'000);
+  sent.Add(check, 3'500);
+  sent.watch.Start(nullptr);
+  EXPECT_EQ(sent.Cut(), 1u);
+  EXPECT_EQ(sent.watch.count(), 1u);
+  sent.Add(later, 0);
+  EXPECT_EQ(sent.watch.count(), 2u);
 }
 
 TEST(Connections, NoneIsHandedOverWhenTheAcceptorIsGone) {
