@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/base/call_errors.h"
-#include "server/relay/stream_summary.h"
+#include "server/relay/local_streams.h"
 #include "server/telemetry/logging.h"
 
 namespace partiemc::server {
@@ -93,13 +93,6 @@ bool Relay::Send(const std::string& subject, relay::v1::RelayMessage& message) {
   return sent;
 }
 
-// Converts `time` to Unix time in milliseconds, which replicas can compare.
-std::int64_t Relay::UnixMs(TimePoint time) const {
-  const auto ago =
-      std::chrono::duration_cast<std::chrono::system_clock::duration>(clock_.Now() - time);
-  return std::chrono::floor<milliseconds>((clock_.TimeOfDay() - ago).time_since_epoch()).count();
-}
-
 void Relay::Run() {
   using Queue = RelayQueue;
   subscriptions_.push_back(queue_->Listen(*bus_, kReplicasSubject, Queue::kNews));
@@ -125,12 +118,7 @@ void Relay::Run() {
 void Relay::Tick(TimePoint now) {
   ticked_ = now;
   CheckConnection(now);
-  if (registry_.changes() != local_changes_) {
-    LookAtLocalStreams();
-    Announce(now, false, false);
-  } else if (now - announced_ >= kAnnounceEvery) {
-    Announce(now, false, false);
-  }
+  if (UpdateLocalStreams() || now - announced_ >= kAnnounceEvery) Announce(now, false, false);
   if (now - pieces_checked_ >= kPiecePatience) {
     pieces_checked_ = now;
     joiner_.ForgetIdle();
@@ -184,32 +172,14 @@ void Relay::Announce(TimePoint now, bool asks, bool leaving) {
   announcement.set_leaving(leaving);
   announcement.set_address(address_);
   announcement.set_draining(will_drain_);
-  const auto streams = leaving ? std::vector<StreamSummary>()
-                               : registry_.List(0, std::numeric_limits<std::size_t>::max());
-  for (const StreamSummary& stream : streams) {
-    const auto found = local_.find(stream.id);
-    if (found == local_.end()) continue;  // Opened just now; the next tick announces it.
-    relay::v1::LiveStream& live = *announcement.add_streams();
-    EncodeSummary(stream, now, *live.mutable_summary());
-    live.set_lineage(stream.lineage);
-    live.set_opened_unix_ms(found->second.opened_unix_ms);
-  }
+  if (!leaving) local_.Announce(now, announcement);
   Send(kReplicasSubject, message);
 }
 
-void Relay::LookAtLocalStreams() {
-  local_changes_ = registry_.changes();
+bool Relay::UpdateLocalStreams() {
+  if (!local_.Update()) return false;
   changed_ = true;
-  std::map<std::string, LocalStream> streams;
-  for (const StreamSummary& stream : registry_.List(0, std::numeric_limits<std::size_t>::max())) {
-    const auto known = local_.find(stream.id);
-    streams[stream.id] = known != local_.end()
-                             ? known->second
-                             : LocalStream{.broadcaster = stream.description.broadcaster,
-                                           .lineage = stream.lineage,
-                                           .opened_unix_ms = UnixMs(stream.opened)};
-  }
-  local_.swap(streams);
+  return true;
 }
 
 // Handles producers that have resumed their stream at another replica. The replica of the former
@@ -218,22 +188,13 @@ void Relay::LookAtLocalStreams() {
 void Relay::EndTakenOver() {
   const WatchEnd taken_over{
       std::string(kReasonTakenOver), "another replica has the stream now", {}};
-  for (auto& [id, local] : local_) {
-    if (local.was_told) continue;
-    const auto elsewhere = directory_.FindLineage(local.lineage);
-    if (!elsewhere || elsewhere->stream.opened_unix_ms() <= local.opened_unix_ms) continue;
-    local.was_told = true;
-    local.broadcaster->End(taken_over);
-  }
+  local_.EndTakenOver(directory_, taken_over);
   for (Import& import : imports_) {
     const RemoteStream& remote = import.stream->stream();
-    const std::int64_t opened = remote.stream.opened_unix_ms();
     const auto elsewhere = directory_.FindLineage(remote.stream.lineage());
-    const bool is_here = std::ranges::any_of(local_, [&](const auto& item) {
-      return item.second.lineage == remote.stream.lineage() && item.second.opened_unix_ms > opened;
-    });
-    if (is_here || (elsewhere && elsewhere->id() != remote.id() &&
-                    elsewhere->stream.opened_unix_ms() > opened)) {
+    const bool is_elsewhere = elsewhere && elsewhere->id() != remote.id() &&
+                              elsewhere->stream.opened_unix_ms() > remote.stream.opened_unix_ms();
+    if (is_elsewhere || local_.HasTakenOver(remote.stream)) {
       import.stream->End(taken_over);
     }
   }
@@ -241,14 +202,14 @@ void Relay::EndTakenOver() {
 
 bool Relay::WasResumedElsewhere(std::string_view lineage, TimePoint opened) const {
   const auto elsewhere = directory_.FindLineage(lineage);
-  return elsewhere && elsewhere->stream.opened_unix_ms() > UnixMs(opened);
+  return elsewhere && elsewhere->stream.opened_unix_ms() > UnixMs(clock_, opened);
 }
 
 std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::size_t count,
                                                const Caller& caller) const {
   std::map<std::string, std::int64_t> here;  // Opening time by lineage.
   for (const StreamSummary& stream : registry_.List(0, std::numeric_limits<std::size_t>::max())) {
-    here[stream.lineage] = UnixMs(stream.opened);
+    here[stream.lineage] = UnixMs(clock_, stream.opened);
   }
   return directory_.List(after, count, [&](const relay::v1::LiveStream& stream) {
     const auto found = here.find(stream.lineage());
@@ -348,7 +309,7 @@ void Relay::Take(const std::string& replica, const relay::v1::Announcement& anno
   // drains, it does not respond: its next announcement, after the ends of its streams, reports that
   // it leaves.
   if (!announcement.asks() || draining_since_) return;
-  if (registry_.changes() != local_changes_) LookAtLocalStreams();
+  UpdateLocalStreams();
   was_asked_ = true;
 }
 
@@ -373,17 +334,17 @@ void Relay::AnswerNextFetch(TimePoint now) {
 }
 
 void Relay::Answer(const std::string& replica, const relay::v1::Fetch& fetch) {
-  if (registry_.changes() != local_changes_) LookAtLocalStreams();
-  const auto local = local_.find(fetch.stream_id());
+  UpdateLocalStreams();
+  auto broadcaster = local_.BroadcasterOf(fetch.stream_id());
   auto exported = exports_.find(fetch.stream_id());
   const bool is_over = exported == exports_.end() || !exported->second->live();
-  if (local != local_.end() && is_over && !draining_since_) {
+  if (broadcaster != nullptr && is_over && !draining_since_) {
     exported =
         exports_
             .insert_or_assign(fetch.stream_id(),
                               std::make_shared<ExportedStream>(
-                                  fetch.stream_id(), local->second.broadcaster,
-                                  limits_.watcher_bytes, static_cast<RelayPort&>(*this), clock_))
+                                  fetch.stream_id(), std::move(broadcaster), limits_.watcher_bytes,
+                                  static_cast<RelayPort&>(*this), clock_))
             .first;
     exported->second->Begin();
   }
@@ -426,12 +387,7 @@ void Relay::Find(const std::string& name, std::optional<std::uint64_t> from_sequ
 
 bool Relay::TryFind(const Search& search, TimePoint now) {
   const auto remote = directory_.FindName(search.name);
-  // Whether a producer has resumed the remote stream at this server.
-  const auto is_here = [&](const auto& item) {
-    return item.second.lineage == remote->stream.lineage() &&
-           item.second.opened_unix_ms > remote->stream.opened_unix_ms();
-  };
-  if (!remote || std::ranges::any_of(local_, is_here)) return false;
+  if (!remote || local_.HasTakenOver(remote->stream)) return false;
   Watch(*remote, search, now);
   return true;
 }

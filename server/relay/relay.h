@@ -23,6 +23,7 @@
 #include "server/relay/exported_stream.h"
 #include "server/relay/fetch_queue.h"
 #include "server/relay/imported_stream.h"
+#include "server/relay/local_streams.h"
 #include "server/relay/message_bus.h"
 #include "server/relay/pieces.h"
 #include "server/relay/relay_port.h"
@@ -96,12 +97,6 @@ class Relay final : private RelayPort {
  private:
   static constexpr std::size_t kMaxAddresses = 16;
 
-  struct LocalStream {
-    std::shared_ptr<ResultBroadcaster> broadcaster;
-    std::string lineage;
-    std::int64_t opened_unix_ms = 0;
-    bool was_told = false;  // Its watches were ended, because another replica has the stream.
-  };
   struct Import {
     std::unique_ptr<ImportedStream> stream;
     std::unique_ptr<MessageBus::Subscription> results;
@@ -117,13 +112,11 @@ class Relay final : private RelayPort {
   void Post(std::function<void()> action) override;
   bool Send(const std::string& subject, relay::v1::RelayMessage& message) override;
 
-  std::int64_t UnixMs(TimePoint time) const;
-
   void Run();
   void Tick(TimePoint now);
   void CheckConnection(TimePoint now);
   void Announce(TimePoint now, bool asks, bool leaving);
-  void LookAtLocalStreams();
+  bool UpdateLocalStreams();
   void LookAtExports(TimePoint now);
   void LookAtImports(TimePoint now);
   void EndTakenOver();
@@ -156,11 +149,10 @@ class Relay final : private RelayPort {
   FetchQueue fetches_;
   std::uint64_t sent_ = 0;
   std::vector<std::unique_ptr<MessageBus::Subscription>> subscriptions_;
-  std::map<std::string, LocalStream> local_;
+  LocalStreams local_{registry_, clock_};
   std::map<std::string, std::shared_ptr<ExportedStream>> exports_;
   std::vector<Import> imports_;
   std::vector<Search> searches_;
-  std::uint64_t local_changes_ = 0;
   bool loss_logged_ = false;  // A log line has reported that NATS was lost or not reached.
   bool changed_ = false;      // The set of streams has changed, here or at another replica.
   bool was_asked_ = false;    // Another replica has requested an announcement.
