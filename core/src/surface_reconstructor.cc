@@ -468,9 +468,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       if (!lightest.ok()) return lightest.status();
     }
     scale = MakeScale(in_space_, h, cell_size, *lightest, sizes);
-    const std::span<const std::uint32_t> originals(b.images.originals);
-    checked = space::FindBricks(frame, scale, limits_, b.bins,
-                                parameters_.wall_planes.empty() ? originals.first(0) : originals);
+    space::GivenParticles names{.originals = lifted.originals, .first = lifted.particles};
+    if (!parameters_.wall_planes.empty()) names = {.originals = b.images.originals};
+    checked = space::FindBricks(frame, scale, limits_, b.bins, names);
     size.bricks = bricks.size();
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);

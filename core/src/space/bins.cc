@@ -87,7 +87,7 @@ absl::Status TooManyBricks(const Scale& scale, std::size_t most) {
 /// Finds the brick and the key of each particle.
 template <typename Real>
 absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std::size_t most_bricks,
-                       std::span<const std::uint32_t> originals, SpaceBins& bins) {
+                       const GivenParticles& given, SpaceBins& bins) {
   const double cells_per_world = 1 / scale.cell_size;
   const std::size_t count = positions.size() / 3;
   bins.home.resize(count);
@@ -99,8 +99,7 @@ absl::Status FindHomes(std::span<const Real> positions, const Scale& scale, std:
     for (int axis = 0; axis < 3; ++axis) {
       const auto value = static_cast<double>(positions[3 * p + axis]);
       const double cells = value * cells_per_world;
-      if (!(std::abs(cells) < kMostCells))
-        return TooFar(originals.empty() ? p : originals[p], axis, value, scale);
+      if (!(std::abs(cells) < kMostCells)) return TooFar(given.Of(p), axis, value, scale);
       at[axis] = Quantised(cells);
     }
     const BrickCoordinate brick{static_cast<std::int32_t>(at[2] >> kBrickBits),
@@ -300,12 +299,10 @@ void SpaceBins::Clear() {
 }
 
 absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                        SpaceBins& bins, std::span<const std::uint32_t> originals) {
+                        SpaceBins& bins, const GivenParticles& given) {
   bins.Clear();
   absl::Status status = std::visit(
-      [&](auto positions) {
-        return FindHomes(positions, scale, limits.max_tiles, originals, bins);
-      },
+      [&](auto positions) { return FindHomes(positions, scale, limits.max_tiles, given, bins); },
       frame.positions);
   if (!status.ok()) return status;
   // Inside nodes are within the kernel radius of a particle. The other corners of their cells are

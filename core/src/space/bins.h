@@ -78,13 +78,25 @@ struct SpaceBins {
   }
 };
 
+/// The caller's particles from which the particles of a frame were derived, for errors.
+struct GivenParticles {
+  /// The caller's number of each particle from `first` on. Empty: the frame is the caller's.
+  std::span<const std::uint32_t> originals = {};
+  std::size_t first = 0;  ///< Particles before it have the caller's numbers.
+
+  /// The caller's number of a particle of the frame.
+  std::size_t Of(std::size_t particle) const {
+    return particle < first || originals.empty() ? particle : originals[particle - first];
+  }
+};
+
 /// Finds the bricks and the size classes of a frame. A brick exists if one of its nodes may be
 /// within the kernel radius plus one cell of a particle. Requires: CheckFrame has passed the frame
 /// as for a slice, with three components. Errors with a Violation: INVALID_ARGUMENT for coordinates
-/// beyond 2^30 cells; RESOURCE_EXHAUSTED for more than `max_tiles` bricks. `originals`: if the
-/// frame was derived from the caller's frame, the caller's number of each particle, for errors.
+/// beyond 2^30 cells; RESOURCE_EXHAUSTED for more than `max_tiles` bricks. They name the particles
+/// of `given`.
 absl::Status FindBricks(const Frame& frame, const Scale& scale, const FrameLimits& limits,
-                        SpaceBins& bins, std::span<const std::uint32_t> originals = {});
+                        SpaceBins& bins, const GivenParticles& given = {});
 
 /// Sorts the particles into cells. Requires: FindBricks for the same frame.
 void SortParticles(const Frame& frame, const Scale& scale, SpaceBins& bins);

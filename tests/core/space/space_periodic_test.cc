@@ -150,6 +150,25 @@ TEST(PeriodicSpace, WrongBoxesAreRefused) {
   EXPECT_EQ(field_of(Cube(12)), "OK");
 }
 
+// Of a row across the box only copies lie beyond the lattice. The error names the caller's
+// particle.
+TEST(PeriodicSpace, FarCopyIsReportedAsItsParticle) {
+  constexpr double kEnd = 0x1p30;  // Of the lattice, in cells.
+  PeriodicBox box;
+  box.axes[0] = PeriodicAxis{kEnd - 16, 12};
+  SpaceParticles row;
+  for (int k = 0; k < 12; ++k) row.Add(Vec3{kEnd - 16 + k, 0, 0});
+  const auto reconstructor = SurfaceReconstructor::Create(In(box, SurfacePlacement::kQef));
+  ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+  SurfaceWorkspace workspace;
+  Surface surface;
+  const auto violation =
+      FindViolation(reconstructor->Reconstruct(row.AsFrame(), workspace, surface));
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->reason, kReasonOutOfRange);
+  EXPECT_EQ(violation->field, "positions[4].x");
+}
+
 // Through Reconstructor, as streams do.
 TEST(PeriodicSpace, StreamOfSurfacesHasTheBox) {
   const PeriodicBox box = Cube(32);
