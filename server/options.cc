@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <limits>
 #include <thread>
 #include <utility>
 
 #include "server/base/machine_limits.h"
+#include "server/limit_flags.h"
 #include "server/stream/memory_plan.h"
 
 namespace partiemc::server {
@@ -45,10 +45,9 @@ struct Raw {
   std::string health_check;
   bool print_memory_plan = false;
   std::string port_file;
-  std::uint64_t max_frame_bytes = 0;
   double grace_seconds = 4;
   double drain_delay = 0;
-  double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
+  LimitFlags limits;
   std::string token_file;
   std::string checkpoint_key_file;
   std::string metrics;
@@ -59,16 +58,6 @@ struct Raw {
   std::string log_format = "text";
   CommandLine line;
 };
-
-// Maximum of --max-frame-bytes and --max-watcher-bytes: gRPC's limit for a received message is 1.25
-// times this value and must fit into an int.
-constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
-
-// By default a frame may have at most 1/kFramesInBudget of the memory budget, because it is in
-// memory before it is counted. With a very small budget it may have kLeastFrameBytes; then streams
-// progress one frame at a time.
-constexpr std::uint64_t kFramesInBudget = 8;
-constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 
 void AddServingOptions(CLI::App& app, Raw& raw) {
   app.add_option("--address", raw.address,
@@ -158,155 +147,6 @@ void AddSecurity(CLI::App& app, Raw& raw) {
   app.add_flag("--insecure", raw.line.server.insecure,
                "Allow an address that other machines can reach without TLS")
       ->envname("PARTIEMC_INSECURE")
-      ->group(kGroup);
-}
-
-void AddLimits(CLI::App& app, Raw& raw) {
-  ServerLimits& limits = raw.line.server.limits;
-  const char* const kGroup = "Limits";
-  app.add_option("--max-streams", limits.max_streams,
-                 "Maximum number of open streams; further ones are refused")
-      ->check(CLI::Range(1, 100'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_STREAMS")
-      ->group(kGroup);
-  app.add_option("--frames-in-flight", limits.frames_in_flight,
-                 "Window of a stream: frames accepted before their results are received")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_FRAMES_IN_FLIGHT")
-      ->group(kGroup);
-  app.add_option("--max-watchers", limits.max_watchers,
-                 "Maximum number of watchers of all streams; further ones are refused")
-      ->check(CLI::Range(0, 100'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_WATCHERS")
-      ->group(kGroup);
-  app.add_option("--max-parts", limits.max_parts,
-                 "Maximum number of parts of a frame, and of connections that send parts for all "
-                 "streams; 0: no parts")
-      ->check(CLI::Range(0, 10'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_PARTS")
-      ->group(kGroup);
-  app.add_option("--max-watcher-bytes", limits.max_watcher_bytes,
-                 "Memory limit of one watcher, with a unit as in 16MB; larger results cannot be "
-                 "watched")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(std::uint64_t{4096}, kMaxFrameBytes))
-      ->capture_default_str()
-      ->type_name("BYTES")
-      ->envname("PARTIEMC_MAX_WATCHER_BYTES")
-      ->group(kGroup);
-  app.add_option("--history-bytes", limits.history_bytes,
-                 "History of a stream for watchers that join late or go back, with a unit as in "
-                 "64MB; the oldest results are dropped. All histories share an eighth of "
-                 "--memory-budget equally; 0: none")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50))
-      ->capture_default_str()
-      ->type_name("BYTES")
-      ->envname("PARTIEMC_HISTORY_BYTES")
-      ->group(kGroup);
-  app.add_option("--max-particles", limits.frame.max_particles,
-                 "Maximum number of particles of a frame")
-      ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostParticles))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_PARTICLES")
-      ->group(kGroup);
-  app.add_option(
-         "--max-tiles", limits.frame.max_tiles,
-         "Maximum number of tiles (32 x 32 lattice nodes) of a frame; a tile takes 10 kB, and "
-         "more with many drops")
-      ->check(CLI::Range(std::size_t{1}, FrameLimits::kMostTiles))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_TILES")
-      ->group(kGroup);
-  app.add_option(
-         "--max-frame-bytes", raw.max_frame_bytes,
-         "Maximum size of a serialised frame, with a unit as in 200MB (default: 48 bytes per "
-         "particle of --max-particles, at most an eighth of --memory-budget)")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(std::uint64_t{1}, kMaxFrameBytes))
-      ->type_name("BYTES")
-      ->envname("PARTIEMC_MAX_FRAME_BYTES")
-      ->group(kGroup);
-  app.add_option(
-         "--memory-budget", raw.line.server.limits.memory_budget,
-         "Memory for requests, responses, workers and histories of all streams, with a unit as in "
-         "2GB. "
-         "When it is used up, streams take turns with one frame each (default: half of the "
-         "memory of this machine or container)")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::PositiveNumber)
-      ->type_name("BYTES")
-      ->envname("PARTIEMC_MEMORY_BUDGET")
-      ->group(kGroup);
-  app.add_option(
-         "--streams-beyond-budget", limits.streams_beyond_budget,
-         "Maximum number of streams with a frame beyond --memory-budget at the same time; the "
-         "others wait. A larger number takes more memory and shortens the wait for large frames")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_STREAMS_BEYOND_BUDGET")
-      ->group(kGroup);
-  app.add_option("--idle-timeout", raw.idle_seconds,
-                 "End a stream that sends no frame for this time; 0: never")
-      ->check(CLI::Range(0.0, 1e8))
-      ->capture_default_str()
-      ->type_name("SECONDS")
-      ->envname("PARTIEMC_IDLE_TIMEOUT")
-      ->group(kGroup);
-}
-
-void AddConnections(CLI::App& app, Raw& raw) {
-  ConnectionLimits& limits = raw.line.server.connections;
-  const char* const kGroup = "Connections of --address";
-  app.add_option(
-         "--max-connections", limits.connections,
-         "Maximum number of connections, at most half of the file descriptors. Above it, a "
-         "connection without a call is closed; if all have calls, the new one may only make "
-         "health checks")
-      ->check(CLI::Range(1, 100'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_MAX_CONNECTIONS")
-      ->group(kGroup);
-  app.add_option(
-         "--connections-per-address", limits.of_address,
-         "Maximum number of connections of one address, except for health checks; 0: no limit, "
-         "for a server behind a proxy")
-      ->check(CLI::Range(0, 100'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_CONNECTIONS_PER_ADDRESS")
-      ->group(kGroup);
-  app.add_option(
-         "--new-connections-per-address", limits.new_of_address,
-         "Maximum rate of new connections of one address per second, with bursts of twice the "
-         "rate, except for health checks; 0: no limit, for a server behind a proxy")
-      ->check(CLI::Range(0, 100'000))
-      ->capture_default_str()
-      ->type_name("N")
-      ->envname("PARTIEMC_NEW_CONNECTIONS_PER_ADDRESS")
-      ->group(kGroup);
-  app.add_option(
-         "--unaccounted-bytes", raw.line.server.unaccounted_bytes,
-         "Maximum number of bytes of a TCP connection that belong to no call and no message, with "
-         "a unit as in 512KiB. A connection above it is cut, and its address may only make "
-         "health checks for ten seconds; 0: no limit")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 40))
-      ->capture_default_str()
-      ->type_name("BYTES")
-      ->envname("PARTIEMC_UNACCOUNTED_BYTES")
       ->group(kGroup);
 }
 
@@ -460,12 +300,8 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   raw.line.grace = Milliseconds(raw.grace_seconds);
   raw.line.drain_delay = Milliseconds(raw.drain_delay);
   ServerLimits& limits = raw.line.server.limits;
-  limits.idle.streaming = Milliseconds(raw.idle_seconds);
-  limits.max_frame_bytes =
-      raw.max_frame_bytes != 0
-          ? raw.max_frame_bytes
-          : std::min({ServerLimits::DefaultFrameBytes(limits.frame.max_particles), kMaxFrameBytes,
-                      std::max(limits.memory_budget / kFramesInBudget, kLeastFrameBytes)});
+  limits.idle.streaming = Milliseconds(raw.limits.idle_seconds);
+  limits.max_frame_bytes = FrameBytes(raw.limits, limits);
   if (raw.print_memory_plan) {
     return EarlyExit{0, MemoryPlan(limits, raw.line.server.threads).ToString()};
   }
@@ -482,8 +318,8 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   raw.line.server.limits.memory_budget = AvailableMemory() / 2;
   AddServingOptions(app, raw);
   AddSecurity(app, raw);
-  AddLimits(app, raw);
-  AddConnections(app, raw);
+  AddLimitFlags(app, raw.line.server.limits, raw.limits);
+  AddConnectionFlags(app, raw.line.server);
   AddWeb(app, raw);
   AddMetrics(app, raw);
   AddLogging(app, raw);

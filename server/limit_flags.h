@@ -1,0 +1,31 @@
+// The flags of the server's limits: of streams, frames and memory, and of the connections of
+// --address.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "server/server.h"
+
+namespace CLI {
+class App;
+}
+
+namespace partiemc::server {
+
+/// Values of flags from which limits are computed after all flags are known.
+struct LimitFlags {
+  std::uint64_t max_frame_bytes = 0;  ///< 0: the default (FrameBytes).
+  double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
+};
+
+/// Adds the flags that set `limits` and `flags`. Both must live until `app` has parsed.
+void AddLimitFlags(CLI::App& app, ServerLimits& limits, LimitFlags& flags);
+
+/// Adds the flags of connections. `options` must live until `app` has parsed.
+void AddConnectionFlags(CLI::App& app, ServerOptions& options);
+
+/// The maximum size of a serialised frame: the given one, or the default for `limits`.
+std::uint64_t FrameBytes(const LimitFlags& flags, const ServerLimits& limits);
+
+}  // namespace partiemc::server
