@@ -1,15 +1,23 @@
-// Converts a server's responses to the events of a stream.
+// Converts a server's responses to the properties and the events of a stream.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "partiemc/client/frame_stream.h"
+#include "partiemc/parameters.h"
 #include "partiemc/v1/reconstruction.pb.h"
 #include "wire/codec.h"
 
 namespace partiemc::client {
+
+/// Reads the properties of an opened stream. Limits its window, because a server may announce any.
+/// Errors: UNIMPLEMENTED if the server ignores one of the `requested` parameters, as an older one
+/// does; INVALID_ARGUMENT for parameters that cannot be decoded.
+absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
+                                      const ReconstructionParameters& requested);
 
 /// True for a response to a frame or to a part of one.
 bool IsAnswer(const v1::ReconstructResponse& response);
