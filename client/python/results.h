@@ -37,6 +37,12 @@ struct PythonResult {
   std::vector<std::shared_ptr<PythonResult>> sections;
 };
 
+/// Number of coordinates of each of the result's particles.
+std::size_t CoordinatesOf(const PythonResult& result);
+
+/// The additional outlines of the frame. The first call moves them out of `result.frame`.
+const std::vector<std::shared_ptr<PythonResult>>& SectionsOf(PythonResult& result);
+
 /// Reuses the buffers of results that Python has released. Thread-safe.
 class ResultPool : public std::enable_shared_from_this<ResultPool> {
  public:
