@@ -8,7 +8,7 @@ import type { Mark } from '../export/marks';
 import type { Frame } from '../protocol/frame';
 import { type Outline, outlineName, pictureOf } from '../protocol/sections';
 import type { SpaceView, Vector } from '../space/camera';
-import { DEFAULT_SPACE_LOOK, type SpaceLook } from '../space/look';
+import type { SpaceLook } from '../space/look';
 import type { SpaceEvents, SpacePicture } from '../space/picture';
 import type { Entry, Summary } from '../stream/history';
 import { cellSizeOf, isAsStreamed, methodWith, type Settings, settingsPhrase, settingsText } from '../stream/settings';
@@ -26,6 +26,7 @@ import { Overlay, type Overlaid } from './overlay';
 import { PaneNotice } from './pane_notice';
 import { paneState, type PaneState, stateName } from './pane_state';
 import { ScaleBar } from './scale_bar';
+import { SpaceSlot } from './space_slot';
 import type { TextPace } from './text_pace';
 
 export interface PaneEvents {
@@ -80,11 +81,7 @@ export class Pane {
   private isPending = false;
   private dirty = true;
   private look: Look | null = null;
-  /** The picture of surfaces; null until there is one. */
-  private space: SpacePicture | null = null;
-  private spaceLook: SpaceLook = DEFAULT_SPACE_LOOK;
-  /** The view for the picture of surfaces before there is one. */
-  private firstSpaceView: SpaceView | null = null;
+  private readonly space: SpaceSlot;
 
   /**
    * `variants`: computes other settings; null if they are not offered. `pictureOfSpace`: makes the
@@ -92,7 +89,7 @@ export class Pane {
    */
   constructor(public track: Track, public settings: Settings, private readonly events: PaneEvents,
               private readonly variants: Variants | null,
-              private readonly pictureOfSpace: ((events: SpaceEvents) => SpacePicture) | null = null) {
+              pictureOfSpace: ((events: SpaceEvents) => SpacePicture) | null = null) {
     this.variant = variants?.frame(() => { this.dirty = true; }) ?? null;
     this.closeButton.addEventListener('click', () => events.closed(this));
     // Without WebGL, the scene puts its picture after the canvas, which must have a parent.
@@ -108,6 +105,11 @@ export class Pane {
       changed: () => { this.dirty = true; },
       selected: (point) => this.events.selected?.(this, point),
     });
+    this.space = new SpaceSlot(pictureOfSpace, {
+      moved: (byUser) => events.moved(this, byUser),
+      selected: (point) => events.selected?.(this, point),
+      shown: (frame) => { if (this.isSpace) this.showNumbers(frame); },
+    }, this.canvas);
     picture.append(this.overlay.element, this.scaleBar.element, this.pointer.readout, this.notice.element);
     this.element = make('section', { class: 'pane' },
       make('header', {}, this.badge, this.name, this.subtitle, this.closeButton), picture, this.numbers.element);
@@ -123,7 +125,7 @@ export class Pane {
     this.element.setAttribute('aria-label', label);
     this.element.classList.toggle('active', active);
     this.canvas.setAttribute('aria-label', `${label}: outline of ${this.track.title}`);
-    this.space?.canvas.setAttribute('aria-label', `${label}: surface of ${this.track.title}`);
+    this.space.picture?.canvas.setAttribute('aria-label', `${label}: surface of ${this.track.title}`);
     this.closeButton.setAttribute('aria-label', `Close ${label.toLowerCase()}`);
     this.closeButton.hidden = count === 1;
   }
@@ -134,8 +136,8 @@ export class Pane {
     this.followed.follow();
     this.resetVariant();
     this.pointer.select(null);
-    this.space?.select(null);
-    if (this.space) this.space.isFree = true;
+    this.space.picture?.select(null);
+    if (this.space.picture) this.space.picture.isFree = true;
     this.showSpace(false);
   }
 
@@ -153,36 +155,31 @@ export class Pane {
     const isOther = look.outlineShown !== this.look?.outlineShown;
     this.look = look;
     this.dirty = true;
-    this.space?.setLook(look, this.spaceLook);
+    this.space.setLook(look);
     if (isOther && this.whole && this.whole.sections.length > 0) this.showOutline(this.whole);
     if (isNew && this.frame) void this.addParticles(this.frame);
   }
 
-  setSpaceLook(spaceLook: SpaceLook): void {
-    this.spaceLook = spaceLook;
-    if (this.look) this.space?.setLook(this.look, spaceLook);
-  }
+  setSpaceLook(spaceLook: SpaceLook): void { this.space.setSpaceLook(spaceLook); }
 
   /** Whether the pane shows surfaces in space. */
-  get isSpace(): boolean { return this.space !== null && !this.space.element.hidden; }
+  get isSpace(): boolean { return this.space.shown !== null; }
 
   /** The canvas of the picture, for exports. */
-  get drawn(): Drawn { return this.space && this.isSpace ? this.space.scene : this.scene; }
+  get drawn(): Drawn { return (this.space.shown ?? this).scene; }
 
-  get legend(): Legend | null { return this.space && this.isSpace ? this.space.scene.legend() : this.scene.legend(); }
+  get legend(): Legend | null { return (this.space.shown ?? this).scene.legend(); }
 
   /** Names of the numbers that the frame can be coloured by. */
-  get channels(): string[] { return this.space && this.isSpace ? this.space.scene.channels : this.scene.channels; }
+  get channels(): string[] { return (this.space.shown ?? this).scene.channels; }
 
   /** The camera of a picture of surfaces; null for another picture. `isMoved`: whether the user has moved it. */
   get spaceView(): { view: SpaceView; isMoved: boolean } | null {
-    return this.space && this.isSpace ? { view: this.space.scene.view, isMoved: !this.space.isFree } : null;
+    const { shown } = this.space;
+    return shown && { view: shown.scene.view, isMoved: !shown.isFree };
   }
 
-  setSpaceView(view: SpaceView): void {
-    if (this.space) this.space.setView(view);
-    else this.firstSpaceView = view;
-  }
+  setSpaceView(view: SpaceView): void { this.space.setView(view); }
 
   /** Adopts the view of another pane that shows the same kind of picture. */
   followView(other: Pane): void {
@@ -193,7 +190,7 @@ export class Pane {
 
   /** Marks of a picture of surfaces, for exports; null for another picture. */
   spaceMarks(dark: boolean): Mark[] | null {
-    return this.space && this.isSpace ? this.space.marks(this.caption, dark) : null;
+    return this.space.shown?.marks(this.caption, dark) ?? null;
   }
 
   /** Whether the view follows the content. */
@@ -201,8 +198,8 @@ export class Pane {
 
   /** Zooms about the middle of the picture by the key + or -. */
   zoom(key: string): void {
-    if (this.space && this.isSpace) {
-      this.space.zoom(key);
+    if (this.space.shown) {
+      this.space.shown.zoom(key);
       return;
     }
     applyKey(this.scene, key, false);
@@ -211,8 +208,8 @@ export class Pane {
 
   /** Lets the view follow the content again. */
   fit(): void {
-    if (this.isSpace) {
-      this.space?.fit();
+    if (this.space.shown) {
+      this.space.shown.fit();
       return;
     }
     this.followed.follow();
@@ -285,7 +282,7 @@ export class Pane {
 
   get state(): PaneState {
     const doubts = this.frame?.statistics.doubts ?? [];
-    const problem = (this.isSpace ? this.space : this.frame)?.problem ?? '';
+    const problem = (this.space.shown ?? this.frame)?.problem ?? '';
     return paneState(this.track, this.refusal || problem, doubts.map((doubt) => this.track.doubtText(doubt)).join(' '),
       this.frame !== null && !this.isPending);
   }
@@ -312,7 +309,7 @@ export class Pane {
   }
 
   private refreshSpace(): void {
-    const drawn = this.space?.refresh() ?? null;
+    const drawn = this.space.shown?.refresh() ?? null;
     const entry = drawn && this.track.history.get(Number(drawn.sequence));
     if (entry) this.countDrawn(entry);
   }
@@ -321,7 +318,7 @@ export class Pane {
     this.detach();
     this.resetVariant();
     this.observer.disconnect();
-    this.space?.destroy();
+    this.space.picture?.destroy();
     this.scene.destroy();
     this.element.remove();
   }
@@ -335,7 +332,7 @@ export class Pane {
     this.refusal = '';
     this.isPending = false;
     this.scene.show(null);
-    this.space?.clear();
+    this.space.picture?.clear();
     this.numbers.clear();
     this.dirty = true;
   }
@@ -416,10 +413,10 @@ export class Pane {
     this.shown = source;
     this.isPending = false;
     this.whole = frame;
-    const isSpace = this.pictureOfSpace !== null && frame.surface !== undefined && this.outlineShown === 0;
+    const isSpace = this.space.isOffered && frame.surface !== undefined && this.outlineShown === 0;
     this.showSpace(isSpace);
     if (isSpace) {
-      this.space?.show(frame, this.outlines);
+      this.space.picture?.show(frame, this.outlines);
       return;
     }
     frame = pictureOf(frame, this.outlines, this.outlineShown);
@@ -440,26 +437,10 @@ export class Pane {
   /** Switches between the pictures of surfaces and of outlines. */
   private showSpace(isSpace: boolean): void {
     if (isSpace === this.isSpace) return;
-    if (isSpace) this.space ??= this.newSpacePicture(this.pictureOfSpace);
-    if (this.space) this.space.element.hidden = !isSpace;
+    this.space.show(isSpace, `Surface of ${this.track.title}`);
     const ofOutlines = [this.canvas, this.overlay.element, this.scaleBar.element, this.pointer.readout];
     for (const element of ofOutlines) element.toggleAttribute('hidden', isSpace);
-    (isSpace ? this.space?.scene : this.scene)?.resize();
-  }
-
-  private newSpacePicture(make: Pane['pictureOfSpace']): SpacePicture | null {
-    if (!make) return null;
-    const space = make({
-      moved: (byUser) => this.events.moved(this, byUser),
-      selected: (point) => this.events.selected?.(this, point),
-      shown: (frame) => { if (this.isSpace) this.showNumbers(frame); },
-    });
-    space.element.hidden = true;
-    space.canvas.setAttribute('aria-label', `Surface of ${this.track.title}`);
-    this.canvas.before(space.element);
-    if (this.look) space.setLook(this.look, this.spaceLook);
-    if (this.firstSpaceView) space.setView(this.firstSpaceView);
-    return space;
+    (this.space.shown ?? this).scene.resize();
   }
 
   /** Shows another outline of the frame, in the coordinates of its plane. */
@@ -502,7 +483,7 @@ export class Pane {
   /** Selects the ring or the body at a world position, or none. A position of the other kind of picture selects none. */
   selectAt(point: Point | Vector | null): void {
     if (this.isSpace || point?.length === 3) {
-      this.space?.selectAt(point?.length === 3 ? point : null);
+      this.space.picture?.selectAt(point?.length === 3 ? point : null);
       return;
     }
     this.pointer.selectAt(point);
