@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import tempfile
 import time
+import unittest
 
 import numpy
 
@@ -88,6 +89,16 @@ class Server:
         self.process.kill()
         self.process.wait()
         self.folder.cleanup()
+
+
+class ServerTest(unittest.TestCase):
+    """Tests that share a server."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.server = Server().__enter__()
+        cls.addClassCleanup(cls.server.__exit__)
+        cls.address = cls.server.address
 
 
 def document(path):
