@@ -4,24 +4,14 @@
     formats_of_programs.py --partiemc PROGRAM
 """
 
-import argparse
-import csv
 import json
-import pathlib
-import resource
 import struct
-import subprocess
 import sys
-import tempfile
-import unittest
-import zlib
 
 try:
     import gsd.hoomd
-    import h5py
     import meshio
     import numpy
-    import numpy.lib.recfunctions
     import vtk
     from pysph.base.utils import get_particle_array
     from pysph.solver.output import dump as dump_pysph
@@ -30,85 +20,10 @@ except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
 
-PROGRAM = None
-SPACING = 0.1
-TIMES = [0.5, 0.75, 1.25]
-STEPS = [100, 150, 250]
+from program_frames import FRAMES, IDS, STEPS, TIMES, VELOCITIES, VOLUMES, ReplayTest, main
 
 
-def frames():
-    """A drop that falls and widens: positions (N, 3) with z = 0 that are exact in float32."""
-    axis = numpy.arange(-1, 1, SPACING)
-    grid = numpy.stack(numpy.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    disc = grid[(grid ** 2).sum(axis=1) < 0.8]
-    for k in range(len(TIMES)):
-        moved = disc * [1 + 0.02 * k, 1] - [0, 0.1 * k]
-        yield numpy.column_stack([moved, numpy.zeros(len(disc))]).astype("f4").astype("f8")
-
-
-FRAMES = list(frames())
-IDS = numpy.arange(len(FRAMES[0]))[::-1] + 5
-VELOCITIES = numpy.tile([0.1, -0.4, 0], (len(FRAMES[0]), 1))
-VOLUMES = numpy.full(len(FRAMES[0]), SPACING ** 2)
-
-
-def limit_memory():
-    """Hostile files must be refused before memory is allocated for them."""
-    resource.setrlimit(resource.RLIMIT_DATA, (700 << 20, 700 << 20))
-
-
-class Formats(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def attribute_ranges(self):
-        """The least and the greatest value of each attribute in the last frame that was replayed."""
-        ranges = {}
-        for name, value in self.properties.items():
-            for k, suffix in enumerate(("_min", "_max")):
-                if name.endswith(suffix):
-                    ranges.setdefault(name.removesuffix(suffix), [None, None])[k] = value
-        return ranges
-
-    def replay(self, source, *flags):
-        """The rows of --stats, and the times of the frames."""
-        table = self.folder / "stats.csv"
-        with tempfile.TemporaryDirectory() as out:
-            subprocess.run([PROGRAM, "replay", str(source), "--local", "--quiet", "--spacing", str(SPACING), "--stats",
-                            str(table), "--output-dir", out, "--format", "geojson", *flags], check=True)
-            written = [json.loads(path.read_text()) for path in sorted(pathlib.Path(out).glob("*.geojson"))]
-        times = [one["time"] for one in written]
-        self.properties = written[-1]["features"][0]["properties"] if written[-1]["features"] else {}
-        with open(table, newline="") as rows:
-            return [{**row, "time": time} for row, time in zip(csv.DictReader(rows), times)]
-
-    def csv_rows(self, columns, time):
-        """The rows of the same frames as CSV with these columns."""
-        folder = self.folder / "truth"
-        folder.mkdir()
-        for k, positions in enumerate(FRAMES):
-            table = {"x": positions[:, 0], "y": positions[:, 1], "id": IDS, "vx": VELOCITIES[:, 0],
-                     "vy": VELOCITIES[:, 1], "volume": VOLUMES}
-            with open(folder / f"frame_{k}.csv", "w", newline="") as file:
-                writer = csv.writer(file)
-                writer.writerow(columns)
-                writer.writerows(zip(*(map(repr, table[name].tolist()) for name in columns)))
-        if time:
-            lines = "\n".join(f"{k},{t}" for k, t in enumerate(TIMES))
-            (folder / "times.csv").write_text(f"frame,t\n{lines}\n")
-        return self.replay(folder)
-
-    def assert_same(self, source, *flags, columns=("x", "y"), time=True, count=len(FRAMES)):
-        truth = self.csv_rows(columns, time)[:count]
-        rows = self.replay(source, *flags)
-        self.assertEqual(len(rows), count)
-        keys = [key for key in rows[0] if "digest" in key] + ["particles", "time"]
-        self.assertEqual(keys[:2], ["rings_digest", "mesh_digest"])
-        for row, true in zip(rows, truth):
-            self.assertEqual([row[key] for key in keys], [true[key] for key in keys])
-
+class Formats(ReplayTest):
     # Text.
 
     def test_lammps_dump(self):
@@ -165,20 +80,13 @@ class Formats(unittest.TestCase):
                     self.setUpTruth()
                     self.assert_same(source, columns=("x", "y", "id", "vx", "vy", "volume"))
 
-    def setUpTruth(self):
-        truth = self.folder / "truth"
-        if truth.exists():
-            for file in truth.iterdir():
-                file.unlink()
-            truth.rmdir()
-
     def test_pysph_array_by_name(self):
         for suffix in ("hdf5", "npz"):
             with self.subTest(suffix=suffix):
                 source = self.dump_pysph(suffix, names=("wall", "sand"))
                 self.setUpTruth()
                 self.assert_same(source, "--columns", "wall/x,wall/y", columns=("x", "y", "id", "vx", "vy", "volume"))
-                refused = subprocess.run([PROGRAM, "replay", str(source), "--local"], capture_output=True, text=True)
+                refused = self.run_replay(source)
                 self.assertEqual(refused.returncode, 3)
                 self.assertIn("choose one of", refused.stderr)
 
@@ -208,221 +116,6 @@ class Formats(unittest.TestCase):
                 self.dump_pysph(suffix)
                 self.replay(self.folder / f"run_*.{suffix}", "--attributes", "volume")
                 numpy.testing.assert_allclose(self.attribute_ranges()["volume"], [VOLUMES[0]] * 2, rtol=1e-5)
-
-    # HDF5.
-
-    def test_h5part(self):
-        with h5py.File(self.folder / "a.h5part", "w") as file:
-            for k in (10, 2, 1):  # Not in the order of time.
-                index = (1, 2, 10).index(k)
-                group = file.create_group(f"Step#{k}")
-                group.attrs["TimeValue"] = TIMES[index]
-                group["x"], group["y"], group["z"] = FRAMES[index].T
-                group["id"] = IDS
-        self.assert_same(self.folder / "a.h5part", columns=("x", "y", "id"))
-
-    def write_vtkhdf(self, name, indices):
-        with h5py.File(self.folder / name, "w") as file:
-            root = file.create_group("VTKHDF")
-            root.attrs["Version"] = (2, 0)
-            root.attrs["Type"] = numpy.bytes_("PolyData")
-            root["NumberOfPoints"] = [len(IDS)] * len(indices)
-            root["Points"] = numpy.concatenate([FRAMES[k] for k in indices]).astype("f4")
-            data = root.create_group("PointData")
-            data["id"] = numpy.concatenate([IDS] * len(indices))
-            data["velocity"] = numpy.concatenate([VELOCITIES] * len(indices))
-            if len(indices) == 1:
-                return
-            steps = root.create_group("Steps")
-            steps.attrs["NSteps"] = len(indices)
-            steps["Values"] = [TIMES[k] for k in indices]
-            steps["PartOffsets"] = range(len(indices))
-            steps["NumberOfParts"] = [1] * len(indices)
-            steps["PointOffsets"] = [len(IDS) * k for k in range(len(indices))]
-            offsets = steps.create_group("PointDataOffsets")
-            offsets["id"] = steps["PointOffsets"][()]
-            offsets["velocity"] = steps["PointOffsets"][()]
-
-    def test_vtkhdf(self):
-        self.write_vtkhdf("a.vtkhdf", [0])
-        self.assert_same(self.folder / "a.vtkhdf", columns=("x", "y", "id"), time=False, count=1)
-
-    def test_vtkhdf_with_steps(self):
-        self.write_vtkhdf("a.vtkhdf", [0, 1, 2])
-        self.assert_same(self.folder / "a.vtkhdf", columns=("x", "y", "id", "vx", "vy"))
-
-    def test_openpmd(self):
-        with h5py.File(self.folder / "a.h5", "w") as file:
-            file.attrs["openPMD"] = numpy.bytes_("1.1.0")
-            for step, time, positions in zip(STEPS, TIMES, FRAMES):
-                species = file.create_group(f"data/{step}/particles/fluid")
-                file[f"data/{step}"].attrs["time"] = time
-                for axis, name in enumerate("xyz"[:2]):
-                    # Offsets in units of a quarter: sums are exact.
-                    shift = numpy.floor(positions[:, axis] * 4)
-                    species[f"position/{name}"] = positions[:, axis] - shift / 4
-                    species[f"position/{name}"].attrs["unitSI"] = 1.0
-                    species[f"positionOffset/{name}"] = shift
-                    species[f"positionOffset/{name}"].attrs["unitSI"] = 0.25
-                flat = species.create_group("position/z")
-                flat.attrs["value"], flat.attrs["shape"] = 0.0, len(IDS)
-                species["id"] = IDS
-        self.assert_same(self.folder / "a.h5", columns=("x", "y", "id"))
-        self.setUpTruth()
-        self.assert_same(self.folder / "a.h5", "--columns", "data/*/particles/fluid/position", columns=("x", "y", "id"))
-
-    def test_openpmd_offsets_must_match_the_positions(self):
-        for shape in ((3,), (2, 2)):
-            with h5py.File(self.folder / "a.h5", "w") as file:
-                species = file.create_group("data/1/particles/fluid")
-                for name in "xy":
-                    species[f"position/{name}"] = [1.0, 2.0]
-                    species[f"positionOffset/{name}"] = numpy.ones(shape)
-            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local"], capture_output=True,
-                                 text=True)
-            self.assertEqual(ran.returncode, 3, ran.stderr)
-            self.assertIn("positionOffset/x must have one number", ran.stderr)
-
-    def test_vtkhdf_steps_that_repeat_long_names_are_refused(self):
-        with h5py.File(self.folder / "a.vtkhdf", "w") as file:
-            count = 100_000
-            file["VTKHDF/Points"] = numpy.zeros((1, 3))
-            file["VTKHDF/NumberOfPoints"] = [1]
-            file["VTKHDF/PointData/" + "n" * 5000] = [1.0]
-            steps = file["VTKHDF"].create_group("Steps")
-            steps.attrs["NSteps"] = count
-            for name in ("Values", "PartOffsets", "PointOffsets"):
-                steps.create_dataset(name, data=numpy.zeros(count, "i8"), compression="gzip")
-        ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.vtkhdf"), "--local"], capture_output=True,
-                             text=True, preexec_fn=limit_memory)
-        self.assertEqual(ran.returncode, 3, ran.stderr)
-        self.assertIn("256 MiB", ran.stderr)
-
-    def test_gadget(self):
-        for k, (time, positions) in enumerate(zip(TIMES, FRAMES)):
-            with h5py.File(self.folder / f"snapshot_{k:03}.hdf5", "w") as file:
-                file.create_group("Header").attrs["Time"] = time
-                for kind in ("PartType0", "PartType1"):
-                    group = file.create_group(kind)
-                    group.create_dataset("Coordinates", data=positions + (kind == "PartType1"), chunks=(16, 3),
-                                         compression="gzip")
-                    group["Velocities"] = VELOCITIES
-                    group["ParticleIDs"] = IDS
-        source = self.folder / "snapshot_*.hdf5"
-        self.assert_same(source, "--columns", "PartType0/Coordinates", columns=("x", "y", "id", "vx", "vy"))
-        refused = subprocess.run([PROGRAM, "replay", str(source), "--local"], capture_output=True, text=True)
-        self.assertEqual(refused.returncode, 3)
-        self.assertIn("PartType0/Coordinates", refused.stderr)
-
-    def test_members_of_a_large_hdf5_group_are_listed_in_part(self):
-        def listed(group, others):
-            with h5py.File(self.folder / "a.h5", "w", libver="latest") as file:
-                file["other/sizes"] = [1.0, 2.0]
-                file.require_group(group)
-                for k in range(others):
-                    file[group][f"p{k}"] = file["other/sizes"]  # A hard link.
-            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local", "--columns", "g/x,g/y"],
-                                 capture_output=True, text=True, preexec_fn=limit_memory)
-            self.assertEqual(ran.returncode, 3, ran.stderr)
-            return ran.stderr.splitlines()[-1].split("the datasets are ")[1]
-
-        self.assertEqual(listed("/", 2), "p0, p1, other/sizes")
-        many = listed("/", 12_000)
-        self.assertRegex(many, r"^p\d+(, p\d+){11}, \.\.\.; the root group has 11989 more members$")
-        nested = listed("many", 12_000)
-        self.assertRegex(nested, r"^many/p\d+(, many/p\d+){11}, \.\.\.; the group many has 11988 more members$")
-
-    def test_hdf5_that_leads_out_of_the_file_or_lies(self):
-        hidden = self.folder / "hidden.h5"
-        with h5py.File(hidden, "w") as file:
-            file["g/x"] = file["g/y"] = [1.0, 2.0]
-
-        def refusal(write):
-            with h5py.File(self.folder / "a.h5", "w") as file:
-                write(file)
-            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "a.h5"), "--local", "--columns", "g/x,g/y"],
-                                 capture_output=True, text=True, preexec_fn=limit_memory)
-            self.assertEqual(ran.returncode, 3, ran.stderr)
-            return ran.stderr.splitlines()[-1]
-
-        def external_link(file):
-            file["g"] = h5py.ExternalLink(str(hidden), "g")
-
-        def virtual(file):
-            layout = h5py.VirtualLayout(shape=(2,), dtype="f8")
-            layout[:] = h5py.VirtualSource(str(hidden), "g/x", shape=(2,))
-            file.create_virtual_dataset("g/x", layout)
-            file["g/y"] = [1.0, 2.0]
-
-        def external_data(file):
-            file.create_dataset("g/x", (2,), "f8", external=[(str(hidden), 0, 16)])
-            file["g/y"] = [1.0, 2.0]
-
-        def declared_only(file):
-            for name in ("x", "y"):
-                file.create_dataset(f"g/{name}", (60_000_000,), "f8", chunks=(1000,))
-
-        def mostly_declared(file):
-            for name in ("x", "y"):
-                file.create_dataset(f"g/{name}", (60_000_000,), "f8", chunks=(1000,))[:1] = 1
-
-        def huge_chunk(file):
-            # Filtered chunks are unpacked as a whole; these hold a row of an extensible dataset.
-            for name in ("x", "y"):
-                data = file.create_dataset(f"g/{name}", (10,), "f8", maxshape=(None,), chunks=(2 ** 28,),
-                                           compression="gzip")
-                data.id.write_direct_chunk((0,), zlib.compress(bytes(80)))
-
-        def never_written(file):
-            for name in ("x", "y"):
-                file.create_dataset(f"g/{name}", (10 ** 12,), "f8", fillvalue=1, chunks=(2 ** 20,))
-
-        def never_written_contiguous(file):
-            for name in ("x", "y"):
-                file.create_dataset(f"g/{name}", (10 ** 12,), "f8", fillvalue=1)
-
-        def constants(file):
-            for name in ("x", "y"):
-                group = file.create_group(f"g/{name}")
-                group.attrs["value"], group.attrs["shape"] = 1.0, 60_000_000
-            file.create_dataset("g/id", (60_000_000,), "i8", chunks=(1000,))
-
-        def stacked_compression(file):
-            creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-            creation.set_chunk((1024,))
-            creation.set_filter(1, 0, (9,))
-            creation.set_filter(1, 0, (9,))
-            space = h5py.h5s.create_simple((1024,))
-            file.create_group("g")
-            for name in (b"x", b"y"):
-                h5py.h5d.create(file["g"].id, name, h5py.h5t.IEEE_F64LE, space, creation).write(
-                    h5py.h5s.ALL, h5py.h5s.ALL, numpy.zeros(1024))
-
-        def unsafe_filter(file):
-            for name in ("x", "y"):
-                file.create_dataset(f"g/{name}", data=numpy.arange(1024), chunks=(1024,), scaleoffset=0)
-
-        self.assertIn("chunks of 2147483648 bytes", refusal(huge_chunk))
-        for write in (never_written, never_written_contiguous):
-            self.assertIn("1000000000000 particles; at most 67108864", refusal(write))
-        self.assertIn("declares 60000000 rows", refusal(constants))
-        self.assertIn("filter 1 twice", refusal(stacked_compression))
-        self.assertIn("filter 6", refusal(unsafe_filter))
-        self.assertIn("no group g", refusal(external_link))
-        self.assertIn("in another file", refusal(virtual))
-        self.assertIn("in another file", refusal(external_data))
-        self.assertIn("declares 60000000 rows", refusal(declared_only))
-        self.assertIn("declares 60000000 rows", refusal(mostly_declared))
-
-    def test_truncated_hdf5(self):
-        self.write_vtkhdf("a.vtkhdf", [0])
-        whole = (self.folder / "a.vtkhdf").read_bytes()
-        for size in range(8, len(whole), len(whole) // 40):
-            (self.folder / "cut.vtkhdf").write_bytes(whole[:size])
-            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "cut.vtkhdf"), "--local"], capture_output=True,
-                                 text=True)
-            self.assertEqual(ran.returncode, 3, size)
-            self.assertIn("cut.vtkhdf", ran.stderr)
 
     # Other binary formats.
 
@@ -476,8 +169,7 @@ class Formats(unittest.TestCase):
         whole = self.write_gsd().read_bytes()
         for size in [*range(8, 300, 29), *range(300, len(whole), len(whole) // 40)]:
             (self.folder / "cut.gsd").write_bytes(whole[:size])
-            ran = subprocess.run([PROGRAM, "replay", str(self.folder / "cut.gsd"), "--local"], capture_output=True,
-                                 text=True)
+            ran = self.run_replay(self.folder / "cut.gsd")
             self.assertEqual(ran.returncode, 3, size)
             self.assertIn("cut.gsd", ran.stderr)
 
@@ -531,107 +223,5 @@ class Formats(unittest.TestCase):
         (self.folder / "out" / "a.vtp.series").write_text(json.dumps({"file-series-version": "1.0", "files": files}))
         self.assert_same(self.folder / "out" / "a.vtp.series", columns=("x", "y", "id"))
 
-
-class Outputs(unittest.TestCase):
-    """Files of results, as the readers of ParaView (VTK), meshio and Shapely see them."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.folder = pathlib.Path(cls.temporary.name)
-        for k, positions in enumerate(FRAMES):
-            lines = [f"{x!r},{y!r},{x!r}" for x, y in positions[:, :2].tolist()]
-            (cls.folder / f"in_{k}.csv").write_text("\n".join(["x,y,p x", *lines]))
-        (cls.folder / "times.csv").write_text("frame,t\n" + "".join(f"{k},{t}\n" for k, t in enumerate(TIMES)))
-        subprocess.run([PROGRAM, "replay", f"{cls.folder}/in_*.csv", "--local", "--quiet", "--spacing", str(SPACING),
-                        "--attributes", "p x", "--times", str(cls.folder / "times.csv"), "--output-dir",
-                        str(cls.folder / "out"), "--format", "vtp,ply,stl,glb,geojson,obj"], check=True)
-        reader = vtk.vtkXMLPolyDataReader()
-        cls.vtp = cls.read(reader, "vtp")
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.temporary.cleanup()
-
-    @classmethod
-    def path(cls, extension):
-        return str(cls.folder / f"out/frame_000001.{extension}")
-
-    @classmethod
-    def read(cls, reader, extension):
-        reader.SetFileName(cls.path(extension))
-        reader.Update()
-        return reader.GetOutput()
-
-    def points_of(self, data):
-        return numpy.array([data.GetPoint(k)[:2] for k in range(data.GetNumberOfPoints())])
-
-    def area_of(self, points, triangles):
-        a, b, c = (points[triangles[:, k]] for k in range(3))
-        return float(((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() / 2)
-
-    def true_area(self):
-        import shapely.geometry
-
-        features = json.loads(pathlib.Path(self.path("geojson")).read_text())["features"]
-        return sum(shapely.geometry.shape(feature["geometry"]).area for feature in features)
-
-    def test_ply(self):
-        read = meshio.read(self.path("ply"))
-        triangles = read.cells[0].data
-        self.assertEqual(len(triangles), self.vtp.GetNumberOfPolys())
-        self.assertAlmostEqual(self.area_of(read.points, triangles), self.true_area(), 9)
-        numpy.testing.assert_array_equal(read.points[:, :2], self.points_of(self.vtp))
-        # The attribute is linear, so it is exact.
-        numpy.testing.assert_allclose(read.point_data["p_x"], read.points[:, 0], atol=0.02)
-        shown = self.read(vtk.vtkPLYReader(), "ply")
-        self.assertEqual(shown.GetNumberOfPolys(), len(triangles))
-        numpy.testing.assert_allclose(self.points_of(shown), read.points[:, :2], atol=1e-6)
-
-    def test_vtp_attributes(self):
-        array = self.vtp.GetPointData().GetArray("p x")
-        values = [array.GetValue(k) for k in range(array.GetNumberOfTuples())]
-        numpy.testing.assert_array_equal(meshio.read(self.path("ply")).point_data["p_x"], values)
-
-    def test_stl(self):
-        for points, triangles in ((lambda mesh: (mesh.points, mesh.cells[0].data))(meshio.read(self.path("stl"))),):
-            self.assertEqual(len(triangles), self.vtp.GetNumberOfPolys())
-            self.assertAlmostEqual(self.area_of(points, triangles), self.true_area(), 5)
-        self.assertEqual(self.read(vtk.vtkSTLReader(), "stl").GetNumberOfPolys(), self.vtp.GetNumberOfPolys())
-
-    def test_glb(self):
-        blocks = self.read(vtk.vtkGLTFReader(), "glb")
-        iterator = blocks.NewIterator()
-        found = []
-        while not iterator.IsDoneWithTraversal():
-            found.append(iterator.GetCurrentDataObject())
-            iterator.GoToNextItem()
-        self.assertEqual([(data.GetNumberOfPolys(), data.GetNumberOfLines() > 0) for data in found],
-                         [(self.vtp.GetNumberOfPolys(), False), (0, True)])
-        numpy.testing.assert_allclose(self.points_of(found[0]), self.points_of(self.vtp), atol=1e-6)
-
-    def test_geojson_properties(self):
-        feature = json.loads(pathlib.Path(self.path("geojson")).read_text())["features"][0]
-        xs = [x for ring in feature["geometry"]["coordinates"] for x, _ in ring[:-1]]
-        properties = feature["properties"]
-        self.assertAlmostEqual(properties["p x_min"], min(xs), delta=0.02)
-        self.assertAlmostEqual(properties["p x_max"], max(xs), delta=0.02)
-        self.assertAlmostEqual(properties["p x_mean"], sum(xs) / len(xs), delta=0.02)
-
-    def test_collections(self):
-        import xml.etree.ElementTree
-
-        sets = xml.etree.ElementTree.parse(self.folder / "out/frames.pvd").iter("DataSet")
-        found = [(float(one.get("timestep")), one.get("file")) for one in sets]
-        names = [f"frame_{k:06}.vtp" for k in range(len(FRAMES))]
-        self.assertEqual(found, list(zip(TIMES, names)))
-        series = json.loads((self.folder / "out/frames.vtp.series").read_text())
-        self.assertEqual([(one["time"], one["name"]) for one in series["files"]], found)
-
-
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--partiemc", required=True)
-    arguments, rest = parser.parse_known_args()
-    PROGRAM = arguments.partiemc
-    unittest.main(argv=[sys.argv[0], *rest])
+    main()
