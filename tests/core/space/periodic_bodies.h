@@ -89,4 +89,14 @@ SpaceParticles Filled(int x, int y, int z, double shake, support::Random& random
   return particles;
 }
 
+/// `count` particles at random points of a box from the origin.
+inline SpaceParticles Uniform(std::size_t count, const Vec3& lengths, support::Random& random) {
+  SpaceParticles particles;
+  for (; count > 0; --count) {
+    const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
+    particles.Add({x, y, random.Uniform(0, lengths.z)});
+  }
+  return particles;
+}
+
 }  // namespace partiemc::testing
