@@ -7,9 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "client/library/backoff.h"
 #include "client/library/fake_server.h"
-#include "client/library/resend_buffer.h"
 #include "partiemc/client/stream.h"
 
 namespace partiemc::client {
@@ -476,49 +474,6 @@ TEST(Resume, AnotherAddressServesWhereTheFirstHasNobody) {
   StreamOptions options = Options(&server);
   const auto stream = Stream::Open("127.0.0.1:1", options);
   EXPECT_TRUE(stream.ok()) << stream.status();
-}
-
-TEST(Backoff, TriesEachAddressAtOnceThenDoublesThePauseToALimit) {
-  const ReconnectPolicy policy{.first_pause = milliseconds(100),
-                               .longest_pause = milliseconds(1000)};
-  Backoff backoff(policy, 3, 42);
-  for (int k = 0; k < 3; ++k) EXPECT_EQ(backoff.NextPause(), milliseconds(0));
-  for (const int pause : {100, 200, 400, 800, 1000, 1000, 1000}) {
-    const auto first_of_round = backoff.NextPause();
-    EXPECT_GE(first_of_round, milliseconds(pause / 2 - 1));
-    EXPECT_LE(first_of_round, milliseconds(pause));
-    for (int k = 1; k < 3; ++k) EXPECT_EQ(backoff.NextPause(), milliseconds(0));
-  }
-  for (int k = 0; k < 1000; ++k) EXPECT_LE(backoff.NextPause(), policy.longest_pause);
-}
-
-TEST(Backoff, ClientsDoNotComeBackAsOne) {
-  const ReconnectPolicy policy{.first_pause = milliseconds(1000)};
-  Backoff one(policy, 1, 1), other(policy, 1, 2);
-  one.NextPause();
-  other.NextPause();
-  EXPECT_NE(one.NextPause(), other.NextPause());
-}
-
-TEST(ResendBuffer, HoldsFramesByTheirNumbersAndCountsTheirBytes) {
-  const auto request = [](const std::string& text) {
-    const grpc::Slice slice(text);
-    return grpc::ByteBuffer(&slice, 1);
-  };
-  ResendBuffer buffer(5);
-  buffer.Add(request("12"));
-  buffer.Add(request("1234"));
-  buffer.Add(request("1"));
-  EXPECT_EQ(buffer.begin(), 5u);
-  EXPECT_EQ(buffer.end(), 8u);
-  EXPECT_EQ(buffer.bytes(), 7u);
-  EXPECT_EQ(buffer.at(6).Length(), 4u);
-  buffer.DropBelow(7);
-  EXPECT_EQ(buffer.begin(), 7u);
-  EXPECT_EQ(buffer.bytes(), 1u);
-  buffer.DropBelow(100);
-  EXPECT_EQ(buffer.begin(), 8u) << "what was never there cannot go";
-  EXPECT_EQ(buffer.bytes(), 0u);
 }
 
 }  // namespace
