@@ -72,11 +72,7 @@ StreamRegistry::StreamRegistry(std::uint32_t max_streams, HistoryRoom* history,
 absl::Status StreamRegistry::Enter(std::shared_ptr<StreamStateMachine> machine, Caller caller) {
   const MutexLock lock(mutex_);
   if (auto status = CheckServingLocked(); !status.ok()) return status;
-  const StreamStateMachine* key = machine.get();
-  Entry& entry = entries_[key];
-  entry.machine = std::move(machine);
-  entry.arrival = arrived_++;
-  entry.caller = std::move(caller);
+  Add(std::move(machine)).caller = std::move(caller);
   return absl::OkStatus();
 }
 
@@ -268,11 +264,7 @@ std::optional<StreamSummary> StreamRegistry::Close(const StreamStateMachine& mac
 
 void StreamRegistry::Leave(const StreamStateMachine& machine) {
   const MutexLock lock(mutex_);
-  const auto found = entries_.find(&machine);
-  if (found == entries_.end()) return;  // The machine was not admitted.
-  entries_.erase(found);
-  // Holds the lock, because a thread in WaitUntilEmpty may destroy the registry afterwards.
-  left_.NotifyAll();
+  Remove(machine);
 }
 
 absl::StatusOr<StreamSummary> StreamRegistry::Find(const std::string& name,
@@ -310,15 +302,6 @@ std::size_t StreamRegistry::OpenCount() const {
       entries_.begin(), entries_.end(), [](const auto& item) { return item.second.IsOpen(); }));
 }
 
-std::vector<std::shared_ptr<StreamStateMachine>> StreamRegistry::Machines() const {
-  std::map<std::uint64_t, const Entry*> by_arrival;
-  for (const auto& [key, entry] : entries_) by_arrival[entry.arrival] = &entry;
-  std::vector<std::shared_ptr<StreamStateMachine>> machines;
-  machines.reserve(by_arrival.size());
-  for (const auto& [arrival, entry] : by_arrival) machines.push_back(entry->machine);
-  return machines;
-}
-
 void StreamRegistry::SetElsewhere(std::vector<std::string> addresses) {
   const MutexLock lock(mutex_);
   elsewhere_ = std::move(addresses);
@@ -333,11 +316,7 @@ std::vector<std::string> StreamRegistry::TakeElsewhere() {
 
 void StreamRegistry::SendAway(std::chrono::milliseconds within) {
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<std::shared_ptr<StreamStateMachine>> machines;
-  {
-    const MutexLock lock(mutex_);
-    machines = Machines();
-  }
+  auto machines = All();
   for (std::size_t k = 0; k < machines.size(); ++k) {
     machines[k]->Drain();
     machines[k].reset();
@@ -347,27 +326,13 @@ void StreamRegistry::SendAway(std::chrono::milliseconds within) {
 }
 
 void StreamRegistry::Drain() {
-  std::vector<std::shared_ptr<StreamStateMachine>> machines;
-  {
-    const MutexLock lock(mutex_);
-    draining_ = true;
-    machines = Machines();
-  }
-  // Without the lock, because a state machine that drains may call Leave.
-  for (const auto& machine : machines) machine->Drain();
+  StopAdmitting();
+  for (const auto& machine : All()) machine->Drain();
 }
 
 std::chrono::steady_clock::time_point StreamRegistry::EndIdle(
     const IdleLimits& limits, std::chrono::steady_clock::time_point now) {
-  std::vector<std::shared_ptr<StreamStateMachine>> machines;
-  {
-    const MutexLock lock(mutex_);
-    machines = Machines();
-  }
-  auto look_again = std::chrono::steady_clock::time_point::max();
-  for (const auto& machine : machines)
-    look_again = std::min(look_again, machine->EndIfIdle(limits, now));
-  return look_again;
+  return EndLate([&](StreamStateMachine& machine) { return machine.EndIfIdle(limits, now); });
 }
 
 absl::Status StreamRegistry::CheckServing() {
@@ -389,13 +354,6 @@ std::uint64_t StreamRegistry::turned_away() const {
 bool StreamRegistry::draining() const {
   const MutexLock lock(mutex_);
   return draining_;
-}
-
-bool StreamRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
-  const MutexLock lock(mutex_);
-  while (!entries_.empty() && left_.WaitUntil(mutex_, deadline)) {
-  }
-  return entries_.empty();
 }
 
 }  // namespace partiemc::server

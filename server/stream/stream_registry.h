@@ -16,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "common/mutex.h"
 #include "partiemc/parameters.h"
+#include "server/base/call_registry.h"
 #include "server/security/caller.h"
 #include "server/stream/stream_state_machine.h"
 #include "server/watch/result_broadcaster.h"
@@ -76,9 +77,22 @@ struct StreamSummary {
   std::chrono::steady_clock::time_point opened;
 };
 
+struct StreamEntry : CallEntry<StreamStateMachine> {
+  Caller caller;
+  CallerAccount::Place place;           ///< Set while the stream is open.
+  std::optional<StreamSummary> stream;  ///< Set from Open to Close; its `counts` are out of date.
+  std::string token;                    ///< The stream token.
+  bool taken_over = false;              ///< Whether another entry continues the stream.
+  /// The name of the stream whose parts it sends, and its part. No name: it sends no parts.
+  std::string part_of;
+  std::uint32_t part = 0;
+
+  bool IsOpen() const { return stream && !taken_over; }
+};
+
 /// The life of a StreamStateMachine ("machine") in the registry: it enters; it opens a stream, or
 /// joins a stream to send one of its parts; it closes; it leaves. Thread-safe.
-class StreamRegistry {
+class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
  public:
   /// `history`: the memory for the histories of all streams, which outlives the registry. Null:
   /// streams have no histories. `max_parts`: maximum number of calls that send parts 1 and above.
@@ -152,25 +166,9 @@ class StreamRegistry {
   /// returned, because a stream has been opened or joined. Empty: no call. `tell` must not call the
   /// registry.
   void OnEarlierLook(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Blocks until all state machines have left. Returns false if `deadline` passes first.
-  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
+  using CallRegistry::WaitUntilEmpty;
 
  private:
-  struct Entry {
-    std::shared_ptr<StreamStateMachine> machine;
-    std::uint64_t arrival = 0;  // Number of calls that were admitted before this one.
-    Caller caller;
-    CallerAccount::Place place;           // Set while the stream is open.
-    std::optional<StreamSummary> stream;  // Set from Open to Close; its `counts` are out of date.
-    std::string token;                    // The stream token.
-    bool taken_over = false;              // Whether another entry continues the stream.
-    // The name of the stream whose parts it sends, and its part. No name: it sends no parts.
-    std::string part_of;
-    std::uint32_t part = 0;
-
-    bool IsOpen() const { return stream && !taken_over; }
-  };
-
   absl::StatusOr<StreamSummary> OpenLocked(const StreamStateMachine& machine,
                                            StreamDescription description, std::string token,
                                            std::shared_ptr<StreamStateMachine>& former_machine)
@@ -183,9 +181,6 @@ class StreamRegistry {
   // Moves the slot of `former` to `entry` if both have the same caller account. Otherwise takes a
   // new slot for the caller of `entry`.
   static absl::Status TakePlace(Entry& entry, Entry* former);
-  // In the order of arrival.
-  std::vector<std::shared_ptr<StreamStateMachine>> Machines() const
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Entry* FindOpen(std::string_view token) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -199,14 +194,9 @@ class StreamRegistry {
   HistoryRoom* const history_;
   const std::string id_prefix_;  // Random, so that ids differ between runs of a server.
 
-  mutable Mutex mutex_;
-  CondVar left_;
-  std::map<const StreamStateMachine*, Entry> entries_ ABSL_GUARDED_BY(mutex_);
-  std::uint64_t arrived_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t opened_ ABSL_GUARDED_BY(mutex_) = 0;
   std::atomic<std::uint64_t> changes_ = 0;
   std::vector<std::string> elsewhere_ ABSL_GUARDED_BY(mutex_);
-  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
   std::uint64_t turned_away_ ABSL_GUARDED_BY(mutex_) = 0;
   std::function<void()> tell_earlier_look_ ABSL_GUARDED_BY(mutex_);
 };

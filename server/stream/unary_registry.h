@@ -4,13 +4,12 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "common/mutex.h"
+#include "server/base/call_registry.h"
 #include "server/compute/fair_share.h"
 #include "server/security/caller.h"
 #include "server/stream/unary_state_machine.h"
@@ -20,8 +19,13 @@ namespace partiemc::server {
 /// The violation's reason if there are too many calls (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonTooManyCalls = "TOO_MANY_CALLS";
 
+struct UnaryEntry : CallEntry<UnaryStateMachine> {
+  UnaryKind kind = UnaryKind::kFrame;
+  const CallerAccount* caller = nullptr;  ///< The caller charged for its slot; null: no slot.
+};
+
 /// Limits the number of concurrent calls of each kind. Thread-safe.
-class UnaryRegistry {
+class UnaryRegistry : private CallRegistry<UnaryStateMachine, UnaryEntry> {
  public:
   /// Maximum number of one caller's calls for information, and of its health checks. Such calls
   /// take little time.
@@ -62,21 +66,10 @@ class UnaryRegistry {
   bool WaitForFrames(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  struct Entry {
-    std::shared_ptr<UnaryStateMachine> call;
-    UnaryKind kind;
-    const CallerAccount* caller = nullptr;  // The caller charged for its slot; null: no slot.
-  };
-
-  std::vector<std::shared_ptr<UnaryStateMachine>> All() const ABSL_LOCKS_EXCLUDED(mutex_);
   void FreePlace(const UnaryStateMachine& call) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasFrames() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  mutable Mutex mutex_;
-  CondVar left_;
-  std::map<const UnaryStateMachine*, Entry> calls_ ABSL_GUARDED_BY(mutex_);
   std::array<FairShare, 3> places_ ABSL_GUARDED_BY(mutex_);  // By kind.
-  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server

@@ -1,6 +1,5 @@
 #include "server/watch/watch_registry.h"
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -13,8 +12,7 @@ namespace partiemc::server {
 absl::Status WatchRegistry::Enter(std::shared_ptr<WatchStateMachine> watcher) {
   const MutexLock lock(mutex_);
   if (draining_) return DrainingError();
-  const WatchStateMachine* key = watcher.get();
-  watchers_[key] = std::move(watcher);
+  Add(std::move(watcher));
   return absl::OkStatus();
 }
 
@@ -42,9 +40,7 @@ void WatchRegistry::Close(const WatchStateMachine& watcher) {
 void WatchRegistry::Leave(const WatchStateMachine& watcher) {
   const MutexLock lock(mutex_);
   placed_.erase(&watcher);
-  watchers_.erase(&watcher);
-  // Holds the lock, because the waiting thread may destroy the registry afterwards.
-  left_.NotifyAll();
+  Remove(watcher);
 }
 
 std::size_t WatchRegistry::count() const {
@@ -60,37 +56,14 @@ std::uint64_t WatchRegistry::held_bytes() const {
 
 std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
     std::chrono::milliseconds limit, std::chrono::steady_clock::time_point now) {
-  auto look_again = std::chrono::steady_clock::time_point::max();
-  // Without the lock, because a watch that ends may call Leave.
-  for (const auto& watcher : All()) {
-    look_again = std::min(look_again, watcher->EndIfSilent(limit, now));
-  }
-  return look_again;
+  return EndLate([&](WatchStateMachine& watcher) { return watcher.EndIfSilent(limit, now); });
 }
 
-std::vector<std::shared_ptr<WatchStateMachine>> WatchRegistry::All() const {
-  std::vector<std::shared_ptr<WatchStateMachine>> all;
-  const MutexLock lock(mutex_);
-  for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
-  return all;
-}
-
-// Ends the watches without the lock, because a watch that ends may call Leave.
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
-  {
-    const MutexLock lock(mutex_);
-    draining_ = true;
-  }
+  StopAdmitting();
   for (const auto& watcher : All()) watcher->Drain();
   if (WaitUntilEmpty(patience)) return;
   for (const auto& watcher : All()) watcher->Cut();
-}
-
-bool WatchRegistry::WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) {
-  const MutexLock lock(mutex_);
-  while (!watchers_.empty() && left_.WaitUntil(mutex_, deadline)) {
-  }
-  return watchers_.empty();
 }
 
 }  // namespace partiemc::server

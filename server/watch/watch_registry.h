@@ -6,10 +6,10 @@
 #include <map>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "common/mutex.h"
+#include "server/base/call_registry.h"
 #include "server/security/caller.h"
 #include "server/watch/watch_state_machine.h"
 
@@ -18,7 +18,7 @@ namespace partiemc::server {
 inline constexpr std::string_view kReasonTooManyWatchers = "TOO_MANY_WATCHERS";
 
 /// Thread-safe.
-class WatchRegistry {
+class WatchRegistry : private CallRegistry<WatchStateMachine, CallEntry<WatchStateMachine>> {
  public:
   explicit WatchRegistry(std::uint32_t max_watchers) : max_watchers_(max_watchers) {}
 
@@ -49,20 +49,12 @@ class WatchRegistry {
   /// Refuses new watchers and ends every watch. Blocks until all have left, at most until
   /// `patience`; then cuts the watches whose clients have not read the end.
   void Drain(std::chrono::steady_clock::time_point patience) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Waits until all watchers have left. Returns false if the deadline passes first.
-  bool WaitUntilEmpty(std::chrono::steady_clock::time_point deadline) ABSL_LOCKS_EXCLUDED(mutex_);
+  using CallRegistry::WaitUntilEmpty;
 
  private:
-  std::vector<std::shared_ptr<WatchStateMachine>> All() const ABSL_LOCKS_EXCLUDED(mutex_);
-
   const std::uint32_t max_watchers_;
-  mutable Mutex mutex_;
-  CondVar left_;
-  std::map<const WatchStateMachine*, std::shared_ptr<WatchStateMachine>> watchers_
-      ABSL_GUARDED_BY(mutex_);
   // Open, not closed.
   std::map<const WatchStateMachine*, CallerAccount::Place> placed_ ABSL_GUARDED_BY(mutex_);
-  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace partiemc::server
