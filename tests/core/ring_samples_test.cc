@@ -47,9 +47,8 @@ struct Traced {
 bool Precedes(const ParticleSample& a, const ParticleSample& b) {
   return std::tie(a.ring, a.hash) < std::tie(b.ring, b.hash);
 }
-bool FoundPrecedes(const FoundSample& a, const FoundSample& b) {
-  return std::tie(a.before, a.now, a.displacement.columns, a.displacement.rows) <
-         std::tie(b.before, b.now, b.displacement.columns, b.displacement.rows);
+bool FoundPrecedes(const FoundSample<RingPieces>& a, const FoundSample<RingPieces>& b) {
+  return std::tie(a.before, a.now, a.displacement) < std::tie(b.before, b.now, b.displacement);
 }
 
 // All particles of all rings, sorted, and then the first ones of each ring.
@@ -73,7 +72,7 @@ void ExpectAsBySorting(const Traced& traced, std::span<const std::uint64_t> ids,
   for (const ParticleSample& sample : all) {
     if (taken[sample.ring]++ < kMaxSamples) expected.push_back(sample);
   }
-  std::vector<FoundSample> found;
+  std::vector<FoundSample<RingPieces>> found;
   std::map<std::uint64_t, ParticleSample> known;
   for (const ParticleSample& sample : previous) known[sample.hash] = sample;
   for (const ParticleSample& now : all) {
@@ -87,10 +86,10 @@ void ExpectAsBySorting(const Traced& traced, std::span<const std::uint64_t> ids,
   std::sort(found.begin(), found.end(), FoundPrecedes);
   std::sort(tested.samples.begin(), tested.samples.end(), Precedes);
   EXPECT_EQ(tested.samples, expected);
-  EXPECT_TRUE(std::is_sorted(tested.found.begin(), tested.found.end(),
-                             [](const FoundSample& a, const FoundSample& b) {
-                               return std::tie(a.before, a.now) < std::tie(b.before, b.now);
-                             }));
+  EXPECT_TRUE(
+      std::is_sorted(tested.found.begin(), tested.found.end(), [](const auto& a, const auto& b) {
+        return std::tie(a.before, a.now) < std::tie(b.before, b.now);
+      }));
   std::sort(tested.found.begin(), tested.found.end(), FoundPrecedes);
   ASSERT_EQ(tested.found.size(), found.size());
   for (std::size_t k = 0; k < found.size(); ++k) {

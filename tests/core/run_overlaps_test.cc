@@ -29,14 +29,14 @@ std::vector<NodeRun> RandomRuns(support::Random& random, std::uint32_t rings) {
   return runs;
 }
 
-Shared ByNodes(const std::vector<NodeRun>& a_runs, const std::vector<CellShift>& shifts,
+Shared ByNodes(const std::vector<NodeRun>& a_runs, const std::vector<CellShift<2>>& shifts,
                const std::vector<NodeRun>& b_runs) {
   Shared shared;
   for (const NodeRun& a : a_runs) {
     for (const NodeRun& b : b_runs) {
       for (std::int64_t column = a.first; column <= a.last; ++column) {
-        const std::int64_t moved = column + shifts[a.ring].columns;
-        if (a.row + shifts[a.ring].rows == b.row && moved >= b.first && moved <= b.last) {
+        const std::int64_t moved = column + shifts[a.ring][0];
+        if (a.row + shifts[a.ring][1] == b.row && moved >= b.first && moved <= b.last) {
           ++shared[{a.ring, b.ring}];
         }
       }
@@ -48,7 +48,7 @@ Shared ByNodes(const std::vector<NodeRun>& a_runs, const std::vector<CellShift>&
 Shared Found(const std::vector<NodeRun>& a_runs, const std::vector<NodeRun>& b_runs) {
   std::vector<SharedNodes> pairs;
   std::vector<std::uint32_t> newest;
-  FindSharedNodes(a_runs, b_runs, newest, pairs);
+  FindSharedNodes<NodeRun>(a_runs, b_runs, newest, pairs);
   Shared shared;
   for (const SharedNodes& pair : pairs) {
     EXPECT_TRUE(shared.emplace(std::pair(pair.a, pair.b), pair.nodes).second);
@@ -63,14 +63,14 @@ TEST(RunOverlaps, AgreeWithNodesAlsoIfMovedRingsOverlap) {
     constexpr std::uint32_t kRings = 6;
     const std::vector<NodeRun> before = RandomRuns(random, kRings);
     const std::vector<NodeRun> now = RandomRuns(random, kRings);
-    std::vector<CellShift> shifts(kRings);
+    std::vector<CellShift<2>> shifts(kRings);
     EXPECT_EQ(Found(before, now), ByNodes(before, shifts, now));
-    for (CellShift& shift : shifts) {
+    for (CellShift<2>& shift : shifts) {
       shift = {static_cast<std::int64_t>(random.Below(21)) - 10,
                static_cast<std::int64_t>(random.Below(7)) - 3};
     }
     std::vector<NodeRun> moved;
-    MoveRuns(before, shifts, moved);
+    MoveRuns<NodeRun>(before, shifts, moved);
     EXPECT_EQ(Found(moved, now), ByNodes(before, shifts, now));
   }
 }
@@ -79,7 +79,7 @@ TEST(RunOverlaps, DropRunsBeyondTheLattice) {
   constexpr std::int32_t kLargest = std::numeric_limits<std::int32_t>::max();
   const std::vector<NodeRun> runs = {{0, 0, 3, 0}, {kLargest, 5, 6, 0}, {kLargest, 7, 8, 1}};
   std::vector<NodeRun> moved;
-  MoveRuns(runs, std::vector<CellShift>{{0, 1}, {kLargest - 8, 0}}, moved);
+  MoveRuns<NodeRun>(runs, std::vector<CellShift<2>>{{0, 1}, {kLargest - 8, 0}}, moved);
   EXPECT_EQ(moved, (std::vector<NodeRun>{{1, 0, 3, 0}, {kLargest, kLargest - 1, kLargest, 1}}));
 }
 

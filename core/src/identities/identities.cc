@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 #include <span>
-#include <tuple>
 
 #include "base/bits.h"
 
@@ -94,9 +93,7 @@ void AddBodiesBesideNodes(const IdentityInput& input, IdentityScratch& s,
     run.ring = NumberOf(StandInOf(input, ring), s);
     runs.push_back(run);
   });
-  std::ranges::sort(runs, [](const NodeRun& a, const NodeRun& b) {
-    return std::tie(a.row, a.first, a.ring) < std::tie(b.row, b.first, b.ring);
-  });
+  std::ranges::sort(runs, ComesBefore<NodeRun>);
 }
 
 // Collects the runs of this frame and numbers the rings. Every ring has a run: it encloses a node,
@@ -225,15 +222,15 @@ void ContinueRings(const IdentityInput& input, const RingHistory& last, Identity
                                  .percolation = input.percolation,
                                  .subset = input.subset}},
                   previous, scratch.rings, scratch.tracks);
-  RelateRings(previous,
-              {.runs = next.runs,
-               .rings = scratch.rings,
-               .found = scratch.tracks.by_id.found,
-               .has_ids = !input.frame.ids.empty(),
-               .time = input.frame.time,
-               .cell_size = input.cell_size,
-               .periods = input.periods},
-              scratch.relation_scratch, scratch.relations);
+  RelatePieces<RingPieces>(previous,
+                           {.runs = next.runs,
+                            .pieces = scratch.rings,
+                            .found = scratch.tracks.by_id.found,
+                            .has_ids = !input.frame.ids.empty(),
+                            .time = input.frame.time,
+                            .cell_size = input.cell_size,
+                            .periods = input.periods},
+                           scratch.relation_scratch, scratch.relations);
   AssignIdentities(previous, scratch, next);
   WriteResult(previous, input.placed.kept_as, scratch, rings);
   WriteHistory(input, scratch, next);

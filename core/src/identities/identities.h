@@ -8,8 +8,8 @@
 #include "bins/bins.h"
 #include "crossings/crossings.h"
 #include "crossings/scanlines.h"
+#include "identities/piece_relations.h"
 #include "identities/relations.h"
-#include "identities/ring_relations.h"
 #include "identities/ring_tracks.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
@@ -34,7 +34,7 @@ struct IdentityScratch {
   std::vector<KnownRing> rings;                  // By number; `outer` is a number.
   RingTracks tracks;
   RingHistory carried;  // The last frame, moved with its box.
-  RelationScratch relation_scratch;
+  RelationScratch<RingPieces> relation_scratch;
   std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By ring of the last frame.
   std::vector<std::uint32_t> continues;    // By number: ring of the last frame, or kNoIndex.

@@ -153,7 +153,7 @@ void SampleRings(const SampleInput& input, std::span<const ParticleSample> previ
            {std::int64_t{now.column} - before->column, std::int64_t{now.row} - before->row}});
     }
   });
-  std::sort(s.found.begin(), s.found.end(), [](const FoundSample& x, const FoundSample& y) {
+  std::ranges::sort(s.found, [](const auto& x, const auto& y) {
     return std::tie(x.before, x.now) < std::tie(y.before, y.now);
   });
   FillShortRings(input, s);

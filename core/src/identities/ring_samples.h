@@ -8,23 +8,17 @@
 #include "bins/bins.h"
 #include "crossings/crossings.h"
 #include "frame/particle_subset.h"
-#include "identities/run_overlaps.h"
+#include "identities/piece_relations.h"
 #include "partiemc/state.h"
 #include "rings/components.h"
 #include "rings/percolation.h"
 
 namespace partiemc {
 
-/// A sample of the last frame that is in a ring of this frame.
-struct FoundSample {
-  std::uint32_t before = 0, now = 0;  ///< Its ring: index in the history; number.
-  CellShift displacement;             ///< From the last frame to this one.
-};
-
 /// Samples of a frame, and scratch of SampleRings.
 struct RingSamples {
-  std::vector<ParticleSample> samples;  ///< By ring, then in any order; `ring` is a number.
-  std::vector<FoundSample> found;       ///< Sorted by `before`, then `now`.
+  std::vector<ParticleSample> samples;         ///< By ring, then in any order; `ring` is a number.
+  std::vector<FoundSample<RingPieces>> found;  ///< Sorted by `before`, then `now`.
 
   // Scratch.
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.

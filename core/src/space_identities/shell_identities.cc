@@ -72,15 +72,15 @@ void ContinueShells(const ShellInput& input, const ShellHistory& last,
   const ShellHistory& previous = input.box_motion.any ? scratch.carried : last;
   NumberShells(input, surface, scratch.shells, next.runs);
   FollowShells(input.frame, input.bins, previous, scratch.shells, scratch.tracks);
-  RelateShells(previous,
-               {.runs = next.runs,
-                .shells = scratch.shells.shells,
-                .found = scratch.tracks.found,
-                .has_ids = !input.frame.ids.empty(),
-                .time = input.frame.time,
-                .cell_size = input.cell_size,
-                .periods = input.periods},
-               scratch.relation_scratch, scratch.relations);
+  RelatePieces<ShellPieces>(previous,
+                            {.runs = next.runs,
+                             .pieces = scratch.shells.shells,
+                             .found = scratch.tracks.found,
+                             .has_ids = !input.frame.ids.empty(),
+                             .time = input.frame.time,
+                             .cell_size = input.cell_size,
+                             .periods = input.periods},
+                            scratch.relation_scratch, scratch.relations);
   AssignShellIdentities(previous, scratch, next);
   WriteIdentities(previous, scratch, surface);
   WriteShellHistory(input, scratch, next);

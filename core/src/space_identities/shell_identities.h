@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "identities/piece_relations.h"
 #include "identities/relations.h"
 #include "partiemc/surface.h"
-#include "space_identities/shell_relations.h"
 #include "space_identities/shell_runs.h"
 #include "space_identities/shell_tracks.h"
 
@@ -17,7 +17,7 @@ struct ShellIdentityScratch {
   NumberedShells shells;
   ShellTracks tracks;
   ShellHistory carried;  // The history of the last frame, moved with the box.
-  ShellRelationScratch relation_scratch;
+  RelationScratch<ShellPieces> relation_scratch;
   std::vector<Relation> relations;
   std::vector<std::uint8_t> is_continued;  // By shell of the last frame.
   std::vector<std::uint32_t> continues;    // By number: index of the shell that it continues.

@@ -4,10 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
-#include "identities/shared_nodes.h"
 #include "partiemc/frame.h"
 #include "partiemc/surface.h"
 #include "periodic/frame_box.h"
@@ -20,15 +18,7 @@
 #include "space_images/body_images.h"
 #include "space_vertices/drops.h"
 
-namespace partiemc {
-
-/// The row of a run, for SweepSharedNodes: its layer and its row in the layer.
-inline std::pair<std::int32_t, std::int32_t> RowOf(const ShellRun& run) {
-  return {run.layer, run.row};
-}
-inline std::uint32_t PieceOf(const ShellRun& run) { return run.shell; }
-
-namespace space {
+namespace partiemc::space {
 
 /// The frame and the results of the earlier stages.
 struct ShellInput {
@@ -81,5 +71,4 @@ struct NumberedShells {
 void NumberShells(const ShellInput& input, const Surface& surface, NumberedShells& shells,
                   std::vector<ShellRun>& runs);
 
-}  // namespace space
-}  // namespace partiemc
+}  // namespace partiemc::space

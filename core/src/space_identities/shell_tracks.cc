@@ -48,10 +48,9 @@ void SampleShells(const Frame& frame, const SpaceBins& bins, const ShellHistory&
                           std::int64_t{now.z} - same->z}});
     }
   }
-  std::sort(t.found.begin(), t.found.end(),
-            [](const FoundShellSample& a, const FoundShellSample& b) {
-              return std::tie(a.before, a.now) < std::tie(b.before, b.now);
-            });
+  std::ranges::sort(t.found, [](const auto& a, const auto& b) {
+    return std::tie(a.before, a.now) < std::tie(b.before, b.now);
+  });
 }
 
 void AverageVelocities(const Frame& frame, const SpaceBins& bins, NumberedShells& shells,

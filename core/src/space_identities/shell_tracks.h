@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "identities/piece_relations.h"
 #include "partiemc/frame.h"
 #include "partiemc/surface_state.h"
 #include "space/bins.h"
@@ -12,22 +13,10 @@
 
 namespace partiemc::space {
 
-/// A displacement in whole cells.
-struct NodeShift {
-  std::int64_t x = 0, y = 0, z = 0;
-  friend bool operator==(const NodeShift&, const NodeShift&) = default;
-};
-
-/// A sample of the last frame whose particle is in a body of this frame.
-struct FoundShellSample {
-  std::uint32_t before = 0, now = 0;  ///< Its shells: index in the history; number in this frame.
-  NodeShift displacement;             ///< Since the last frame.
-};
-
 /// Samples of a frame, and warm buffers.
 struct ShellTracks {
-  std::vector<ShellSample> samples;     ///< By number; ShellSample::shell is a number.
-  std::vector<FoundShellSample> found;  ///< By `before`, then `now`.
+  std::vector<ShellSample> samples;             ///< By number; ShellSample::shell is a number.
+  std::vector<FoundSample<ShellPieces>> found;  ///< By `before`, then `now`.
 
   // Scratch.
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.
