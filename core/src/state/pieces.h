@@ -20,6 +20,7 @@ namespace partiemc {
 static_assert(kNoRing == kNoIndex && kNoShell == kNoIndex);
 
 struct RingPieces {
+  static constexpr char kName[] = "ring", kInnerName[] = "hole";  // In messages.
   static constexpr std::size_t kDimensions = 2;
   using History = RingHistory;
   using Known = KnownRing;
@@ -27,6 +28,7 @@ struct RingPieces {
 };
 
 struct ShellPieces {
+  static constexpr char kName[] = "shell", kInnerName[] = "cavity";
   static constexpr std::size_t kDimensions = 3;
   using History = ShellHistory;
   using Known = KnownShell;

@@ -11,7 +11,6 @@
 
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -23,6 +22,7 @@
 #include "core/internal/byte_string.h"
 #include "partiemc/parameters.h"
 #include "partiemc/status.h"
+#include "state/history_checks.h"
 #include "state/noise_history.h"
 #include "state/state_bytes.h"
 
@@ -90,72 +90,11 @@ absl::Status CheckNormals(const std::vector<CellNormal>& normals) {
   return absl::OkStatus();
 }
 
-absl::Status CheckRings(const RingHistory& history) {
-  for (std::size_t k = 0; k < history.rings.size(); ++k) {
-    const KnownRing& ring = history.rings[k];
-    const std::uint64_t after = k == 0 ? 0 : history.rings[k - 1].identity;
-    if (ring.identity <= after || ring.identity > history.identities_given) {
-      return Corrupt(
-          absl::StrCat("identity ", ring.identity),
-          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
-    }
-    if (ring.outer != kNoRing && (!ring.is_hole || ring.outer >= history.rings.size() ||
-                                  history.rings[ring.outer].is_hole)) {
-      return Corrupt(absl::StrCat("ring ", k, " in ring ", ring.outer),
-                     "must be a hole in an outer ring, or stand alone");
-    }
-    if (!std::isfinite(ring.velocity_x) || !std::isfinite(ring.velocity_y)) {
-      return Corrupt(absl::StrCat("velocity of ring ", k), "must be finite");
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckRuns(const RingHistory& history) {
-  for (std::size_t k = 0; k < history.runs.size(); ++k) {
-    const NodeRun& run = history.runs[k];
-    if (run.first > run.last || run.ring >= history.rings.size()) {
-      return Corrupt(absl::StrCat("run ", k), "must have nodes and a ring");
-    }
-    if (k > 0 && std::tie(history.runs[k - 1].row, history.runs[k - 1].last) >=
-                     std::tie(run.row, run.first)) {
-      return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckSamples(const RingHistory& history) {
-  std::vector<std::uint32_t> count(history.rings.size());
-  for (std::size_t k = 0; k < history.samples.size(); ++k) {
-    const ParticleSample& sample = history.samples[k];
-    if (sample.ring >= history.rings.size() || history.rings[sample.ring].is_hole ||
-        ++count[sample.ring] > kMaxSamples) {
-      return Corrupt(absl::StrCat("sample ", k),
-                     absl::StrCat("must be one of at most ", kMaxSamples, " of an outer ring"));
-    }
-    if (k > 0 && history.samples[k - 1].hash >= sample.hash) {
-      return Corrupt(absl::StrCat("sample ", k), "must come after the one before it");
-    }
-  }
-  return absl::OkStatus();
-}
-
 absl::Status CheckContents(const State& state) {
-  const RingHistory& history = state.history;
-  if (history.identities_given > kMaxIdentities) {
-    return Corrupt(absl::StrCat(history.identities_given, " identities"),
-                   absl::StrCat("must be at most ", kMaxIdentities));
-  }
-  if (history.time && !std::isfinite(*history.time)) {
-    return Corrupt(absl::StrCat("time ", ShortestNumber(*history.time)),
-                   "must be absent or finite");
-  }
-  absl::Status status = CheckLengths(state);
+  absl::Status status = CheckIdentitiesAndTime(state.history);
+  if (status.ok()) status = CheckLengths(state);
   if (status.ok()) status = CheckNormals(state.normals);
-  if (status.ok()) status = CheckRings(history);
-  if (status.ok()) status = CheckRuns(history);
-  if (status.ok()) status = CheckSamples(history);
+  if (status.ok()) status = CheckHistoryArrays<RingPieces>(state.history);
   return status;
 }
 

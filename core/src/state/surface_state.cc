@@ -3,11 +3,11 @@
 // runs and samples, these arrays, checksum.
 #include "partiemc/surface_state.h"
 
-#include <cmath>
 #include <tuple>
 #include <type_traits>
 
 #include "partiemc/state.h"
+#include "state/history_checks.h"
 #include "state/state_bytes.h"
 
 namespace partiemc {
@@ -40,78 +40,14 @@ auto ShellNumbersOf(auto& item) {
   }
 }
 
-absl::Status CheckShells(const ShellHistory& history) {
-  for (std::size_t k = 0; k < history.shells.size(); ++k) {
-    const KnownShell& shell = history.shells[k];
-    const std::uint64_t after = k == 0 ? 0 : history.shells[k - 1].identity;
-    if (shell.identity <= after || shell.identity > history.identities_given) {
-      return Corrupt(
-          absl::StrCat("identity ", shell.identity),
-          absl::StrCat("must be above ", after, " and at most ", history.identities_given));
-    }
-    if (shell.outer != kNoShell && (!shell.is_cavity || shell.outer >= history.shells.size() ||
-                                    history.shells[shell.outer].is_cavity)) {
-      return Corrupt(absl::StrCat("shell ", k, " in shell ", shell.outer),
-                     "must be a cavity in an outer shell, or stand alone");
-    }
-    if (!std::isfinite(shell.velocity_x) || !std::isfinite(shell.velocity_y) ||
-        !std::isfinite(shell.velocity_z)) {
-      return Corrupt(absl::StrCat("velocity of shell ", k), "must be finite");
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckShellRuns(const ShellHistory& history) {
-  for (std::size_t k = 0; k < history.runs.size(); ++k) {
-    const ShellRun& run = history.runs[k];
-    if (run.first > run.last || run.shell >= history.shells.size()) {
-      return Corrupt(absl::StrCat("run ", k), "must have nodes and a shell");
-    }
-    if (k == 0) continue;
-    const ShellRun& before = history.runs[k - 1];
-    if (std::tie(before.layer, before.row, before.last) >=
-        std::tie(run.layer, run.row, run.first)) {
-      return Corrupt(absl::StrCat("run ", k), "must come after the one before it");
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckShellSamples(const ShellHistory& history) {
-  std::vector<std::uint32_t> count(history.shells.size());
-  for (std::size_t k = 0; k < history.samples.size(); ++k) {
-    const ShellSample& sample = history.samples[k];
-    if (sample.shell >= history.shells.size() || history.shells[sample.shell].is_cavity ||
-        ++count[sample.shell] > kMaxSamples) {
-      return Corrupt(absl::StrCat("sample ", k),
-                     absl::StrCat("must be one of at most ", kMaxSamples, " of an outer shell"));
-    }
-    if (k > 0 && history.samples[k - 1].hash >= sample.hash) {
-      return Corrupt(absl::StrCat("sample ", k), "must come after the one before it");
-    }
-  }
-  return absl::OkStatus();
-}
-
 absl::Status CheckSurfaceState(const SurfaceState& state) {
-  const ShellHistory& history = state.history;
   const double cell_size = state.cell_size.value_or(1);
   if (!(cell_size >= 1e-62 && cell_size <= 1e62)) {
     return Corrupt(absl::StrCat("cell size ", ShortestNumber(cell_size)),
                    "must be absent or a length");
   }
-  if (history.identities_given > kMaxIdentities) {
-    return Corrupt(absl::StrCat(history.identities_given, " identities"),
-                   absl::StrCat("must be at most ", kMaxIdentities));
-  }
-  if (history.time && !std::isfinite(*history.time)) {
-    return Corrupt(absl::StrCat("time ", ShortestNumber(*history.time)),
-                   "must be absent or finite");
-  }
-  absl::Status status = CheckShells(history);
-  if (status.ok()) status = CheckShellRuns(history);
-  if (status.ok()) status = CheckShellSamples(history);
+  absl::Status status = CheckIdentitiesAndTime(state.history);
+  if (status.ok()) status = CheckHistoryArrays<ShellPieces>(state.history);
   return status;
 }
 
