@@ -18,7 +18,7 @@ CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb) {
                       "EXT_meshopt_compression");
 }
 
-CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
+void AddStatisticsFlags(CLI::App& app, FrameOutputs::Places& places, const std::string& group) {
   std::string kinds;
   for (const GaugeTraits& traits : AllGauges()) {
     AppendAll(kinds, kinds.empty() ? "" : ", ", traits.name);
@@ -27,15 +27,20 @@ CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges) {
       AppendAll(kinds, std::exchange(separator, ','), number);
     }
   }
-  return app
-      .add_option(
-          "--gauge", gauges,
-          "Measurement of the outline, in columns of --stats: NAME=KIND:NUMBERS, such as "
-          "level=height:0.5. Repeat for more. packing uses the attribute radius or diameter "
-          "of the particles, else their volumes. Kinds: " +
-              kinds)
+  CLI::Option* const stats =
+      app.add_option("--stats", places.stats,
+                     "Statistics of every frame, as CSV or JSON by extension")
+          ->type_name("FILE")
+          ->group(group);
+  app.add_option("--gauge", places.gauges,
+                 "Measurement of the outline, in columns of --stats: NAME=KIND:NUMBERS, such as "
+                 "level=height:0.5. Repeat for more. packing uses the attribute radius or diameter "
+                 "of the particles, else their volumes. Kinds: " +
+                     kinds)
       ->type_name("NAME=KIND:...")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->needs(stats)
+      ->group(group);
 }
 
 namespace {

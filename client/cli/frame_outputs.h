@@ -22,9 +22,6 @@ namespace partiemc::client {
 
 CLI::Option* AddCompressGlbFlag(CLI::App& app, bool& compress_glb);
 
-/// Adds --gauge, whose help lists the kinds.
-CLI::Option* AddGaugeFlag(CLI::App& app, std::vector<std::string>& gauges);
-
 class FrameOutputs {
  public:
   /// Values of the flags with the same names. Empty: this output is not written.
@@ -33,9 +30,9 @@ class FrameOutputs {
     std::string format;  ///< Empty: geojson, or ply for surfaces.
     std::string stats, color_by;
     bool compress_glb = false;
-    bool surface = false;  ///< The frames are surfaces in space.
-    bool walls = false;    ///< The stream has walls.
-    std::vector<std::string> gauges = {};
+    bool surface = false;                  ///< The frames are surfaces in space.
+    bool walls = false;                    ///< The stream has walls.
+    std::vector<std::string> gauges = {};  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
   };
 
   /// Errors: INVALID_ARGUMENT for a wrong format, extension or gauge, for a format, gauge or
@@ -65,5 +62,8 @@ class FrameOutputs {
   std::optional<StatisticsWriter> statistics_;
   Summary summary_;
 };
+
+/// Adds --stats and --gauge, whose help lists the kinds.
+void AddStatisticsFlags(CLI::App& app, FrameOutputs::Places& places, const std::string& group);
 
 }  // namespace partiemc::client

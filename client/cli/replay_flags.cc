@@ -4,7 +4,6 @@
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
-#include "client/cli/frame_outputs.h"
 #include "client/cli/input_source.h"
 #include "client/output/frame_writer.h"
 #include "client/output/text.h"
@@ -311,27 +310,23 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
 
 void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   constexpr const char* kGroup = "Output";
-  app.add_option("--output-dir", flags.output_dir, "Write DIR/frame_000000.EXT for every frame")
+  app.add_option("--output-dir", flags.files.output_dir,
+                 "Write DIR/frame_000000.EXT for every frame")
       ->type_name("DIR")
       ->group(kGroup);
-  app.add_option("--format", flags.format,
+  app.add_option("--format", flags.files.format,
                  "Formats of these files, from " + Names(AllFrameFormats()) +
                      " (default: geojson; with --surface ply)")
       ->type_name("LIST")
       ->group(kGroup);
-  AddCompressGlbFlag(app, flags.compress_glb)->group(kGroup);
-  app.add_option("--color-by", flags.color_by,
+  AddCompressGlbFlag(app, flags.files.compress_glb)->group(kGroup);
+  app.add_option("--color-by", flags.files.color_by,
                  "Attribute that colours the pictures of svg and report; a vector by its length. "
                  "The values "
                  "are taken at the vertices: --fill grid has the most")
       ->type_name("NAME")
       ->group(kGroup);
-  CLI::Option* const stats =
-      app.add_option("--stats", flags.stats,
-                     "Statistics of every frame, as CSV or JSON by extension")
-          ->type_name("FILE")
-          ->group(kGroup);
-  AddGaugeFlag(app, flags.gauges)->needs(stats)->group(kGroup);
+  AddStatisticsFlags(app, flags.files, kGroup);
   CLI::Option* const report =
       app.add_option("--report", flags.report, "HTML page that shows every frame")
           ->type_name("FILE.html")

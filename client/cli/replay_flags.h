@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/frame_outputs.h"
 #include "client/cli/server_flags.h"
 #include "client/input/sequence.h"
 #include "partiemc/parameters.h"
@@ -65,12 +66,7 @@ struct ReplayFlags {
   bool keep_going = false;
   bool quiet = false;
 
-  std::string output_dir;
-  std::string format;  ///< Empty: geojson, or ply for surfaces.
-  std::string color_by;
-  bool compress_glb = false;
-  std::string stats;
-  std::vector<std::string> gauges;  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
+  FrameOutputs::Places files;  ///< Without `surface` and `walls`.
   std::string report;
   std::uint64_t report_particles = 20'000;
 };

@@ -12,7 +12,6 @@
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
-#include "client/cli/frame_outputs.h"
 #include "client/cli/stream_recorder.h"
 #include "client/library/adapters/seconds.h"
 #include "client/output/progress.h"
@@ -262,24 +261,21 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       ->capture_default_str();
   auto* const output_dir =
       verb->add_option(
-              "--output-dir", flags.output_dir,
+              "--output-dir", flags.files.output_dir,
               "Write DIR/frame_000000.EXT for every frame, with the numbers of the producer")
           ->type_name("DIR");
-  verb->add_option("--format", flags.format,
+  verb->add_option("--format", flags.files.format,
                    "Formats of these files, from " + Names(AllFrameFormats()) +
                        " (default: geojson; for streams of surfaces ply)")
       ->needs(output_dir)
       ->type_name("LIST");
   verb->add_option(
-          "--color-by", flags.color_by,
+          "--color-by", flags.files.color_by,
           "Attribute of the stream that colours the pictures of svg; a vector by its length")
       ->type_name("NAME")
       ->needs(output_dir);
-  AddCompressGlbFlag(*verb, flags.compress_glb);
-  auto* const stats = verb->add_option("--stats", flags.stats,
-                                       "Statistics of every frame, as CSV or JSON by extension")
-                          ->type_name("FILE");
-  AddGaugeFlag(*verb, flags.gauges)->needs(stats);
+  AddCompressGlbFlag(*verb, flags.files.compress_glb);
+  AddStatisticsFlags(*verb, flags.files, "Options");
   verb->add_option("--record", flags.record,
                    "Record the particles that the producer sends to watchers (its "
                    "--echo-particles); a replay "
@@ -308,12 +304,7 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
 
 int Watch(const WatchFlags& flags) {
   CatchInterrupts();  // Before the first temporary file exists.
-  FrameOutputs::Places places{.output_dir = flags.output_dir,
-                              .format = flags.format,
-                              .stats = flags.stats,
-                              .color_by = flags.color_by,
-                              .compress_glb = flags.compress_glb,
-                              .gauges = flags.gauges};
+  FrameOutputs::Places places = flags.files;
   // Checks the flags now, because waiting for the stream may take long.
   if (const absl::Status right = FrameOutputs::Check(places); !right.ok()) {
     return Complain(kUsage, right);

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
+#include "client/cli/frame_outputs.h"
 #include "client/cli/server_flags.h"
 
 namespace CLI {
@@ -25,14 +25,9 @@ struct WatchFlags {
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;
   double give_up_after_seconds = 30;  ///< 0: a lost connection ends the watch.
-  std::string output_dir;
-  std::string format;  ///< Empty: geojson, or ply for surfaces.
-  std::string color_by;
-  bool compress_glb = false;
-  std::string stats;
-  std::vector<std::string> gauges;
-  std::string record;  ///< A recording to write; empty: none.
-  bool wait = false;   ///< Wait for the stream to start.
+  FrameOutputs::Places files;         ///< Without `surface` and `walls`.
+  std::string record;                 ///< A recording to write; empty: none.
+  bool wait = false;                  ///< Wait for the stream to start.
   bool quiet = false;
 };
 

@@ -164,7 +164,7 @@ class Receiver {
   /// The areas of the particles in the plane: of discs with the attribute `radius` or `diameter`,
   /// else their volumes; empty if no gauge needs them.
   std::vector<float> ParticleAreas(const RecordedFrame& frame) const {
-    if (flags_.gauges.empty() || frame.components != 2) return {};
+    if (flags_.files.gauges.empty() || frame.components != 2) return {};
     for (const ParticleAttribute& attribute : frame.attributes) {
       const bool is_diameter = attribute.name == "diameter";
       if (attribute.components != 1 || !(is_diameter || attribute.name == "radius")) continue;
@@ -180,14 +180,14 @@ class Receiver {
 
   /// The attribute of --color-by at the particles, for the report; empty without one.
   AttributeValues ParticleColor(const RecordedFrame& frame) const {
-    if (flags_.color_by.empty() || flags_.report.empty()) return {};
+    if (flags_.files.color_by.empty() || flags_.report.empty()) return {};
     for (const ParticleAttribute& attribute : frame.attributes) {
-      if (attribute.name == flags_.color_by) {
+      if (attribute.name == flags_.files.color_by) {
         return {attribute.name, attribute.components, attribute.values};
       }
     }
-    if (flags_.color_by != kVelocityAttribute || frame.velocities.empty()) return {};
-    return {flags_.color_by, frame.components, frame.velocities};
+    if (flags_.files.color_by != kVelocityAttribute || frame.velocities.empty()) return {};
+    return {flags_.files.color_by, frame.components, frame.velocities};
   }
 
   void Check(const std::string& source) {
@@ -247,7 +247,8 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
                                       : std::string()));
     if (!expected) code = kFailed;
   }
-  const bool has_files = !flags.output_dir.empty() || !flags.stats.empty() || !flags.report.empty();
+  const bool has_files =
+      !flags.files.output_dir.empty() || !flags.files.stats.empty() || !flags.report.empty();
   if (flags.local && !has_files && !flags.check && !flags.quiet) {
     Complain(kGood, "no file was written; --output-dir, --stats and --report write files");
   }

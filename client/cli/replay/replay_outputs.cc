@@ -8,14 +8,10 @@ namespace partiemc::client {
 
 absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                                     const ReconstructionParameters& parameters) {
-  auto frames = FrameOutputs::Create({.output_dir = flags.output_dir,
-                                      .format = flags.format,
-                                      .stats = flags.stats,
-                                      .color_by = flags.color_by,
-                                      .compress_glb = flags.compress_glb,
-                                      .surface = flags.surface,
-                                      .walls = !flags.walls.empty(),
-                                      .gauges = flags.gauges});
+  FrameOutputs::Places places = flags.files;
+  places.surface = flags.surface;
+  places.walls = !flags.walls.empty();
+  auto frames = FrameOutputs::Create(places);
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));
   if (!flags.report.empty()) {
@@ -26,7 +22,7 @@ absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                  : "reconstructed by the server at " + flags.server.address,
          .parameters = DescribeParameters(Resolve(parameters)),
          .max_particles = flags.report_particles,
-         .color_by = flags.color_by});
+         .color_by = flags.files.color_by});
     if (!report.ok()) return report.status();
     outputs.report_.emplace(*std::move(report));
     outputs.is_surface_ = flags.surface;
