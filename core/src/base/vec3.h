@@ -1,6 +1,7 @@
 // A point or vector of space, in any unit.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -26,6 +27,14 @@ constexpr double Dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.
 
 constexpr Vec3 Cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// The lower, and the higher, of each coordinate.
+constexpr Vec3 Lower(const Vec3& a, const Vec3& b) {
+  return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
+}
+constexpr Vec3 Upper(const Vec3& a, const Vec3& b) {
+  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
 }
 
 inline double Length(const Vec3& a) { return std::sqrt(Dot(a, a)); }

@@ -127,13 +127,6 @@ void WrapParticles(const Grid& grid, std::span<const Real> positions, std::size_
   });
 }
 
-Vec3 Lower(const Vec3& a, const Vec3& b) {
-  return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
-}
-Vec3 Upper(const Vec3& a, const Vec3& b) {
-  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
-}
-
 void ListCells(LiftScratch& s) {
   s.cells.clear();
   s.cells.reserve(s.groups.groups().size());

@@ -19,9 +19,7 @@ Triangle TriangleAt(std::span<const std::uint32_t> triangles, std::size_t triang
 }
 
 Box Intersection(const Box& a, const Box& b) {
-  return {
-      {std::max(a.low.x, b.low.x), std::max(a.low.y, b.low.y), std::max(a.low.z, b.low.z)},
-      {std::min(a.high.x, b.high.x), std::min(a.high.y, b.high.y), std::min(a.high.z, b.high.z)}};
+  return {Upper(a.low, b.low), Lower(a.high, b.high)};
 }
 
 /// A side of a triangle, and the triangle's third corner.
@@ -51,8 +49,8 @@ Box BoxOf(std::span<const double> points, std::span<const std::uint32_t> indices
   Box box{Vec3At(points, indices[0]), Vec3At(points, indices[0])};
   for (const std::uint32_t index : indices.subspan(1)) {
     const Vec3 at = Vec3At(points, index);
-    box.low = {std::min(box.low.x, at.x), std::min(box.low.y, at.y), std::min(box.low.z, at.z)};
-    box.high = {std::max(box.high.x, at.x), std::max(box.high.y, at.y), std::max(box.high.z, at.z)};
+    box.low = Lower(box.low, at);
+    box.high = Upper(box.high, at);
   }
   return box;
 }

@@ -207,9 +207,8 @@ bool Assembly::DropDust() {
     const Vec3 at = Vec3At(mesh.points, point);
     Size& size = sizes[s_.piece_of[point]];
     size.origin = at;
-    size.low = {std::min(size.low.x, at.x), std::min(size.low.y, at.y), std::min(size.low.z, at.z)};
-    size.high = {std::max(size.high.x, at.x), std::max(size.high.y, at.y),
-                 std::max(size.high.z, at.z)};
+    size.low = Lower(size.low, at);
+    size.high = Upper(size.high, at);
   }
   for (std::size_t k = 0; k < mesh.triangles.size(); k += 3) {
     Size& size = sizes[s_.piece_of[mesh.triangles[k]]];

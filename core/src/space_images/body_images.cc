@@ -34,10 +34,8 @@ void IncludePart(const Vec3& origin, const BrickBits& nodes, Image& image) {
                                  1. * (std::countr_zero(columns) / kBrickSize), 1. * first};
   const Vec3 high = origin + Vec3{1. * (63 - std::countl_zero(row)),
                                   1. * ((63 - std::countl_zero(columns)) / kBrickSize), 1. * last};
-  image.low = {std::min(image.low.x, low.x), std::min(image.low.y, low.y),
-               std::min(image.low.z, low.z)};
-  image.high = {std::max(image.high.x, high.x), std::max(image.high.y, high.y),
-                std::max(image.high.z, high.z)};
+  image.low = Lower(image.low, low);
+  image.high = Upper(image.high, high);
 }
 
 void MeasureImages(const BrickDirectory& bricks, const Bodies& bodies, std::vector<Image>& images) {

@@ -97,10 +97,8 @@ const Polyhedron& PolyhedronFor(double radius) {
 }
 
 void Include(const Vec3& point, Drops::Box& box) {
-  box.low = {std::min(box.low.x, point.x), std::min(box.low.y, point.y),
-             std::min(box.low.z, point.z)};
-  box.high = {std::max(box.high.x, point.x), std::max(box.high.y, point.y),
-              std::max(box.high.z, point.z)};
+  box.low = Lower(box.low, point);
+  box.high = Upper(box.high, point);
 }
 
 bool Touch(const Drops::Box& a, const Drops::Box& b) {

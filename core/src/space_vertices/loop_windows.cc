@@ -52,8 +52,8 @@ struct Box {
   Vec3 low, high;
 
   void Include(const Vec3& at) {
-    low = {std::min(low.x, at.x), std::min(low.y, at.y), std::min(low.z, at.z)};
-    high = {std::max(high.x, at.x), std::max(high.y, at.y), std::max(high.z, at.z)};
+    low = Lower(low, at);
+    high = Upper(high, at);
   }
   double SquareTo(const Vec3& at) const {
     const Vec3 to{std::max({0.0, low.x - at.x, at.x - high.x}),
