@@ -2,10 +2,12 @@
 
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/message_lite.h>
 #include <google/protobuf/wire_format_lite.h>
 #include <grpcpp/support/proto_buffer_reader.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -42,35 +44,23 @@ struct Span {
   std::size_t offset = 0, length = 0;
 };
 
-// Appends the result of Find to `found`. Returns false if the message is malformed.
-bool FindIn(CodedInputStream& input, std::span<const int> path, std::vector<Span>& found) {
-  std::uint32_t length = 0;
-  while (const std::uint32_t tag = input.ReadTag()) {
-    if (tag != LengthTag(path.front())) {
-      if (!WireFormatLite::SkipField(&input, tag)) return false;
-      continue;
-    }
-    if (!input.ReadVarint32(&length)) return false;
-    if (path.size() == 1) {
-      found.push_back({static_cast<std::size_t>(input.CurrentPosition()), length});
-      if (!input.Skip(static_cast<int>(length))) return false;
-      continue;
-    }
-    const auto outer = input.PushLimit(static_cast<int>(length));
-    if (!FindIn(input, path.subspan(1), found)) return false;
-    input.PopLimit(outer);
-  }
-  return true;
-}
-
-// The contents of the field with the path `path` in the message in `bytes`, in order. Each number
-// of a path is a field of the message in the field before it. Empty if the message is malformed.
-std::vector<Span> Find(grpc::ByteBuffer& bytes, std::span<const int> path) {
-  std::vector<Span> found;
+// The content of the last field with the number `field` in the message in `bytes`; nothing if there
+// is none or the message is malformed.
+std::optional<Span> FindLast(grpc::ByteBuffer& bytes, int field) {
   grpc::ProtoBufferReader reader(&bytes);
-  if (!reader.status().ok()) return found;
+  if (!reader.status().ok()) return std::nullopt;
   CodedInputStream input(&reader);
-  if (!FindIn(input, path, found)) found.clear();
+  std::optional<Span> found;
+  while (const std::uint32_t tag = input.ReadTag()) {
+    if (tag != LengthTag(field)) {
+      if (!WireFormatLite::SkipField(&input, tag)) return std::nullopt;
+      continue;
+    }
+    std::uint32_t length = 0;
+    if (!input.ReadVarint32(&length)) return std::nullopt;
+    found = {static_cast<std::size_t>(input.CurrentPosition()), length};
+    if (!input.Skip(static_cast<int>(length))) return std::nullopt;
+  }
   return found;
 }
 
@@ -84,40 +74,42 @@ std::vector<grpc::Slice> SlicesOf(const grpc::ByteBuffer& bytes) {
 }  // namespace
 
 WatchedBytes::WatchedBytes(grpc::ByteBuffer& response) {
-  constexpr int kPath[] = {v1::ReconstructResponse::kFrameFieldNumber};
   // If there are several frames, the last one counts, as for a parser.
-  const std::vector<Span> frames = Find(response, kPath);
-  if (!frames.empty()) Append(SlicesOf(response), frames.back().offset, frames.back().length);
+  const auto frame = FindLast(response, v1::ReconstructResponse::kFrameFieldNumber);
+  if (frame) Append(SlicesOf(response), frame->offset, frame->length);
 }
 
-void WatchedBytes::EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame) {
+void WatchedBytes::EchoParticles(const v1::ParticleFrame& frame) {
   if (frame.positions().empty()) return;  // A frame without particles.
-  using From = v1::ParticleFrame;
   using To = v1::ReconstructedFrame;
-  static constexpr int kFields[][2] = {
-      {From::kPositionsFieldNumber, To::kParticlesFieldNumber},
-      {From::kIdsFieldNumber, To::kParticleIdsFieldNumber},
-      {From::kVolumesFieldNumber, To::kParticleVolumesFieldNumber},
-      {From::kVelocitiesFieldNumber, To::kParticleVelocitiesFieldNumber},
-      {From::kScalarsFieldNumber, To::kParticleScalarsFieldNumber},
-      {From::kBoxFieldNumber, To::kParticleBoxFieldNumber},
+  std::string echo;
+  echo.reserve(frame.ByteSizeLong());
+  const auto add_head = [&](int field, std::size_t length) {
+    echo += Written([&](CodedOutputStream& out) {
+      out.WriteTag(LengthTag(field));
+      out.WriteVarint64(length);
+    });
   };
-  const std::vector<grpc::Slice> slices = SlicesOf(request);
-  AppendOwn(Written([&](CodedOutputStream& out) {
+  const auto add = [&](int field, const std::string& bytes) {
+    if (bytes.empty()) return;
+    add_head(field, bytes.size());
+    echo += bytes;
+  };
+  const auto add_message = [&](int field, const google::protobuf::MessageLite& message) {
+    add_head(field, message.ByteSizeLong());
+    message.AppendToString(&echo);
+  };
+  echo += Written([&](CodedOutputStream& out) {
     out.WriteTag(VarintTag(To::kParticleFormatFieldNumber));
     out.WriteVarint32(static_cast<std::uint32_t>(frame.position_format()));
-  }));
-  for (const auto& [from, to] : kFields) {
-    const int path[] = {v1::ReconstructRequest::kFrameFieldNumber, from};
-    for (const Span& array : Find(request, path)) {
-      if (array.length == 0) continue;
-      AppendOwn(Written([&, field = to](CodedOutputStream& out) {
-        out.WriteTag(LengthTag(field));
-        out.WriteVarint64(array.length);
-      }));
-      Append(slices, array.offset, array.length);
-    }
-  }
+  });
+  add(To::kParticlesFieldNumber, frame.positions());
+  add(To::kParticleIdsFieldNumber, frame.ids());
+  add(To::kParticleVolumesFieldNumber, frame.volumes());
+  add(To::kParticleVelocitiesFieldNumber, frame.velocities());
+  for (const auto& scalar : frame.scalars()) add_message(To::kParticleScalarsFieldNumber, scalar);
+  if (frame.has_box()) add_message(To::kParticleBoxFieldNumber, frame.box());
+  AppendOwn(std::move(echo));
 }
 
 grpc::ByteBuffer WatchedBytes::ToResponse(std::uint64_t dropped,
@@ -153,10 +145,12 @@ std::string WatchedBytes::ToString() const {
   return bytes;
 }
 
-void WatchedBytes::AppendOwn(const std::string& bytes) {
-  slices_.emplace_back(bytes);
+void WatchedBytes::AppendOwn(std::string bytes) {
   size_ += bytes.size();
-  memory_ += bytes.size();
+  memory_ += bytes.capacity();
+  auto* const kept = new std::string(std::move(bytes));
+  slices_.emplace_back(
+      kept->data(), kept->size(), [](void* own) { delete static_cast<std::string*>(own); }, kept);
 }
 
 void WatchedBytes::Append(std::span<const grpc::Slice> whole, std::size_t offset,

@@ -1,4 +1,4 @@
-// A serialised result for watchers, who all share the bytes of the producer's response.
+// A serialised result for watchers, who all share its bytes.
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "partiemc/v1/reconstruction.pb.h"
@@ -21,18 +22,17 @@ class WatchedBytes {
   /// a frame without particles.
   explicit WatchedBytes(grpc::ByteBuffer& response);
 
-  /// Copies a serialised ReconstructedFrame. Does not check it.
-  explicit WatchedBytes(const std::string& frame) { AppendOwn(frame); }
+  /// Takes over a serialised ReconstructedFrame. Does not check it.
+  explicit WatchedBytes(std::string frame) { AppendOwn(std::move(frame)); }
 
-  /// Adds the format, positions, ids, volumes, velocities and scalars of the frame in `request`.
-  /// Shares the memory of `request`. Requires: `frame` is the parsed frame of `request`.
-  void EchoParticles(grpc::ByteBuffer& request, const v1::ParticleFrame& frame);
+  /// Adds the format, positions, ids, volumes, velocities, scalars and box of `frame`. Copies them:
+  /// slices of the producer's request could keep much larger buffers of received bytes alive.
+  void EchoParticles(const v1::ParticleFrame& frame);
 
   /// Size of the serialised ReconstructedFrame.
   std::size_t size() const { return size_; }
 
-  /// Bytes of memory that this object keeps alive, including other parts of a shared response or
-  /// request.
+  /// Bytes of memory that this object keeps alive, including other parts of a shared response.
   std::size_t memory() const { return memory_; }
 
   /// The serialised ReconstructedFrame, copied.
@@ -43,7 +43,7 @@ class WatchedBytes {
   grpc::ByteBuffer ToResponse(std::uint64_t dropped, std::uint64_t oldest_sequence) const;
 
  private:
-  void AppendOwn(const std::string& bytes);
+  void AppendOwn(std::string bytes);
   void Append(std::span<const grpc::Slice> whole, std::size_t offset, std::size_t length);
 
   std::vector<grpc::Slice> slices_;

@@ -301,11 +301,10 @@ absl::Status ReconstructCall::Compute(const absl::Status& parsed, FrameMessages&
   return status;
 }
 
-// Publishes the response to watchers. Returns whether there are watchers. They share the bytes of
-// the response and, if the stream echoes particles, of the request.
+// Publishes the response to watchers, who share its bytes. Returns whether there are watchers.
 bool ReconstructCall::Publish(std::size_t slot, const v1::ParticleFrame& request) {
   wire::WatchedBytes bytes(answers_[slot]);
-  if (outputs_.echo_particles) bytes.EchoParticles(requests_[slot], request);
+  if (outputs_.echo_particles) bytes.EchoParticles(request);
   return broadcaster_->Publish(std::make_shared<WatchedResult>(std::move(bytes)),
                                request.sequence());
 }
