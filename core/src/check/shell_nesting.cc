@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <map>
+#include <numeric>
+#include <span>
 
+#include "base/cancellation.h"
 #include "base/expansion.h"
 #include "base/point.h"
 #include "base/predicates.h"
@@ -16,9 +18,9 @@
 namespace partiemc {
 namespace {
 
-// Work, in units of WorkLimit, for a triangle above or below a point, and for each shell around
-// another one. The second is large because the list of these shells takes memory.
-constexpr std::uint64_t kWorkOfTriangle = 8, kWorkOfContaining = 1 << 10;
+// Work, in units of WorkLimit, for a tested box, for a triangle above or below a point, and for
+// each shell around another one. The last is large because the list of these shells takes memory.
+constexpr std::uint64_t kWorkOfBox = 4, kWorkOfTriangle = 8, kWorkOfContaining = 1 << 10;
 
 // --- Orientation --------------------------------------------------------------------------------
 
@@ -112,6 +114,91 @@ int PassesShadow(const std::array<Point, 3>& shadow, const Point& p) {
   return turn;
 }
 
+/// Finds the shells whose bounding boxes contain a point. Only these can wind around the point, but
+/// all shells of a stack along z share the columns of Columns.
+class ShellBoxes {
+ public:
+  explicit ShellBoxes(const Surface& surface)
+      : boxes_(surface.ShellCount()), order_(boxes_.size()), bounds_(boxes_.size()) {
+    for (std::size_t shell = 0; shell < boxes_.size(); ++shell) {
+      for (std::size_t k = 3 * std::size_t{surface.triangle_offsets[shell]};
+           k < 3 * std::size_t{surface.triangle_offsets[shell + 1]}; ++k) {
+        const Vec3 corner = Vec3At(surface.points, surface.triangles[k]);
+        boxes_[shell].Add({corner, corner});
+      }
+    }
+    std::iota(order_.begin(), order_.end(), 0);
+    Build(0, order_.size());
+  }
+
+  /// Writes the shells whose closed boxes contain p, ascending. Returns the number of tested boxes.
+  std::size_t FindAt(const Vec3& p, std::vector<std::uint32_t>& found) const {
+    found.clear();
+    const std::size_t tested = Find(0, order_.size(), p, found);
+    std::sort(found.begin(), found.end());
+    return tested;
+  }
+
+ private:
+  struct Box {
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+    void Add(const Box& other) {
+      low = Lower(low, other.low);
+      high = Upper(high, other.high);
+    }
+    bool Contains(const Vec3& p) const {
+      return low.x <= p.x && p.x <= high.x && low.y <= p.y && p.y <= high.y && low.z <= p.z &&
+             p.z <= high.z;
+    }
+
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  };
+
+  static std::size_t MiddleOf(std::size_t first, std::size_t last) {
+    return first + (last - first) / 2;
+  }
+
+  /// Makes a tree of these places in `order_`: the middle one is the root, the places before and
+  /// after it are the two subtrees.
+  void Build(std::size_t first, std::size_t last) {
+    if (first == last) return;
+    ThrowIfCancelled();
+    Box lows, bounds;
+    for (std::size_t k = first; k < last; ++k) {
+      const Box& box = boxes_[order_[k]];
+      lows.Add({box.low, box.low});
+      bounds.Add(box);
+    }
+    const Vec3 spread = lows.high - lows.low;
+    const auto axis = spread.z >= std::max(spread.x, spread.y) ? &Vec3::z
+                      : spread.y >= spread.x                   ? &Vec3::y
+                                                               : &Vec3::x;
+    const std::size_t middle = MiddleOf(first, last);
+    std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const double low_a = boxes_[a].low.*axis, low_b = boxes_[b].low.*axis;
+                       return low_a < low_b || (low_a == low_b && a < b);
+                     });
+    bounds_[middle] = bounds;
+    Build(first, middle);
+    Build(middle + 1, last);
+  }
+
+  std::size_t Find(std::size_t first, std::size_t last, const Vec3& p,
+                   std::vector<std::uint32_t>& found) const {
+    if (first == last) return 0;
+    const std::size_t middle = MiddleOf(first, last);
+    if (!bounds_[middle].Contains(p)) return 1;
+    if (boxes_[order_[middle]].Contains(p)) found.push_back(order_[middle]);
+    return 2 + Find(first, middle, p, found) + Find(middle + 1, last, p, found);
+  }
+
+  std::vector<Box> boxes_;            // By shell.
+  std::vector<std::uint32_t> order_;  // The shells, by place in the tree.
+  std::vector<Box> bounds_;           // By place: the bounding box of its subtree.
+};
+
 /// Lists the triangles in each column of a grid over x and y.
 class Columns {
  public:
@@ -140,8 +227,12 @@ class Columns {
     for (std::uint32_t t = 0; t < count; ++t) AddTriangle(surface, t);
   }
 
-  const std::vector<std::uint32_t>& At(const Vec3& p) const {
-    return triangles_[Row(p.y) * columns_ + Column(p.x)];
+  /// The triangles of a shell in the column of p, ascending.
+  std::span<const std::uint32_t> At(const Vec3& p, const Surface& surface,
+                                    std::uint32_t shell) const {
+    const std::vector<std::uint32_t>& all = triangles_[Row(p.y) * columns_ + Column(p.x)];
+    const auto first = std::lower_bound(all.begin(), all.end(), surface.triangle_offsets[shell]);
+    return {first, std::lower_bound(first, all.end(), surface.triangle_offsets[shell + 1])};
   }
 
  private:
@@ -164,6 +255,7 @@ class Columns {
   }
   /// The number of columns that triangles reach, summed over the triangles.
   double Reached(const Surface& surface) const {
+    ThrowIfCancelled();
     double reached = 0;
     for (std::uint32_t t = 0; t < surface.TriangleCount(); ++t) {
       const Range range = RangeOf(surface, t);
@@ -186,28 +278,19 @@ class Columns {
   std::vector<std::vector<std::uint32_t>> triangles_;
 };
 
-/// The other shells around `shell`: the winding number around its first point is not 0.
-std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& columns,
-                                      const std::vector<std::uint32_t>& shell_of,
-                                      std::uint32_t shell) {
-  const Vec3 p = Vec3At(surface.points, surface.point_offsets[shell]);
-  std::map<std::uint32_t, int> winding;
-  for (const std::uint32_t t : columns.At(p)) {
-    if (shell_of[t] == shell) continue;
+/// The winding number of a shell around p. `triangles`: those of the shell in the column of p.
+int WindingAround(const Surface& surface, std::span<const std::uint32_t> triangles, const Vec3& p) {
+  int winding = 0;
+  for (const std::uint32_t t : triangles) {
     const Vec3 a = Vec3At(surface.points, surface.triangles[3 * t]);
     const Vec3 b = Vec3At(surface.points, surface.triangles[3 * t + 1]);
     const Vec3 c = Vec3At(surface.points, surface.triangles[3 * t + 2]);
     const int turn = PassesShadow({Point{a.x, a.y}, Point{b.x, b.y}, Point{c.x, c.y}}, {p.x, p.y});
     // Only triangles above p count: p is on their lower side. If p is in the plane of a triangle,
     // the vertical line does not pass the triangle at p, because triangles do not touch.
-    if (turn == 0 || SideOfPlane(a, b, c, p) != -turn) continue;
-    winding[shell_of[t]] += turn;
+    if (turn != 0 && SideOfPlane(a, b, c, p) == -turn) winding += turn;
   }
-  std::vector<std::uint32_t> containing;
-  for (const auto& [other, turns] : winding) {
-    if (turns != 0) containing.push_back(other);
-  }
-  return containing;
+  return winding;
 }
 
 }  // namespace
@@ -215,6 +298,7 @@ std::vector<std::uint32_t> Containing(const Surface& surface, const Columns& col
 std::vector<int> OrientationsOf(const Surface& surface) {
   std::vector<int> orientations;
   for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    ThrowIfCancelled();
     orientations.push_back(OrientationOf(surface, shell));
   }
   return orientations;
@@ -223,19 +307,24 @@ std::vector<int> OrientationsOf(const Surface& surface) {
 std::vector<std::uint32_t> ShellsAround(const Surface& surface, WorkLimit* limit) {
   std::vector<std::uint32_t> around(surface.ShellCount(), kNoShell);
   if (around.size() < 2) return around;
-  std::vector<std::uint32_t> shell_of(surface.TriangleCount());
-  for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
-    std::fill(shell_of.begin() + surface.triangle_offsets[shell],
-              shell_of.begin() + surface.triangle_offsets[shell + 1], shell);
-  }
   const Columns columns(surface);
+  const ShellBoxes boxes(surface);
   WorkCounter work(limit);
-  std::vector<std::vector<std::uint32_t>> containing;
+  // By shell: the other shells around it, those that wind around its first point.
+  std::vector<std::vector<std::uint32_t>> containing(around.size());
+  std::vector<std::uint32_t> candidates;
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
+    ThrowIfCancelled();
     const Vec3 first = Vec3At(surface.points, surface.point_offsets[shell]);
-    work.Add(kWorkOfTriangle * columns.At(first).size());
-    containing.push_back(Containing(surface, columns, shell_of, shell));
-    work.Add(kWorkOfContaining * containing.back().size());
+    work.Add(kWorkOfBox * boxes.FindAt(first, candidates));
+    for (const std::uint32_t other : candidates) {
+      if (other == shell) continue;
+      const auto triangles = columns.At(first, surface, other);
+      work.Add(kWorkOfTriangle * triangles.size());
+      if (WindingAround(surface, triangles, first) == 0) continue;
+      containing[shell].push_back(other);
+      work.Add(kWorkOfContaining);
+    }
   }
   work.Finish();
   for (std::uint32_t shell = 0; shell < around.size(); ++shell) {
