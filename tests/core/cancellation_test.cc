@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "cut/ring_cut.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/surface_reconstructor.h"
 #include "support/particles.h"
@@ -194,6 +195,21 @@ TEST_P(Cancellation, ATaskThatIsGivenUpDoesNotGoOnWithHalfOfItsParts) {
     });
   }
   EXPECT_FALSE(went_on_with_half);
+}
+
+// The rings alone, without parallel.h.
+TEST(CancelledCut, OfRingsKeepsRings) {
+  const std::atomic<bool> flag = true;
+  const CancellationScope scope(&flag);
+  const Percolation percolation{};
+  const RingTopology topology;
+  const RingCutInput input{.percolation = percolation, .topology = topology, .spacing = 1};
+  RingCutScratch scratch;
+  PlacedVertices placed;
+  Rings rings;
+  std::uint64_t bodies = 7;
+  EXPECT_THROW((void)CutRings(input, scratch, placed, rings, bodies), Cancelled);
+  EXPECT_EQ(bodies, 7u);
 }
 
 // Grants all memory, and cancels the frame when it is asked for the last of `requests`.

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "base/cancellation.h"
 #include "vertices/measure.h"
 
 namespace partiemc {
@@ -274,6 +275,7 @@ bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& plac
     if (placed.kept_as[ring] != kNoRing) s.topology_ring[placed.kept_as[ring]] = ring;
   }
   for (int steps = 0; steps < kMostShifts; ++steps) {
+    ThrowIfCancelled();
     CollectLoops(input, rings, placed, s);
     if (!CutAtSides(input, steps, s)) continue;
     if (!Assembly(input, rings, placed, s).Run() || !NestRings(s)) continue;

@@ -48,7 +48,7 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
 /// If a ring has a vertex on a side, or pieces would touch, all sides move by up to some billionths
 /// of the spacing (kMostShifts in ring_cut.cc), opposite sides in the same direction. Returns false
 /// if this does not help, which is a bug.
-/// Cost: as CutAtLine, CountTouchingPairs and RingDepths.
+/// Cost: as CutAtLine, CountTouchingPairs and RingDepths. Throws Cancelled as ThrowIfCancelled.
 [[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
                             PlacedVertices& placed, Rings& rings, std::uint64_t& cut_bodies);
 

@@ -384,6 +384,7 @@ bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePiece
   const std::size_t shifts = input.are_walls ? kShiftsOfWalls : kShifts.size();
   const std::size_t tries = input.are_walls ? 2 * shifts : shifts;
   for (std::size_t attempt = 0; attempt < tries; ++attempt) {
+    ThrowIfCancelled();
     const double shift = kShifts[attempt % shifts];
     FillMesh(input, surface, s.plane, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;

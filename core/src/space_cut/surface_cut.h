@@ -72,7 +72,8 @@ struct SurfacePieces {
 /// surface_cut.cc). Walls move by at most a sixth of this, each on its own. Returns false, with
 /// `surface` unchanged, if this does not help, which is a bug. Requires: S1 to S5;
 /// `surface.attributes` without values. Deterministic. Cost: linear in the surface, plus CutAtPlane
-/// and CapPlanes, plus ShellsAround if a shell with a cavity falls into several parts.
+/// and CapPlanes, plus ShellsAround if a shell with a cavity falls into several parts. Throws
+/// Cancelled as ThrowIfCancelled, with `surface` unchanged.
 [[nodiscard]] bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& scratch,
                               SurfacePieces& pieces, Surface& surface);
 

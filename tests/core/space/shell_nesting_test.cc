@@ -15,6 +15,7 @@
 #include "check/work_limit.h"
 #include "partiemc/surface.h"
 #include "space/shells.h"
+#include "space_cut/surface_cut.h"
 #include "support/random.h"
 #include "support/tries.h"
 
@@ -163,6 +164,17 @@ TEST(ShellsAround, StopsWhenCancelledWithoutLimit) {
   const CancellationScope scope(&flag);
   EXPECT_THROW((void)ShellsAround(surface), Cancelled);
   EXPECT_THROW((void)OrientationsOf(surface), Cancelled);
+}
+
+TEST(CutSurface, StopsWhenCancelledWithoutPlanes) {
+  const std::atomic<bool> flag = true;
+  const CancellationScope scope(&flag);
+  Surface surface = StackAlong(&Vec3::z, 2);
+  const Surface given = surface;
+  space::SurfaceCutScratch scratch;
+  space::SurfacePieces pieces;
+  EXPECT_THROW((void)space::CutSurface({.planes = {}}, scratch, pieces, surface), Cancelled);
+  EXPECT_EQ(surface, given);
 }
 
 }  // namespace
