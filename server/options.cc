@@ -132,7 +132,7 @@ void AddSecurity(CLI::App& app, Raw& raw) {
          "Require a bearer token of this file, except for health checks. A line is TOKEN [NAME] "
          "[may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] "
          "[bytes=64MB]. NAME identifies the client in the log; fields that are left out set "
-         "no limit")
+         "no limit. The last line must end with a newline")
       ->type_name("FILE")
       ->envname("PARTIEMC_TOKEN_FILE")
       ->group(kGroup);
@@ -140,7 +140,7 @@ void AddSecurity(CLI::App& app, Raw& raw) {
          "--checkpoint-key-file", raw.checkpoint_key_file,
          "Sign checkpoints with the key in this file, and accept only signed ones. All servers "
          "that share streams need the same key. A second key on its own line is accepted "
-         "but not used for signing")
+         "but not used for signing. The last line must end with a newline")
       ->type_name("FILE")
       ->envname("PARTIEMC_CHECKPOINT_KEY_FILE")
       ->group(kGroup);

@@ -25,6 +25,7 @@
 #include "server/rpc/health_service.h"
 #include "server/rpc/service.h"
 #include "server/rpc/stream_counts.h"
+#include "server/security/secrets.h"
 #include "server/security/tls_credentials.h"
 #include "server/stream/memory_plan.h"
 #include "server/telemetry/logging.h"
@@ -69,11 +70,12 @@ auto ReadSecrets(const std::string& flag, const std::string& path, Parse parse)
     -> decltype(parse(std::string())) {
   const auto text = ReadSmallFile(flag, path);
   if (!text.ok()) return text.status();
+  const auto wrong = [&](const absl::Status& status) {
+    return absl::InvalidArgumentError(absl::StrCat(flag, " ", path, ": ", status.message()));
+  };
+  if (const auto status = CheckIsWhole(*text); !status.ok()) return wrong(status);
   auto secrets = parse(*text);
-  if (!secrets.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(flag, " ", path, ": ", secrets.status().message()));
-  }
+  if (!secrets.ok()) return wrong(secrets.status());
   return secrets;
 }
 

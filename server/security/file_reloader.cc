@@ -60,14 +60,20 @@ void FileReloader::Run(std::chrono::milliseconds interval) {
     }
     if (stopping_) return;
     const MutexUnlock unlock(mutex_);
-    for (Watched& watched : watched_) Look(watched);
+    Look();
   }
+}
+
+void FileReloader::Look() {
+  for (Watched& watched : watched_) Look(watched);
 }
 
 void FileReloader::Look(Watched& watched) {
   std::string stamp = StampOf(watched.files);
-  if (stamp == watched.stamp) return;
-  watched.stamp = std::move(stamp);
+  const bool is_settled = stamp == watched.seen;
+  watched.seen = stamp;
+  if (stamp == watched.loaded || !is_settled) return;
+  watched.loaded = std::move(stamp);
   if (const auto status = watched.load(); status.ok()) {
     LogEvent(spdlog::level::info, watched.what + " reloaded", {});
   } else {

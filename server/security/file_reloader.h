@@ -12,8 +12,9 @@
 
 namespace partiemc::server {
 
-/// Polls files and reloads them after a change. If a load fails, the failure is logged once per
-/// change, and the previous content stays in use.
+/// Polls files and reloads them after a change. A change is loaded when two successive looks find
+/// the files the same, because another program may still be writing them. If a load fails, the
+/// failure is logged once per change, and the previous content stays in use.
 class FileReloader {
  public:
   using Load = std::function<absl::Status()>;
@@ -31,12 +32,16 @@ class FileReloader {
   /// Starts a thread that polls the files every `interval`. Starts no thread if there are no files.
   void Start(std::chrono::milliseconds interval);
 
+  /// Looks at the files once; the thread calls this. Requires: the thread does not run.
+  void Look();
+
  private:
   struct Watched {
     std::string what;
     std::vector<std::string> files;
     Load load;
-    std::string stamp;  // Stamp of the files at the last load.
+    // Stamps of the files at the last load and at the last look.
+    std::string loaded = {}, seen = {};
   };
 
   void Run(std::chrono::milliseconds interval);

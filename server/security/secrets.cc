@@ -15,4 +15,11 @@ bool IsSecret(std::string_view text) {
          });
 }
 
+absl::Status CheckIsWhole(std::string_view text) {
+  if (text.empty() || text.back() == '\n') return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the last line may be half written; must end with a newline: add one, or replace the file by "
+      "a rename");
+}
+
 }  // namespace partiemc::server

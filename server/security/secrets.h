@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string_view>
 
+#include "absl/status/status.h"
+
 namespace partiemc::server {
 
 /// Shorter secrets can be guessed.
@@ -15,5 +17,10 @@ inline constexpr char kSecretRule[] = "of 16 to 512 characters of [A-Za-z0-9-._~
 /// Whether `text` conforms to kSecretRule, which is the syntax of a token in `authorization:
 /// Bearer` (RFC 6750, 2.1).
 bool IsSecret(std::string_view text);
+
+/// Checks that the text of a file of secrets ends with a newline. Without it, the file may be half
+/// written: the rest of its last line could restrict the permissions of a token, and the beginning
+/// of a token is shorter than the token. Errors: INVALID_ARGUMENT. An empty text is valid here.
+absl::Status CheckIsWhole(std::string_view text);
 
 }  // namespace partiemc::server

@@ -371,7 +371,7 @@ TEST_P(ResumeProtocol, ABrokenKeyFileFailsTheStartAndLaterKeepsTheOldKeys) {
   };
   ServerOptions options = TestOptions();
   options.reload_interval = std::chrono::milliseconds(10);
-  options.checkpoint_key_file = write("short-secret");
+  options.checkpoint_key_file = write("short-secret\n");
   const CapturedLog log;
   const auto refused = Server::Start(options);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
@@ -379,16 +379,19 @@ TEST_P(ResumeProtocol, ABrokenKeyFileFailsTheStartAndLaterKeepsTheOldKeys) {
       std::string(refused.status().message()),
       HasSubstr("--checkpoint-key-file " + folder.Path("keys") + ": line 1: must be a key"));
 
-  write("key-a-secret-0123456789");
+  write("key-a-secret-0123456789\n");
   server_ = StartServer(options);
   channel_ = Connect(*server_, GetParam());
   const Stream stream = Start();
-  write("short-secret");
+  write("short-secret\n");
   EXPECT_TRUE(Eventually([&] { return log.Count("checkpoint keys not reloaded") == 1; }));
   StreamClient client(channel_);
   EXPECT_TRUE(client.SendAndReceive(Resume(stream.checkpoint, stream.token)).has_opened());
 
-  write("key-b-secret-0123456789");
+  write("key-b-secret-01234567");  // Half written.
+  EXPECT_TRUE(Eventually([&] { return log.Count("must end with a newline") == 1; }));
+  EXPECT_EQ(log.Count("checkpoint keys reloaded"), 0u);
+  write("key-b-secret-0123456789\n");
   EXPECT_TRUE(Eventually([&] { return log.Count("checkpoint keys reloaded") >= 1; }));
   ExpectRefused(Resume(stream.checkpoint, stream.token), grpc::StatusCode::FAILED_PRECONDITION,
                 "CHECKPOINT_SIGNATURE");

@@ -30,6 +30,8 @@ class Security : public ::testing::Test {
   std::string Path(const std::string& name) const { return folder_.Path(name); }
   // Replaces the file atomically.
   void Write(const std::string& name, const std::string& text) const;
+  // Writes a token file of one line.
+  void WriteTokens(const std::string& line) const { Write("tokens", line + "\n"); }
   void WriteIdentity(const IssuedCertificate& identity) const;
 
   ServerOptions Options(bool tls, bool client_ca, bool tokens) const;

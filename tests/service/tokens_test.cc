@@ -49,7 +49,7 @@ TEST_F(Security, EveryMethodWantsAToken) {
 }
 
 TEST_F(Security, ReflectionWantsATokenAndHealthDoesNot) {
-  Write("tokens", kToken);
+  WriteTokens(kToken);
   server_ = StartServer(Options(false, false, true));
   const auto channel = Connect(*server_, Transport::kTcp);
   const std::string reflection = "grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
@@ -65,7 +65,7 @@ TEST_F(Security, ReflectionWantsATokenAndHealthDoesNot) {
 }
 
 TEST_F(Security, AStreamIsOpenedWithATokenAndGoesOnWhenItIsTakenBack) {
-  Write("tokens", kToken);
+  WriteTokens(kToken);
   server_ = StartServer(Options(false, false, true));
   const auto channel = Connect(*server_, Transport::kTcp);
   TimedContext context;
@@ -74,7 +74,7 @@ TEST_F(Security, AStreamIsOpenedWithATokenAndGoesOnWhenItIsTakenBack) {
   const auto stream = stub->Reconstruct(&context);
   v1::ReconstructResponse answer;
   ASSERT_TRUE(stream->Write(OpenRequest()) && stream->Read(&answer) && answer.has_opened());
-  Write("tokens", kOtherToken);
+  WriteTokens(kOtherToken);
   EXPECT_TRUE(
       Eventually([&] { return Ask(channel, kToken).code == grpc::StatusCode::UNAUTHENTICATED; }));
   ASSERT_TRUE(stream->Write(BlobRequest(1, 1, 0)) && stream->Read(&answer) && answer.has_frame());
@@ -83,7 +83,7 @@ TEST_F(Security, AStreamIsOpenedWithATokenAndGoesOnWhenItIsTakenBack) {
 }
 
 TEST_F(Security, TokensAreReloadedAndABrokenFileKeepsThoseThatWereThere) {
-  Write("tokens", kToken);
+  WriteTokens(kToken);
   server_ = StartServer(Options(false, false, true));
   const auto channel = Connect(*server_, Transport::kTcp);
   const auto comes_in = [&](const char* token) {
@@ -91,21 +91,45 @@ TEST_F(Security, TokensAreReloadedAndABrokenFileKeepsThoseThatWereThere) {
   };
   EXPECT_TRUE(comes_in(kToken));
   EXPECT_FALSE(comes_in(kOtherToken));
-  Write("tokens", kOtherToken);
+  WriteTokens(kOtherToken);
   EXPECT_TRUE(Eventually([&] { return comes_in(kOtherToken); }));
   EXPECT_FALSE(comes_in(kToken));
 
   const CapturedLog log;
-  Write("tokens", "short");
+  WriteTokens("short");
   EXPECT_TRUE(Eventually([&] { return log.Count("tokens not reloaded") == 1; }));
   std::filesystem::remove(Path("tokens"));
   EXPECT_TRUE(Eventually([&] { return log.Count("tokens not reloaded") == 2; }));
   EXPECT_THAT(log.Text(), HasSubstr(Path("tokens")));
   EXPECT_TRUE(comes_in(kOtherToken));
   EXPECT_FALSE(Ask(channel, "").code == grpc::StatusCode::OK);
-  Write("tokens", kToken);
+  WriteTokens(kToken);
   EXPECT_TRUE(Eventually([&] { return comes_in(kToken); }));
   EXPECT_EQ(log.Count("tokens not reloaded"), 2u);
+}
+
+// The rest of the line restricts the token.
+TEST_F(Security, AHalfWrittenLineOfATokenFileIsNotUsed) {
+  const std::string half = std::string(kToken) + " alice";
+  const auto may_list = [&] {
+    return Call(Connect(*server_, Transport::kTcp), "partiemc.v1.ReconstructionService/ListStreams",
+                std::string("Bearer ") + kToken)
+               .code == grpc::StatusCode::OK;
+  };
+  Write("tokens", half);
+  const auto refused = Server::Start(Options(false, false, true)).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("must end with a newline"));
+  Write("tokens", half + " may=watch\n");
+  server_ = StartServer(Options(false, false, true));
+  EXPECT_FALSE(may_list());
+  const CapturedLog log;
+  Write("tokens", half);
+  EXPECT_TRUE(Eventually([&] { return log.Count("tokens not reloaded") == 1; }));
+  EXPECT_THAT(log.Text(), HasSubstr("must end with a newline"));
+  EXPECT_FALSE(may_list());
+  Write("tokens", half + "\n");
+  EXPECT_TRUE(Eventually(may_list));
 }
 
 TEST_F(Security, WhatDoesNotHoldIsToldAtTheStart) {
@@ -118,11 +142,11 @@ TEST_F(Security, WhatDoesNotHoldIsToldAtTheStart) {
   EXPECT_THAT(told(Options(false, false, true)), HasSubstr("--token-file " + Path("tokens")));
   WriteIdentity({authority_.Issue("server").certificate, authority_.Issue("server").key});
   EXPECT_THAT(told(Options(true, false, false)), HasSubstr("must be the key of"));
-  Write("tokens", "short-secret");
+  WriteTokens("short-secret");
   EXPECT_THAT(told(Options(false, false, true)), HasSubstr("line 1"));
 
   // Without TLS beyond this machine.
-  Write("tokens", kToken);
+  WriteTokens(kToken);
   ServerOptions options = Options(false, false, true);
   options.address.host = "0.0.0.0";
   EXPECT_THAT(told(options), HasSubstr("tokens would travel in the clear"));
