@@ -187,8 +187,9 @@ void AddWeb(CLI::App& app, Raw& raw) {
   app.add_option(
          "--web-host", raw.web_options.hosts,
          "Accept requests for this host name, for example from a proxy on this machine; may be "
-         "given several times. On a loopback address, the server accepts only localhost, "
-         "loopback addresses, these names and the hosts of --web-origin")
+         "given several times. The server accepts only localhost, loopback addresses, these names "
+         "and the hosts of --web-origin; if it listens on another than a loopback address, also "
+         "any IP address, and with TLS or tokens and without this option any name")
       ->needs(web)
       ->type_name("NAME")
       ->envname("PARTIEMC_WEB_HOST")

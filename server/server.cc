@@ -340,6 +340,7 @@ absl::Status Server::OpenGateway() {
   auto web = WebGateway::Start(*options_.web, {.methods = *methods_,
                                                .limits = options_.limits,
                                                .tls = options_.tls ? tls_identity_.get() : nullptr,
+                                               .has_tokens = options_.token_file.has_value(),
                                                .metrics = *metrics_,
                                                .draining = [this] { return leaves_.load(); },
                                                .ping_interval = options_.keepalive.interval,

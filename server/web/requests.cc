@@ -1,5 +1,7 @@
 #include "server/web/requests.h"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -107,6 +109,14 @@ std::string_view NameOf(std::string_view host) {
   return host.substr(0, host.front() == '[' ? host.find(']') + 1 : host.find(':'));
 }
 
+// Whether `name` is an IPv4 address, or an IPv6 address in brackets.
+bool IsNumber(std::string_view name) {
+  const bool is_six = ConsumePrefix(name, "[");
+  if (is_six) name.remove_suffix(1);
+  in6_addr number{};
+  return inet_pton(is_six ? AF_INET6 : AF_INET, std::string(name).c_str(), &number) == 1;
+}
+
 bool IsLocalHost(std::string_view host) {
   std::string_view name = NameOf(host);
   if (ConsumePrefix(name, "[")) name.remove_suffix(1);
@@ -161,11 +171,12 @@ std::string_view Name(WebRefusal refusal) {
 }
 
 bool IsHostAllowed(std::string_view host, const WebRules& rules) {
-  if (!rules.is_local) return true;
+  if (rules.any_host) return true;
   const auto normal = NormalHost(host, "");
   if (!normal) return false;
   const std::string_view name = NameOf(*normal);
-  return IsLocalHost(*normal) || std::ranges::find(rules.hosts, name) != rules.hosts.end() ||
+  return IsLocalHost(*normal) || (!rules.is_local && IsNumber(name)) ||
+         std::ranges::find(rules.hosts, name) != rules.hosts.end() ||
          std::ranges::any_of(rules.origins, [&](std::string_view origin) {
            return NameOf(origin.substr(origin.find("//") + 2)) == name;
          });
@@ -190,7 +201,7 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
   if (!IsHostAllowed(request.hosts.front(), rules)) {
     return RefusedAs(
         WebRefusal::kHost, 421,
-        "the request must name a host of this machine, or one of the server's --web-host");
+        "the request must name localhost, an address of this server, or one of its --web-host");
   }
   if (!path.starts_with(kCalls)) {
     if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");

@@ -34,6 +34,8 @@ struct WebRules {
   std::vector<std::string> hosts = {};
   /// Whether the server listens on a loopback address only.
   bool is_local = true;
+  /// Whether requests may name any host (IsHostAllowed).
+  bool any_host = false;
 };
 
 /// Kinds of refusals; the metrics use these names.
@@ -90,10 +92,11 @@ struct WebAnswer {
 
 WebAnswer Understand(const WebRequest& request, const WebRules& rules);
 
-/// Whether a request may name `host`. A server on another than a loopback address accepts every
-/// host. A server on a loopback address accepts only names and addresses of this machine, the hosts
-/// of `rules`, and the hosts of the origins in `rules`. This prevents DNS rebinding, in which a
-/// page whose name resolves to 127.0.0.1 reads the server's responses.
+/// Whether a request may name `host`. Unless `rules` allow any host, it may name localhost, a
+/// loopback address, one of the hosts of `rules`, or the host of an origin in `rules`. If the
+/// server listens on another than a loopback address, the request may also name any IP address.
+/// This prevents DNS rebinding, in which a page whose name resolves to the server's address reads
+/// the server's responses.
 bool IsHostAllowed(std::string_view host, const WebRules& rules);
 
 /// Whether a page of `origin` may call the server under the name `host`. It may if the origin is

@@ -65,17 +65,29 @@ absl::StatusOr<std::vector<std::string>> Normal(
   return normal;
 }
 
-absl::StatusOr<CheckedOptions> Check(const WebOptions& options) {
+// Returns the rules for the hosts that requests may name. A page that reaches the server under its
+// own name (DNS rebinding) has no token, and no certificate for this name. So tokens or TLS permit
+// any name, except on a loopback address, or if the operator lists the names.
+WebRules RulesFor(const WebOptions& options, std::vector<std::string> hosts, bool is_secure) {
+  WebRules rules{.hosts = std::move(hosts), .is_local = options.address.IsLocal()};
+  rules.any_host = !rules.is_local && is_secure && rules.hosts.empty();
+  if (auto own = NormalHostName(options.address.host); own.ok()) {
+    rules.hosts.push_back(*std::move(own));
+  }
+  return rules;
+}
+
+absl::StatusOr<CheckedOptions> Check(const WebOptions& options, bool is_secure) {
   auto origins = Normal("--web-origin", options.origins, &NormalOrigin);
   if (!origins.ok()) return origins.status();
   auto hosts = Normal("--web-host", options.hosts, &NormalHostName);
   if (!hosts.ok()) return hosts.status();
   auto ancestors = Normal("--web-frame-ancestors", options.frame_ancestors, &NormalOrigin);
   if (!ancestors.ok()) return ancestors.status();
-  return CheckedOptions{.rules = {.origins = *std::move(origins),
-                                  .hosts = *std::move(hosts),
-                                  .is_local = options.address.IsLocal()},
-                        .frame_ancestors = *std::move(ancestors)};
+  CheckedOptions checked{.rules = RulesFor(options, *std::move(hosts), is_secure),
+                         .frame_ancestors = *std::move(ancestors)};
+  checked.rules.origins = *std::move(origins);
+  return checked;
 }
 
 void Converse(const std::shared_ptr<WebConnectionOver<WebSocket>>& connection) {
@@ -273,7 +285,7 @@ absl::StatusOr<std::unique_ptr<WebGateway>> WebGateway::Start(const WebOptions& 
     return absl::InvalidArgumentError(
         absl::StrCat("--web ", options.address.ToString(), ": must be HOST:PORT or [IPV6]:PORT"));
   }
-  auto checked = Check(options);
+  auto checked = Check(options, setup.has_tokens || setup.tls != nullptr);
   if (!checked.ok()) return checked.status();
   auto implementation = std::make_unique<Implementation>(options, setup, *std::move(checked));
   if (auto status = implementation->Listen(); !status.ok()) return status;

@@ -25,6 +25,8 @@ class WebGateway {
     const Methods& methods;
     const ServerLimits& limits;
     const CurrentTlsIdentity* tls = nullptr;
+    /// Whether calls require a token.
+    bool has_tokens = false;
     Metrics& metrics;
     std::function<bool()> draining;
     std::chrono::milliseconds ping_interval, ping_timeout;

@@ -16,8 +16,9 @@ struct WebOptions {
   /// Origins of pages that may call the server, in addition to the server's own host:
   /// "https://host:port".
   std::vector<std::string> origins = {};
-  /// Host names that requests may use if the server listens on a loopback address, in addition to
-  /// the names of this machine: "viewer.example".
+  /// Host names that requests may use, in addition to localhost and addresses (IsHostAllowed):
+  /// "viewer.example". Empty: with TLS or tokens, requests may use any name, except on a loopback
+  /// address.
   std::vector<std::string> hosts = {};
   /// Other origins whose pages may show the page in a frame.
   std::vector<std::string> frame_ancestors = {};

@@ -68,7 +68,7 @@ TEST(NormalOrigin, HasOneForm) {
 
 TEST(IsOriginAllowed, TakesThePagesOfThisServerAndThoseThatAreNamed) {
   const WebRules local{.origins = {"https://viewer.example"}, .is_local = true};
-  const WebRules open{.origins = {}, .is_local = false};
+  const WebRules open{.origins = {}, .is_local = false, .any_host = true};
   EXPECT_TRUE(IsOriginAllowed("http://localhost:8080", "localhost:8080", local));
   EXPECT_TRUE(IsOriginAllowed("http://127.0.0.1:8080", "127.0.0.1:8080", local));
   EXPECT_TRUE(IsOriginAllowed("http://[::1]:8080", "[::1]:8080", local));
@@ -94,7 +94,22 @@ TEST(IsHostAllowed, OnLoopbackAcceptsThisMachineAndTheRules) {
        {"", ":80", "evil.example", "viewer.example.evil.example", "192.0.2.1", "[2001:db8::1]",
         "evil.example:localhost", "localhost:x", "127.0.0.1x"}) {
     EXPECT_FALSE(IsHostAllowed(host, local)) << host;
-    EXPECT_TRUE(IsHostAllowed(host, {.is_local = false})) << host;
+    EXPECT_TRUE(IsHostAllowed(host, {.is_local = false, .any_host = true})) << host;
+  }
+}
+
+TEST(IsHostAllowed, ElsewhereAcceptsAlsoAddresses) {
+  const WebRules open{
+      .origins = {"https://lab.example:8443"}, .hosts = {"viewer.example"}, .is_local = false};
+  for (const char* host :
+       {"localhost:8080", "127.0.0.1", "192.0.2.1", "192.0.2.1:8080", "[2001:db8::1]",
+        "[2001:DB8::1]:8080", "[::1]", "viewer.example:1", "LAB.example"}) {
+    EXPECT_TRUE(IsHostAllowed(host, open)) << host;
+  }
+  for (const char* host : {"", ":80", "evil.example", "viewer.example.evil.example", "192.0.2.1x",
+                           "192.0.2.1.evil.example", "192.0.2", "2001:db8::1", "[192.0.2.1]",
+                           "[2001:db8::1", "beef", "0x7f.1"}) {
+    EXPECT_FALSE(IsHostAllowed(host, open)) << host;
   }
 }
 

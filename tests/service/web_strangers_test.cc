@@ -137,6 +137,35 @@ TEST_F(WebStrangers, OnLoopbackAForeignHostIsMisdirected) {
   EXPECT_EQ(status("evil.example", "/v1/healthz"), 200u);
 }
 
+// DNS rebinding: a page under a name that resolves to the server's address.
+TEST_F(WebStrangers, ElsewhereAForeignHostIsMisdirectedToo) {
+  const support::TemporaryFolder folder;
+  const auto status = [&](const char* host, const std::string& target = "/") {
+    return Ask(web(), "GET", target, absl::StrCat("Host: ", host, "\r\n")).status;
+  };
+  options_.insecure = true;
+  options_.web->address.host = "0.0.0.0";
+  Serve();
+  EXPECT_EQ(status("evil.example"), 421u);
+  EXPECT_EQ(
+      Post(web(), "/v1/info", "", "Host: evil.example\r\nOrigin: http://evil.example\r\n").status,
+      421u);
+  for (const char* host : {"localhost:8080", "127.0.0.1", "192.0.2.1", "[2001:db8::1]:8080"}) {
+    EXPECT_EQ(status(host), 200u) << host;
+  }
+  EXPECT_EQ(status("evil.example", "/v1/healthz"), 200u);
+
+  options_.token_file = folder.Write("tokens", "0123456789abcdef0123456789abcdef lab\n");
+  Serve();
+  EXPECT_EQ(status("viewer.example"), 200u);
+  options_.web->hosts = {"viewer.example"};
+  Serve();
+  EXPECT_EQ(status("viewer.example"), 200u);
+  EXPECT_EQ(status("192.0.2.1"), 200u);
+  EXPECT_EQ(status("evil.example"), 421u);
+  EXPECT_EQ(status("evil.example", "/v1/healthz"), 200u);
+}
+
 TEST_F(WebStrangers, WhatIsNoHostNameIsNoOption) {
   for (const char* host : {"viewer.example:80", "https://viewer.example", "", "a b"}) {
     options_.web->hosts = {host};
