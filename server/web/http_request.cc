@@ -40,7 +40,8 @@ WebRequest ViewOf(const HttpParser& parser) {
           .accept_encoding = View(request[http::field::accept_encoding]),
           .if_none_match = View(request[http::field::if_none_match]),
           .is_upgrade = boost::beast::websocket::is_upgrade(request),
-          .has_body = parser.chunked() || (length && *length > 0)};
+          .has_body = parser.chunked() || (length && *length > 0),
+          .is_before_1_1 = request.version() < 11};
 }
 
 }  // namespace partiemc::server

@@ -194,6 +194,11 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
     return RefusedAs(WebRefusal::kMalformed, 400,
                      "the request must have no Transfer-Encoding, or once and exactly `chunked`");
   }
+  // HTTP/1.0 has no Transfer-Encoding, so a proxy could find another end of the request.
+  if (!encodings.empty() && request.is_before_1_1) {
+    return RefusedAs(WebRefusal::kMalformed, 400,
+                     "the request must be HTTP/1.1 if it has a Transfer-Encoding");
+  }
   if (path == "/v1/healthz") {
     if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
     return {.what = WebHealth{.head_only = head_only}};

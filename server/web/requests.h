@@ -25,6 +25,7 @@ struct WebRequest {
   std::string_view content_type, accept_encoding, if_none_match;
   bool is_upgrade = false;  ///< Upgrade to WebSocket.
   bool has_body = false;
+  bool is_before_1_1 = false;  ///< HTTP/1.0.
 };
 
 struct WebRules {

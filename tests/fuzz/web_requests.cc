@@ -46,6 +46,8 @@ void RequireSound(const server::WebRequest& request, const server::WebAnswer& an
             "a page of a stranger makes no call");
     Require(request.authorizations.size() < 2 || !call->authorization,
             "of several tokens none counts");
+    Require(!request.is_before_1_1 || request.transfer_encodings.empty(),
+            "a request has one end for every version of HTTP");
     Require(request.hosts.size() == 1, "who is asked is known");
   }
   if (!answer.allowed_origin.empty()) {

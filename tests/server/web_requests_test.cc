@@ -122,6 +122,18 @@ TEST(NormalHostName, IsANameWithoutAPort) {
   }
 }
 
+TEST(Understand, RefusesATransferEncodingBeforeHttp11) {
+  WebRequest request{.method = "GET",
+                     .target = "/v1/healthz",
+                     .hosts = {"localhost"},
+                     .transfer_encodings = {"chunked"}};
+  EXPECT_TRUE(std::holds_alternative<WebHealth>(Understand(request, {}).what));
+  request.is_before_1_1 = true;
+  EXPECT_EQ(std::get<WebRefused>(Understand(request, {}).what).http_status, 400u);
+  request.transfer_encodings = {};
+  EXPECT_TRUE(std::holds_alternative<WebHealth>(Understand(request, {}).what));
+}
+
 TEST(Understand, KnowsWhatIsAskedFor) {
   WebRequest request{.method = "GET", .target = "/v1/watch", .hosts = {"localhost"}};
   const auto refused = [&] {

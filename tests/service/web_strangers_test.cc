@@ -101,6 +101,23 @@ TEST_F(WebStrangers, ABodyIsFramedByChunkedAloneOrByItsLength) {
   EXPECT_GE(Refusals("malformed"), 24);
 }
 
+TEST_F(WebStrangers, ARequestBeforeHttp11HasNoTransferEncoding) {
+  Serve();
+  const std::string inner = "GET /v1/healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  for (const char* target : {"GET /v1/healthz", "GET /", "POST /v1/info"}) {
+    const std::string head =
+        absl::StrCat(target, " HTTP/1.0\r\nHost: localhost\r\nConnection: keep-alive\r\n",
+                     "Content-Type: application/x-protobuf\r\n");
+    const std::string all = Exchange(head + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n" + inner);
+    EXPECT_THAT(all, StartsWith("HTTP/1.1 400 ")) << target;
+    EXPECT_THAT(all, HasSubstr("Connection: close\r\n")) << target;
+    EXPECT_EQ(Responses(all), 1u) << target;
+    WebPipe plain(web());
+    plain.Send(head + "Content-Length: 0\r\n\r\n");
+    EXPECT_THAT(plain.ReceiveUntil("\r\n"), StartsWith("HTTP/1.1 200 ")) << target;
+  }
+}
+
 TEST_F(WebStrangers, AChunkBeyondTheLimitIsRefusedWhenItIsAnnounced) {
   Serve();
   for (const char* size : {"ffffffffffffffff", "10001"}) {
