@@ -276,7 +276,8 @@ absl::Status Server::Listen() {
   hand_over_ = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials_);
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
-  interceptors.push_back(MakeGuardOfForeignServices(authentication_, connections_));
+  interceptors.push_back(
+      MakeGuardOfForeignServices(authentication_, connections_, options_.reflection_time));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   builder.RegisterService(service_.get());
   builder.RegisterService(health_.get());

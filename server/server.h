@@ -78,6 +78,8 @@ struct ServerOptions {
   /// Interval for checking the files above for changes. A change applies to later connections and
   /// calls.
   std::chrono::milliseconds reload_interval{1000};
+  /// Maximum length of a call of reflection.
+  std::chrono::milliseconds reflection_time{30'000};
   /// If set, the server serves metrics over HTTP at this address. They contain no names and no data
   /// of streams.
   std::optional<Address> metrics;

@@ -18,6 +18,7 @@ Words WordsOf(CallerAccount::Kind kind) {
   switch (kind) {
     case CallerAccount::Kind::kCall:
     case CallerAccount::Kind::kProbe:
+    case CallerAccount::Kind::kReflection:
       return {kReasonCallerCalls, "caller.calls"};
     case CallerAccount::Kind::kStream:
       return {kReasonCallerStreams, "caller.streams"};
@@ -37,6 +38,8 @@ std::uint32_t LimitOf(const CallerQuota& quota, CallerAccount::Kind kind) {
       return quota.streams.value_or(kNone);
     case CallerAccount::Kind::kWatcher:
       return quota.watchers.value_or(kNone);
+    case CallerAccount::Kind::kReflection:
+      return CallerAccount::kMaxReflectionCalls;
   }
   return kNone;
 }

@@ -24,12 +24,16 @@ inline constexpr std::string_view kReasonCallerWatchers = "CALLER_WATCHERS";
 inline constexpr std::string_view kReasonCallerBytes = "CALLER_BYTES";
 
 /// Counts the resources that a caller holds. Health checks (kProbe) count apart from other calls,
-/// with the same limit. All calls with the same token share an account. All calls without a token
-/// from the same host share one (HostOfPeer). ComputePool and FairShare identify callers by the
-/// memory address of this object. Thread-safe.
+/// with the same limit. A call of reflection counts as kCall and as kReflection. All calls with the
+/// same token share an account. All calls without a token from the same host share one
+/// (HostOfPeer). ComputePool and FairShare identify callers by the memory address of this object.
+/// Thread-safe.
 class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
  public:
-  enum class Kind { kCall, kStream, kWatcher, kProbe };
+  enum class Kind { kCall, kStream, kWatcher, kProbe, kReflection };
+
+  /// The limit of kReflection, because gRPC uses a thread for each of these calls.
+  static constexpr std::uint32_t kMaxReflectionCalls = 4;
 
   /// One counted resource. The destructor releases it. Keeps the account alive.
   class Place {
@@ -67,7 +71,7 @@ class CallerAccount : public std::enable_shared_from_this<CallerAccount> {
   std::uint32_t held(Kind kind) const ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  static constexpr std::size_t kKinds = 4;
+  static constexpr std::size_t kKinds = 5;
 
   mutable Mutex mutex_;
   CallerQuota quota_ ABSL_GUARDED_BY(mutex_);

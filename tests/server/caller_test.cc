@@ -33,7 +33,8 @@ TEST(CallerAccount, HasAsManyPlacesOfEachKindAsItsQuotaSays) {
     std::string_view reason;
   } kinds[] = {{Kind::kCall, 3, kReasonCallerCalls},
                {Kind::kStream, 1, kReasonCallerStreams},
-               {Kind::kWatcher, 2, kReasonCallerWatchers}};
+               {Kind::kWatcher, 2, kReasonCallerWatchers},
+               {Kind::kReflection, 4, kReasonCallerCalls}};
   std::vector<Place> places;
   for (const auto& [kind, most, reason] : kinds) {
     for (std::uint32_t i = 0; i < most; ++i) {

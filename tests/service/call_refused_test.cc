@@ -86,6 +86,22 @@ class CallRefused : public ErrorTable {
     const auto status = stub_->GetServerInfo(&context, {}, &response);
     Expect(status, ReasonOf(context), grpc::StatusCode::UNAUTHENTICATED, reason);
   }
+  // Expects this end of a call of reflection without a request.
+  void ExpectOfMuteReflection(grpc::StatusCode code) {
+    TimedContext context;
+    grpc::GenericStub stub(channel_);
+    grpc::CompletionQueue queue;
+    const auto call = stub.PrepareCall(
+        &context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
+    void* tag = nullptr;
+    bool ok = false;
+    call->StartCall(nullptr);
+    queue.Next(&tag, &ok);
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    queue.Next(&tag, &ok);
+    Expect(status, ReasonOf(context), code, "");
+  }
   static v1::ReconstructRequest Resume(const std::string& checkpoint, const std::string& token) {
     auto open = OpenRequest("tank");
     open.mutable_open()->set_checkpoint_interval(1);
@@ -374,19 +390,13 @@ TEST_F(CallRefused, PAGE_TOKEN) {
 
 TEST_F(CallRefused, NoReason_UNAUTHENTICATED) {
   WantToken();
-  TimedContext context;
-  grpc::GenericStub stub(channel_);
-  grpc::CompletionQueue queue;
-  const auto call = stub.PrepareCall(
-      &context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
-  void* tag = nullptr;
-  bool ok = false;
-  call->StartCall(nullptr);
-  queue.Next(&tag, &ok);
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  queue.Next(&tag, &ok);
-  Expect(status, ReasonOf(context), StatusCode::UNAUTHENTICATED, "");
+  ExpectOfMuteReflection(StatusCode::UNAUTHENTICATED);
+}
+
+TEST_F(CallRefused, NoReason_DEADLINE_EXCEEDED) {
+  options_.reflection_time = std::chrono::milliseconds(100);
+  Serve();
+  ExpectOfMuteReflection(StatusCode::DEADLINE_EXCEEDED);
 }
 
 }  // namespace

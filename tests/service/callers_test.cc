@@ -1,5 +1,6 @@
 // Several callers of one server: permissions, and that no caller blocks the others.
 #include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -59,6 +60,7 @@ std::ptrdiff_t CountEnded(std::vector<Call>& calls, std::string_view reason) {
 
 using Stream = Bidi<v1::ReconstructRequest, v1::ReconstructResponse>;
 using Watch = Bidi<v1::WatchStreamRequest, v1::WatchStreamResponse>;
+using Reflection = Bidi<grpc::ByteBuffer, grpc::ByteBuffer>;
 
 class Callers : public ::testing::Test {
  protected:
@@ -84,6 +86,22 @@ class Callers : public ::testing::Test {
     Identify(*watch.context, token);
     watch.rpc = stub_->WatchStream(watch.context.get());
     return watch;
+  }
+  Reflection BeginReflection(const char* token) {
+    const grpc::internal::RpcMethod method(
+        "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+        grpc::internal::RpcMethod::BIDI_STREAMING);
+    Reflection reflection;
+    Identify(*reflection.context, token);
+    reflection.rpc.reset(
+        grpc::internal::ClientReaderWriterFactory<grpc::ByteBuffer, grpc::ByteBuffer>::Create(
+            channel_.get(), method, reflection.context.get()));
+    return reflection;
+  }
+  // ServerReflectionRequest{list_services: "*"}: field 7, one byte.
+  static grpc::ByteBuffer ListServices() {
+    const grpc::Slice slice(std::string("\x3a\x01*"));
+    return {&slice, 1};
   }
   static v1::WatchStreamRequest OpenWatch(const std::string& name) {
     v1::WatchStreamRequest request;
@@ -127,6 +145,32 @@ TEST_F(Callers, MuteStreamsOfOneKeepNobodyOut) {
   // Nor other calls of the same caller, as behind a proxy.
   Stream own = BeginStream(kMallory);
   EXPECT_TRUE(own.Ask(OpenRequest()).has_opened()) << own.EndReason();
+}
+
+// gRPC has 16 threads for reflection.
+TEST_F(Callers, MuteReflectionOfOneKeepsNobodyOut) {
+  Serve("alice", "mallory");
+  std::vector<Reflection> mute;
+  for (int i = 0; i < 40; ++i) mute.push_back(BeginReflection(kMallory));
+  EXPECT_GT(BeginReflection(kAlice).Ask(ListServices()).Length(), 0u);
+  EXPECT_GE(std::ranges::count_if(mute,
+                                  [](Reflection& call) {
+                                    call.rpc->WritesDone();
+                                    return call.rpc->Finish().error_code() ==
+                                           StatusCode::RESOURCE_EXHAUSTED;
+                                  }),
+            1);
+}
+
+TEST_F(Callers, ReflectionCountsAsACall) {
+  Serve("alice calls=1", "mallory");
+  {
+    Reflection call = BeginReflection(kAlice);
+    ASSERT_GT(call.Ask(ListServices()).Length(), 0u);
+    EXPECT_EQ(CallFrame(kAlice), "CALLER_CALLS");
+    EXPECT_EQ(CallFrame(kMallory), "OK");
+  }
+  EXPECT_TRUE(Eventually([&] { return CallFrame(kAlice) == "OK"; }));
 }
 
 TEST_F(Callers, MuteWatchersOfOneKeepNobodyOut) {
