@@ -49,6 +49,9 @@ void Server::AddGauges() {
         &LogLosses::dropped_lines);
   count("partiemc_log_refusals_held_back_total", "Refusals beyond what the log tells in a second.",
         &LogLosses::refusals_held_back);
+  count("partiemc_log_calls_held_back_total",
+        "Begins and ends of calls beyond what the log tells in a second.",
+        &LogLosses::calls_held_back);
   if (!options_.tls) return;
   add("partiemc_tls_certificate_not_after_seconds", "When the server's certificate expires (Unix).",
       [this] {

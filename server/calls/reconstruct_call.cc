@@ -22,24 +22,22 @@ void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
   }
   const auto violation = FindViolation(status);
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - stream->opened;
-  LogEvent(spdlog::level::info, "stream closed",
-           {{"id", stream->id},
-            {"name", stream->description.name},
-            {"frames", stream->counts.frames},
-            {"frame_errors", stream->counts.frame_errors},
-            {"watch_waits", stream->description.broadcaster->producer_waits()},
-            {"seconds", open.count()},
-            {"status", absl::StatusCodeToString(status.code())},
-            {"reason", violation ? violation->reason : std::string()}});
+  LogCall("stream closed", {{"id", stream->id},
+                            {"name", stream->description.name},
+                            {"frames", stream->counts.frames},
+                            {"frame_errors", stream->counts.frame_errors},
+                            {"watch_waits", stream->description.broadcaster->producer_waits()},
+                            {"seconds", open.count()},
+                            {"status", absl::StatusCodeToString(status.code())},
+                            {"reason", violation ? violation->reason : std::string()}});
 }
 
 void LogPartEnd(const JoinedPart& part, const absl::Status& status) {
   const auto violation = FindViolation(status);
-  LogEvent(spdlog::level::info, "part left",
-           {{"stream", part.stream_id},
-            {"part", std::uint64_t{part.seat.part}},
-            {"status", absl::StatusCodeToString(status.code())},
-            {"reason", violation ? violation->reason : std::string()}});
+  LogCall("part left", {{"stream", part.stream_id},
+                        {"part", std::uint64_t{part.seat.part}},
+                        {"status", absl::StatusCodeToString(status.code())},
+                        {"reason", violation ? violation->reason : std::string()}});
 }
 
 }  // namespace
@@ -180,15 +178,14 @@ absl::Status ReconstructCall::OpenStream(const v1::OpenStream& open) {
   wire::EncodeParameters(session_->parameters(), *opened.mutable_parameters());
   opened.set_next_sequence(session_->next_sequence());
   PrepareOpened(std::move(opened));
-  LogEvent(spdlog::level::info, "stream opened",
-           {{"id", stream->id},
-            {"name", terms_.name},
-            {"peer", channel().peer()},
-            {"client", caller().name()},
-            {"output", std::string(Name(session_->parameters().output))},
-            {"placement", std::string(Name(session_->parameters().placement))},
-            {"fill", std::string(Name(session_->parameters().fill))},
-            {"parts", std::uint64_t{open.parts()}}});
+  LogCall("stream opened", {{"id", stream->id},
+                            {"name", terms_.name},
+                            {"peer", channel().peer()},
+                            {"client", caller().name()},
+                            {"output", std::string(Name(session_->parameters().output))},
+                            {"placement", std::string(Name(session_->parameters().placement))},
+                            {"fill", std::string(Name(session_->parameters().fill))},
+                            {"parts", std::uint64_t{open.parts()}}});
   return absl::OkStatus();
 }
 
@@ -205,12 +202,11 @@ absl::Status ReconstructCall::JoinStream(const v1::OpenStream& open) {
   wire::EncodeParameters(part.parameters, *opened.mutable_parameters());
   opened.set_next_sequence(part.assembler->next_wanted());
   PrepareOpened(std::move(opened));
-  LogEvent(spdlog::level::info, "part joined",
-           {{"stream", part.stream_id},
-            {"name", open.stream_name()},
-            {"part", std::uint64_t{part.seat.part}},
-            {"peer", channel().peer()},
-            {"client", caller().name()}});
+  LogCall("part joined", {{"stream", part.stream_id},
+                          {"name", open.stream_name()},
+                          {"part", std::uint64_t{part.seat.part}},
+                          {"peer", channel().peer()},
+                          {"client", caller().name()}});
   return absl::OkStatus();
 }
 

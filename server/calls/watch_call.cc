@@ -166,12 +166,11 @@ absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::strin
   if (auto status = context().watchers.Open(*machine_, caller()); !status.ok()) return status;
   stream_name_ = stream_name;
   opened_.mutable_opened()->set_stream_id(stream_id);
-  LogEvent(spdlog::level::info, "watch opened",
-           {{"stream", stream_id},
-            {"name", stream_name_},
-            {"mode", terms_.mode == WatchMode::kEvery ? "every" : "latest"},
-            {"peer", channel().peer()},
-            {"client", caller().name()}});
+  LogCall("watch opened", {{"stream", stream_id},
+                           {"name", stream_name_},
+                           {"mode", terms_.mode == WatchMode::kEvery ? "every" : "latest"},
+                           {"peer", channel().peer()},
+                           {"client", caller().name()}});
   return absl::OkStatus();
 }
 
@@ -237,15 +236,14 @@ void WatchCall::LogEnd(const absl::Status& status) const {
   const std::string reason = !end_reason_.empty() ? end_reason_
                              : violation          ? violation->reason
                                                   : "LEFT";
-  LogEvent(spdlog::level::info, "watch closed",
-           {{"stream", opened_.opened().stream_id()},
-            {"name", stream_name_},
-            {"frames", counts.frames},
-            {"dropped", counts.dropped},
-            {"most_held_bytes", std::uint64_t{counts.most_held_bytes}},
-            {"seconds", open.count()},
-            {"reason", reason},
-            {"status", absl::StatusCodeToString(status.code())}});
+  LogCall("watch closed", {{"stream", opened_.opened().stream_id()},
+                           {"name", stream_name_},
+                           {"frames", counts.frames},
+                           {"dropped", counts.dropped},
+                           {"most_held_bytes", std::uint64_t{counts.most_held_bytes}},
+                           {"seconds", open.count()},
+                           {"reason", reason},
+                           {"status", absl::StatusCodeToString(status.code())}});
 }
 
 }  // namespace partiemc::server

@@ -28,10 +28,12 @@ namespace {
 constexpr char kFieldsFollow = '\x1e';
 
 constexpr std::uint32_t kRefusalsPerSecond = 20;
+// All ranks of a simulation join their stream at the same time (--max-parts).
+constexpr std::uint32_t kCallsPerSecond = 500;
 constexpr std::chrono::milliseconds kPatienceOnAbort(500);
 
 std::atomic<LogFormat> log_format = LogFormat::kText;
-RateLimit refusals(kRefusalsPerSecond);
+RateLimit refusals(kRefusalsPerSecond), calls(kCallsPerSecond);
 // The writer of the log, set by SetUpLogging. Never destroyed, because abandoned threads may log
 // until the process ends.
 std::shared_ptr<LogWriter>& writer = *new std::shared_ptr<LogWriter>;
@@ -104,10 +106,14 @@ class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
   const std::shared_ptr<LogWriter> to_;
 };
 
-// Logs how many refusals were held back, and how many lines were dropped since the last call.
+// Logs how many refusals and calls were held back, and how many lines were dropped since the last
+// call.
 void TellLosses() {
   if (const auto count = refusals.TakeHeldBack(); count > 0) {
     LogEvent(spdlog::level::warn, "more refusals", {{"count", count}});
+  }
+  if (const auto count = calls.TakeHeldBack(); count > 0) {
+    LogEvent(spdlog::level::warn, "more calls", {{"count", count}});
   }
   static std::atomic<std::uint64_t> told = 0;
   const std::uint64_t dropped = LossesOfLog().dropped_lines;
@@ -151,6 +157,12 @@ void LogRefusal(std::string_view event, const std::string& peer, const absl::Sta
             {"error", std::string(status.message())}});
 }
 
+void LogCall(std::string_view event, std::initializer_list<LogField> fields) {
+  constexpr auto kLevel = spdlog::level::info;
+  if (!logger->should_log(kLevel) || !calls.Allow(RateLimit::Clock::now())) return;
+  LogEvent(kLevel, event, fields);
+}
+
 void SetUpLogging(const std::string& level, LogFormat format) {
   log_format = format;
   writer = std::make_shared<LogWriter>(LogWriter::Options{.every_second = &TellLosses});
@@ -189,6 +201,10 @@ void FlushLog(std::chrono::milliseconds patience) {
   if (writer) writer->Flush(patience);
 }
 
-LogLosses LossesOfLog() { return {writer ? writer->dropped() : 0, refusals.held_back_in_all()}; }
+LogLosses LossesOfLog() {
+  return {.dropped_lines = writer ? writer->dropped() : 0,
+          .refusals_held_back = refusals.held_back_in_all(),
+          .calls_held_back = calls.held_back_in_all()};
+}
 
 }  // namespace partiemc::server

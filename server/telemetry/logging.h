@@ -34,10 +34,11 @@ void FlushLogOnAbort();
 void FlushLog(std::chrono::milliseconds patience = std::chrono::milliseconds(500));
 
 /// Losses since the start: lines that were dropped because standard error was too slow, and
-/// refusals that LogRefusal did not log because of its rate limit.
+/// refusals and calls that LogRefusal and LogCall did not log because of their rate limits.
 struct LogLosses {
   std::uint64_t dropped_lines = 0;
   std::uint64_t refusals_held_back = 0;
+  std::uint64_t calls_held_back = 0;
 };
 LogLosses LossesOfLog();
 
@@ -57,6 +58,10 @@ void LogEvent(spdlog::level::level_enum level, std::string_view event,
 /// Logs a refused caller or request with its reason. Writes at most twenty lines per second; then
 /// writes one line with the number of refusals that were not logged.
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status);
+
+/// Logs the begin or the end of an admitted call. Writes at most 500 lines per second; then writes
+/// one line with the number of lines that were not written.
+void LogCall(std::string_view event, std::initializer_list<LogField> fields);
 
 /// Creates the formatter of log lines, for other sinks of spdlog.
 std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format);

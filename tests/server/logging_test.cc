@@ -169,6 +169,23 @@ TEST(LoggingDeathTest, AFloodOfRefusalsIsTwentyLinesAndTheirNumber) {
                      testing::ContainsRegex("more refusals count=[0-9]+")));
 }
 
+TEST(LoggingDeathTest, AFloodOfCallsIsLimitedAndLeavesRefusals) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_LOG(
+      {
+        for (std::uint64_t k = 0; k < 100'000; ++k) LogCall("stream opened", {{"id", k}});
+        LogRefusal("call refused", "somebody", absl::InternalError("seen"));
+        const LogLosses losses = LossesOfLog();
+        FlushLog();
+        if (losses.calls_held_back + 500 > 100'000 || losses.calls_held_back < 90'000) exit(1);
+        exit(losses.refusals_held_back == 0 ? 0 : 1);
+      },
+      testing::ExitedWithCode(0),
+      testing::AllOf(testing::HasSubstr("id=0\n"), testing::HasSubstr("id=499\n"),
+                     testing::HasSubstr("error=seen\n"),
+                     testing::ContainsRegex("more calls count=[0-9]+")));
+}
+
 TEST(Logging, WhatIsHeldBackIsToldWithoutAFurtherRefusal) {
   Pipe pipe;
   const int standard_error = dup(STDERR_FILENO);
