@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
 
+#include "frame/neighbour_tree.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 
@@ -225,6 +229,59 @@ TEST(Spacing, ScalesWithThePositionsBitForBit) {
   for (const double factor : {0x1p-190, 0x1p-20, 0x1p20, 0x1p190}) {
     EXPECT_EQ(*Estimate(support::Scaled(particles, factor)), *Estimate(particles) * factor);
   }
+}
+
+// Around the sampled particles of the clump, sums have thousands of terms.
+TEST(Spacing, OfALatticeBesideADenseClumpIsItsConstant) {
+  support::Random random(24);
+  Particles particles = support::Lattice(210, 210);
+  particles.Add(support::Shifted(support::Noise(random, 5200, 1e-3), 40.3, 30.6));
+  EXPECT_EQ(Estimate(particles), 1.0);
+}
+
+// The median distance is that of the spray, so the first sums in the body have thousands of terms.
+TEST(Spacing, OfABodyWithMoreSprayThanParticlesIsThatOfTheBody) {
+  Particles particles = support::Lattice(130, 130);
+  particles.Add(support::Shifted(support::Scaled(support::Lattice(18'000, 1), 13), 0, -200));
+  EXPECT_NEAR(*Estimate(particles), 1, 0.01);
+}
+
+TEST(NeighbourTree, GroupsStandForAllPositionsAround) {
+  support::Random random(25);
+  const Particles noise = support::Noise(random, 5000, 10);
+  std::vector<Point> positions;
+  for (std::size_t k = 0; k < noise.size(); ++k) positions.push_back({noise.x(k), noise.y(k)});
+  BuildTree(std::span(positions));
+  const std::span<const Point> tree = positions;
+  const Point point{3, 4};
+  for (const double radius : {0.5, 2.0, 20.0}) {
+    std::size_t around = 0;
+    for (const Point& at : tree) around += LongestOf(Difference(at, point)) <= radius;
+    for (const std::size_t group : {1, 8, 64, 8192}) {
+      std::size_t visits = 0, sum = 0;
+      const auto visit = [&](const Point& offset, std::size_t count) {
+        EXPECT_LE(LongestOf(offset), radius);
+        EXPECT_LE(count, group);
+        ++visits;
+        sum += count;
+        return true;
+      };
+      EXPECT_TRUE(VisitAround(tree, point, radius, group, visit));
+      if (group == 1 || radius == 20.0) {
+        EXPECT_EQ(sum, around) << radius << ' ' << group;
+      }
+      if (group == 1) {
+        EXPECT_EQ(visits, around) << radius;
+      }
+      if (radius == 20.0) {
+        EXPECT_LE(visits * group, 4 * around + group) << group;
+      }
+    }
+  }
+  std::size_t visits = 0;
+  const auto stop = [&](const Point&, std::size_t) { return ++visits < 10; };
+  EXPECT_FALSE(VisitAround(tree, point, 20, 1, stop));
+  EXPECT_EQ(visits, 10u);
 }
 
 TEST(Spacing, IsMeasuredInThePlaneOfTheParticles) {

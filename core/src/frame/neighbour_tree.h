@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
@@ -19,6 +20,11 @@ inline Point Difference(const Point& a, const Point& b) { return {a.x - b.x, a.y
 inline Vec3 Difference(const Vec3& a, const Vec3& b) { return a - b; }
 inline double SquareOf(const Point& a) { return a.x * a.x + a.y * a.y; }
 inline double SquareOf(const Vec3& a) { return Dot(a, a); }
+/// The largest magnitude of a coordinate.
+inline double LongestOf(const Point& a) { return std::max(std::abs(a.x), std::abs(a.y)); }
+inline double LongestOf(const Vec3& a) {
+  return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)});
+}
 constexpr int AxisAfter(const Point&, int axis) { return 1 - axis; }
 constexpr int AxisAfter(const Vec3&, int axis) { return axis == 2 ? 0 : axis + 1; }
 
@@ -61,18 +67,26 @@ void GatherNearest(std::span<const Place> tree, const Place& query, Near& near, 
   }
 }
 
-/// Calls visit(offset) for the positions closer than `radius` to a point, in the order of the tree.
+/// Calls visit(offset, count) for the positions in the square or cube with half the side `radius`
+/// around a point, in the order of the tree. A branch of at most `group` positions counts as its
+/// middle one, with `count` positions; other positions have the count 1. Ends and returns false as
+/// soon as visit returns false.
 template <typename Place, typename Visit>
-void ForEachWithin(std::span<const Place> tree, const Place& point, double radius,
-                   const Visit& visit, int axis = 0) {
-  if (tree.empty()) return;
+bool VisitAround(std::span<const Place> tree, const Place& point, double radius, std::size_t group,
+                 Visit& visit, int axis = 0) {
+  if (tree.empty()) return true;
   const std::size_t middle = tree.size() / 2;
+  const bool is_group = tree.size() <= group;
   const int next = AxisAfter(point, axis);
   const double across = Along(point, axis) - Along(tree[middle], axis);
-  if (across <= radius) ForEachWithin(tree.first(middle), point, radius, visit, next);
+  if (!is_group && across <= radius &&
+      !VisitAround(tree.first(middle), point, radius, group, visit, next)) {
+    return false;
+  }
   const Place offset = Difference(tree[middle], point);
-  if (SquareOf(offset) < radius * radius) visit(offset);
-  if (across >= -radius) ForEachWithin(tree.subspan(middle + 1), point, radius, visit, next);
+  if (LongestOf(offset) <= radius && !visit(offset, is_group ? tree.size() : 1)) return false;
+  return is_group || !(across >= -radius) ||
+         VisitAround(tree.subspan(middle + 1), point, radius, group, visit, next);
 }
 
 }  // namespace partiemc
