@@ -24,6 +24,8 @@ constexpr double kTileRadius = kTileSize * .7072;
 // simple fraction, so corners of walls rarely lie on paths. A corner on a path may put a row of
 // nodes on the wrong side.
 constexpr double kMark = .3819660112501051;
+// FindSolids checks for cancellation at each row, and at each multiple of this number of tiles.
+constexpr std::uint32_t kTilesPerCheck = 1 << 10;
 
 // The height of the marks of a row of tiles.
 double MarkOf(std::int32_t row) { return static_cast<double>(row) * kTileSize - kMark; }
@@ -290,6 +292,7 @@ void WallField::CollectCrossings(std::int32_t row) {
 // Finds the solids that contain the marks of tiles, row by row, by the crossings left of a mark.
 void WallField::FindSolids(const TileDirectory& directory) {
   std::uint32_t tile = 0;
+  is_listed_.assign(lines_.SolidCount(), 0);
   while (tile < directory.size()) {
     ThrowIfCancelled();
     const std::int32_t row = directory[tile].y;
@@ -301,6 +304,7 @@ void WallField::FindSolids(const TileDirectory& directory) {
     }
     std::size_t crossing = 0;
     for (; tile < directory.size() && directory[tile].y == row; ++tile) {
+      if (tile % kTilesPerCheck == 0) ThrowIfCancelled();
       const double x = OriginOf(directory, tile).x - kMark;
       for (; crossing < crossings_.size() && crossings_[crossing].x <= x; ++crossing) {
         const std::uint32_t solid = crossings_[crossing].solid;
@@ -323,16 +327,16 @@ void WallField::SetTile(const TileDirectory& directory, std::uint32_t tile) {
                                      : std::span(solids_).subspan(
                                            near_[near].first, near_[near].last - near_[near].first);
   for (NearSolid& of : listed) {
+    is_listed_[of.solid] = 1;
     if (lines_.IsEndless(of.solid)) continue;
     of.is_solid_at_mark = (is_odd_[of.solid] != 0) == lines_.IsSolidInside(of.solid);
     covering -= of.is_solid_at_mark;
   }
-  for (const std::uint32_t line : long_lines_) {
-    const WallEdge& edge = lines_.edges()[line];
-    if (!edge.is_endless || !lines_.IsBehindEndless(edge.solid, mark)) continue;
-    covering +=
-        std::ranges::none_of(listed, [&](const NearSolid& of) { return of.solid == edge.solid; });
+  for (const std::uint32_t solid : endless_) {
+    if (covering > 0) break;
+    covering += is_listed_[solid] == 0 && lines_.IsBehindEndless(solid, mark);
   }
+  for (const NearSolid& of : listed) is_listed_[of.solid] = 0;
   if (covering > 0) near_of_tile_[tile] = kSolid;
 }
 

@@ -117,8 +117,9 @@ class WallField {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // Tile, line.
   std::vector<std::pair<std::int32_t, std::uint32_t>> by_row_;  // Row of tiles, short line.
   std::vector<Crossing> crossings_;                             // In a row, by x.
-  std::vector<std::uint8_t> is_odd_;  // By solid: odd number of crossings so far.
-  std::size_t covering_ = 0;          // Solids with closed loops that contain the mark.
+  std::vector<std::uint8_t> is_odd_;     // By solid: odd number of crossings so far.
+  std::vector<std::uint8_t> is_listed_;  // By solid: has lines near the tile (SetTile).
+  std::size_t covering_ = 0;             // Solids with closed loops that contain the mark.
 };
 
 }  // namespace partiemc
