@@ -12,8 +12,8 @@ using std::chrono::milliseconds;
 // before this time has passed.
 milliseconds ShortestLimit(const ServerLimits& limits) {
   milliseconds shortest = std::chrono::hours(1);
-  for (const milliseconds limit :
-       {limits.idle.opening, limits.idle.streaming, limits.unary.request, limits.unary.answer}) {
+  for (const milliseconds limit : {limits.idle.opening, limits.idle.streaming, limits.unary.request,
+                                   limits.unary.answer, limits.paused.pause, limits.paused.write}) {
     if (limit > milliseconds(0)) shortest = std::min(shortest, limit);
   }
   return shortest;
@@ -62,7 +62,8 @@ std::chrono::steady_clock::time_point IdleTimer::EndIdleCalls() {
   const auto now = std::chrono::steady_clock::now();
   return std::min({streams_.EndIdle(limits_.idle, now),
                    watchers_.EndSilent(limits_.idle.opening, now),
-                   calls_.EndIdle(limits_.unary, now), now + ShortestLimit(limits_)});
+                   watchers_.EndPaused(limits_.paused, now), calls_.EndIdle(limits_.unary, now),
+                   now + ShortestLimit(limits_)});
 }
 
 }  // namespace partiemc::server

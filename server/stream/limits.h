@@ -9,6 +9,7 @@
 #include "partiemc/frame.h"
 #include "server/stream/stream_state_machine.h"
 #include "server/stream/unary_state_machine.h"
+#include "server/watch/watch_state_machine.h"
 
 namespace partiemc::server {
 
@@ -107,6 +108,10 @@ struct ServerLimits {
   /// Limits of unary calls. A response that the client does not receive in time is dropped, because
   /// it holds memory.
   UnaryLimits unary{.request = std::chrono::seconds(30), .answer = std::chrono::minutes(2)};
+
+  /// Limits of watchers of ended streams, because such a watcher keeps the stream's history. A
+  /// write may wait for a level of detail, so its limit is longer.
+  PauseLimits paused{.pause = std::chrono::seconds(30), .write = std::chrono::minutes(2)};
 
   /// Maximum number of watchers of all streams together.
   std::uint32_t max_watchers = 64;

@@ -168,10 +168,6 @@ void StreamRegistry::BeginHistory(const StreamDescription& description, const En
   ResultBroadcaster* const before =
       former != nullptr ? former->stream->description.broadcaster.get() : nullptr;
   description.broadcaster->BeginHistory(*history_, before, description.next_sequence);
-  if (!history_->is_scarce()) return;
-  for (const auto& [machine, entry] : entries_) {
-    if (entry.IsOpen()) entry.stream->description.broadcaster->ShareRoom();
-  }
 }
 
 StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {

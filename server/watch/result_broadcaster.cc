@@ -33,16 +33,19 @@ void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* forme
                                      std::uint64_t next_sequence) {
   std::vector<Published> frames;
   if (former != nullptr) frames = former->HandOver();
-  const MutexLock lock(mutex_);
-  history_.emplace(room);
-  for (Published& published : frames) {
-    if (published.sequence >= next_sequence) break;
-    published.number = ++published_;
-    history_->Add(published);
+  {
+    const MutexLock lock(mutex_);
+    history_.emplace(room);
+    for (Published& published : frames) {
+      if (published.sequence >= next_sequence) break;
+      published.number = ++published_;
+      history_->Add(published);
+    }
+    collected_ = published_;
+    if (!history_->empty()) newest_ = history_->at(history_->size() - 1);
+    NoteOldest();
   }
-  collected_ = published_;
-  if (!history_->empty()) newest_ = history_->at(history_->size() - 1);
-  NoteOldest();
+  room.Enter(std::shared_ptr<HistoryOwner>(shared_from_this(), this));
 }
 
 std::vector<Published> ResultBroadcaster::HandOver() {
@@ -130,7 +133,10 @@ void ResultBroadcaster::Leave(const WatchStateMachine& watcher) {
   if (found == watchers_.end()) return;
   left = std::move(*found);
   watchers_.erase(found);
-  if (--watcher_count_ != 0) return;
+  if (--watcher_count_ != 0) {
+    if (end_ && history_) dispatcher_.Wake(*this);  // It may have been the last that goes back.
+    return;
+  }
   news = TakeNews();
   newest = newest_;
   dropped = Collect();
@@ -218,11 +224,11 @@ void ResultBroadcaster::Serve() {
     machine->Offer(news);
     if (end) machine->StreamEnded(*end);
   }
-  if (end) DropHistoryOf(watchers);
+  if (end) DropHistoryUnlessRead(watchers);
 }
 
 // Drops the history of an ended stream, unless a watcher still reads it.
-void ResultBroadcaster::DropHistoryOf(
+void ResultBroadcaster::DropHistoryUnlessRead(
     const std::vector<std::shared_ptr<WatchStateMachine>>& watchers) {
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {
     return;

@@ -19,7 +19,7 @@ namespace partiemc::server {
 /// Publishes the results of a stream and keeps its watchers. Publish and Announce never wait for
 /// watchers. Publish is called by one thread at a time; all other functions are thread-safe. Held
 /// by shared_ptr.
-class ResultBroadcaster final : public Dispatched {
+class ResultBroadcaster final : public Dispatched, public HistoryOwner {
  public:
   struct Limits {
     /// Maximum bytes of frames that the dispatcher has not taken yet. A frame beyond it drops them.
@@ -37,9 +37,7 @@ class ResultBroadcaster final : public Dispatched {
   /// again. Requires: called once, before Publish and Join; `room` outlives this.
   void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Schedules the history to shrink, because other histories have started and share the memory.
-  /// Does not block.
-  void ShareRoom() { dispatcher_.Wake(*this); }
+  void ShareRoom() override { dispatcher_.Wake(*this); }
 
   /// Publishes the result of the frame `sequence`. Wait-free: takes the lock only if it is free.
   /// Returns whether there are watchers; if so, the caller must call Announce. Requires: `sequence`
@@ -103,7 +101,7 @@ class ResultBroadcaster final : public Dispatched {
   std::vector<Published> HandOver() ABSL_LOCKS_EXCLUDED(mutex_);
   // As Publish.
   [[nodiscard]] bool Post(Published published) ABSL_LOCKS_EXCLUDED(mutex_);
-  void DropHistoryOf(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
+  void DropHistoryUnlessRead(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
       ABSL_LOCKS_EXCLUDED(mutex_);
   // Takes the frames of the mailbox. Returns the frames that were dropped from news_. The caller
   // frees them without the lock, because they may be large.

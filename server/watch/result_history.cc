@@ -14,6 +14,19 @@ std::uint64_t BytesOf(const Published& published) {
 
 }  // namespace
 
+void HistoryRoom::Enter(std::weak_ptr<HistoryOwner> owner) {
+  std::vector<std::shared_ptr<HistoryOwner>> others;  // Released without the lock.
+  const MutexLock lock(mutex_);
+  std::erase_if(owners_, [](const auto& other) { return other.expired(); });
+  if (is_scarce()) {
+    for (const auto& other : owners_) others.push_back(other.lock());
+  }
+  for (const auto& other : others) {
+    if (other != nullptr) other->ShareRoom();
+  }
+  owners_.push_back(std::move(owner));
+}
+
 bool HistoryRoom::TryTake(std::uint64_t bytes) {
   std::uint64_t held = held_;
   do {

@@ -6,8 +6,10 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "common/mutex.h"
 #include "server/watch/result_mailbox.h"
 
 namespace partiemc::server {
@@ -18,12 +20,26 @@ struct HeldFrames {
   std::uint64_t oldest = 0, newest = 0;  ///< 0 without frames.
 };
 
-/// The memory limit of all histories, which share it equally. Lock-free and thread-safe.
+/// The owner of a history.
+class HistoryOwner {
+ public:
+  virtual ~HistoryOwner() = default;
+  /// Schedules the history to shrink, because other histories have started and share the memory.
+  /// Does not block.
+  virtual void ShareRoom() = 0;
+};
+
+/// The memory limit of all histories, which share it equally. Thread-safe; all functions but Enter
+/// are lock-free.
 class HistoryRoom {
  public:
   /// `bytes_of_one` limits each history, `bytes_of_all` their total.
   HistoryRoom(std::uint64_t bytes_of_one, std::uint64_t bytes_of_all)
       : bytes_of_one_(bytes_of_one), bytes_of_all_(bytes_of_all) {}
+
+  /// Adds the owner of a history that has started. If the share of each history has become smaller,
+  /// calls ShareRoom of the other owners that still exist, also of those whose streams have ended.
+  void Enter(std::weak_ptr<HistoryOwner> owner) ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// The current limit of each history.
   std::uint64_t share() const {
@@ -42,6 +58,8 @@ class HistoryRoom {
 
   const std::uint64_t bytes_of_one_, bytes_of_all_;
   std::atomic<std::uint64_t> histories_ = 0, held_ = 0;
+  Mutex mutex_;
+  std::vector<std::weak_ptr<HistoryOwner>> owners_ ABSL_GUARDED_BY(mutex_);
 };
 
 /// The newest frames without gaps. If a frame cannot be added because it exceeds the limit, all

@@ -59,6 +59,11 @@ std::chrono::steady_clock::time_point WatchRegistry::EndSilent(
   return EndLate([&](WatchStateMachine& watcher) { return watcher.EndIfSilent(limit, now); });
 }
 
+std::chrono::steady_clock::time_point WatchRegistry::EndPaused(
+    const PauseLimits& limits, std::chrono::steady_clock::time_point now) {
+  return EndLate([&](WatchStateMachine& watcher) { return watcher.EndIfPaused(limits, now); });
+}
+
 void WatchRegistry::Drain(std::chrono::steady_clock::time_point patience) {
   StopAdmitting();
   for (const auto& watcher : All()) watcher->Drain();

@@ -46,6 +46,11 @@ class WatchRegistry : private CallRegistry<WatchStateMachine, CallEntry<WatchSta
   std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
                                                   std::chrono::steady_clock::time_point now);
 
+  /// Ends the watchers that are ending and exceed `limits`. Returns the earliest time at which
+  /// another watcher can exceed a limit.
+  std::chrono::steady_clock::time_point EndPaused(const PauseLimits& limits,
+                                                  std::chrono::steady_clock::time_point now);
+
   /// Refuses new watchers and ends every watch. Blocks until all have left, at most until
   /// `patience`; then cuts the watches whose clients have not read the end.
   void Drain(std::chrono::steady_clock::time_point patience) ABSL_LOCKS_EXCLUDED(mutex_);

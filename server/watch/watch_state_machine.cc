@@ -10,6 +10,10 @@
 namespace partiemc::server {
 namespace {
 
+// The rule for a watcher of an ended stream.
+constexpr char kPausedRule[] =
+    "must give credit and accept results within this time, once the stream has ended";
+
 absl::Status WatcherGone() { return absl::CancelledError("the watcher went away"); }
 
 }  // namespace
@@ -44,6 +48,7 @@ void WatchStateMachine::TakeRequest(const WatchRequest& request) {
         {std::string(kReasonOutOfRange), "credit.frames", "0", "must be at least 1"})));
   } else {
     credit_ += request.credit;
+    NoteMove();
   }
 }
 
@@ -101,6 +106,7 @@ void WatchStateMachine::WriteRefused(const absl::Status& status) {
 
 Published WatchStateMachine::TakeInWrite() {
   state_.writing = Writing::kIdle;
+  NoteMove();
   if (in_write_.frame != nullptr) held_bytes_ -= in_write_.pending_bytes();
   return std::exchange(in_write_, {});
 }
@@ -152,9 +158,7 @@ void WatchStateMachine::Take(const Published& published) {
     if (missed == 0 && LeaveToHistory(published)) return;
     ++counts_.dropped;
     if (is_lost) {
-      state_.phase = Phase::kEnding;
-      end_ = WatchEnd::ResultsLost(missed);
-      return;
+      return BeginEnding(WatchEnd::ResultsLost(missed));
     }
     return End(WatchEnd::FellBehind(pending_.size() + missed + 1, held_bytes_ + bytes, max_bytes_));
   }
@@ -220,8 +224,7 @@ void WatchStateMachine::StreamEnded(const WatchEnd& end) {
     offered_ = end.last_number;
   }
   if (!end.status.ok()) return End(end);
-  state_.phase = Phase::kEnding;
-  end_ = end;
+  BeginEnding(end);
 }
 
 void WatchStateMachine::Drain() {
@@ -237,6 +240,23 @@ std::chrono::steady_clock::time_point WatchStateMachine::EndIfSilent(
   if (!waits || limit <= limit.zero()) return std::chrono::steady_clock::time_point::max();
   if (now < came_ + limit) return came_ + limit;
   Refuse(IdleError("sends no `open`", limit));
+  return std::chrono::steady_clock::time_point::max();
+}
+
+std::chrono::steady_clock::time_point WatchStateMachine::EndIfPaused(
+    const PauseLimits& limits, std::chrono::steady_clock::time_point now) {
+  const Event event(*this);
+  const bool writes = state_.writing != Writing::kIdle;
+  const bool ends = state_.phase == Phase::kEnding || state_.phase == Phase::kClosing;
+  const auto limit = writes ? limits.write : limits.pause;
+  if (!ends || limit <= limit.zero()) return std::chrono::steady_clock::time_point::max();
+  if (now < moved_ + limit) return moved_ + limit;
+  if (writes) {
+    Abandon(IdleError("takes no result", limit, kPausedRule));
+    Do([this] { transport_.Cut(); });
+  } else {
+    End(WatchEnd::With(IdleError("gives no credit", limit, kPausedRule)));
+  }
   return std::chrono::steady_clock::time_point::max();
 }
 
@@ -283,12 +303,22 @@ void WatchStateMachine::DropPending() {
   CatchUp();
 }
 
+void WatchStateMachine::BeginEnding(WatchEnd end) {
+  state_.phase = Phase::kEnding;
+  end_ = std::move(end);
+  NoteMove();
+}
+
 // Ends an open watch. Drops its pending frames instead of waiting for credit.
 void WatchStateMachine::End(WatchEnd end) {
   if (state_.phase != Phase::kServing && state_.phase != Phase::kEnding) return;
-  state_.phase = Phase::kEnding;
-  end_ = std::move(end);
+  BeginEnding(std::move(end));
   DropPending();
+}
+
+// Restarts the time of EndIfPaused.
+void WatchStateMachine::NoteMove() {
+  if (state_.phase == Phase::kEnding) moved_ = std::chrono::steady_clock::now();
 }
 
 // Ends a watch that is not open yet. The client receives only a status, no message.

@@ -38,6 +38,12 @@ struct WatchTerms {
   bool keeps_history = false;
 };
 
+/// Limits of a watch whose stream has ended.
+struct PauseLimits {
+  std::chrono::milliseconds pause{0};  ///< Without credit.
+  std::chrono::milliseconds write{0};  ///< From a write's start to its end.
+};
+
 /// A parsed request.
 struct WatchRequest {
   enum class Kind { kMalformed, kEmpty, kOpen, kCredit };
@@ -93,7 +99,7 @@ struct WatchCounts {
 /// frames, up to `max_bytes` including the frame being written; it reads further frames from the
 /// history later. If the history lacks such a frame, the watch ends. After the end of the stream,
 /// pending frames are still written as credit arrives, unless the stream ended with an error
-/// status. Thread-safe.
+/// status, or the client pauses for too long. Thread-safe.
 ///
 /// A watcher that starts in the history reads it frame by frame, in both modes, and holds only the
 /// frame being written. When it has read the whole history, it continues with the frames that are
@@ -138,6 +144,12 @@ class WatchStateMachine final : public SerializedCall {
   /// the time `now`. `limit` 0: no limit. Returns the time of the next check.
   std::chrono::steady_clock::time_point EndIfSilent(std::chrono::milliseconds limit,
                                                     std::chrono::steady_clock::time_point now);
+  /// Ends the watch with DEADLINE_EXCEEDED (IDLE) if its stream has ended and its client has
+  /// exceeded a limit at `now`: it has given no credit for `pause`, or has not accepted a write
+  /// within `write`; in the second case at once, as GiveUp. A limit of 0: none. Returns the time of
+  /// the next check.
+  std::chrono::steady_clock::time_point EndIfPaused(const PauseLimits& limits,
+                                                    std::chrono::steady_clock::time_point now);
   /// Ends this watch with this error if it has received no `open`. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
   /// Ends an open watch with this error at once. Pending frames and the message `ended` are not
@@ -171,6 +183,8 @@ class WatchStateMachine final : public SerializedCall {
   void TakeHeld() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void CatchUp() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void MissUntil(std::uint64_t number) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void BeginEnding(WatchEnd end) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void NoteMove() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void End(WatchEnd end) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Refuse(absl::Status status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon(absl::Status status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -182,6 +196,8 @@ class WatchStateMachine final : public SerializedCall {
 
   const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
 
+  // When the client of a watch that ends last gave credit or accepted a write.
+  std::chrono::steady_clock::time_point moved_ ABSL_GUARDED_BY(mutex_);
   WatchEnd end_ ABSL_GUARDED_BY(mutex_);  // Set from kEnding on.
   std::shared_ptr<ResultBroadcaster> broadcaster_ ABSL_GUARDED_BY(mutex_);
   WatchMode mode_ ABSL_GUARDED_BY(mutex_) = WatchMode::kLatest;

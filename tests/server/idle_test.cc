@@ -8,6 +8,7 @@
 
 #include "partiemc/status.h"
 #include "server/memory_transport.h"
+#include "server/memory_watcher.h"
 #include "server/moving_blob.h"
 #include "server/scripted_transport.h"
 #include "server/stream/idle_timer.h"
@@ -147,6 +148,29 @@ TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
     EXPECT_EQ(FindViolation(transport.status())->reason, kReasonIdle);
     registry.Leave(transport.machine());
   }
+}
+
+TEST(IdleTimer, EndsAWatcherThatPausesAfterTheEndOfItsStream) {
+  StreamRegistry registry(10);
+  WatchRegistry watchers(10);
+  UnaryRegistry calls(10);
+  HistoryRoom room(1'000'000, 1'000'000);
+  WatchDispatcher dispatcher;
+  const auto broadcaster =
+      std::make_shared<ResultBroadcaster>(dispatcher, ResultBroadcaster::Limits{});
+  broadcaster->BeginHistory(room, nullptr, 1);
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    EXPECT_FALSE(broadcaster->Publish(std::make_shared<NumberedFrame>(k, 1000), k));
+  }
+  ServerLimits limits;
+  limits.paused = {.pause = milliseconds(20), .write = minutes(10)};
+  const IdleTimer timer(registry, watchers, calls, limits);
+  MemoryWatcher watcher(broadcaster, WatchMode::kEvery, 1, 100'000, 1);
+  ASSERT_TRUE(watchers.Enter(watcher.machine().shared_from_this()).ok());
+  watcher.WaitForFrames(1);
+  broadcaster->End(WatchEnd::OfStream(absl::OkStatus()));
+  EXPECT_EQ(FindViolation(watcher.status())->reason, kReasonIdle);
+  watchers.Leave(watcher.machine());
 }
 
 }  // namespace

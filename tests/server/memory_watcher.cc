@@ -65,6 +65,11 @@ HeldFrames MemoryWatcher::held() const {
   return held_;
 }
 
+bool MemoryWatcher::writes() const {
+  const std::lock_guard lock(mutex_);
+  return writing_;
+}
+
 std::vector<SeenFrame> MemoryWatcher::seen() const {
   const std::lock_guard lock(mutex_);
   return seen_;

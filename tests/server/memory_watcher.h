@@ -55,6 +55,8 @@ class MemoryWatcher final : private WatchTransport {
   /// Waits for the end.
   absl::Status status();
 
+  /// Whether a write is in progress.
+  bool writes() const;
   std::vector<SeenFrame> seen() const;
   /// Reason in the last message of an ended watch; empty if there is none.
   std::string end_reason() const;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <random>
@@ -11,8 +12,10 @@
 #include <vector>
 
 #include "partiemc/status.h"
+#include "server/base/call_errors.h"
 #include "server/memory_watcher.h"
 #include "server/watch/result_broadcaster.h"
+#include "server/watch/watch_registry.h"
 
 namespace partiemc::server {
 namespace {
@@ -47,6 +50,9 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
         std::make_unique<MemoryWatcher>(broadcaster_, GetParam(), credit, kMaxBytes, from);
     watcher->WaitUntilOpened();
     return watcher;
+  }
+  static std::chrono::steady_clock::time_point Later(std::chrono::seconds time) {
+    return std::chrono::steady_clock::now() + time;
   }
   void EndStream() { broadcaster_->End(WatchEnd::OfStream(absl::OkStatus())); }
 
@@ -174,6 +180,82 @@ TEST_P(WatchBack, WhatIsHeldStillComesAfterTheEndOfTheStream) {
   EXPECT_EQ(NumbersOf(*watcher), From(1, 8));
   EXPECT_EQ(watcher->end_reason(), kReasonFinished);
   EXPECT_EQ(watcher->end_dropped(), 0u);
+}
+
+TEST_P(WatchBack, AnEndedStreamWaitsForCreditForALimitedTime) {
+  using std::chrono::seconds;
+  constexpr PauseLimits kLimits{.pause = seconds(30), .write = seconds(120)};
+  constexpr auto kNever = std::chrono::steady_clock::time_point::max();
+  WatchRegistry registry(1);
+  PublishAll(1, 8);
+  const auto watcher = Join(2, 1);
+  watcher->WaitForFrames(2);
+  ASSERT_TRUE(registry.Enter(watcher->machine().shared_from_this()).ok());
+  EXPECT_EQ(registry.EndPaused(kLimits, Later(seconds(999))), kNever) << "the stream is open";
+  EndStream();
+  dispatcher_.Flush();
+  watcher->Credit(1);
+  watcher->WaitForFrames(3);
+  while (watcher->writes()) std::this_thread::yield();
+  EXPECT_EQ(registry.EndPaused({}, Later(seconds(999))), kNever);
+  const auto next = registry.EndPaused(kLimits, Later(seconds(20)));
+  EXPECT_GT(next, Later(seconds(20)));
+  EXPECT_LE(next, Later(seconds(30)));
+  EXPECT_GT(room_.held(), 0u);
+  registry.EndPaused(kLimits, Later(seconds(31)));
+  const absl::Status status = watcher->status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(FindViolation(status)->value, "gives no credit for 30 s");
+  EXPECT_EQ(watcher->end_reason(), kReasonIdle);
+  EXPECT_EQ(watcher->end_dropped(), 5u);
+  registry.Leave(watcher->machine());
+}
+
+TEST_P(WatchBack, AnEndedStreamWaitsForAWriteForALimitedTime) {
+  using std::chrono::seconds;
+  constexpr PauseLimits kLimits{.pause = seconds(30), .write = seconds(120)};
+  PublishAll(1, 8);
+  const auto watcher = Join(1, 1);
+  watcher->WaitForFrames(1);
+  watcher->StopReading();
+  watcher->Credit(kMany);
+  watcher->WaitForFrames(2);
+  EndStream();
+  dispatcher_.Flush();
+  watcher->machine().EndIfPaused(kLimits, Later(seconds(110)));
+  EXPECT_TRUE(watcher->writes());
+  watcher->machine().EndIfPaused(kLimits, Later(seconds(121)));
+  EXPECT_EQ(FindViolation(watcher->status())->value, "takes no result for 120 s");
+}
+
+TEST_P(WatchBack, AnEndedStreamDropsItsHistoryAfterItsLastReader) {
+  PublishAll(1, 8);
+  auto reader = Join(1, 1);
+  const auto other = Join(1, std::nullopt);
+  reader->WaitForFrames(1);
+  other->WaitForFrames(1);
+  Publish(9);  // `other` has no credit for it.
+  EndStream();
+  dispatcher_.Flush();
+  EXPECT_EQ(room_.held(), 9 * kCost);
+  reader.reset();
+  dispatcher_.Flush();
+  EXPECT_EQ(room_.held(), 0u);
+}
+
+TEST_P(WatchBack, AnEndedStreamSharesTheRoomWithOpenOnes) {
+  PublishAll(1, 10);
+  const auto paused = Join(1, 1);
+  paused->WaitForFrames(1);
+  const auto ended = std::exchange(broadcaster_, Begin(nullptr, 1));
+  ended->End(WatchEnd::OfStream(absl::OkStatus()));
+  PublishAll(1, 10);
+  EXPECT_EQ(room_.held(), 20 * kCost);
+  const auto third = Begin(nullptr, 1);
+  dispatcher_.Flush();
+  EXPECT_LE(room_.held(), 12 * kCost) << "each of three may have six";
+  for (std::uint64_t k = 1; k <= 6; ++k) PublishTo(*third, k);
+  EXPECT_EQ(third->oldest_here(), 1u);
 }
 
 TEST_P(WatchBack, AnEndedStreamHoldsNothingForThoseWhoDoNotGoBack) {

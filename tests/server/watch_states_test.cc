@@ -147,6 +147,11 @@ class Order {
         [&] {
           machine.EndIfSilent(std::chrono::seconds(1),
                               std::chrono::steady_clock::now() + std::chrono::hours(1));
+        },
+        [&] {
+          const std::chrono::seconds limit(1);
+          machine.EndIfPaused({.pause = limit, .write = limit},
+                              std::chrono::steady_clock::now() + std::chrono::hours(1));
         }};
     events[random_.Below(events.size())]();
   }
