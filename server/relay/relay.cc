@@ -54,6 +54,9 @@ constexpr std::array kQueueBytes = {std::size_t{64} << 20, std::size_t{4} << 20}
 // Messages of up to this size are accepted, or larger ones if results may be larger.
 constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
+// Maximum number of imports of one stream that has not ended. Each has a history.
+constexpr std::size_t kMaxImports = 2;
+
 // The text of the error NO_SUCH_STREAM while the streams of other replicas are unknown.
 constexpr char kOnlyHere[] =
     "must be the name of an open stream of this server: NATS cannot be reached, so that those of "
@@ -393,20 +396,23 @@ bool Relay::TryFind(const Search& search, TimePoint now) {
 }
 
 void Relay::Watch(const RemoteStream& remote, const Search& search, TimePoint now) {
-  const auto begun = std::ranges::find_if(imports_, [&](const Import& import) {
-    return import.stream->stream().id() == remote.id() &&
-           import.stream->Covers(search.from_sequence, now);
-  });
+  // A second import fetches the whole history, so that it suffices for all further watchers.
+  std::size_t imports = 0;
   ImportedStream* stream = nullptr;
-  if (begun != imports_.end()) {
-    stream = begun->stream.get();
-  } else {
+  for (const Import& import : imports_) {
+    if (import.stream->stream().id() != remote.id() || import.stream->ended()) continue;
+    ++imports;
+    stream = import.stream.get();
+    if (stream->Covers(search.from_sequence, now)) break;
+    if (imports < kMaxImports) stream = nullptr;
+  }
+  if (stream == nullptr) {
     // Subscribes to the results before it fetches earlier ones, so that no result in between is
     // missed.
     Import import;
     import.results = queue_->Listen(*bus_, SubjectOfResults(remote.id()), RelayQueue::kNews);
     import.stream = std::make_unique<ImportedStream>(
-        remote, search.from_sequence, dispatcher_,
+        remote, imports == 0 ? search.from_sequence : 0, dispatcher_,
         ImportedStream::Limits{.broadcaster = limits_.broadcaster,
                                .waiting_bytes = limits_.watcher_bytes,
                                .history = limits_.history},

@@ -127,6 +127,8 @@ class Relay final : private RelayPort {
   void AnswerNextFetch(TimePoint now);
   void Answer(const std::string& replica, const relay::v1::Fetch& fetch);
   bool TryFind(const Search& search, TimePoint now);
+  // Lets watchers join an import of the stream, or begins one. A watcher that starts earlier than
+  // both imports can provide starts with their oldest result.
   void Watch(const RemoteStream& remote, const Search& search, TimePoint now);
   void LookAtSearches(TimePoint now);
   void GoOnDraining(TimePoint now);

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -125,6 +126,28 @@ TEST_F(RelayTest, WhoGoesBackGetsWhatItsReplicaHoldsAndWhoGoesFurtherBackToo) {
   all->WaitForFrames(101);
   ExpectAll(recent->seen(), 60, 101);
   ExpectAll(all->seen(), 1, 101);
+}
+
+TEST_F(RelayTest, AStreamIsImportedTwiceAtMost) {
+  Publish(1, 100);
+  std::set<const ResultBroadcaster*> imports;
+  std::vector<std::unique_ptr<MemoryWatcher>> watchers;
+  for (std::uint64_t from = 66; from >= 10; from -= 8) {
+    const auto found = shows_.Find("dam", from);
+    ASSERT_TRUE(found.ok()) << found.status();
+    imports.insert(found->broadcaster.get());
+    watchers.push_back(shows_.Watch("dam", WatchMode::kEvery, from));
+    ASSERT_NE(watchers.back(), nullptr);
+    watchers.back()->WaitForFrames(101 - from);
+    ExpectAll(watchers.back()->seen(), from, 100);
+  }
+  EXPECT_EQ(imports.size(), 2u);
+  Publish(101, 101);
+  for (std::size_t k = 0; k < watchers.size(); ++k) {
+    const std::uint64_t from = 66 - 8 * k;
+    watchers[k]->WaitForFrames(102 - from);
+    ExpectAll(watchers[k]->seen(), from, 101);
+  }
 }
 
 // More than one response to a fetch can hold.

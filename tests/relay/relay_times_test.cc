@@ -7,8 +7,10 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "partiemc/status.h"
 #include "relay/memory_replica.h"
@@ -89,6 +91,27 @@ TEST_F(RelayTimes, AReplicaIsGoneAfterThreeSecondsOfSilence) {
   EXPECT_EQ(watcher->end_reason(), kReasonProducerLost);
   has_.bus().SetConnected(true);
   EXPECT_TRUE(Within(seconds(4), [this] { return has_.relay().exported_streams() == 0; }));
+}
+
+TEST_F(RelayTimes, WithoutRoomForTheWholeHistoryAStreamIsImportedTwiceAtMost) {
+  MemoryReplica small(hub_, 20'000, {}, {.clock = &clock_});  // Room for 13 frames.
+  relays_ = 3;
+  ASSERT_TRUE(Within(seconds(2), [&] { return small.relay().remote_streams() == 1; }));
+  Publish(1, 100);
+  std::set<const ResultBroadcaster*> imports;
+  std::vector<std::unique_ptr<MemoryWatcher>> watchers;
+  for (const std::uint64_t from : {99, 50, 40}) {
+    watchers.push_back(small.Watch("dam", WatchMode::kEvery, from));
+    ASSERT_NE(watchers.back(), nullptr);
+    watchers.back()->WaitForFrames(from == 99 ? 2 : 13);
+    EXPECT_EQ(watchers.back()->seen().back(), (SeenFrame{100, 0}));
+    const auto found = small.Find("dam", from);
+    ASSERT_TRUE(found.ok()) << found.status();
+    imports.insert(found->broadcaster.get());
+    Pass(milliseconds(5100));  // Longer than an import counts as new.
+  }
+  EXPECT_EQ(imports.size(), 2u);
+  EXPECT_EQ(small.relay().imported_streams(), 2u);
 }
 
 TEST_F(RelayTimes, ADrainedReplicaAnnouncesNothing) {
