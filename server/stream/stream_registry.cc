@@ -83,20 +83,20 @@ absl::StatusOr<StreamSummary> StreamRegistry::Open(const StreamStateMachine& mac
   if (auto status = CheckLabels(description.labels); !status.ok()) return status;
   if (auto status = CheckStreamToken(token); !status.ok()) return status;
 
-  std::shared_ptr<StreamStateMachine> former_machine;
+  Replaced replaced;
   absl::StatusOr<StreamSummary> opened;
   {
     const MutexLock lock(mutex_);
-    opened = OpenLocked(machine, std::move(description), std::move(token), former_machine);
+    opened = OpenLocked(machine, std::move(description), std::move(token), replaced);
   }
   // Without the lock, because TakenOver may call Leave.
-  if (former_machine != nullptr) former_machine->TakenOver();
+  if (replaced.machine != nullptr) replaced.machine->TakenOver();
   return opened;
 }
 
-absl::StatusOr<StreamSummary> StreamRegistry::OpenLocked(
-    const StreamStateMachine& machine, StreamDescription description, std::string token,
-    std::shared_ptr<StreamStateMachine>& former_machine) {
+absl::StatusOr<StreamSummary> StreamRegistry::OpenLocked(const StreamStateMachine& machine,
+                                                         StreamDescription description,
+                                                         std::string token, Replaced& replaced) {
   if (auto status = CheckServingLocked(); !status.ok()) return status;
   Entry& entry = entries_.at(&machine);
   Entry* const former = FindOpen(token);
@@ -111,7 +111,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::OpenLocked(
     return status;
   }
   if (auto status = TakePlace(entry, former); !status.ok()) return status;
-  BeginHistory(description, former);
+  replaced.frames = BeginHistory(description, former);
   entry.stream.emplace();
   entry.stream->number = ++opened_;
   entry.stream->id = id;
@@ -127,7 +127,7 @@ absl::StatusOr<StreamSummary> StreamRegistry::OpenLocked(
   StreamSummary opened = *entry.stream;
   if (former == nullptr) return opened;
   former->taken_over = true;
-  former_machine = former->machine;
+  replaced.machine = former->machine;
   return opened;
 }
 
@@ -162,12 +162,13 @@ absl::Status StreamRegistry::TakePlace(Entry& entry, Entry* former) {
 }
 
 // Starts the stream's history. Called before watchers can find the stream, so that no watcher
-// misses a result.
-void StreamRegistry::BeginHistory(const StreamDescription& description, const Entry* former) {
-  if (history_ == nullptr || description.broadcaster == nullptr) return;
+// misses a result. Returns frames to free without the lock.
+std::vector<Published> StreamRegistry::BeginHistory(const StreamDescription& description,
+                                                    const Entry* former) {
+  if (history_ == nullptr || description.broadcaster == nullptr) return {};
   ResultBroadcaster* const before =
       former != nullptr ? former->stream->description.broadcaster.get() : nullptr;
-  description.broadcaster->BeginHistory(*history_, before, description.next_sequence);
+  return description.broadcaster->BeginHistory(*history_, before, description.next_sequence);
 }
 
 StreamRegistry::Entry* StreamRegistry::FindOpen(std::string_view token) {

@@ -169,9 +169,15 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
   using CallRegistry::WaitUntilEmpty;
 
  private:
+  // What is released without the lock after a stream was taken over.
+  struct Replaced {
+    std::shared_ptr<StreamStateMachine> machine;
+    std::vector<Published> frames;
+  };
+
   absl::StatusOr<StreamSummary> OpenLocked(const StreamStateMachine& machine,
                                            StreamDescription description, std::string token,
-                                           std::shared_ptr<StreamStateMachine>& former_machine)
+                                           Replaced& replaced)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckServingLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Returns an error if no slot is free or `name` is in use. Ignores the stream of `former`, which
@@ -187,7 +193,7 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
   // Lets `entry` send a part, unless `max_parts` calls do. Does not count calls that sent this part
   // before: Join ends them, or their stream has ended.
   absl::Status TakePart(Entry& entry, const PartTerms& terms) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void BeginHistory(const StreamDescription& description, const Entry* former)
+  std::vector<Published> BeginHistory(const StreamDescription& description, const Entry* former)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::uint32_t max_streams_, max_parts_;

@@ -29,35 +29,31 @@ void ResultBroadcaster::CountWaits(Action action) {
   if (Sleeps() != sleeps) ++producer_waits_;
 }
 
-void ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* former,
-                                     std::uint64_t next_sequence) {
-  std::vector<Published> frames;
-  if (former != nullptr) frames = former->HandOver();
+std::vector<Published> ResultBroadcaster::BeginHistory(HistoryRoom& room, ResultBroadcaster* former,
+                                                       std::uint64_t next_sequence) {
+  std::vector<Published> dropped;
+  std::unique_ptr<ResultHistory> history;
+  if (former != nullptr) history = former->HandOver(next_sequence, dropped);
+  if (history == nullptr) history = std::make_unique<ResultHistory>(room);
+  std::ranges::move(history->TakeFrom(next_sequence), std::back_inserter(dropped));
   {
     const MutexLock lock(mutex_);
-    history_.emplace(room);
-    for (Published& published : frames) {
-      if (published.sequence >= next_sequence) break;
-      published.number = ++published_;
-      history_->Add(published);
-    }
-    collected_ = published_;
+    history_ = std::move(history);
     if (!history_->empty()) newest_ = history_->at(history_->size() - 1);
+    collected_ = published_ = newest_.number;
     NoteOldest();
   }
   room.Enter(std::shared_ptr<HistoryOwner>(shared_from_this(), this));
+  if (room.is_scarce()) ShareRoom();  // The former owner can no longer do so.
+  return dropped;
 }
 
-std::vector<Published> ResultBroadcaster::HandOver() {
-  std::vector<Published> frames;
-  std::vector<Published> dropped;  // Freed without the lock.
+std::unique_ptr<ResultHistory> ResultBroadcaster::HandOver(std::uint64_t next_sequence,
+                                                           std::vector<Published>& dropped) {
   const MutexLock lock(mutex_);
   dropped = Collect();
-  if (!history_) return frames;
-  frames.reserve(history_->size());
-  for (std::size_t k = 0; k < history_->size(); ++k) frames.push_back(history_->at(k));
-  if (watchers_.empty()) history_.reset();  // Present watchers may still read it.
-  return frames;
+  if (history_ != nullptr && !watchers_.empty()) return history_->CopyBefore(next_sequence);
+  return std::move(history_);
 }
 
 bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence) {
@@ -233,9 +229,10 @@ void ResultBroadcaster::DropHistoryUnlessRead(
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {
     return;
   }
+  std::unique_ptr<ResultHistory> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
   if (watchers_ != watchers) return;
-  history_.reset();
+  dropped = std::move(history_);
   NoteOldest();
 }
 

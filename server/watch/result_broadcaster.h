@@ -33,10 +33,12 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   ResultBroadcaster(WatchDispatcher& dispatcher, const Limits& limits);
 
   /// Starts a history within the limits of `room`. If the stream resumes the stream of `former`,
-  /// the history takes over the former frames before `next_sequence`; later frames will be computed
-  /// again. Requires: called once, before Publish and Join; `room` outlives this.
-  void BeginHistory(HistoryRoom& room, ResultBroadcaster* former, std::uint64_t next_sequence)
-      ABSL_LOCKS_EXCLUDED(mutex_);
+  /// the history takes over the former frames before `next_sequence` with their result numbers;
+  /// later frames will be computed again. Returns frames that are no longer needed; the caller
+  /// frees them without its locks, because they may be large. Requires: called once, before Publish
+  /// and Join; `room` outlives this.
+  std::vector<Published> BeginHistory(HistoryRoom& room, ResultBroadcaster* former,
+                                      std::uint64_t next_sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   void ShareRoom() override { dispatcher_.Wake(*this); }
 
   /// Publishes the result of the frame `sequence`. Wait-free: takes the lock only if it is free.
@@ -98,7 +100,12 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
 
  private:
   void Serve() override ABSL_LOCKS_EXCLUDED(mutex_);
-  std::vector<Published> HandOver() ABSL_LOCKS_EXCLUDED(mutex_);
+  // Returns the history for the stream that resumes this one; null if there is none. Moves it, or
+  // copies the frames before `next_sequence` if present watchers may still read it. Adds frames
+  // that are no longer needed to `dropped`.
+  std::unique_ptr<ResultHistory> HandOver(std::uint64_t next_sequence,
+                                          std::vector<Published>& dropped)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   // As Publish.
   [[nodiscard]] bool Post(Published published) ABSL_LOCKS_EXCLUDED(mutex_);
   void DropHistoryUnlessRead(const std::vector<std::shared_ptr<WatchStateMachine>>& watchers)
@@ -130,7 +137,7 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   // Frames that were taken from the mailbox and have not been offered to watchers yet.
   std::vector<Published> news_ ABSL_GUARDED_BY(mutex_);
   std::size_t news_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::optional<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
+  std::unique_ptr<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
   Published newest_ ABSL_GUARDED_BY(mutex_);  // Kept if it is in the history, small, or watched.
   std::optional<WatchEnd> end_ ABSL_GUARDED_BY(mutex_);
 };

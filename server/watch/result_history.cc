@@ -61,6 +61,37 @@ void ResultHistory::Add(const Published& published) {
   bytes_ += bytes;
 }
 
+std::unique_ptr<ResultHistory> ResultHistory::CopyBefore(std::uint64_t sequence) const {
+  auto copy = std::make_unique<ResultHistory>(room_);
+  const std::size_t end = CountBefore(sequence);
+  const std::uint64_t share = room_.share();
+  std::size_t first = end;
+  std::uint64_t bytes = 0;
+  while (first > 0 && bytes + BytesOf(at(first - 1)) <= share) bytes += BytesOf(at(--first));
+  while (!room_.TryTake(bytes)) bytes -= BytesOf(at(first++));
+  copy->ring_.reserve(end - first);
+  for (std::size_t k = first; k < end; ++k) copy->ring_.push_back(at(k));
+  copy->size_ = end - first;
+  copy->bytes_ = bytes;
+  return copy;
+}
+
+std::vector<Published> ResultHistory::TakeFrom(std::uint64_t sequence) {
+  std::vector<Published> taken;
+  const std::size_t left = CountBefore(sequence);
+  taken.reserve(size_ - left);
+  std::uint64_t bytes = 0;
+  for (std::size_t k = left; k < size_; ++k) {
+    Published& published = ring_[(first_ + k) % ring_.size()];
+    bytes += BytesOf(published);
+    taken.push_back(std::exchange(published, {}));
+  }
+  size_ = left;
+  bytes_ -= bytes;
+  room_.GiveBack(bytes);
+  return taken;
+}
+
 void ResultHistory::DropUntilFits(std::uint64_t bytes) {
   const std::uint64_t share = room_.share();
   while (size_ > 0 && bytes_ + bytes > share) DropOldest();
@@ -90,6 +121,11 @@ const Published* ResultHistory::FromNumber(std::uint64_t number) const {
 }
 
 const Published* ResultHistory::FromSequence(std::uint64_t sequence) const {
+  const std::size_t older = CountBefore(sequence);
+  return older == size_ ? nullptr : &at(older);
+}
+
+std::size_t ResultHistory::CountBefore(std::uint64_t sequence) const {
   std::size_t older = 0,
               end = size_;  // Binary search: frames before `older` are older, from `end` on not.
   while (older < end) {
@@ -100,7 +136,7 @@ const Published* ResultHistory::FromSequence(std::uint64_t sequence) const {
       end = middle;
     }
   }
-  return end == size_ ? nullptr : &at(end);
+  return end;
 }
 
 }  // namespace partiemc::server

@@ -78,6 +78,13 @@ class ResultHistory {
   /// Drops the oldest frames until the history fits into its share, which may have become smaller.
   void Shrink() { DropUntilFits(0); }
 
+  /// Copies the newest frames before `sequence` that fit into the share of a history and into the
+  /// remaining memory of all histories.
+  std::unique_ptr<ResultHistory> CopyBefore(std::uint64_t sequence) const;
+  /// Removes the frames from `sequence` on, and returns them. The caller frees them without locks,
+  /// because they may be large.
+  std::vector<Published> TakeFrom(std::uint64_t sequence);
+
   bool empty() const { return size_ == 0; }
   std::size_t size() const { return size_; }
   /// Bytes of all frames, including the overhead of each frame.
@@ -91,6 +98,8 @@ class ResultHistory {
   const Published* FromSequence(std::uint64_t sequence) const;
 
  private:
+  // Number of frames before `sequence`.
+  std::size_t CountBefore(std::uint64_t sequence) const;
   void DropOldest();
   void DropUntilFits(std::uint64_t bytes);
   void Grow();

@@ -49,6 +49,43 @@ TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
   }
 }
 
+TEST(ResultHistory, ACopyHasTheNewestThatFitBeforeASequence) {
+  HistoryRoom room(8 * kCost, 11 * kCost);
+  ResultHistory history(room);
+  for (std::uint64_t number = 1; number <= 8; ++number) history.Add(Frame(number));
+  const auto numbers = [&](std::uint64_t sequence) {
+    return NumbersOf(*history.CopyBefore(sequence));
+  };
+  EXPECT_EQ(numbers(1), (std::vector<std::uint64_t>{}));
+  EXPECT_EQ(numbers(21), (std::vector<std::uint64_t>{1, 2}));
+  EXPECT_EQ(numbers(70), (std::vector<std::uint64_t>{4, 5, 6})) << "the room has three";
+  {
+    ResultHistory others[] = {ResultHistory(room), ResultHistory(room), ResultHistory(room)};
+    EXPECT_EQ(numbers(99), (std::vector<std::uint64_t>{7, 8})) << "a share of five has two";
+    EXPECT_EQ(room.held(), 8 * kCost);
+  }
+  const auto copy = history.CopyBefore(31);
+  EXPECT_EQ(room.held(), 11 * kCost);
+  copy->Add(Frame(4));
+  EXPECT_EQ(NumbersOf(*copy), (std::vector<std::uint64_t>{2, 3, 4}));
+}
+
+TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
+  HistoryRoom room(8 * kCost, 8 * kCost);
+  ResultHistory history(room);
+  for (std::uint64_t number = 1; number <= 11; ++number) history.Add(Frame(number));
+  EXPECT_TRUE(history.TakeFrom(999).empty());
+  const auto taken = history.TakeFrom(61);
+  ASSERT_EQ(taken.size(), 5u);
+  EXPECT_EQ(taken.front().number, 7u);
+  EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6}));
+  EXPECT_EQ(room.held(), 3 * kCost);
+  for (std::uint64_t number = 7; number <= 11; ++number) history.Add(Frame(number));
+  EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6, 7, 8, 9, 10, 11}));
+  EXPECT_EQ(history.TakeFrom(0).size(), 8u);
+  EXPECT_TRUE(history.empty());
+}
+
 TEST(ResultHistory, HasNoHole) {
   HistoryRoom room(100 * kCost, 100 * kCost);
   ResultHistory history(room);

@@ -293,6 +293,19 @@ TEST_P(WatchBack, AStreamThatIsTakenOverKeepsItsHistoryUpToWhereItGoesOn) {
   }
 }
 
+TEST_P(WatchBack, ATakeoverMovesTheHistoryAndReturnsTheRest) {
+  PublishAll(1, 10);
+  const auto next = std::make_shared<ResultBroadcaster>(dispatcher_, ResultBroadcaster::Limits{});
+  const auto rest = next->BeginHistory(room_, broadcaster_.get(), 8);
+  ASSERT_EQ(rest.size(), 3u);
+  EXPECT_EQ(rest.front().sequence, 8u);
+  EXPECT_EQ(room_.held(), 7 * kCost);
+  EXPECT_EQ(broadcaster_->HeldFrom(1).frame, nullptr);
+  EXPECT_EQ(next->oldest_here(), 1u);
+  EXPECT_EQ(next->Newest().sequence, 7u);
+  EXPECT_EQ(next->LastNumber(), 7u);
+}
+
 TEST_P(WatchBack, OthersGetAllWhileOneReadsSlowly) {
   PublishAll(1, 10);
   const auto slow = Join(1, 0);
