@@ -111,7 +111,7 @@ struct ServerLimits {
 
   /// Limits of watchers of ended streams, because such a watcher keeps the stream's history. A
   /// write may wait for a level of detail, so its limit is longer.
-  PauseLimits paused{.pause = std::chrono::seconds(30), .write = std::chrono::minutes(2)};
+  PauseLimits paused{.pause = std::chrono::minutes(10), .write = std::chrono::minutes(2)};
 
   /// Maximum number of watchers of all streams together.
   std::uint32_t max_watchers = 64;
