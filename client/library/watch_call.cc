@@ -16,6 +16,9 @@
 namespace partiemc::client {
 namespace {
 
+// Messages that need no credit: WatchOpened and WatchEnded.
+constexpr std::size_t kMessagesWithoutCredit = 2;
+
 v1::WatchMode ToWire(WatchMode mode) {
   return mode == WatchMode::kEvery ? v1::WATCH_MODE_EVERY : v1::WATCH_MODE_LATEST;
 }
@@ -106,7 +109,9 @@ void WatchCall::Start(std::string_view stream_name, const WatcherOptions& option
 void WatchCall::Run(v1::WatchStreamRequest open) {
   rpc_ = stub_->WatchStream(&context_);
   rpc_->Write(open);  // If it fails, the end of the call reports the reason.
-  for (;;) {
+  const std::size_t most_ready = std::size_t{open.open().credits()} + kMessagesWithoutCredit;
+  bool exceeded = false;
+  while (!exceeded) {
     Message message;
     {
       const MutexLock lock(mutex_);
@@ -118,12 +123,19 @@ void WatchCall::Run(v1::WatchStreamRequest open) {
     if (message == nullptr) message = std::make_unique<v1::WatchStreamResponse>();
     if (!rpc_->Read(message.get())) break;
     const MutexLock lock(mutex_);
-    ready_.push_back(std::move(message));
-    changed_.NotifyAll();
+    exceeded = ready_.size() >= most_ready;  // A frame returns its credit when it leaves `ready_`.
+    if (exceeded) {
+      context_.TryCancel();
+    } else {
+      ready_.push_back(std::move(message));
+      changed_.NotifyAll();
+    }
   }
   const grpc::Status status = rpc_->Finish();
   const MutexLock lock(mutex_);
-  status_ = status;
+  exceeded_credit_ = exceeded;
+  status_ =
+      exceeded ? grpc::Status(grpc::StatusCode::DATA_LOSS, "sent frames without credit") : status;
   reason_ = ReasonOf(context_);
   changed_.NotifyAll();
 }
@@ -135,6 +147,7 @@ absl::StatusOr<bool> WatchCall::WaitUntilOpened(TimePoint until) {
   if (cancelled_) return absl::CancelledError("the watch was cancelled");
   if (ready_.empty() && !status_) return false;
   if (ready_.empty()) {
+    if (exceeded_credit_) return ExceededCredit();
     if (status_->ok()) return Broken("ended the watch at once");
     return FromGrpc(*status_, address_);
   }
@@ -195,6 +208,8 @@ WatchCall::Message WatchCall::TakeNext(std::optional<TimePoint> until,
     Message message = std::move(ready_.front());
     ready_.pop_front();
     return message;
+  } else if (exceeded_credit_) {
+    received = ExceededCredit();
   } else if (!status_->ok()) {
     received = FromGrpc(*status_, address_);
   } else if (end_.reason.empty()) {
@@ -272,6 +287,8 @@ std::string WatchCall::why() {
   if (status_ && !status_->ok()) return Reason(*status_);
   return end_.message.empty() ? "ended without a reason" : end_.message;
 }
+
+absl::Status WatchCall::ExceededCredit() const { return Broken("sent frames without credit"); }
 
 absl::Status WatchCall::Broken(const char* what) const {
   return absl::DataLossError(

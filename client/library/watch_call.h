@@ -1,5 +1,6 @@
 // One WatchStream call. Its own thread opens the call and reads messages into `ready_`; the credits
-// limit their number. The receiver's thread decodes messages and returns credits.
+// limit their number, and a server that ignores them ends the call. The receiver's thread decodes
+// messages and returns credits.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -77,6 +78,7 @@ class WatchCall {
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
+  absl::Status ExceededCredit() const;
   absl::Status Broken(const char* what) const;
 
   const std::string address_;
@@ -97,6 +99,7 @@ class WatchCall {
   std::vector<Message> spare_ ABSL_GUARDED_BY(mutex_);
   std::optional<grpc::Status> status_ ABSL_GUARDED_BY(mutex_);  // Set after the last read.
   std::string reason_ ABSL_GUARDED_BY(mutex_);                  // Reason in `status_`.
+  bool exceeded_credit_ ABSL_GUARDED_BY(mutex_) = false;        // By the server.
   bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

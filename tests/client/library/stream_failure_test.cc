@@ -6,6 +6,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -335,6 +338,51 @@ TEST(WatchFailure, WaitsOnceForTheStatusAfterTheEnd) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, kWait + kUntilTheEnd);
   ASSERT_TRUE(received.ok()) << received.status();
   EXPECT_EQ(*received, Received::kNothingYet);
+}
+
+TEST(WatchFailure, AServerThatIgnoresCreditsIsCutOff) {
+  std::atomic<bool> was_cut_off = false;
+  const FakeServer server(AnswerAll, [&](grpc::ServerContext&, FakeServer::WatchRpc& rpc) {
+    v1::WatchStreamResponse response;
+    response.mutable_opened()->set_stream_id("fake");
+    rpc.Write(response);
+    v1::ReconstructedFrame& frame = *response.mutable_frame()->mutable_frame();
+    frame.set_particles(std::string(1 << 20, 'a'));
+    for (int k = 0; k < 1500 && !was_cut_off; ++k) was_cut_off = !rpc.Write(response);
+    return grpc::Status::OK;
+  });
+  const auto watcher = Watcher::Open(server.address(), "fake", {.credits = 3});
+  ASSERT_TRUE(watcher.ok()) << watcher.status();
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!was_cut_off && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_TRUE(was_cut_off);
+}
+
+TEST(WatchFailure, FramesWithoutCreditBreakTheProtocol) {
+  const FakeServer server(AnswerAll, [&](grpc::ServerContext& context, FakeServer::WatchRpc& rpc) {
+    v1::WatchStreamResponse response;
+    response.mutable_opened()->set_stream_id("fake");
+    rpc.Write(response);
+    response.mutable_frame();
+    for (int k = 0; k < 100 && rpc.Write(response); ++k) {
+    }
+    return WaitForCancel(context);
+  });
+  const auto watcher = Watcher::Open(server.address(), "fake", {.credits = 1});
+  ASSERT_TRUE(watcher.ok()) << watcher.status();
+  std::this_thread::sleep_for(kShort);  // The frames arrive.
+  WatchedFrame frame;
+  absl::StatusOr<Received> received = Received::kEvent;
+  int frames = -1;
+  for (; received.ok() && *received == Received::kEvent; ++frames) {
+    received = (*watcher)->Receive(frame, std::chrono::seconds(30));
+  }
+  EXPECT_LE(frames, 3);
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kDataLoss) << received.status();
+  EXPECT_THAT(std::string(received.status().message()),
+              HasSubstr("sent frames without credit: it breaks the protocol"));
 }
 
 }  // namespace
