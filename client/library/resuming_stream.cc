@@ -260,6 +260,8 @@ absl::StatusOr<Received> ResumingStream::Advance(Event& event, OptionalTime unti
       monitor_.changed.NotifyAll();
       return Received::kEvent;
     }
+    // A server that only sends notices is overdue, too.
+    if (!call_->reads_over() && !call_->HasAnswer() && IsOverdue()) return TooSlowToAnswer();
     if (auto response = call_->Take()) {
       const auto delivered = Deliver(std::move(response), event);
       if (!delivered.ok()) return delivered.status();
@@ -279,9 +281,7 @@ absl::StatusOr<Received> ResumingStream::Advance(Event& event, OptionalTime unti
         return absl::DataLossError(absl::StrCat("an answer of the server at ", call_->address(),
                                                 " cannot be read: it breaks the protocol"));
       }
-      return absl::DeadlineExceededError(absl::StrCat(
-          "the server at ", call_->address(), " did not answer frame ", next_answer_, " within ",
-          Seconds(options_.deadline), ": it may be overloaded; try again later"));
+      return TooSlowToAnswer();
     }
     if (until && now >= *until) return Received::kNothingYet;
     if (due || until) {
@@ -298,6 +298,19 @@ ResumingStream::OptionalTime ResumingStream::AnswerDue() const {
   if (all_answered() && !finished_) return std::nullopt;
   if (sends_other_part()) return std::nullopt;  // Its responses wait for part 0.
   return std::max(due_since_, call_->progress_at()) + options_.deadline;
+}
+
+bool ResumingStream::IsOverdue() const {
+  AssertShared();
+  const auto due = AnswerDue();
+  return due && monitor_.Now() >= *due;
+}
+
+absl::Status ResumingStream::TooSlowToAnswer() const {
+  AssertShared();
+  return absl::DeadlineExceededError(absl::StrCat(
+      "the server at ", call_->address(), " did not answer frame ", next_answer_, " within ",
+      Seconds(options_.deadline), ": it may be overloaded; try again later"));
 }
 
 // Fills `event` if the response is new to the caller; otherwise drops it and returns false.

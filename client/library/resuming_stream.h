@@ -72,6 +72,8 @@ class ResumingStream final : public Stream {
   void LoseCall(std::unique_ptr<StreamCall> call, const Loss& loss)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   OptionalTime AnswerDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  bool IsOverdue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  absl::Status TooSlowToAnswer() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   // Any thread:
   absl::StatusOr<std::uint64_t> SendRows(const wire::FrameRows& frame, std::size_t particles)
       ABSL_LOCKS_EXCLUDED(monitor_.mutex);

@@ -1,5 +1,6 @@
 #include "client/library/stream_call.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -89,8 +90,14 @@ StreamCall::Response StreamCall::Take() {
 void StreamCall::Recycle(Response response) {
   spare_.push_back(std::move(response));
   if (reading_ != nullptr || window_ == 0) return;
-  progress_at_ = monitor_.Now();  // No read was pending, so the silence was not the server's.
+  // No read was pending, so the silence was not the server's. Notices do not count: a server that
+  // sends many would postpone the deadline.
+  if (IsAnswer(*spare_.back())) progress_at_ = monitor_.Now();
   ReadNext();
+}
+
+bool StreamCall::HasAnswer() const {
+  return std::ranges::any_of(ready_, [](const Response& response) { return IsAnswer(*response); });
 }
 
 std::string StreamCall::reason() const { return ReasonOf(context_); }
@@ -148,7 +155,7 @@ void StreamCall::OnWriteDone(bool ok) {
 
 void StreamCall::OnReadDone(bool ok) {
   const MutexLock lock(monitor_.mutex);
-  progress_at_ = monitor_.Now();
+  if (!ok || IsAnswer(*reading_) || reading_->has_opened()) progress_at_ = monitor_.Now();
   if (ok) {
     if (IsAnswer(*reading_)) ++answered_;
     ready_.push_back(std::move(reading_));

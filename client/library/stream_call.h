@@ -83,7 +83,10 @@ class StreamCall final
   }
   /// Responses that can be taken.
   std::size_t ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return ready_.size(); }
-  /// Time of the last message from the server, or of the last read that started after a pause.
+  /// Whether an answer can be taken.
+  bool HasAnswer() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
+  /// Time of the last answer, of StreamOpened or of the end of the reads; or of the last read that
+  /// started after a pause. Notices do not count.
   TimePoint progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
     return progress_at_;
   }

@@ -385,5 +385,27 @@ TEST(WatchFailure, FramesWithoutCreditBreakTheProtocol) {
               HasSubstr("sent frames without credit: it breaks the protocol"));
 }
 
+TEST(StreamFailure, NoticesDoNotPostponeTheDeadline) {
+  FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
+    Accept(rpc, 1);
+    v1::ReconstructResponse response;
+    response.mutable_notice()->set_message("wait");
+    while (!context.IsCancelled() && rpc.Write(response)) {
+      std::this_thread::sleep_for(kShort / 10);
+    }
+    return grpc::Status::CANCELLED;
+  });
+  const auto stream = Stream::Open(server.address(), {.deadline = kShort});
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  ASSERT_TRUE((*stream)->Send(kFrame, 0).ok());
+  const auto start = std::chrono::steady_clock::now();
+  absl::StatusOr<Received> received = Received::kEvent;
+  while (received.ok() && std::chrono::steady_clock::now() - start < 50 * kShort) {
+    Event event;
+    received = (*stream)->Receive(event);
+  }
+  EXPECT_EQ(received.status().code(), absl::StatusCode::kDeadlineExceeded) << received.status();
+}
+
 }  // namespace
 }  // namespace partiemc::client
