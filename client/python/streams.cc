@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -151,23 +152,25 @@ class ProducerStream {
   }
 
   // Finishes the stream. Receives and drops the results that are left, so that waiting frames are
-  // still sent.
+  // still sent. Ctrl-C cancels the stream.
   void Close() {
-    const py::gil_scoped_release others_may_run;
-    std::thread receiver([this] {
-      const std::scoped_lock lock(receiving_);
-      Drain(std::nullopt);
-    });
-    {
-      const MutexLock lock(sending_);
-      if (!std::exchange(finished_, true)) {
-        const absl::Status status =
-            latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
-        if (!status.ok()) stream_->Cancel();
+    std::packaged_task<void()> task([this] { FinishAndDrain(); });
+    std::future<void> closed = task.get_future();
+    std::thread closer(std::move(task));
+    bool is_interrupted = false;
+    for (bool is_closed = false; !is_closed && !is_interrupted;) {
+      {
+        const py::gil_scoped_release others_may_run;
+        is_closed = closed.wait_for(kSlice) == std::future_status::ready;
       }
+      is_interrupted = PyErr_CheckSignals() != 0;
     }
-    receiver.join();
-    if (finisher_.joinable()) finisher_.join();
+    {
+      const py::gil_scoped_release others_may_run;
+      if (is_interrupted) stream_->Cancel();
+      closer.join();
+    }
+    if (is_interrupted) throw py::error_already_set();
   }
 
   void Cancel() {
@@ -208,6 +211,23 @@ class ProducerStream {
    private:
     ProducerStream& stream_;
   };
+
+  void FinishAndDrain() {
+    std::thread receiver([this] {
+      const std::scoped_lock lock(receiving_);
+      Drain(std::nullopt);
+    });
+    {
+      const MutexLock lock(sending_);
+      if (!std::exchange(finished_, true)) {
+        const absl::Status status =
+            latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
+        if (!status.ok()) stream_->Cancel();
+      }
+    }
+    receiver.join();
+    if (finisher_.joinable()) finisher_.join();
+  }
 
   // Receives and drops events until the stream has ended or `until` has passed.
   void Drain(std::optional<std::chrono::steady_clock::time_point> until) {

@@ -430,6 +430,20 @@ class Streams(ServerTest):
         _, error = waiting.communicate(timeout=60)
         self.assertIn("KeyboardInterrupt", error)
 
+    def test_ctrl_c_ends_the_end_of_with(self):
+        # The other part of the frame never comes.
+        script = ("import numpy, partiemc\n"
+                  f"with partiemc.connect({self.address!r}, name='half', parts=2, part_timeout=50, "
+                  "spacing=1) as s:\n    s.send(numpy.zeros((1, 2)))\n    print('ready', flush=True)")
+        waiting = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.assertEqual(waiting.stdout.readline(), "ready\n")
+        time.sleep(0.5)
+        self.assertIsNone(waiting.poll())
+        waiting.send_signal(2)
+        _, error = waiting.communicate(timeout=20)
+        self.assertIn("KeyboardInterrupt", error)
+
     def test_readme_script_draws_and_gives_the_digests_of_replay(self):
         script = readme()
         self.assertLessEqual(len(script.split("\n\n")[1].splitlines()), 10)
