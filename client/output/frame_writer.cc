@@ -33,6 +33,23 @@ bool AreFloats(std::span<const double> points) {
       points, [](double x) { return std::abs(x) < std::numeric_limits<float>::max() / 2; });
 }
 
+// Whether the rounding to 32-bit floats moves no coordinate by more than a thousandth of `spacing`.
+// With spacing 0 (unknown) the longest side of the points' box replaces it.
+bool AreFineFloats(std::span<const double> points, std::size_t components, double spacing) {
+  double scale = spacing;
+  for (std::size_t c = 0; !(spacing > 0) && c < components && c < points.size(); ++c) {
+    double low = points[c], high = points[c];
+    for (std::size_t k = c; k < points.size(); k += components) {
+      low = std::min(low, points[k]);
+      high = std::max(high, points[k]);
+    }
+    scale = std::max(scale, high - low);
+  }
+  return std::ranges::all_of(points, [scale](double x) {
+    return std::abs(static_cast<double>(static_cast<float>(x)) - x) <= 1e-3 * scale;
+  });
+}
+
 bool AllFinite(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(),
                      [](double value) { return std::isfinite(value); });
@@ -121,6 +138,15 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
   if (has_floats && !AreFloats(points)) {
     return absl::OutOfRangeError(Concat("frame ", frame.index, ": coordinates above 3.4e38; ",
                                         Name(format), " has 32-bit floats"));
+  }
+  // GLB has its origin at the centre of the frame.
+  const std::span<const double> vertices = frame.surface ? points : frame.result.mesh.points;
+  if (format == FrameFormat::kStl &&
+      !AreFineFloats(vertices, frame.surface ? 3 : 2, frame.result.statistics.spacing)) {
+    return absl::OutOfRangeError(Concat(
+        "frame ", frame.index,
+        ": its coordinates are too far from the origin for the 32-bit floats of stl; choose ",
+        "ply, obj, vtp or glb, or move the origin"));
   }
   switch (format) {
     case FrameFormat::kGeoJson:

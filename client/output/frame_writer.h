@@ -53,7 +53,8 @@ enum class FrameFormat : std::uint8_t {
   /// mesh, the rings as edges.
   /// A surface: vertices also have the normals nx, ny, nz, and the integer "shell".
   kPly,
-  /// Binary STL: the triangles of the mesh in float32. It cannot hold rings and attributes.
+  /// Binary STL: the triangles of the mesh in float32. It cannot hold rings and attributes. Refused
+  /// far from the origin, where float32 moves points by more than a thousandth of the spacing.
   /// A surface: facets have their normals.
   kStl,
   /// Binary glTF: triangles, and lines for the rings, in float32 relative to the node's

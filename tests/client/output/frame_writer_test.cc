@@ -298,6 +298,25 @@ TEST(Stl, HasOneRecordForEachTriangle) {
   EXPECT_EQ(stl.size(), 84u + 9 * 50);
 }
 
+TEST(Stl, IsRefusedFarFromTheOrigin) {
+  Result result = SquareWithHoleAndIsland();
+  const auto code = [&] {
+    return EncodeFrame(FrameFormat::kStl, {.result = result}, {}).status().code();
+  };
+  for (double& coordinate : result.mesh.points) coordinate += 1000.3;
+  EXPECT_EQ(code(), absl::StatusCode::kOk);
+  for (double& coordinate : result.mesh.points) coordinate += 1e7;
+  EXPECT_EQ(code(), absl::StatusCode::kOutOfRange);
+  result.statistics.spacing = 0;  // Unknown: the size of the frame counts.
+  EXPECT_EQ(code(), absl::StatusCode::kOutOfRange);
+  for (double& coordinate : result.mesh.points) coordinate -= 1e7;
+  EXPECT_EQ(code(), absl::StatusCode::kOk);
+  for (double& coordinate : result.mesh.points) coordinate += 1e7;
+  for (const FrameFormat format : {FrameFormat::kPly, FrameFormat::kObj, FrameFormat::kGlb}) {
+    EXPECT_TRUE(EncodeFrame(format, {.result = result}, {}).ok()) << Name(format);
+  }
+}
+
 TEST(FrameWriter, ListsVtpFilesWithTheirTimes) {
   const auto formats = AllFrameFormats();
   if (std::find(formats.begin(), formats.end(), FrameFormat::kVtp) == formats.end()) return;
