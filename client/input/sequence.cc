@@ -112,6 +112,7 @@ class FileSequence final : public Sequence {
       if (!std::isfinite(frame.time.value_or(0)) || !std::isfinite(frame.step.value_or(0))) {
         return absl::DataLossError(Concat(frame.source, ": its time is not finite; give --times"));
       }
+      CheckOrder(frame);
       return true;
     }
     return false;
@@ -141,6 +142,19 @@ class FileSequence final : public Sequence {
     if (!reader.ok()) return reader.status();
     reader_ = *std::move(reader);
     return absl::OkStatus();
+  }
+
+  // Adds one notice if the time of a frame does not exceed the time of the frame before it.
+  void CheckOrder(const RecordedFrame& frame) {
+    if (!frame.time) return;
+    const std::optional<double> former = std::exchange(former_time_, frame.time);
+    if (!former || *frame.time > *former || noticed_order_) return;
+    noticed_order_ = true;
+    recording_.notices.push_back(
+        *frame.time < *former
+            ? Concat("time goes back at frame ", frame.index, ": ", *former, " then ", *frame.time,
+                     "; check the order of the frames")
+            : Concat("time repeats at frame ", frame.index, ": ", *former, "; check the frames"));
   }
 
   absl::Status TakeTime(RecordedFrame& frame) {
@@ -189,8 +203,10 @@ class FileSequence final : public Sequence {
   ParticleRows rows_;
   PlaneProjection projection_;
   absl::Status failure_;
-  std::uint64_t selected_ = 0;    // Particles of all frames.
-  std::uint64_t unselected_ = 0;  // Particles that --select left out.
+  std::uint64_t selected_ = 0;         // Particles of all frames.
+  std::uint64_t unselected_ = 0;       // Particles that --select left out.
+  std::optional<double> former_time_;  // Of the frame that was read last.
+  bool noticed_order_ = false;
   bool counted_ = false;
   std::optional<std::size_t> count_;
 };

@@ -66,7 +66,10 @@ absl::StatusOr<FrameTimes> ReadTimes(const std::string& path) {
     const auto frame = columns->frame ? ParseId(cells[*columns->frame]) : row;
     const auto time = ParseNumber(cells[columns->time]);
     if (!frame || !time || !std::isfinite(*time)) return BadRow(**stream);
-    times[*frame] = *time;
+    if (!times.emplace(*frame, *time).second) {
+      return (*stream)->ErrorAtLine(absl::StatusCode::kDataLoss,
+                                    Concat("frame ", *frame, " already has a time"));
+    }
   }
 }
 

@@ -7,6 +7,7 @@ namespace {
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 std::vector<double> FirstCoordinates(const ReadSequence& read) {
   std::vector<double> firsts;
@@ -97,6 +98,31 @@ TEST(InputFiles, ATimesFileMayBeASingleColumn) {
   directory.Write("t.txt", "a,b\n1,2\n");
   ExpectRefused(ReadAll(directory.Path("frame_*.csv"), {.times = times}).status,
                 absl::StatusCode::kFailedPrecondition, {"t.txt", "frame,t"});
+}
+
+TEST(InputFiles, AFrameWithTwoTimesIsRefused) {
+  support::TemporaryFolder directory;
+  WriteFrames(directory, "frame_", 2);
+  const std::string times = directory.Write("t.csv", "frame,t\n0,0.5\n1,0.75\n0,1\n");
+  ExpectRefused(ReadAll(directory.Path("frame_*.csv"), {.times = times}).status,
+                absl::StatusCode::kDataLoss, {"t.csv:4", "frame 0 already has a time"});
+}
+
+TEST(InputFiles, TimesThatDoNotIncreaseHaveOneNotice) {
+  support::TemporaryFolder directory;
+  WriteFrames(directory, "frame_", 4);
+  const std::string frames = directory.Path("frame_*.csv");
+  const std::string times = directory.Write("t.txt", "1\n0.5\n0.25\n2\n");
+  const auto is_of_order = HasSubstr("check the");
+  EXPECT_THAT(ReadAll(frames, {.times = times}).notices,
+              ElementsAre(HasSubstr("times of the frames"),
+                          HasSubstr("time goes back at frame 1: 1 then 0.5")));
+  directory.Write("t.txt", "1\n2\n2\n1\n");
+  EXPECT_THAT(
+      ReadAll(frames, {.times = times}).notices,
+      ElementsAre(HasSubstr("times of the frames"), HasSubstr("time repeats at frame 2: 2")));
+  directory.Write("t.txt", "1\n2\n3\n4\n");
+  EXPECT_THAT(ReadAll(frames, {.times = times}).notices, Not(Contains(is_of_order)));
 }
 
 TEST(InputFiles, FramesWithoutATimeInTheTimesFileAreRefused) {
