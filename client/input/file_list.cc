@@ -88,6 +88,7 @@ std::vector<FileSeries> GroupBySeries(std::vector<std::string> files, bool one_n
   }
   std::vector<FileSeries> all;
   for (auto& [pattern, series] : by_pattern) {
+    series.uncertain_order = SortNaturally(series.files);
     const bool single = series.files.size() == 1;
     series.pattern = single ? fs::path(series.files.front()).filename().string() : pattern;
     all.push_back(std::move(series));

@@ -14,7 +14,8 @@ namespace partiemc::client::input {
 struct FileSeries {
   std::string pattern;  ///< "WaterBlock_*.vtp", or the name of the only file.
   std::vector<std::string> files;
-  std::size_t bytes = 0;  ///< Total size of the files.
+  std::size_t bytes = 0;         ///< Total size of the files.
+  bool uncertain_order = false;  ///< As SortNaturally returns it.
 };
 
 enum class InputKind { kFile, kDirectory, kPattern };

@@ -331,6 +331,11 @@ absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& inpu
     directory = files->directory;
     auto series = ChooseSeries(input, *std::move(files), recording);
     if (!series.ok()) return series.status();
+    if (series->uncertain_order) {
+      recording.notices.push_back(Concat(
+          "the digits after the point in ", series->pattern, " are sorted as decimal ",
+          "fractions, .25 before .5; if they are whole numbers, write them with equal length"));
+    }
     recording.files = std::move(series->files);
     recording.bytes = series->bytes;
   }

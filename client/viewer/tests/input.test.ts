@@ -6,7 +6,7 @@ import { planNamedColumns } from '../src/input/columns';
 import { parseTimes } from '../src/input/csv';
 import { inspectFiles } from '../src/input/drop';
 import { parseLammpsFrame } from '../src/input/lammps';
-import { naturalOrder } from '../src/input/natural_order';
+import { naturalOrder, sortNaturally } from '../src/input/natural_order';
 import { FieldError, type FileOptions, NO_OPTIONS, optionsText, parseOptions, parseSlices, parseSpacing } from '../src/input/options';
 import { RecordingSource } from '../src/input/recording';
 import { shareOf } from '../src/input/share';
@@ -23,6 +23,21 @@ const recording = new URL('../../../recordings/dam_break.pemc', import.meta.url)
 test('names are in natural order', () => {
   const names = ['f10.csv', 'f2.csv', 'f1.csv', 'a/f3.csv', 'f02.csv'];
   assert.deepEqual(names.sort(naturalOrder), ['a/f3.csv', 'f1.csv', 'f02.csv', 'f2.csv', 'f10.csv']);
+});
+
+test('decimal times in names are in their order', () => {
+  for (const ordered of [
+    ['p_0.05.csv', 'p_0.1.csv', 'p_0.15.csv', 'p_0.2.csv'],
+    ['p_0.0.csv', 'p_0.005.csv', 'p_0.5.csv', 'p_1.0.csv', 'p_10.25.csv'],
+    ['p_0.25.csv', 'p_0.5.csv', 'p_0.75.csv', 'p_1.0.csv'],
+    ['p_0.10.csv', 'p_0.15.csv', 'p_0.20.csv'],
+    ['run1.1.csv', 'run1.9.csv', 'run1.10.csv', 'run1.11.csv'],
+    ['run1.08.csv', 'run1.99.csv', 'run1.100.csv'],
+    ['v1.2.9.csv', 'v1.2.25.csv', 'v1.2.111.csv'],
+    ['a.2.csv', 'a.15.csv'],
+  ]) {
+    assert.deepEqual(sortNaturally([...ordered].reverse(), (name) => name), ordered);
+  }
 });
 
 test('tables may use any separator, quotes and comments', () => {

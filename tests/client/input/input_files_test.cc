@@ -100,6 +100,21 @@ TEST(InputFiles, ATimesFileMayBeASingleColumn) {
                 absl::StatusCode::kFailedPrecondition, {"t.txt", "frame,t"});
 }
 
+TEST(InputFiles, DecimalTimesInNamesOrderTheFrames) {
+  support::TemporaryFolder directory;
+  directory.Write("p_0.05.csv", "x,y\n1,0\n");
+  directory.Write("p_0.1.csv", "x,y\n2,0\n");
+  directory.Write("p_0.15.csv", "x,y\n3,0\n");
+  directory.Write("p_0.2.csv", "x,y\n4,0\n");
+  const ReadSequence certain = ReadAll(directory.path());
+  EXPECT_THAT(FirstCoordinates(certain), ElementsAre(1, 2, 3, 4)) << certain.status;
+  EXPECT_TRUE(certain.notices.empty());
+  std::filesystem::remove(directory.Path("p_0.05.csv"));
+  const ReadSequence uncertain = ReadAll(directory.path());
+  EXPECT_THAT(FirstCoordinates(uncertain), ElementsAre(2, 3, 4)) << uncertain.status;
+  EXPECT_THAT(uncertain.notices, ElementsAre(HasSubstr("sorted as decimal fractions")));
+}
+
 TEST(InputFiles, AFrameWithTwoTimesIsRefused) {
   support::TemporaryFolder directory;
   WriteFrames(directory, "frame_", 2);

@@ -27,6 +27,33 @@ TEST(NaturalOrder, LeadingZerosOnlyBreakTies) {
   EXPECT_TRUE(NaturalLess("f007a", "f7b"));
 }
 
+// Sorts shuffled names and expects them in this order.
+void ExpectOrder(const std::vector<std::string>& ordered, bool uncertain) {
+  std::vector<std::string> names = ordered;
+  const std::uint32_t seed = 3;
+  std::mt19937 random(seed);
+  for (int round = 0; round < 5; ++round) {
+    std::shuffle(names.begin(), names.end(), random);
+    EXPECT_EQ(SortNaturally(names), uncertain) << ordered.front();
+    EXPECT_EQ(names, ordered);
+  }
+}
+
+TEST(NaturalOrder, DecimalTimesAreInTheirOrder) {
+  ExpectOrder({"p_0.05.csv", "p_0.1.csv", "p_0.15.csv", "p_0.2.csv"}, false);
+  ExpectOrder({"p_0.0.csv", "p_0.005.csv", "p_0.5.csv", "p_1.0.csv", "p_10.25.csv"}, false);
+  ExpectOrder({"p_0.25.csv", "p_0.5.csv", "p_0.75.csv", "p_1.0.csv"}, true);
+  ExpectOrder({"p_0.10.csv", "p_0.15.csv", "p_0.20.csv"}, false);
+}
+
+TEST(NaturalOrder, WholeNumbersAfterAPointAreInTheirOrder) {
+  ExpectOrder({"run1.1.csv", "run1.9.csv", "run1.10.csv", "run1.11.csv"}, false);
+  ExpectOrder({"run1.08.csv", "run1.99.csv", "run1.100.csv"}, false);
+  ExpectOrder({"v1.2.9.csv", "v1.2.25.csv", "v1.2.111.csv"}, false);
+  ExpectOrder({"a.2.csv", "a.15.csv"}, false);
+  ExpectOrder({"dump.9", "dump.11"}, false);
+}
+
 TEST(NaturalOrder, IsAStrictOrderThatShufflingDoesNotChange) {
   std::vector<std::string> names = {"",    "0",    "00",    "a",  "a0",  "a00", "a1",
                                     "a01", "a1b2", "a1b10", "a2", "a10", "b",   "b1.5"};

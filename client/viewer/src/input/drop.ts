@@ -2,7 +2,7 @@ import { filesOfMembers, isCollectionName, membersOf } from './collection';
 import { CsvReader, parseTimes } from './csv';
 import { refusalOf } from './kinds';
 import { LammpsReader } from './lammps';
-import { naturalOrder } from './natural_order';
+import { sortNaturally } from './natural_order';
 import { NpyReader } from './npy';
 import { NpzReader } from './npz';
 import type { FileFacts, FileOptions } from './options';
@@ -95,8 +95,8 @@ export interface FileInput {
 
 /** Determines the kind and the facts of dropped files. Throws InputError. */
 export async function inspectFiles(dropped: File[]): Promise<FileInput> {
-  const files = dropped.filter((file) => !file.name.startsWith('.'))
-    .sort((a, b) => naturalOrder(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name));
+  const visible = dropped.filter((file) => !file.name.startsWith('.'));
+  const files = sortNaturally(visible, (file) => file.webkitRelativePath || file.name);
   if (files.length === 0) throw new InputError('No readable file was dropped.');
   const first = files[0];
   const firstHead = await headOf(first);
