@@ -188,10 +188,17 @@ absl::Status ReadUpTo(ByteSource& source, std::size_t size, std::vector<char>& b
     // Doubling keeps the allocation within twice the bytes that have arrived.
     const std::size_t step = std::min(size - old_size, std::max(kBlockBytes, old_size));
     bytes.resize(old_size + step);
-    const auto count = source.Read(bytes.data() + old_size, step);
-    bytes.resize(old_size + count.value_or(0));
-    if (!count.ok()) return count.status();
-    if (*count == 0) break;
+    // A source may return less at a time. A resize for each of its parts would fill all of `step`
+    // with zeros again and again.
+    std::size_t filled = old_size;
+    while (filled < bytes.size()) {
+      const auto count = source.Read(bytes.data() + filled, bytes.size() - filled);
+      if (count.value_or(0) == 0) {
+        bytes.resize(filled);
+        return count.status();
+      }
+      filled += *count;
+    }
   }
   return absl::OkStatus();
 }

@@ -1,5 +1,8 @@
 #include <zstd.h>
 
+#include <algorithm>
+#include <set>
+
 #include "client/input/deflated.h"
 #include "client/input/fixtures.h"
 
@@ -85,6 +88,30 @@ TEST(Packed, RefusesWhatExpandsTooMuch) {
   EXPECT_THAT(ReadOne(path, {.max_expansion = 1e6}).positions, testing::ElementsAre(1, 2));
   const std::string small = directory.Write("small.csv.zst", Zstd(MostlyComments(60 << 20)));
   EXPECT_THAT(ReadOne(small).positions, testing::ElementsAre(1, 2));
+}
+
+// Gives a thousand bytes at a time.
+class SlowSource final : public input::ByteSource {
+ public:
+  absl::StatusOr<std::size_t> Read(char* bytes, std::size_t size) override {
+    ends.insert(bytes + size);
+    const std::size_t count = std::min({size, left, std::size_t{1000}});
+    std::fill_n(bytes, count, 'x');
+    left -= count;
+    return count;
+  }
+
+  std::size_t left = 5'000'000;
+  std::set<const char*> ends;  // Of the memory that was offered.
+};
+
+TEST(ReadUpTo, EnlargesItsMemoryFewTimesForManyReads) {
+  SlowSource source;
+  std::vector<char> bytes;
+  const absl::Status status = input::ReadUpTo(source, std::size_t{1} << 30, bytes);
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(bytes, std::vector<char>(5'000'000, 'x'));
+  EXPECT_LE(source.ends.size(), 8u);
 }
 
 TEST(Packed, TablesMayBePackedToo) {
