@@ -165,7 +165,7 @@ std::vector<Member> MembersOfSeries(std::string_view rest) {
     if (c == '"') {
       rest.remove_prefix(1);
       if (!TakeJsonString(rest, text)) break;
-      const std::string_view next = Strip(rest);
+      const std::string_view next = StripFront(rest);
       if (next.starts_with(':')) {
         key = std::exchange(text, {});
       } else if (key == "name") {

@@ -51,7 +51,7 @@ std::optional<std::string_view> ValueOf(std::string_view header, std::string_vie
     if (std::string_view("}])").find(c) != std::string_view::npos) --depth;
     if (c != '\'' && c != '"') continue;
     if (!TakePythonString(rest, c, text)) return std::nullopt;
-    const std::string_view next = Strip(rest);
+    const std::string_view next = StripFront(rest);
     if (depth == 1 && text == key && next.starts_with(':')) return Strip(next.substr(1));
   }
   return std::nullopt;
@@ -87,7 +87,7 @@ class TypeParser {
   }
 
   bool Skip(char wanted) {
-    rest_ = Strip(rest_);
+    rest_ = StripFront(rest_);
     if (rest_.empty() || rest_.front() != wanted) return false;
     rest_.remove_prefix(1);
     return true;
@@ -104,7 +104,7 @@ class TypeParser {
     const bool several = Skip('(');
     std::size_t count = 1;
     do {
-      rest_ = Strip(rest_);
+      rest_ = StripFront(rest_);
       const std::size_t digits = std::min(rest_.find_first_not_of("0123456789"), rest_.size());
       const auto extent = ParseCount(rest_.substr(0, digits));
       rest_.remove_prefix(digits);

@@ -1,3 +1,4 @@
+#include "client/input/collection.h"
 #include "client/input/fixtures.h"
 #include "client/input/frame_range.h"
 
@@ -179,6 +180,20 @@ TEST(InputFiles, ARangeWithinOneFilePassesOverTheOthers) {
   const ReadSequence read = ReadAll(directory.Write("dump.xyz", dump), {.frames = "1::2"});
   EXPECT_EQ(read.frame_count, 2u);
   EXPECT_THAT(FirstCoordinates(read), ElementsAre(1, 3));
+}
+
+// Takes hours if every string searches the blanks at the end.
+TEST(InputFiles, ASeriesIsReadInLinearTime) {
+  constexpr std::size_t kFiles = 50'000;
+  std::string text = "{\"files\" : [";
+  for (std::size_t k = 0; k < kFiles; ++k) {
+    text += "{\"name\" : \"a.vtp\", \"time\" : " + std::to_string(k) + "},\n";
+  }
+  text += "]}" + std::string(std::size_t{32} << 20, ' ');
+  const support::TemporaryFolder directory;
+  const auto collection = input::ReadCollection(directory.Write("a.vtp.series", text));
+  ASSERT_TRUE(collection.ok() && collection->has_value()) << collection.status();
+  EXPECT_EQ((*collection)->files.size(), kFiles);
 }
 
 TEST(InputFiles, WhatIsNoRangeIsRefused) {
