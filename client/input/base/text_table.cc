@@ -52,7 +52,8 @@ char Separator(std::string_view line) {
   return ' ';
 }
 
-void SplitCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
+// Keeps an empty cell behind a separator at the end of the line.
+void SplitAllCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
   if (separator == ' ') {
     line = Strip(line);
@@ -71,13 +72,29 @@ void SplitCells(std::string_view line, char separator, std::vector<std::string_v
     if (end == line.size()) break;
     begin = end + 1;
   }
+}
+
+// Splits the first line of a table. A separator may end it.
+void SplitCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
+  SplitAllCells(line, separator, cells);
   if (cells.size() > 1 && cells.back().empty()) cells.pop_back();
 }
 
-std::size_t CountCells(std::string_view line, char separator) {
+// Splits a row of a table. A separator that ends the row follows the last column; an empty cell of
+// the last column stays.
+void SplitRow(std::string_view line, char separator, std::size_t column_count,
+              std::vector<std::string_view>& cells) {
+  SplitAllCells(line, separator, cells);
+  if (cells.size() == column_count + 1 && cells.back().empty()) cells.pop_back();
+}
+
+// Whether two lines have the same number of cells, as a header and a row have.
+bool SameCellCount(std::string_view header, std::string_view row, char separator) {
   std::vector<std::string_view> cells;
-  SplitCells(line, separator, cells);
-  return cells.size();
+  SplitCells(header, separator, cells);
+  const std::size_t column_count = cells.size();
+  SplitRow(row, separator, column_count, cells);
+  return cells.size() == column_count;
 }
 
 struct NumberedLine {
@@ -120,9 +137,7 @@ absl::StatusOr<std::size_t> CountPreambleLines(InputStream& stream,
   for (std::size_t k = 0; k + 1 < lines.size(); ++k) {
     const char separator = Separator(lines[k].text);
     if (!IsHeader(lines[k].text, separator, columns)) continue;
-    if (k > 0 && CountCells(lines[k].text, separator) != CountCells(lines[k + 1].text, separator)) {
-      continue;
-    }
+    if (k > 0 && !SameCellCount(lines[k].text, lines[k + 1].text, separator)) continue;
     return k == 0 ? 0 : lines[k].index;
   }
   return std::size_t{0};
@@ -188,13 +203,13 @@ absl::StatusOr<bool> TextTable::ReadContentLine(std::string_view& line) {
 absl::StatusOr<bool> TextTable::ReadRow(std::vector<std::string_view>& cells) {
   if (first_row_waits_) {
     first_row_waits_ = false;
-    SplitCells(first_row_, separator_, cells);
+    SplitRow(first_row_, separator_, column_count_, cells);
     return true;
   }
   std::string_view line;
   const auto found = ReadContentLine(line);
   if (!found.ok() || !*found) return found;
-  SplitCells(line, separator_, cells);
+  SplitRow(line, separator_, column_count_, cells);
   return true;
 }
 

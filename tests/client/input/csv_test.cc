@@ -146,6 +146,14 @@ TEST(Csv, AMissingAttributeIsToldWithTheColumnsThereAre) {
                 {"'high' is not a number"});
 }
 
+TEST(Csv, AnEmptyLastCellIsACell) {
+  EXPECT_THAT(Read("x,y,note\n1,2,\n3,4,wet\n").positions, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(Read("made by hand\nx,y,note\n1,2,\n").positions, ElementsAre(1, 2));
+  EXPECT_THAT(Read("x,y,note,\n1,2,,\n3,4,,\n").positions, ElementsAre(1, 2, 3, 4));
+  ExpectRefused(Refusal("x,p,y\n0.1,0,\n"), absl::StatusCode::kDataLoss, {"frame.csv:2", "''"});
+  ExpectRefused(Refusal("x,y,note\n1,2\n"), absl::StatusCode::kDataLoss, {"2 of 3 values"});
+}
+
 TEST(Csv, LinesBeforeTheHeaderAreSkipped) {
   const std::string rows = "1,2,3\n4,5,6\n";
   for (const std::string preamble : {"[Name]\nPoints\n\n[Data]\n", "time,0.5\n",
