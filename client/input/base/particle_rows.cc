@@ -187,13 +187,16 @@ std::optional<std::uint64_t> ArrayColumn::Id(std::size_t row) const {
   });
 }
 
+absl::Status CheckParticleCount(std::size_t count) {
+  if (count <= kMaxParticles) return absl::OkStatus();
+  return absl::DataLossError(
+      Concat("the frame has ", count, " particles; at most ", kMaxParticles));
+}
+
 absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t row_count,
                              const ColumnPlan& plan, const ColumnRequest& request,
                              ParticleRows& rows) {
-  if (row_count > kMaxParticles) {
-    return absl::DataLossError(
-        Concat("the frame has ", row_count, " particles; at most ", kMaxParticles));
-  }
+  if (absl::Status status = CheckParticleCount(row_count); !status.ok()) return status;
   const auto selected = SelectedRows(columns, row_count, plan, request);
   if (!selected.ok()) return selected.status();
   rows.float32 = true;

@@ -72,6 +72,10 @@ struct ArrayColumn {
   std::optional<std::uint64_t> Id(std::size_t row) const;
 };
 
+/// Refuses a frame of more than kMaxParticles particles with kDataLoss. Readers call it before they
+/// load the arrays of a frame.
+absl::Status CheckParticleCount(std::size_t count);
+
 /// Adds the rows of a binary table that fulfil the conditions of `request`. Requires:
 /// rows.Begin(plan); every column of the plan has `row_count` elements. Errors: kFailedPrecondition
 /// if a condition compares a column with text.

@@ -33,9 +33,10 @@ class NpyReader final : public FrameReader {
         count_ ? Concat(stream_->path(), ", frame ", frame_) : stream_->path();
     ++frame_;
     if (rows == nullptr && !count_) return true;
-    absl::Status status = frame_ == count_.value_or(1)
-                              ? ReadNpyElements(*stream_, header_, source, bytes_)
-                              : ReadNpyBytes(*stream_, FrameBytes(), source, bytes_);
+    absl::Status status = CheckParticleCount(header_.shape[0]);
+    if (!status.ok()) return WithPrefix(source, status);
+    status = frame_ == count_.value_or(1) ? ReadNpyElements(*stream_, header_, source, bytes_)
+                                          : ReadNpyBytes(*stream_, FrameBytes(), source, bytes_);
     if (!status.ok()) return status;
     if (rows == nullptr) return true;
     rows->Begin(plan_);

@@ -119,7 +119,10 @@ class NpzReader final : public OneFrameReader {
                                           " rows, ", first->name, " has ", first->header.shape[0],
                                           "; arrays must have a row per particle"));
       }
-      if (absl::Status status = Load(array, bytes[k]); !status.ok()) return status;
+      absl::Status status = CheckParticleCount(array.header.shape[0]);
+      if (!status.ok()) return WithPrefix(path_, status);
+      status = Load(array, bytes[k]);
+      if (!status.ok()) return status;
       const std::vector<ArrayColumn> loaded = NpyTable(array.header, array.name, bytes[k]).columns;
       std::copy(loaded.begin(), loaded.end(),
                 columns.begin() + static_cast<std::ptrdiff_t>(array.first_column));

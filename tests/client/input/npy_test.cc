@@ -206,7 +206,9 @@ TEST(Npy, DamageAndDeclaredSizesAreFoundOut) {
   };
   ExpectRefused(refusal("(4294967296, 4294967296)"), absl::StatusCode::kDataLoss, {"4 GiB"});
   ExpectRefused(refusal("(99999999999999999999999, 2)"), absl::StatusCode::kDataLoss, {"shape"});
-  ExpectRefused(refusal("(200000000, 2)"), absl::StatusCode::kDataLoss, {"32 of 3200000000 bytes"});
+  ExpectRefused(refusal("(67108864, 2)"), absl::StatusCode::kDataLoss, {"32 of 1073741824 bytes"});
+  ExpectRefused(refusal("(67108865, 2)"), absl::StatusCode::kDataLoss,
+                {"67108865 particles; at most 67108864"});
   ExpectRefused(refusal("(-1, 2)"), absl::StatusCode::kDataLoss, {"shape"});
   ExpectRefused(refusal("2"), absl::StatusCode::kDataLoss, {"shape"});
 }
@@ -251,6 +253,13 @@ TEST(Npz, SeparateAxesAreRecognisedAndOthersChosen) {
   EXPECT_THAT(ReadOne(path, {.columns = "where"}).positions, testing::ElementsAreArray(kPositions));
   ExpectRefused(ReadAll(path, {.select = {"type=fluid"}}).status,
                 absl::StatusCode::kFailedPrecondition, {"type=fluid", "numbers"});
+}
+
+TEST(Npz, CountsParticlesBeforeItReadsThem) {
+  const support::TemporaryFolder directory;
+  const std::string content = Zip({{"pos.npy", Npy("'<f4'", "(67108865, 2)", "")}});
+  ExpectRefused(ReadAll(directory.Write("frame.npz", content)).status, absl::StatusCode::kDataLoss,
+                {"frame.npz", "67108865 particles; at most 67108864"});
 }
 
 TEST(Npz, RefusesSurplusData) {
