@@ -22,6 +22,9 @@ namespace partiemc::client::recording {
 /// blocks are neither written nor read.
 inline constexpr std::size_t kMaxBlockBytes = std::size_t{1} << 30;
 
+/// Limit on the attributes of a frame.
+inline constexpr std::size_t kMaxAttributes = 4096;
+
 inline constexpr std::string_view kFileTag = "PEMCFILE";
 inline constexpr std::string_view kTailTag = "PEMCTAIL";
 inline constexpr std::uint64_t kVersion = 1;

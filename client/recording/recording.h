@@ -41,6 +41,9 @@ struct RecordingOptions {
   /// Compression level of zstd, 1 to 19. 3 writes 200 MB/s; 19 makes files 20 % smaller and writes
   /// 2 MB/s.
   int compression_level = 3;
+  /// A frame with more bytes in the recording, before compression, is refused. At most
+  /// kMaxBlockBytes.
+  std::size_t max_frame_bytes = std::size_t{1} << 30;
 };
 
 /// Writes a recording. Finish creates the file. Memory: one block.
@@ -55,8 +58,8 @@ class RecordingWriter {
   /// Appends a frame with its arrays and its box. A triclinic box is left out, as are the bounds of
   /// axes that are not periodic. Frames are numbered in the order of calls.
   /// If a frame has no time, its velocities are left out, and its time is the number of its time
-  /// step, else the number of the frame. Errors: INVALID_ARGUMENT (float32 is too coarse); the
-  /// errors of AtomicFile.
+  /// step, else the number of the frame. Errors: INVALID_ARGUMENT (float32 is too coarse);
+  /// RESOURCE_EXHAUSTED (more than max_frame_bytes or kMaxAttributes); the errors of AtomicFile.
   absl::Status Add(const RecordedFrame& frame);
 
   absl::Status Finish();
@@ -75,8 +78,9 @@ bool IsRecording(const std::string& path);
 
 /// Reads a recording. A truncated file ends after its last complete block, with a notice; a damaged
 /// block is kDataLoss. Every block is checked before its frames are delivered. Files are not
-/// trusted: blocks are limited (kMaxBlockBytes), and memory grows with their actual content. Ids
-/// are returned unchanged. Velocities are returned only if all velocities of the frame are finite.
+/// trusted: blocks are limited (kMaxBlockBytes, kMaxAttributes), and memory grows with their actual
+/// content. Ids are returned unchanged. Velocities are returned only if all velocities of the frame
+/// are finite.
 class RecordingReader final : public Sequence {
  public:
   /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.

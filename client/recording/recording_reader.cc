@@ -1,4 +1,6 @@
+#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/wire_format_lite.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +20,13 @@
 namespace partiemc::client {
 namespace {
 
+using google::protobuf::internal::WireFormatLite;
+using google::protobuf::io::CodedInputStream;
 using recording::BlockReader;
+
+// Limit on the fields of a message, nested and unknown ones included. An attribute is a field with
+// three fields.
+constexpr std::size_t kMaxFields = 4 * recording::kMaxAttributes + 64;
 
 absl::Status CheckBytes(const char* field, std::size_t size, std::size_t expected) {
   if (size == 0 || size == expected) return absl::OkStatus();
@@ -116,16 +124,48 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   return absl::OkStatus();
 }
 
+// Counts the fields of a message of `type` up to the first malformed one. Returns false if it is
+// malformed or has too many fields. A parsed field can take fifty times its serialised size.
+bool HasFewFields(CodedInputStream& input, const google::protobuf::Descriptor& type,
+                  std::size_t& fields) {
+  while (const std::uint32_t tag = input.ReadTag()) {
+    const auto wire_type = WireFormatLite::GetTagWireType(tag);
+    if (++fields > kMaxFields || wire_type == WireFormatLite::WIRETYPE_START_GROUP) return false;
+    const auto* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    if (field == nullptr || field->message_type() == nullptr ||
+        wire_type != WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
+      if (!WireFormatLite::SkipField(&input, tag)) return false;
+      continue;
+    }
+    int length = 0;
+    if (!input.ReadVarintSizeAsInt(&length)) return false;
+    const auto limit = input.PushLimit(length);
+    if (!HasFewFields(input, *field->message_type(), fields)) return false;
+    if (input.BytesUntilLimit() != 0) return false;
+    input.PopLimit(limit);
+  }
+  return true;
+}
+
 // Removes the next length-delimited message from `block`.
 template <typename Message>
 absl::Status TakeMessage(std::string_view& block, Message& message) {
-  google::protobuf::io::CodedInputStream stream(reinterpret_cast<const std::uint8_t*>(block.data()),
-                                                static_cast<int>(block.size()));
+  CodedInputStream stream(reinterpret_cast<const std::uint8_t*>(block.data()),
+                          static_cast<int>(block.size()));
   std::uint32_t size = 0;
   const bool has_size = stream.ReadVarint32(&size);
   const std::size_t start = static_cast<std::size_t>(stream.CurrentPosition());
-  if (!has_size || size > block.size() - start ||
-      !message.ParseFromArray(block.data() + start, static_cast<int>(size))) {
+  if (!has_size || size > block.size() - start) {
+    return absl::DataLossError("a message cannot be read");
+  }
+  CodedInputStream content(reinterpret_cast<const std::uint8_t*>(block.data()) + start,
+                           static_cast<int>(size));
+  std::size_t fields = 0;
+  const bool has_few_fields = HasFewFields(content, *Message::descriptor(), fields);
+  if (fields > kMaxFields) {
+    return absl::DataLossError(absl::StrCat("a message has more than ", kMaxFields, " fields"));
+  }
+  if (!has_few_fields || !message.ParseFromArray(block.data() + start, static_cast<int>(size))) {
     return absl::DataLossError("a message cannot be read");
   }
   block.remove_prefix(start + size);

@@ -63,6 +63,7 @@ class RecordingWriter::Impl {
       : file_(std::move(file)),
         spacing_(header.spacing),
         float64_(options.float64),
+        max_frame_bytes_(options.max_frame_bytes),
         packer_(options.compression_level) {}
 
   absl::Status Begin(const RecordingHeader& header) {
@@ -77,6 +78,11 @@ class RecordingWriter::Impl {
   }
 
   absl::Status Add(const RecordedFrame& frame) {
+    if (frame.attributes.size() > recording::kMaxAttributes) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat(frame.source, ": has ", frame.attributes.size(),
+                       " attributes; a recording holds at most ", recording::kMaxAttributes));
+    }
     message_.set_sequence(frame_count_);
     message_.set_time(frame.time.value_or(frame.step.value_or(static_cast<double>(frame_count_))));
     const absl::Status status = SetPositions(frame);
@@ -94,6 +100,11 @@ class RecordingWriter::Impl {
       scalar.set_name(attribute.name);
       scalar.set_components(static_cast<std::uint32_t>(attribute.components));
       wire::AssignBytes(std::span<const float>(attribute.values), *scalar.mutable_values());
+    }
+    // Protobuf serialises no message above 2 GiB.
+    if (const std::size_t bytes = message_.ByteSizeLong(); bytes > max_frame_bytes_) {
+      return absl::ResourceExhaustedError(absl::StrCat(
+          frame.source, ": has ", bytes, " bytes; a recording holds at most ", max_frame_bytes_));
     }
     AppendDelimited(message_, block_);
     ++frame_count_;
@@ -168,6 +179,7 @@ class RecordingWriter::Impl {
   AtomicFile file_;
   const std::optional<double> spacing_;
   const bool float64_;
+  const std::size_t max_frame_bytes_;
   recording::BlockPacker packer_;
   v1::ParticleFrame message_;
   std::vector<float> positions_;
@@ -192,6 +204,13 @@ absl::StatusOr<std::unique_ptr<RecordingWriter>> RecordingWriter::Create(
                            .field = "compression_level",
                            .value = absl::StrCat(options.compression_level),
                            .rule = "must be in [1, 19]"});
+  }
+  if (options.max_frame_bytes > recording::kMaxBlockBytes) {
+    return ViolationError(absl::StatusCode::kInvalidArgument,
+                          {.reason = std::string(kReasonOutOfRange),
+                           .field = "max_frame_bytes",
+                           .value = absl::StrCat(options.max_frame_bytes),
+                           .rule = absl::StrCat("must be at most ", recording::kMaxBlockBytes)});
   }
   auto file = AtomicFile::Create(path);
   if (!file.ok()) return file.status();

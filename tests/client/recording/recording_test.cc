@@ -317,6 +317,46 @@ TEST_F(Recording, RefusesABlockOneByteAboveTheLimit) {
   EXPECT_EQ(read(*size - 1).status().code(), absl::StatusCode::kDataLoss);
 }
 
+TEST_F(Recording, RefusesToWriteAFrameAboveTheLimits) {
+  RecordedFrame frame;
+  frame.source = "big.csv";
+  frame.positions.assign(2 * 1000, 0.0);
+  const auto add = [&](std::size_t max_frame_bytes) {
+    const auto writer = RecordingWriter::Create(Path(), {}, {.max_frame_bytes = max_frame_bytes});
+    return writer.ok() ? (*writer)->Add(frame) : writer.status();
+  };
+  EXPECT_TRUE(add(9000).ok());
+  const absl::Status refused = add(8000);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("big.csv: has 80"));
+  EXPECT_EQ(add(recording::kMaxBlockBytes + 1).code(), absl::StatusCode::kInvalidArgument);
+  frame.positions.clear();
+  frame.attributes.resize(recording::kMaxAttributes + 1);
+  EXPECT_EQ(add(recording::kMaxBlockBytes).code(), absl::StatusCode::kResourceExhausted);
+}
+
+TEST_F(Recording, HoldsTheMostAttributesAndReadsNoMore) {
+  RecordedFrame frame;
+  frame.positions = {1, 2};
+  frame.attributes.assign(recording::kMaxAttributes, {"name", 3, {1, 2, 3}});
+  Write(Path(), {frame});
+  const WhatWasRead most = Read(Path());
+  ASSERT_THAT(most.frames, SizeIs(1)) << most.status;
+  EXPECT_EQ(most.frames[0].attributes, frame.attributes);
+
+  // A frame of a million empty attributes (field 8 of ParticleFrame).
+  recording::BlockPacker packer(1);
+  std::string file = recording::MakeMark(recording::kFileTag, recording::kVersion);
+  file += *packer.Pack(std::string(1, '\0'));
+  std::string block("\x80\x89\x7a", 3);
+  for (int k = 0; k < 1'000'000; ++k) block += std::string("\x42\0", 2);
+  file += *packer.Pack(block);
+  WriteBytes(Path(), file);
+  const absl::Status refused = Read(Path()).status;
+  EXPECT_EQ(refused.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("fields"));
+}
+
 TEST_F(Recording, BytesBehindTheEndAreDamage) {
   Write(Path(), RandomFrames(2));
   WriteBytes(Path(), Bytes(Path()) + "x");
