@@ -45,6 +45,12 @@ int Complain(ExitCode code, std::string_view message) {
 
 int Complain(ExitCode code, const absl::Status& status) { return Complain(code, OneLine(status)); }
 
+int EndOutput(int code) {
+  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (is_written || code != kGood) return code;
+  return Complain(kFailed, "standard output: cannot be written; check the disk or the pipe");
+}
+
 std::string AsFlag(const absl::Status& status) {
   std::string line = OneLine(status);
   constexpr std::string_view kAddress = "address:";

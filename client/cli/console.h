@@ -23,6 +23,10 @@ enum ExitCode : int {
 int Complain(ExitCode code, std::string_view message);
 int Complain(ExitCode code, const absl::Status& status);
 
+/// Writes what is left of standard output. Returns `code`, or kFailed with a message for kGood if
+/// standard output could not be written.
+int EndOutput(int code);
+
 /// Makes untrusted text safe to print on one line of a terminal. Line feeds become "\n"; carriage
 /// returns and tabs become blanks; other control characters and invalid UTF-8 become escapes
 /// (Printable).

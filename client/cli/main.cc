@@ -1,5 +1,6 @@
 // `partiemc`: the command line. Connects flags with verbs.
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <string>
 #include <string_view>
@@ -60,12 +61,7 @@ int ComplainUsage(const CLI::App& app, const CLI::ParseError& error, std::string
   return Complain(partiemc::client::kUsage, wrong + "; see `" + help + " --help`");
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  // Disables gRPC's log lines, which are for its developers. This program reports connection errors
-  // itself.
-  setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
+int Run(int argc, char** argv) {
   CLI::App app("Outlines and surfaces of particle frames (SPH, granular), stable over time.",
                "partiemc");
   app.set_version_flag("--version", "partiemc " PARTIEMC_VERSION);
@@ -97,4 +93,15 @@ int main(int argc, char** argv) {
   if (info_verb->parsed()) return Info(info);
   if (load_verb->parsed()) return Load(load);
   return Convert(convert);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Disables gRPC's log lines, which are for its developers. This program reports connection errors
+  // itself.
+  setenv("GRPC_VERBOSITY", "NONE", /*replace=*/0);
+  // A write above the limit of file sizes then fails, and temporary files are removed.
+  std::signal(SIGXFSZ, SIG_IGN);
+  return partiemc::client::EndOutput(Run(argc, argv));
 }

@@ -13,7 +13,9 @@ namespace partiemc::client {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Each;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // Three frames of 900 particles with times, which a notice reports.
@@ -42,6 +44,20 @@ TEST(FullDisk, EndsWithTheErrorInTheLastLine) {
     EXPECT_THAT(ran.error, HasSubstr("times of the frames from"));
     EXPECT_THAT(LastLine(ran.error),
                 AllOf(StartsWith("partiemc: " + output.path().string()), HasSubstr("too large")));
+    EXPECT_THAT(FilesIn(output.path()), Each(Not(HasSubstr(".part"))));
+  }
+}
+
+TEST(FullDisk, IsAnErrorForStandardOutputToo) {
+  for (const auto& command :
+       std::vector<std::vector<std::string>>{{"--version"},
+                                             {"replay", "--help"},
+                                             {"replay", kDamBreak, "--local", "--frames", "0"}}) {
+    std::vector<std::string> arguments = {"-c", "exec \"$0\" \"$@\" > /dev/full", PARTIEMC_PROGRAM};
+    arguments.insert(arguments.end(), command.begin(), command.end());
+    Program program("/bin/sh", arguments);
+    EXPECT_EQ(program.Wait(), 1);
+    EXPECT_THAT(LastLine(program.Error()), StartsWith("partiemc: standard output: cannot be"));
   }
 }
 
