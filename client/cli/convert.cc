@@ -115,9 +115,7 @@ int Convert(const ConvertFlags& flags) {
   Progress progress(std::move(progress_options));
   const CopyEnd ended = CopyFrames(*input->frames, **writer, progress);
   progress.Finish();
-  if (!flags.quiet) {
-    for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
-  }
+  PrintNotices(*input->frames, flags.quiet);
   if (ended.code != kGood) return Complain(ended.code, ended.error);
   if ((*writer)->frame_count() == 0) {
     return Complain(kInput, Concat(flags.input, ": has no frame to convert; check --frames"));

@@ -9,6 +9,7 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
+#include "client/cli/console.h"
 #include "client/recording/recording.h"
 #include "partiemc/spacing.h"
 
@@ -56,6 +57,12 @@ absl::StatusOr<double> EstimatedSpacing(const std::string& input, const Sequence
       std::snprintf(text, sizeof text, "%.4g", *spacing);
       return std::strtod(text, nullptr);
     }
+  }
+}
+
+void PrintNotices(const Sequence& frames, bool quiet) {
+  for (const std::string& notice : quiet ? frames.losses() : frames.notices()) {
+    Complain(kGood, notice);
   }
 }
 

@@ -29,6 +29,9 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
 /// Errors: as OpenInput and Sequence::Next; INVALID_ARGUMENT if there is no such frame.
 absl::StatusOr<double> EstimatedSpacing(const std::string& input, const SequenceOptions& options);
 
+/// Prints the notices of an input on standard error; with `quiet` only those of lost frames.
+void PrintNotices(const Sequence& frames, bool quiet);
+
 /// Adds --attributes, a list of names.
 CLI::Option* AddAttributesFlag(CLI::App& app, SequenceOptions& options, const std::string& what);
 

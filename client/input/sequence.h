@@ -139,6 +139,9 @@ class Sequence {
   /// Notices for the user: skipped files, the recognised plane, ignored arrays. Next may add
   /// notices.
   virtual const std::vector<std::string>& notices() const = 0;
+
+  /// Those of the notices that report lost frames: a truncated recording.
+  virtual std::vector<std::string> losses() const { return {}; }
 };
 
 }  // namespace partiemc::client

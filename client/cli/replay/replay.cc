@@ -335,12 +335,10 @@ int Replay(const ReplayFlags& given) {
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   progress.Finish();
 
-  if (!flags.quiet) {
-    for (const std::string& notice : input->frames->notices()) Complain(kGood, notice);
-    if (feeder.skipped_count() > 0) {
-      Complain(kGood, Concat(Plural(feeder.skipped_count(), "frame"),
-                             " skipped because newer ones arrived (--policy latest)"));
-    }
+  PrintNotices(*input->frames, flags.quiet);
+  if (!flags.quiet && feeder.skipped_count() > 0) {
+    Complain(kGood, Concat(Plural(feeder.skipped_count(), "frame"),
+                           " skipped because newer ones arrived (--policy latest)"));
   }
   const std::string early = WhyEarly(ended.code, input_status);
   if (!early.empty()) outputs->EndEarly(early);

@@ -128,6 +128,21 @@ TEST(Convert, ARecordingOfARecordingIsTheSame) {
   EXPECT_EQ(frames, 75);
 }
 
+TEST(Convert, ATruncatedRecordingIsReportedEvenIfQuiet) {
+  const support::TemporaryFolder directory;
+  const std::string whole = directory.Path("whole.pemc"), copy = directory.Path("copy.pemc");
+  ASSERT_EQ(RunPartiemc({"convert", kDamBreak, whole, "--frames", "0:10"}).exit_code, 0);
+  std::filesystem::resize_file(whole, std::filesystem::file_size(whole) - 100);
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"convert", whole, copy, "--quiet"}, {"replay", whole, "--local", "--quiet"}}) {
+    const Ran ran = RunPartiemc(command);
+    EXPECT_EQ(ran.exit_code, 0);
+    EXPECT_EQ(ran.error, "partiemc: " + whole +
+                             ": truncated after 8 frames; what was recorded later is lost\n");
+    EXPECT_THAT(ran.out, IsEmpty());
+  }
+}
+
 TEST(Convert, RefusesFloat32FarFromTheOriginAndLeavesNothingBehind) {
   const support::TemporaryFolder directory;
   WriteDump(directory.Path("far.lammpstrj"), 1e6);
