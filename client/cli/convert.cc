@@ -101,6 +101,9 @@ int Convert(const ConvertFlags& flags) {
     const bool wrong_flag = input.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kInput, input.status());
   }
+  if (const auto kept = CheckKeepsInput(flags.input, *input->frames, {flags.output}); !kept.ok()) {
+    return Complain(kUsage, kept);
+  }
   CatchInterrupts();  // Before the first temporary file exists.
   const auto writer = RecordingWriter::Create(
       flags.output,

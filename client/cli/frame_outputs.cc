@@ -1,8 +1,10 @@
 #include "client/cli/frame_outputs.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <span>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -89,6 +91,22 @@ absl::Status FrameOutputs::Check(const Places& places) {
     if (!status.ok()) return status;
   }
   return CheckSurfaces(places, formats);
+}
+
+std::vector<std::string> FrameOutputs::Targets(const Places& places) {
+  std::vector<std::string> targets;
+  if (!places.stats.empty()) targets.push_back(places.stats);
+  if (places.output_dir.empty()) return targets;
+  const std::vector<FrameFormat> formats = *ParseFrameFormats(FormatOf(places));
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(places.output_dir, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (std::ranges::any_of(formats, [&](FrameFormat f) { return IsFrameFile(name, f); })) {
+      targets.push_back(it->path().string());
+    }
+  }
+  return targets;
 }
 
 absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {

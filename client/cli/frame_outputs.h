@@ -43,6 +43,10 @@ class FrameOutputs {
   /// writable, the first Write fails. Errors: as Check and AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
+  /// The file of statistics, and the files in the output directory that frames can replace.
+  /// Requires: Check(places) is OK.
+  static std::vector<std::string> Targets(const Places& places);
+
   /// Whether a file shows the normals of ring vertices.
   bool ShowNormals() const { return show_normals_; }
 

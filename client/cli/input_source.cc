@@ -3,7 +3,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -58,6 +60,26 @@ absl::StatusOr<double> EstimatedSpacing(const std::string& input, const Sequence
       return std::strtod(text, nullptr);
     }
   }
+}
+
+absl::Status CheckKeepsInput(const std::string& input, const Sequence& frames,
+                             const std::vector<std::string>& targets) {
+  // Without symbolic links, which AtomicFile follows.
+  const auto canonical = [](const std::string& file) {
+    std::error_code error;
+    std::filesystem::path path =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(file, error), error);
+    return error ? std::filesystem::path(file) : path;
+  };
+  std::set<std::filesystem::path> kept = {canonical(input)};
+  for (const std::string& file : frames.files()) kept.insert(canonical(file));
+  for (const std::string& target : targets) {
+    if (kept.contains(canonical(target))) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(target, ": would overwrite the input; choose another path"));
+    }
+  }
+  return absl::OkStatus();
 }
 
 void PrintNotices(const Sequence& frames, bool quiet) {

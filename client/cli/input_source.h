@@ -29,6 +29,11 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
 /// Errors: as OpenInput and Sequence::Next; INVALID_ARGUMENT if there is no such frame.
 absl::StatusOr<double> EstimatedSpacing(const std::string& input, const SequenceOptions& options);
 
+/// Checks that no file of `targets` is one of the input: `input` itself or a file of `frames`.
+/// Errors: INVALID_ARGUMENT.
+absl::Status CheckKeepsInput(const std::string& input, const Sequence& frames,
+                             const std::vector<std::string>& targets);
+
 /// Prints the notices of an input on standard error; with `quiet` only those of lost frames.
 void PrintNotices(const Sequence& frames, bool quiet);
 

@@ -80,6 +80,12 @@ class FileSequence final : public Sequence {
 
   const std::vector<std::string>& notices() const override { return recording_.notices; }
 
+  std::vector<std::string> files() const override {
+    std::vector<std::string> files = recording_.files;
+    if (!recording_.times_path.empty()) files.push_back(recording_.times_path);
+    return files;
+  }
+
  private:
   absl::StatusOr<bool> ReadNext(RecordedFrame& frame) {
     while (index_ < recording_.range.end) {

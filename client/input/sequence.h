@@ -140,6 +140,9 @@ class Sequence {
   /// notices.
   virtual const std::vector<std::string>& notices() const = 0;
 
+  /// The files that Next reads, and the file of times.
+  virtual std::vector<std::string> files() const = 0;
+
   /// Those of the notices that report lost frames: a truncated recording.
   virtual std::vector<std::string> losses() const { return {}; }
 };

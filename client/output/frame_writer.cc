@@ -27,6 +27,9 @@ constexpr std::array kFormats = {
     FrameFormat::kCsv,     FrameFormat::kPly, FrameFormat::kStl, FrameFormat::kGlb,
 };
 
+// Digits of the index in the name of a file, with leading zeros.
+constexpr int kIndexDigits = 6;
+
 // Whether coordinates and their differences stay finite as 32-bit floats.
 bool AreFloats(std::span<const double> points) {
   return std::ranges::all_of(
@@ -174,6 +177,18 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
       Concat("format: '", Name(format), "' is not part of this build; build it with VTK"));
 }
 
+bool IsFrameFile(std::string_view name, FrameFormat format) {
+  const bool is_list = ConsumePrefix(name, "frames");
+  if (!is_list) {
+    if (!ConsumePrefix(name, "frame_")) return false;
+    const std::size_t size = name.size();
+    if (!ConsumeNumber<std::uint64_t>(name) || size < name.size() + kIndexDigits) return false;
+  }
+  if (ConsumePrefix(name, "_section_") && !ConsumeNumber<std::uint64_t>(name)) return false;
+  if (is_list) return format == FrameFormat::kVtp && (name == ".pvd" || name == ".vtp.series");
+  return name == Concat(".", Name(format));
+}
+
 absl::StatusOr<FrameWriter> FrameWriter::Create(FrameWriterOptions options) {
   std::error_code error;
   std::filesystem::create_directories(options.directory, error);
@@ -235,7 +250,7 @@ absl::Status FrameWriter::Finish() const {
 std::filesystem::path FrameWriter::PathOf(const FrameRecord& frame, FrameFormat format) const {
   const std::string section = frame.section > 0 ? Concat("_section_", frame.section) : "";
   return options_.directory /
-         absl::StrFormat("frame_%06d%s.%s", frame.index, section, Name(format));
+         absl::StrFormat("frame_%0*d%s.%s", kIndexDigits, frame.index, section, Name(format));
 }
 
 }  // namespace partiemc::client

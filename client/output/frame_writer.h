@@ -105,6 +105,9 @@ struct FrameWriterOptions {
 absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& frame,
                                         const FrameWriterOptions& options);
 
+/// Whether a FrameWriter for `format` can write a file of this name.
+bool IsFrameFile(std::string_view name, FrameFormat format);
+
 /// Writes each frame and each of its sections in each format. Files appear complete or not at all.
 class FrameWriter {
  public:

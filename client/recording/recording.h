@@ -95,6 +95,7 @@ class RecordingReader final : public Sequence {
   std::optional<std::size_t> FrameCount() override;
   std::string Description() const override;
   const std::vector<std::string>& notices() const override;
+  std::vector<std::string> files() const override;
   std::vector<std::string> losses() const override { return notices(); }
 
  private:

@@ -332,5 +332,6 @@ std::string RecordingReader::Description() const {
   return title.empty() ? "recording" : absl::StrCat("recording: ", title);
 }
 const std::vector<std::string>& RecordingReader::notices() const { return impl_->notices(); }
+std::vector<std::string> RecordingReader::files() const { return {impl_->path()}; }
 
 }  // namespace partiemc::client

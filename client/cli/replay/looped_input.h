@@ -27,6 +27,7 @@ class LoopedInput final : public Sequence {
   std::optional<std::size_t> FrameCount() override { return std::nullopt; }
   std::string Description() const override { return frames_->Description() + ", in a loop"; }
   const std::vector<std::string>& notices() const override { return frames_->notices(); }
+  std::vector<std::string> files() const override { return frames_->files(); }
   std::vector<std::string> losses() const override { return frames_->losses(); }
 
  private:

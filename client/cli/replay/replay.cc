@@ -307,7 +307,7 @@ int Replay(const ReplayFlags& given) {
     input->frames = std::make_unique<LoopedInput>(*std::move(input), flags.input, flags.sequence);
   }
   CatchInterrupts();  // Before the first temporary file exists.
-  auto outputs = ReplayOutputs::Create(flags, *parameters);
+  auto outputs = ReplayOutputs::Create(flags, *parameters, *input->frames);
   if (!outputs.ok()) {
     const bool wrong_flag = outputs.status().code() == absl::StatusCode::kInvalidArgument;
     return Complain(wrong_flag ? kUsage : kFailed, outputs.status());

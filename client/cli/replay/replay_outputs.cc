@@ -1,16 +1,34 @@
 #include "client/cli/replay/replay_outputs.h"
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "client/cli/input_source.h"
 
 namespace partiemc::client {
 
-absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
-                                                    const ReconstructionParameters& parameters) {
+namespace {
+
+FrameOutputs::Places PlacesOf(const ReplayFlags& flags) {
   FrameOutputs::Places places = flags.files;
   places.surface = flags.surface;
   places.walls = !flags.walls.empty();
+  return places;
+}
+
+}  // namespace
+
+absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
+                                                    const ReconstructionParameters& parameters,
+                                                    const Sequence& input) {
+  const FrameOutputs::Places places = PlacesOf(flags);
+  if (absl::Status status = FrameOutputs::Check(places); !status.ok()) return status;
+  std::vector<std::string> targets = FrameOutputs::Targets(places);
+  if (!flags.report.empty()) targets.push_back(flags.report);
+  if (absl::Status status = CheckKeepsInput(flags.input, input, targets); !status.ok()) {
+    return status;
+  }
   auto frames = FrameOutputs::Create(places);
   if (!frames.ok()) return frames.status();
   ReplayOutputs outputs(*std::move(frames));

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "client/cli/frame_outputs.h"
 #include "client/cli/replay/replay.h"
+#include "client/input/sequence.h"
 #include "client/output/frame_record.h"
 #include "client/output/report.h"
 #include "client/output/summary.h"
@@ -19,9 +20,10 @@ namespace partiemc::client {
 class ReplayOutputs {
  public:
   /// Opens every output, so that an unwritable path is reported before the work begins.
-  /// Errors: as FrameOutputs::Create.
+  /// Errors: as FrameOutputs::Create; INVALID_ARGUMENT if an output would overwrite `input`.
   static absl::StatusOr<ReplayOutputs> Create(const ReplayFlags& flags,
-                                              const ReconstructionParameters& parameters);
+                                              const ReconstructionParameters& parameters,
+                                              const Sequence& input);
 
   /// Whether an output shows the normals of ring vertices.
   bool WantsNormals() const;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Each;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -59,6 +61,37 @@ TEST(FullDisk, IsAnErrorForStandardOutputToo) {
     EXPECT_EQ(program.Wait(), 1);
     EXPECT_THAT(LastLine(program.Error()), StartsWith("partiemc: standard output: cannot be"));
   }
+}
+
+TEST(Input, IsNotOverwritten) {
+  const support::TemporaryFolder directory;
+  const std::string csv = directory.Path("in/frame_000000.csv");
+  const std::string pemc = directory.Path("a.pemc"), link = directory.Path("link.pemc");
+  std::filesystem::create_directory(directory.Path("in"));
+  std::ofstream(csv) << "x,y\n0,0\n1,0\n2,0\n0,1\n1,1\n2,1\n0,2\n1,2\n2,2\n";
+  std::ofstream(directory.Path("in/times.csv")) << "frame,t\n0,0.5\n";
+  ASSERT_EQ(RunPartiemc({"convert", csv, pemc}).exit_code, 0);
+  std::filesystem::create_symlink(pemc, link);
+  const std::string recorded = Content(pemc), table = Content(csv);
+  const std::string in = directory.Path("in");
+  const std::vector<std::vector<std::string>> commands = {
+      {"convert", pemc, pemc, "--frames", "0:1"},
+      {"convert", pemc, link},
+      {"replay", csv, "--local", "--stats", directory.Path("in/../in/frame_000000.csv")},
+      {"replay", in, "--local", "--stats", directory.Path("in/times.csv")},
+      {"replay", in, "--local", "--report", csv},
+      {"replay", in, "--local", "--output-dir", in, "--format", "svg,csv"}};
+  for (const auto& command : commands) {
+    const Ran ran = RunPartiemc(command);
+    EXPECT_EQ(ran.exit_code, 2) << ::testing::PrintToString(command);
+    EXPECT_THAT(LastLine(ran.error), HasSubstr("would overwrite the input"));
+  }
+  EXPECT_EQ(Content(pemc), recorded);
+  EXPECT_EQ(Content(csv), table);
+  EXPECT_THAT(FilesIn(in), ElementsAre("frame_000000.csv", "times.csv"));
+  EXPECT_EQ(RunPartiemc({"replay", in, "--local", "--output-dir", in, "--format", "svg"}).exit_code,
+            0);
+  EXPECT_THAT(FilesIn(in), ElementsAre("frame_000000.csv", "frame_000000.svg", "times.csv"));
 }
 
 // zstd compresses equal lines ten-thousandfold.

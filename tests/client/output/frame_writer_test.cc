@@ -55,6 +55,19 @@ TEST(FrameWriter, RefusesNonFiniteCoordinates) {
   }
 }
 
+TEST(FrameWriter, KnowsTheNamesOfItsFiles) {
+  for (const char* name : {"frame_000000.vtp", "frame_1234567.vtp", "frame_000001_section_2.vtp",
+                           "frames.pvd", "frames_section_12.vtp.series"}) {
+    EXPECT_TRUE(IsFrameFile(name, FrameFormat::kVtp)) << name;
+    EXPECT_FALSE(IsFrameFile(name, FrameFormat::kCsv)) << name;
+  }
+  EXPECT_TRUE(IsFrameFile("frame_000000.csv", FrameFormat::kCsv));
+  for (const char* name : {"frame_0000.csv", "frame_000000.csv.gz", "frame_.csv", "frames.csv",
+                           "frame_000000_section_.csv", "a_000000.csv", "frame_-00001.csv", ""}) {
+    EXPECT_FALSE(IsFrameFile(name, FrameFormat::kCsv)) << name;
+  }
+}
+
 TEST(Stretches, EndAtCuts) {
   Result result;
   result.rings.points.resize(2 * 11);
