@@ -30,6 +30,7 @@ constexpr double kMostCells = 1 << 30;
 constexpr double kMostLengths = 1e6;
 
 constexpr std::size_t kGrain = 1 << 12;
+constexpr std::size_t kItemsPerCheck = 1 << 16;
 
 std::uint8_t AxisBit(std::size_t axis) { return static_cast<std::uint8_t>(1u << axis); }
 
@@ -320,6 +321,7 @@ void ForEachCopy(const Grid& grid, LiftScratch& s, std::size_t components, doubl
     const std::uint8_t axes = s.cells[s.sets.Find(k).root].percolates;
     if (axes == 0) continue;
     for (std::uint32_t i = s.cells[k].first; i < s.cells[k].last; ++i) {
+      if (i % kItemsPerCheck == 0) ThrowIfCancelled();
       const std::uint32_t particle = s.groups.items()[i];
       Image least{}, most{};
       for (std::size_t axis = 0; axis < components; ++axis) {
@@ -349,7 +351,9 @@ std::span<const Value> WithCopies(std::span<const Value> given, std::size_t comp
   if (given.empty()) return given;
   values.reserve(given.size() + components * originals.size());
   values.assign(given.begin(), given.end());
-  for (const std::uint32_t particle : originals) {
+  for (std::size_t copy = 0; copy < originals.size(); ++copy) {
+    if (copy % kItemsPerCheck == 0) ThrowIfCancelled();
+    const std::uint32_t particle = originals[copy];
     const auto first = given.begin() + static_cast<std::ptrdiff_t>(particle * components);
     values.insert(values.end(), first, first + static_cast<std::ptrdiff_t>(components));
   }

@@ -6,9 +6,12 @@
 #include <utility>
 
 #include "base/bits.h"
+#include "base/cancellation.h"
 
 namespace partiemc {
 namespace {
+
+constexpr std::size_t kItemsPerCheck = 1 << 16;
 
 // Joins the components that share a particle.
 void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
@@ -21,9 +24,11 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
   c.total.assign(components, 0);
   c.set.resize(components);
   std::iota(c.set.begin(), c.set.end(), 0u);
+  std::size_t visited = 0;
   topology.components.ForEachParticle(
       input.bins, input.crossings,
       [&](std::uint32_t, std::uint32_t particle, std::uint32_t component) {
+        if (visited++ % kItemsPerCheck == 0) ThrowIfCancelled();
         const std::uint32_t source = input.bins.particles[particle].source;
         c.component_of[source] = component;
         if (source >= given) return;
@@ -31,6 +36,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
         if (!input.bins.weight.empty()) c.given_weight[component] += input.bins.weight[particle];
       });
   for (std::size_t copy = 0; copy < input.lifted.originals.size(); ++copy) {
+    if (copy % kItemsPerCheck == 0) ThrowIfCancelled();
     const std::uint32_t of_copy = c.component_of[given + copy];
     if (of_copy == kNoComponent) continue;
     c.has_copies[of_copy] = 1;

@@ -6,11 +6,13 @@
 #include <limits>
 
 #include "base/bits.h"
+#include "base/cancellation.h"
 
 namespace partiemc::space {
 namespace {
 
 constexpr std::uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
+constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 /// The nodes of `inside`, the inside nodes of a brick, that are connected to `seed` in this brick.
 BrickBits Connected(const BrickBits& inside, const BrickBits& seed) {
@@ -177,6 +179,7 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
     const std::uint32_t only = OnlyBodyAround(bins.bricks, bodies, brick);
     for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
+      if (p % kItemsPerCheck == 0) ThrowIfCancelled();
       const std::uint32_t index = BodyOfParticle(bins, field, bodies, brick, only, p);
       bodies.body_of_particle[p] = index;
       if (index == kNoIndex) continue;

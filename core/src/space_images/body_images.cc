@@ -7,12 +7,15 @@
 #include <variant>
 
 #include "base/bits.h"
+#include "base/cancellation.h"
 #include "space/crossings.h"
 
 namespace partiemc::space {
 namespace {
 
 using Image = BodyImageScratch::Image;
+
+constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 std::uint32_t RootOf(std::vector<Image>& images, std::uint32_t body) {
   return partiemc::RootOf(images, body, &Image::set);
@@ -73,10 +76,12 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
     s.images[body].volume = bodies.bodies[body].volume;
   }
   for (std::uint32_t p = 0; p < count; ++p) {
+    if (p % kItemsPerCheck == 0) ThrowIfCancelled();
     s.body_of[input.bins.source[p]] = bodies.body_of_particle[p];
   }
   const double usual = input.spacing * input.spacing * input.spacing;
   for (std::uint32_t p = 0; p < count; ++p) {
+    if (p % kItemsPerCheck == 0) ThrowIfCancelled();
     const std::uint32_t body = bodies.body_of_particle[p];
     if (body == kNoIndex || !input.bins.IsImage(p)) continue;
     s.images[body].has_copies = true;
@@ -93,6 +98,7 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
     s.images[std::max(a, b)].set = std::min(a, b);
   }
   for (std::uint32_t p = 0; p < count; ++p) {
+    if (p % kItemsPerCheck == 0) ThrowIfCancelled();
     if (bodies.body_of_particle[p] != kNoIndex || (input.bins.IsImage(p) && !input.wraps)) continue;
     const std::uint32_t original = input.lifted.OriginalOf(input.bins.source[p]);
     if (s.body_of[original] != kNoIndex) bodies.body_of_particle[p] = kDroppedBody;
