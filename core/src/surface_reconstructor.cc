@@ -132,7 +132,8 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
 }
 
 /// Sets bodies, samples and attribute values of `size`. `particles`: their number without images.
-void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& bodies,
+/// `usual`: the volume of a particle of the spacing.
+void AddBodies(const Frame& frame, std::size_t particles, double usual, const space::Bodies& bodies,
                space::SurfaceSize& size) {
   const bool wraps = frame.box && frame.box->wraps;
   std::uint64_t in_bodies = 0;
@@ -147,6 +148,9 @@ void AddBodies(const Frame& frame, std::size_t particles, const space::Bodies& b
       wraps ? static_cast<std::uint64_t>(std::ranges::count(bodies.body_of_particle, kNoIndex))
             : particles - in_bodies;
   size.bodies = bodies.bodies.size() + alone;
+  size.lone = alone;
+  size.has_large_lone =
+      !frame.volumes.empty() && std::ranges::max(frame.volumes) > space::kSmallDropVolume * usual;
   size.samples = frame.ids.empty() ? 0 : size.samples + alone;
   for (const Attribute& attribute : frame.attributes) size.attribute_values += attribute.components;
 }
@@ -391,7 +395,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;
     if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
-    AddBodies(frame, own_particles, b.bodies, size);
+    AddBodies(frame, own_particles, h * h * h, b.bodies, size);
     absl::Status reserved = Reserve(size, control.memory);
     if (reserved.ok()) space::ListSteps(bricks, b.crossings);
     return reserved;

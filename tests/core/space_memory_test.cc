@@ -106,6 +106,45 @@ TEST(MemoryGuard, IsToldNoLessThanASurfaceTakesAndNotMuchMore) {
   }
 }
 
+// Lone particles in cells that are larger than the kernel. In each brick they are as many as may
+// become ellipsoids, or far more at one place.
+TEST(MemoryGuard, IsToldNoLessThanLoneParticlesTake) {
+  support::Random random(7);
+  std::vector<double> spread, crowd;
+  for (int p = 0; p < 16 * 16 * 16; ++p) {
+    const int x = p % 16, y = p / 16 % 16, z = p / 256;
+    if ((x + y + z) % 2 == 0) spread.insert(spread.end(), {4. * x + 2, 4. * y + 2, 4. * z + 2});
+  }
+  for (int p = 0; p < 3 * 60'000; ++p) crowd.push_back(14 + random.Uniform(-.01, .01));
+  for (const auto* xyz : {&spread, &crowd}) {
+    for (const float volume : {1.f, 2.f}) {
+      SCOPED_TRACE(absl::StrCat(xyz->size() / 3, " particles of volume ", volume));
+      const std::vector<float> volumes(xyz->size() / 3, volume);
+      const auto reconstructor = SurfaceReconstructor::Create(
+          {.placement = SurfacePlacement::kVirtualPlane, .kernel_radius = 1.5, .cell_size = 4});
+      ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
+      const Frame frame{
+          .positions = std::span<const double>(*xyz), .components = 3, .volumes = volumes};
+      const std::size_t before = live_bytes;
+      peak_bytes = before;
+      RecordingGuard guard(2);
+      SurfaceWorkspace workspace;
+      Surface surface;
+      const absl::Status status =
+          reconstructor->Reconstruct(frame, workspace, surface, {.memory = &guard});
+      ASSERT_TRUE(status.ok()) << status;
+      const std::size_t held = peak_bytes - before;
+      EXPECT_EQ(surface.ShellCount(), xyz == &spread ? 2048u : 0u);
+      EXPECT_LE(held, guard.last());
+      if (xyz == &crowd) {
+        EXPECT_LE(held, 6u << 20);
+      } else {
+        EXPECT_GE(2.5 * static_cast<double>(held), static_cast<double>(guard.last()));
+      }
+    }
+  }
+}
+
 // Lone particles at walls are cut the most. The cut frees memory, so the peak counts.
 TEST(MemoryGuard, IsToldNoLessThanACutAtWallsTakes) {
   support::Random random(5);

@@ -1,6 +1,7 @@
 // An upper bound of the memory of a surface.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace partiemc::space {
@@ -14,6 +15,8 @@ struct SurfaceSize {
   std::uint64_t loops = 0;             ///< Loops of cells, if vertices leave their anchors; else 0.
   bool has_windows = false;            ///< True for `kVirtualPlane`.
   std::uint64_t bodies = 0;            ///< Bodies, and lone particles that may become ellipsoids.
+  std::uint64_t lone = 0;              ///< Lone particles that may become ellipsoids.
+  bool has_large_lone = false;         ///< Some may be larger than kSmallDropVolume.
   std::uint64_t attribute_values = 0;  ///< Components of all attributes.
   bool has_state = false;              ///< The frame belongs to a stream.
   bool is_simplified = false;
@@ -48,6 +51,18 @@ inline constexpr std::uint64_t kBytesPerSample = 200;
 /// Bytes of one value of an attribute at a point. An ellipsoid has up to 42 points.
 inline constexpr std::uint64_t kBytesPerValue = 8;
 inline constexpr std::uint64_t kMostPointsOfDrop = 42;
+/// Ellipsoids of at most kSmallDropVolume, in cubed spacings, have kPointsOfSmallDrop points.
+inline constexpr std::uint64_t kPointsOfSmallDrop = 12;
+inline constexpr double kSmallDropVolume = 1.7;
+
+/// If more drops reach a brick, all of them keep their surfaces. This limits the compared pairs and
+/// the ellipsoids.
+inline constexpr std::uint32_t kMostDropsOfBrick = 256;
+
+/// Bytes of the drop of a lone particle, and of a point of its ellipsoid. A small drop reaches at
+/// most 8 bricks, a large one 64.
+inline constexpr std::uint64_t kBytesPerSmallDrop = 500, kBytesPerLargeDrop = 1500;
+inline constexpr std::uint64_t kBytesPerLonePoint = 300;
 
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
 inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
@@ -78,6 +93,12 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
     if (size.has_windows) {
       bytes += kBytesPerSizedVertex * (size.edges + size.loops) + kBytesPerSizedWindow * size.loops;
     }
+  }
+  if (size.has_windows) {
+    const std::uint64_t most = std::min(size.lone, kMostDropsOfBrick * size.bricks);
+    bytes += (size.has_large_lone ? kBytesPerLargeDrop : kBytesPerSmallDrop) * size.lone;
+    bytes +=
+        kBytesPerLonePoint * most * (size.has_large_lone ? kMostPointsOfDrop : kPointsOfSmallDrop);
   }
   const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
   const std::uint64_t points = size.edges + size.loops + drop_points;

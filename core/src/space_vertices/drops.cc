@@ -8,17 +8,17 @@
 
 #include "base/bits.h"
 #include "base/cancellation.h"
+#include "space/surface_bytes.h"
 
 namespace partiemc::space {
 namespace {
 
-// If more drops reach a brick, all of them keep their surfaces. This limits the compared pairs.
-constexpr std::uint32_t kMostDropsOfBrick = 256;
 // A drop that reaches more bricks along an axis keeps its surface.
 constexpr double kMostBricksAlong = 4;
 // Radius in spacings. Smaller drops become icosahedra, whose edges are about as long as a cell of
 // the default size.
 constexpr double kSmallRadius = .75;
+constexpr std::uint32_t kItemsPerCheck = 1 << 16, kTrianglesPerCheck = 1 << 12;
 
 // Drops that are bent, hollow or in pieces fill less of the ellipsoid with their moments.
 constexpr double kLeastFilling = .5;
@@ -119,60 +119,10 @@ void AddParticle(const Vec3& at, double volume, Drops::Drop& drop) {
   for (int k = 0; k < 6; ++k) drop.second[k] += volume * products[k];
 }
 
-/// Finds the drops and their moments.
-void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) {
-  const Bodies& bodies = input.bodies;
-  const double cell = input.scale.cell_size;
-  const double unit = 1 / (cell * cell * cell);
-  drops.drops.clear();
-  drops.drop_of.assign(bodies.bodies.size(), kNoIndex);
-  for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
-    const std::uint64_t particles = bodies.bodies[body].particles;
-    // A body that is cut is longer than the box, or the box wraps.
-    const bool is_whole = !bodies.IsCut(body) || bodies.bodies[body].is_complete;
-    if (particles == 0 || particles > limits.most_particles || !is_whole) continue;
-    drops.drop_of[body] = static_cast<std::uint32_t>(drops.drops.size());
-    Drops::Drop& drop = drops.drops.emplace_back();
-    drop.body = body;
-    drop.particles = particles;
-  }
-  const double h = input.scale.spacing, usual = h * h * h;
-  const bool takes_lone = limits.least_particles <= 1;
-  for (std::uint32_t brick = 0; brick < input.bins.bricks.size(); ++brick) {
-    const Vec3 origin = OriginOf(input.bins.bricks[brick]);
-    const SpaceBins& bins = input.bins;
-    for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
-      const std::uint32_t body = bodies.body_of_particle[p];
-      if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
-      const bool is_image = bins.IsImage(p);
-      if (body == kNoIndex && is_image && !input.takes_copies) continue;
-      const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
-      const Vec3 at = origin + within;
-      const double volume =
-          input.frame.volumes.empty() ? usual : unit * input.frame.volumes[input.bins.source[p]];
-      if (body != kNoIndex) {
-        Drops::Drop& drop = drops.drops[drops.drop_of[body]];
-        AddParticle(at, volume, drop);
-        continue;
-      }
-      const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
-                                    static_cast<int>(within.z)};
-      const bool is_free = input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
-      if (!takes_lone || volume < unit * limits.least_volume || !is_free) continue;
-      Drops::Drop& drop = drops.drops.emplace_back();
-      drop.particle = p;
-      AddParticle(at, volume, drop);
-      drop.particles = 1;
-      // This node is outside and has not moved, so it is still outside of all bodies.
-      const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
-      drop.box = {corner, corner};
-    }
-  }
-}
-
-/// Adds the points and normals of an ellipsoid with the volume and the moments of the drop. Returns
-/// false if there is no such ellipsoid, or it is too thin, or the drop fills too little of it.
-bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
+/// Sets the points and normals to those of an ellipsoid with the volume and the moments of the
+/// drop. Returns false if there is no such ellipsoid, or it is too thin, or the drop fills too
+/// little of it.
+bool MakeEllipsoid(const Scale& scale, const Drops::Drop& drop, Drops& drops) {
   if (!(drop.volume > 0)) return false;
   const double inverse = 1 / drop.volume;
   const Vec3 centre = inverse * drop.first;
@@ -196,20 +146,24 @@ bool MakeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
   const double farthest =
       std::max({std::abs(drop.origin.x), std::abs(drop.origin.y), std::abs(drop.origin.z)});
   if (!(shortest > kLeastAxis + kLeastAxisByDistance * farthest)) return false;
-  drop.first_point = static_cast<std::uint32_t>(drops.points.size());
+  drops.points.clear();
+  drops.normals.clear();
   for (const Vec3& u : of.corners) {
     const Vec3 from = factor * Vec3{a * u.x, b * u.x + d * u.y, c * u.x + e * u.y + f * u.z};
-    const Vec3 point = scale.cell_size * (drop.origin + centre + from);
-    if (drop.body == kNoIndex || drops.points.size() > drop.first_point) {
-      Include(point, drop.box);
-    } else {
-      drop.box = {point, point};
-    }
-    drops.points.push_back(point);
+    drops.points.push_back(scale.cell_size * (drop.origin + centre + from));
     // The transposed inverse of L.
     const double z = u.z / f, y = (u.y - e * z) / d;
     drops.normals.push_back(Normalised({(u.x - b * y - c * z) / a, y, z}));
   }
+  return true;
+}
+
+/// Extends the box of the drop by its ellipsoid. The box of a body is set. Returns false if there
+/// is no ellipsoid.
+bool IncludeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
+  if (!MakeEllipsoid(scale, drop, drops)) return false;
+  if (drop.body != kNoIndex) drop.box = {drops.points[0], drops.points[0]};
+  for (const Vec3& point : drops.points) Include(point, drop.box);
   return true;
 }
 
@@ -233,11 +187,78 @@ bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit)
   return true;
 }
 
+/// Finds the drops and their moments, and the boxes of lone particles. Leaves out lone particles
+/// that cannot become ellipsoids, unless they matter for other drops.
+void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) {
+  const Bodies& bodies = input.bodies;
+  const double cell = input.scale.cell_size;
+  const double unit = 1 / (cell * cell * cell);
+  drops.drops.clear();
+  drops.drop_of.assign(bodies.bodies.size(), kNoIndex);
+  for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
+    const std::uint64_t particles = bodies.bodies[body].particles;
+    // A body that is cut is longer than the box, or the box wraps.
+    const bool is_whole = !bodies.IsCut(body) || bodies.bodies[body].is_complete;
+    if (particles == 0 || particles > limits.most_particles || !is_whole) continue;
+    drops.drop_of[body] = static_cast<std::uint32_t>(drops.drops.size());
+    Drops::Drop& drop = drops.drops.emplace_back();
+    drop.body = body;
+    drop.particles = particles;
+  }
+  const double h = input.scale.spacing, usual = h * h * h;
+  const bool takes_lone = limits.least_particles <= 1;
+  for (std::uint32_t brick = 0; brick < input.bins.bricks.size(); ++brick) {
+    const Vec3 origin = OriginOf(input.bins.bricks[brick]);
+    const SpaceBins& bins = input.bins;
+    std::uint32_t at_home = 0;  // Listed lone particles of this brick that reach it.
+    for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
+      if (p % kItemsPerCheck == 0) ThrowIfCancelled();
+      const std::uint32_t body = bodies.body_of_particle[p];
+      if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
+      const bool is_image = bins.IsImage(p);
+      if (body == kNoIndex && is_image && !input.takes_copies) continue;
+      const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
+      const Vec3 at = origin + within;
+      const double volume =
+          input.frame.volumes.empty() ? usual : unit * input.frame.volumes[input.bins.source[p]];
+      if (body != kNoIndex) {
+        Drops::Drop& drop = drops.drops[drops.drop_of[body]];
+        AddParticle(at, volume, drop);
+        continue;
+      }
+      const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
+                                    static_cast<int>(within.z)};
+      const bool is_free = input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
+      if (!takes_lone || volume < unit * limits.least_volume || !is_free) continue;
+      Drops::Drop drop;
+      drop.particle = p;
+      AddParticle(at, volume, drop);
+      drop.particles = 1;
+      // This node is outside and has not moved, so it is still outside of all bodies.
+      const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
+      drop.box = {corner, corner};
+      drop.is_taken = IncludeEllipsoid(input.scale, drop, drops);
+      if (!drop.is_taken) continue;
+      std::uint32_t reached = 0, is_at_home = 0;
+      ForEachBrickOf(drop.box, cell, [&](const BrickCoordinate& place) {
+        ++reached;
+        if (place == input.bins.bricks[brick]) is_at_home = 1;
+      });
+      // A brick with too many drops needs no more that reach no other brick.
+      const bool is_needless = is_at_home == reached && at_home > kMostDropsOfBrick;
+      if (reached == 0 || is_needless) continue;
+      at_home += is_at_home;
+      drops.drops.push_back(drop);
+    }
+  }
+}
+
 /// Lists the taken drops by brick. Drops that reach too many bricks are no longer taken.
 void ListDrops(double cell_size, Drops& drops) {
   drops.bricks.Clear();
   drops.reaches.clear();
   for (std::uint32_t index = 0; index < drops.drops.size(); ++index) {
+    if (index % kItemsPerCheck == 0) ThrowIfCancelled();
     Drops::Drop& drop = drops.drops[index];
     if (!drop.is_taken) continue;
     drop.is_taken = ForEachBrickOf(drop.box, cell_size, [&](const BrickCoordinate& at) {
@@ -253,6 +274,7 @@ void ListDrops(double cell_size, Drops& drops) {
 /// Drops whose boxes touch each other keep their surfaces.
 void CompareDrops(Drops& drops) {
   for (std::size_t brick = 0; brick + 1 < drops.first.size(); ++brick) {
+    ThrowIfCancelled();
     const std::uint32_t first = drops.first[brick], last = drops.first[brick + 1];
     for (std::uint32_t k = first; k < last; ++k) {
       Drops::Drop& drop = drops.drops[drops.reaches[k].drop];
@@ -271,7 +293,12 @@ void CompareDrops(Drops& drops) {
 /// Drops whose boxes touch the box of a triangle of another body keep their surfaces.
 void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
                       std::span<const VertexTriangle> triangles, Drops& drops) {
+  std::uint32_t until_check = 0;
   for (const VertexTriangle& triangle : triangles) {
+    if (until_check-- == 0) {
+      ThrowIfCancelled();
+      until_check = kTrianglesPerCheck;
+    }
     const std::uint32_t body = input.body_of[triangle[0]];
     Drops::Box box{positions[triangle[0]], positions[triangle[0]]};
     Include(positions[triangle[1]], box);
@@ -285,7 +312,9 @@ void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
     const bool is_small =
         ForEachBrickOf(box, input.scale.cell_size, [&](const BrickCoordinate& at) {
           const std::uint32_t brick = drops.bricks.Find(at);
-          if (brick != kNoIndex) compare(drops.first[brick], drops.first[brick + 1]);
+          if (brick == kNoIndex) return;
+          const std::uint32_t first = drops.first[brick], last = drops.first[brick + 1];
+          if (last - first <= kMostDropsOfBrick) compare(first, last);  // Else none is taken.
         });
     if (!is_small) compare(0, static_cast<std::uint32_t>(drops.reaches.size()));
   }
@@ -298,14 +327,18 @@ void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positio
     const std::uint32_t drop = drops.drop_of[input.body_of[triangle[0]]];
     return drop != kNoIndex && drops.drops[drop].is_taken;
   });
+  std::uint32_t until_check = 0;
   for (Drops::Drop& drop : drops.drops) {
+    if (until_check-- == 0) {
+      ThrowIfCancelled();
+      until_check = kItemsPerCheck;
+    }
     if (!drop.is_taken) continue;
     const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / input.scale.spacing);
     drop.first_vertex = static_cast<std::uint32_t>(positions.size());
-    for (std::size_t k = 0; k < of.corners.size(); ++k) {
-      positions.push_back(drops.points[drop.first_point + k]);
-      normals.push_back(drops.normals[drop.first_point + k]);
-    }
+    MakeEllipsoid(input.scale, drop, drops);  // Again: to store all points would take much memory.
+    positions.insert(positions.end(), drops.points.begin(), drops.points.end());
+    normals.insert(normals.end(), drops.normals.begin(), drops.normals.end());
     for (const auto& [a, b, c] : of.triangles) {
       triangles.push_back({drop.first_vertex + a, drop.first_vertex + b, drop.first_vertex + c});
     }
@@ -321,9 +354,9 @@ void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drop
   if (limits.most_particles == 0) return;
   FindDrops(input, limits, drops);
   if (drops.drops.empty()) return;
-  drops.points.clear();
-  drops.normals.clear();
-  for (Drops::Drop& drop : drops.drops) drop.is_taken = MakeEllipsoid(input.scale, drop, drops);
+  for (Drops::Drop& drop : drops.drops) {
+    if (drop.body != kNoIndex) drop.is_taken = IncludeEllipsoid(input.scale, drop, drops);
+  }
   for (const VertexTriangle& triangle : triangles) {
     const std::uint32_t index = drops.drop_of[input.body_of[triangle[0]]];
     if (index == kNoIndex) continue;

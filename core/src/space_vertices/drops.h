@@ -55,13 +55,12 @@ struct Drops {
     /// particle without a body. World units.
     Box box;
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
-    std::uint32_t first_point = 0;   ///< First index in `points`.
     std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
   std::vector<Drop> drops;
 
   std::vector<std::uint32_t> drop_of;  ///< Scratch: by body, or kNoIndex.
-  std::vector<Vec3> points, normals;   ///< Scratch: of the ellipsoids, world units.
+  std::vector<Vec3> points, normals;   ///< Scratch: of one ellipsoid, world units.
   struct Reach {
     std::uint32_t brick, drop;
     friend auto operator<=>(const Reach&, const Reach&) = default;

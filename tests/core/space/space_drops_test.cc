@@ -121,6 +121,24 @@ TEST(SpaceDrops, KeepTheirSurfaceNearOthersAndWhereTheyAreBent) {
   EXPECT_EQ(Reconstruct(bow), Reconstruct(bow, 0));
 }
 
+/// One drop reaches into a brick that has too many drops, another drop is beside it.
+TEST(SpaceDrops, KeepTheirSurfaceInABrickWithTooManyDrops) {
+  const auto reconstructor = SurfaceReconstructor::Create(
+      {.placement = SurfacePlacement::kVirtualPlane, .kernel_radius = 1.5, .cell_size = 4});
+  ASSERT_TRUE(reconstructor.ok());
+  for (const int count : {255, 256, 257, 2000}) {
+    SCOPED_TRACE(count);
+    SpaceParticles particles;
+    particles.Add({31.9, 18, 18});  // Also reaches the brick behind x = 32.
+    particles.Add({18, 18, 18});
+    for (int k = 0; k < count; ++k) particles.Add({46, 14, 14});
+    SurfaceWorkspace workspace;
+    Surface surface;
+    ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
+    EXPECT_EQ(surface.ShellCount(), count < 256 ? 2u : 1u);
+  }
+}
+
 /// Drops that touch each other, near walls and in cavities; also of tiny particles, and far away.
 TEST(SpaceDrops, KeepS1ToS5) {
   for (std::uint64_t seed = 0; seed < support::Tries(10u); ++seed) {
