@@ -5,13 +5,16 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "core/boxes.h"
 #include "partiemc/arena.h"
 #include "partiemc/partiemc.h"
@@ -451,6 +454,41 @@ TEST(RunPeriods, RunOfManyPeriodsIsOnePeriod) {
       });
       EXPECT_LE(parts, 3);
       EXPECT_EQ(nodes, static_cast<std::int64_t>(std::ceil(period)));
+    }
+  }
+}
+
+// The last request of Lift comes before the loops over copies.
+TEST(Lift, IsCancelledWhileItCopies) {
+  const std::vector<double> at = {1, 1, 1, 2, 2, 2};
+  const Frame frame{.positions = std::span<const double>(at), .components = 3};
+  const PeriodicBox box{.axes = {PeriodicAxis{0, 3}, PeriodicAxis{0, 3}, PeriodicAxis{0, 3}}};
+  constexpr std::array kAxes = {0, 1, 2};
+  std::atomic<bool> flag = false;
+  const CancellationScope scope(&flag);
+  for (const int requests : {4, 3}) {
+    int left = requests;
+    const auto reserve = [&](std::uint64_t) {
+      if (--left == 0) flag = true;
+      return absl::OkStatus();
+    };
+    LiftScratch scratch;
+    LiftedFrame lifted;
+    const auto lift = [&] {
+      return Lift({.frame = frame,
+                   .box = box,
+                   .axes = kAxes,
+                   .range = 2,
+                   .margin = 3,
+                   .wraps = true,
+                   .reserve = reserve},
+                  scratch, lifted);
+    };
+    if (requests == 4) {
+      EXPECT_TRUE(lift().ok());
+      EXPECT_EQ(lifted.originals.size(), 2 * 26u);
+    } else {
+      EXPECT_THROW((void)lift(), Cancelled);
     }
   }
 }
