@@ -433,7 +433,7 @@ class Streams(ServerTest):
     def test_ctrl_c_ends_the_end_of_with(self):
         # The other part of the frame never comes.
         script = ("import numpy, partiemc\n"
-                  f"with partiemc.connect({self.address!r}, name='half', parts=2, part_timeout=50, "
+                  f"with partiemc.connect({self.address!r}, name='half', parts=2, part_timeout=30, "
                   "spacing=1) as s:\n    s.send(numpy.zeros((1, 2)))\n    print('ready', flush=True)")
         waiting = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
