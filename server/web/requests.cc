@@ -197,7 +197,7 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
   // HTTP/1.0 has no Transfer-Encoding, so a proxy could find another end of the request.
   if (!encodings.empty() && request.is_before_1_1) {
     return RefusedAs(WebRefusal::kMalformed, 400,
-                     "the request must be HTTP/1.1 if it has a Transfer-Encoding");
+                     "a request with a Transfer-Encoding must be HTTP/1.1");
   }
   if (path == "/v1/healthz") {
     if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
