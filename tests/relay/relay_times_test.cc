@@ -112,6 +112,9 @@ TEST_F(RelayTimes, WithoutRoomForTheWholeHistoryAStreamIsImportedTwiceAtMost) {
   }
   EXPECT_EQ(imports.size(), 2u);
   EXPECT_EQ(small.relay().imported_streams(), 2u);
+  watchers.clear();
+  EXPECT_TRUE(Within(seconds(10), [&] { return small.relay().imported_streams() == 0; }));
+  EXPECT_TRUE(Within(seconds(4), [this] { return has_.relay().exported_streams() == 0; }));
 }
 
 TEST_F(RelayTimes, ADrainedReplicaAnnouncesNothing) {
