@@ -169,7 +169,7 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
   using CallRegistry::WaitUntilEmpty;
 
  private:
-  // What is released without the lock after a stream was taken over.
+  // The former stream's data, which a take-over releases without the lock.
   struct Replaced {
     std::shared_ptr<StreamStateMachine> machine;
     std::vector<Published> frames;

@@ -47,7 +47,7 @@ void ForEachAfterPoint(std::string_view name, Visit visit) {
   }
 }
 
-// What the runs with the same ordinal say about themselves.
+// Properties of the runs of digits with the same ordinal, over all names.
 struct RunsAfterPoint {
   std::size_t shortest = std::string_view::npos, longest = 0;
   std::size_t longest_with_zero_first = 0;  // Without the run "0".

@@ -119,9 +119,9 @@ void AddParticle(const Vec3& at, double volume, Drops::Drop& drop) {
   for (int k = 0; k < 6; ++k) drop.second[k] += volume * products[k];
 }
 
-/// Sets the points and normals to those of an ellipsoid with the volume and the moments of the
-/// drop. Returns false if there is no such ellipsoid, or it is too thin, or the drop fills too
-/// little of it.
+/// Computes the points and normals of an ellipsoid with the volume and the moments of the drop.
+/// Returns false if there is no such ellipsoid, or it is too thin, or the drop fills too little of
+/// it.
 bool MakeEllipsoid(const Scale& scale, const Drops::Drop& drop, Drops& drops) {
   if (!(drop.volume > 0)) return false;
   const double inverse = 1 / drop.volume;

@@ -150,8 +150,8 @@ TEST(PeriodicSpace, WrongBoxesAreRefused) {
   EXPECT_EQ(field_of(Cube(12)), "OK");
 }
 
-// Of a row across the box only copies lie beyond the lattice. The error names the caller's
-// particle.
+// A row of particles crosses the box, and only copies of them lie beyond the lattice. The error
+// names the caller's particle.
 TEST(PeriodicSpace, FarCopyIsReportedAsItsParticle) {
   constexpr double kEnd = 0x1p30;  // Of the lattice, in cells.
   PeriodicBox box;
