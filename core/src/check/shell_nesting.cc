@@ -92,8 +92,8 @@ int OrientationOf(const Surface& surface, std::size_t shell) {
 // --- Nesting ------------------------------------------------------------------------------------
 
 // The shadow of a triangle is its projection along z. A vertical line through a point p passes the
-// triangle if it passes the shadow. The point p is moved by (e, e^2) with an infinitely small e >
-// 0, so no line runs through a corner or side of a shadow.
+// triangle if it passes the shadow. The point p is moved by (e, e^2) with an infinitely small,
+// positive e, so no line runs through a corner or side of a shadow.
 
 /// The side of the moved p relative to the line from a to b: +1 left, -1 right. Requires: a != b.
 int SideOfMoved(const Point& a, const Point& b, const Point& p) {
