@@ -138,11 +138,13 @@ ConnectionRules RulesOfConnections(const ServerOptions& options) {
 
 // The limits of the relay. kept_bytes is as large as a watcher's limit, so that the newest result
 // of another replica's stream is always kept: fetching it again takes time.
-Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history) {
+Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history,
+                          FinishedStreams& finished) {
   return {.broadcaster = {.mailbox_bytes = limits.max_watcher_bytes,
                           .kept_bytes = limits.max_watcher_bytes},
           .watcher_bytes = limits.max_watcher_bytes,
           .history = limits.history_bytes > 0 ? &history : nullptr,
+          .finished = &finished,
           .watches = limits.max_watchers};
 }
 
@@ -161,10 +163,11 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
       watchers_(options.limits.max_watchers),
       registry_(options.limits.max_streams, options.limits.history_bytes > 0 ? &history_ : nullptr,
                 options.limits.max_parts),
-      relay_(bus == nullptr ? nullptr
-                            : std::make_unique<Relay>(std::move(bus), registry_, dispatcher_,
-                                                      RelayLimits(options.limits, history_),
-                                                      options.advertised_address)),
+      relay_(bus == nullptr
+                 ? nullptr
+                 : std::make_unique<Relay>(std::move(bus), registry_, dispatcher_,
+                                           RelayLimits(options.limits, history_, finished_),
+                                           options.advertised_address)),
       calls_(options.limits.max_streams),
       budget_(options.limits.FrameBudget(), BeyondOf(options.limits)),
       states_(options.limits.SharedStateBytes(), ServerLimits::kOwnStateBytes),
@@ -185,6 +188,7 @@ Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
                .history = history_,
                .opening = opening_,
                .streams = registry_,
+               .finished = finished_,
                .unary_calls = calls_,
                .watchers = watchers_,
                .dispatcher = dispatcher_,

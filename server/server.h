@@ -17,6 +17,7 @@
 #include "server/connections/acceptor.h"
 #include "server/connections/connection_table.h"
 #include "server/connections/connection_watch.h"
+#include "server/relay/finished_streams.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/security/file_reloader.h"
@@ -162,6 +163,7 @@ class Server {
   WatchDispatcher dispatcher_;
   WatchRegistry watchers_;
   StreamRegistry registry_;
+  FinishedStreams finished_;
   std::unique_ptr<Relay> relay_;
   UnaryRegistry calls_;
   MemoryBudget budget_;

@@ -22,7 +22,7 @@ class RejoiningWatch::Calls final : public Attempts {
     const auto channel = MakeChannel(address, watch_.options_.credentials);
     if (!channel.ok()) return channel.status();
     watch_.SetCall(std::make_shared<WatchCall>(*channel, address, watch_.clock_));
-    watch_.call_->Start(watch_.stream_name_, watch_.options_, watch_.From());
+    watch_.call_->Start(watch_.stream_name_, watch_.options_, watch_.From(), watch_.lineage_);
     return absl::OkStatus();
   }
 
@@ -177,6 +177,11 @@ void RejoiningWatch::Account(WatchedFrame& frame) {
 bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   end_ = call_->end();
   end_.dropped += unreported_drops_;
+  if (retry_.lost() && stream_.held && last_ != 0) {
+    // No frame came since the watch was lost, so all later ones are missing.
+    const std::uint64_t newest = stream_.held->newest_sequence;
+    end_.dropped = std::max(end_.dropped, newest - std::min(newest, last_));
+  }
   if (options_.rejoin.give_up_after.count() <= 0 || lineage_.empty() || !call_->lost()) {
     return false;
   }

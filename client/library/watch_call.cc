@@ -93,11 +93,12 @@ WatchCall::~WatchCall() {
 }
 
 void WatchCall::Start(std::string_view stream_name, const WatcherOptions& options,
-                      std::optional<std::uint64_t> from_sequence) {
+                      std::optional<std::uint64_t> from_sequence, const std::string& lineage) {
   v1::WatchStreamRequest open;
   open.mutable_open()->set_stream_name(std::string(stream_name));
   open.mutable_open()->set_mode(ToWire(options.mode));
   open.mutable_open()->set_credits(std::max<std::uint32_t>(options.credits, 1));
+  open.mutable_open()->set_lineage(lineage);
   if (from_sequence) open.mutable_open()->set_from_sequence(*from_sequence);
   if (options.level_of_detail) {
     wire::EncodeLevelOfDetail(*options.level_of_detail,
@@ -210,15 +211,20 @@ WatchCall::Message WatchCall::TakeNext(std::optional<TimePoint> until,
     return message;
   } else if (exceeded_credit_) {
     received = ExceededCredit();
+  } else if (HasEnd()) {
+    received = Received::kEnd;
   } else if (!status_->ok()) {
     received = FromGrpc(*status_, address_);
-  } else if (end_.reason.empty()) {
+  } else {
     received = absl::UnavailableError(
         absl::StrCat("the server at ", address_, " ended the watch without a reason"));
-  } else {
-    received = Received::kEnd;
   }
   return nullptr;
+}
+
+bool WatchCall::HasEnd() const {
+  if (status_->ok()) return !end_.reason.empty();
+  return end_.reason == "FINISHED" && IsLostConnection(status_->error_code(), reason_);
 }
 
 absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& frame) {
@@ -275,7 +281,7 @@ std::string WatchCall::reason() {
 bool WatchCall::lost() {
   const MutexLock lock(mutex_);
   if (!status_ || cancelled_) return false;
-  if (!status_->ok()) {
+  if (!status_->ok() && !HasEnd()) {
     // TOO_MANY_OPENING counts as a loss, because it is temporary: the server was short of memory.
     return IsLostConnection(status_->error_code(), reason_) || reason_ == "TOO_MANY_OPENING";
   }

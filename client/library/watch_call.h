@@ -39,8 +39,9 @@ class WatchCall {
   ~WatchCall();
 
   /// Starts to open the call without waiting. `from_sequence` replaces options.from_sequence.
+  /// `lineage`: of the watch that was lost; empty for a first watch.
   void Start(std::string_view stream_name, const WatcherOptions& options,
-             std::optional<std::uint64_t> from_sequence);
+             std::optional<std::uint64_t> from_sequence, const std::string& lineage = {});
   /// Waits at most until `until`; true if the server has accepted the watcher. Errors: the server's
   /// refusal.
   absl::StatusOr<bool> WaitUntilOpened(TimePoint until) ABSL_LOCKS_EXCLUDED(mutex_);
@@ -77,6 +78,9 @@ class WatchCall {
   Message TakeNext(std::optional<TimePoint> until, absl::StatusOr<Received>& received)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
+  // Whether the watch has ended as the server's last message says. That message is enough if the
+  // status of a finished watch is lost, as happens behind some proxies.
+  bool HasEnd() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
   absl::Status ExceededCredit() const;
   absl::Status Broken(const char* what) const;

@@ -4,6 +4,8 @@
 
 #include "partiemc/status.h"
 #include "server/compute/memory_budget.h"
+#include "server/relay/finished_streams.h"
+#include "server/relay/stream_summary.h"
 #include "server/relay/watched_result.h"
 #include "server/stream/limits.h"
 #include "server/stream/stream_registry.h"
@@ -93,8 +95,19 @@ void ReconstructCall::Finish(const absl::Status& status) {
   } else {
     LogEnd(stream, channel().peer(), status);
   }
-  if (stream) stream->description.broadcaster->End(WatchEnd::OfStream(status));
+  if (stream) EndWatches(*stream, status);
   End(status);
+}
+
+void ReconstructCall::EndWatches(const StreamSummary& stream, const absl::Status& status) {
+  ResultBroadcaster& broadcaster = *stream.description.broadcaster;
+  if (status.ok()) {
+    relay::v1::LiveStream finished;
+    EncodeSummary(stream, std::chrono::steady_clock::now(), *finished.mutable_summary());
+    finished.set_lineage(stream.lineage);
+    context().finished.Add(std::move(finished), broadcaster.last_sequence());
+  }
+  broadcaster.End(WatchEnd::OfStream(status));
 }
 
 RequestKind ReconstructCall::OnRequestRead(std::size_t slot) {

@@ -65,6 +65,7 @@ class ReconstructCall final : public ByteCall, public StreamHandler, private Str
   bool DropFrame(std::size_t slot, const absl::Status& why) override;
   const void* Assembly() const override { return frames_->assembler().get(); }
 
+  void EndWatches(const StreamSummary& stream, const absl::Status& status);
   absl::Status OpenStream(const v1::OpenStream& open);
   absl::Status JoinStream(const v1::OpenStream& open);
   void PrepareOpened(v1::StreamOpened opened);

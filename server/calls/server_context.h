@@ -6,6 +6,7 @@ namespace partiemc::server {
 class Authentication;
 class ComputePool;
 class CurrentCheckpointKeys;
+class FinishedStreams;
 class HistoryRoom;
 class LevelQueue;
 class MemoryBudget;
@@ -26,6 +27,7 @@ struct ServerContext {
   const HistoryRoom& history;
   OpeningCalls& opening;
   StreamRegistry& streams;
+  FinishedStreams& finished;
   UnaryRegistry& unary_calls;
   WatchRegistry& watchers;
   WatchDispatcher& dispatcher;

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "partiemc/status.h"
 #include "server/calls/requests.h"
+#include "server/relay/finished_streams.h"
 #include "server/relay/watched_result.h"
 #include "server/telemetry/logging.h"
 #include "server/watch/result_broadcaster.h"
@@ -101,6 +102,12 @@ void WatchCall::StartOpen() {
   terms_ = *std::move(terms);
   const std::string name = parsed_.open().stream_name();
   const auto stream = context().streams.Find(name, caller());
+  if (absl::IsNotFound(stream.status())) {
+    if (auto finished = context().finished.Find(name, parsed_.open().lineage())) {
+      const absl::Status status = OpenFinished(*std::move(finished));
+      return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
+    }
+  }
   const bool is_elsewhere =
       context().relay != nullptr &&
       (stream.ok() ? context().relay->WasResumedElsewhere(stream->lineage, stream->opened)
@@ -162,6 +169,14 @@ absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
   return absl::OkStatus();
 }
 
+absl::Status WatchCall::OpenFinished(relay::v1::LiveStream stream) {
+  finished_sequence_ = stream.summary().last_sequence();
+  auto broadcaster =
+      std::make_shared<ResultBroadcaster>(context().dispatcher, ResultBroadcaster::Limits{});
+  broadcaster->End(WatchEnd::OfStream(absl::OkStatus()));
+  return OpenRemote({std::move(broadcaster), std::move(stream)});
+}
+
 absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::string& stream_name) {
   if (auto status = context().watchers.Open(*machine_, caller()); !status.ok()) return status;
   stream_name_ = stream_name;
@@ -176,9 +191,10 @@ absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::strin
 
 void WatchCall::WriteOpened(const HeldFrames& held) {
   v1::WatchOpened& opened = *opened_.mutable_opened();
-  opened.set_oldest_sequence(held.oldest);
-  opened.set_newest_sequence(held.newest);
-  opened.set_has_frames(held.any);
+  const bool finished = finished_sequence_ != 0;
+  opened.set_oldest_sequence(finished ? finished_sequence_ : held.oldest);
+  opened.set_newest_sequence(finished ? finished_sequence_ : held.newest);
+  opened.set_has_frames(finished || held.any);
   Write(wire::ToBytes(opened_));
 }
 

@@ -47,6 +47,7 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   absl::Status JoinLevel(bool has_surfaces);
   absl::Status OpenHere(const StreamSummary& stream);
   absl::Status OpenRemote(const Relay::Found& found);
+  absl::Status OpenFinished(relay::v1::LiveStream stream);
   absl::Status TakePlace(const std::string& stream_id, const std::string& stream_name);
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;
@@ -55,7 +56,8 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   v1::WatchStreamRequest parsed_;
   v1::WatchStreamResponse opened_;  // Filled in when the stream is found.
   WatchTerms terms_;
-  LevelQueue::Seat level_;  // Empty: the watcher receives exact results.
+  LevelQueue::Seat level_;               // Empty: the watcher receives exact results.
+  std::uint64_t finished_sequence_ = 0;  // Last frame of a finished stream; 0: it is live.
   std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Of WriteFrame, until LevelDone.
   std::string stream_name_;
   std::string end_reason_;

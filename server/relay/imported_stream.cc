@@ -208,6 +208,9 @@ void ImportedStream::FetchAgain(TimePoint now) {
 void ImportedStream::End(const WatchEnd& end) {
   if (ended_) return;
   ended_ = true;
+  if (end.reason == kReasonFinished && limits_.finished != nullptr) {
+    limits_.finished->Add(stream_.stream, broadcaster_->last_sequence());
+  }
   broadcaster_->End(end);
   AnswerWaiting(NoSuchStream(stream_.name()));
 }

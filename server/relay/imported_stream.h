@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "common/clock.h"
+#include "server/relay/finished_streams.h"
 #include "server/relay/relay_port.h"
 #include "server/relay/stream_directory.h"
 #include "server/watch/result_broadcaster.h"
@@ -32,7 +33,8 @@ class ImportedStream {
     ResultBroadcaster::Limits broadcaster;
     /// Maximum bytes of results that arrived too early and wait for the results before them.
     std::size_t waiting_bytes = std::size_t{16} << 20;
-    HistoryRoom* history = nullptr;  ///< Outlives this; null: no history for watchers.
+    HistoryRoom* history = nullptr;       ///< Outlives this; null: no history for watchers.
+    FinishedStreams* finished = nullptr;  ///< Outlives this.
   };
 
   /// Begins the import: fetches the history from `from_sequence`. Fetches only the newest result if

@@ -415,7 +415,8 @@ void Relay::Watch(const RemoteStream& remote, const Search& search, TimePoint no
         remote, imports == 0 ? search.from_sequence : 0, dispatcher_,
         ImportedStream::Limits{.broadcaster = limits_.broadcaster,
                                .waiting_bytes = limits_.watcher_bytes,
-                               .history = limits_.history},
+                               .history = limits_.history,
+                               .finished = limits_.finished},
         static_cast<RelayPort&>(*this), now);
     stream = import.stream.get();
     imports_.push_back(std::move(import));

@@ -44,8 +44,9 @@ class Relay final : private RelayPort {
   struct Limits {
     ResultBroadcaster::Limits broadcaster;              ///< For streams of other replicas.
     std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Maximum of waiting results per stream.
-    HistoryRoom* history = nullptr;  ///< Null: no history for streams of other replicas.
-    std::size_t watches = 64;        ///< Maximum number of concurrent searches (Find).
+    HistoryRoom* history = nullptr;       ///< Null: no history for streams of other replicas.
+    FinishedStreams* finished = nullptr;  ///< Receives the finished streams of other replicas.
+    std::size_t watches = 64;             ///< Maximum number of concurrent searches (Find).
   };
 
   /// Requires: all references outlive this object. The relay announces `address` to the other

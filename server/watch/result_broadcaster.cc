@@ -62,6 +62,7 @@ bool ResultBroadcaster::Publish(std::shared_ptr<const WatchFrame> frame, std::ui
 
 bool ResultBroadcaster::Post(Published published) {
   published_ = published.number;
+  last_sequence_ = published.sequence;
   if (watcher_count_ != 0) {
     CountWaits([&] { mailbox_.Put(std::move(published)); });
     return true;

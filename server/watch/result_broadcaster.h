@@ -85,6 +85,8 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   Published Newest() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Result number of the last published result.
   std::uint64_t LastNumber() ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Sequence number of the last published result; 0: none.
+  std::uint64_t last_sequence() const { return last_sequence_; }
   /// The oldest sequence number that watchers can request, here or at the server that owns the
   /// stream; 0: none.
   std::uint64_t oldest_sequence() const {
@@ -128,6 +130,7 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   std::uint64_t published_ = 0;  // Owned by the producer's thread.
   std::atomic<std::uint64_t> producer_waits_ = 0;
   std::atomic<std::uint32_t> watcher_count_ = 0;
+  std::atomic<std::uint64_t> last_sequence_ = 0;
   std::atomic<std::uint64_t> oldest_sequence_ = 0, oldest_elsewhere_ = 0;
 
   Mutex mutex_;  // Publish never waits for it.

@@ -22,6 +22,7 @@
 #include "server/compute/compute_pool.h"
 #include "server/compute/memory_budget.h"
 #include "server/compute/state_memory.h"
+#include "server/relay/finished_streams.h"
 #include "server/security/authentication.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/stream/opening_calls.h"
@@ -68,6 +69,7 @@ class Served {
   server::HistoryRoom history_{0, 0};
   server::OpeningCalls opening_{8};
   server::StreamRegistry streams_{limits_.max_streams};
+  server::FinishedStreams finished_;
   server::UnaryRegistry unary_calls_{8};
   server::WatchRegistry watchers_{4};
   server::WatchDispatcher dispatcher_;
@@ -87,6 +89,7 @@ class Served {
                                        .history = history_,
                                        .opening = opening_,
                                        .streams = streams_,
+                                       .finished = finished_,
                                        .unary_calls = unary_calls_,
                                        .watchers = watchers_,
                                        .dispatcher = dispatcher_,

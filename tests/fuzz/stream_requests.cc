@@ -12,6 +12,7 @@
 #include "fuzz/single_thread.h"
 #include "partiemc/status.h"
 #include "server/calls/reconstruct_call.h"
+#include "server/relay/finished_streams.h"
 #include "server/stream/opening_calls.h"
 #include "server/stream/unary_registry.h"
 #include "server/watch/level_queue.h"
@@ -128,6 +129,7 @@ class Stream {
 
   Shared& shared_;
   server::StreamRegistry registry_{Limits().max_streams};
+  server::FinishedStreams finished_;
   server::CurrentCheckpointKeys keys_;
   server::Authentication authentication_;
   server::OpeningCalls opening_{1};
@@ -140,6 +142,7 @@ class Stream {
                                        .history = history_,
                                        .opening = opening_,
                                        .streams = registry_,
+                                       .finished = finished_,
                                        .unary_calls = unary_calls_,
                                        .watchers = watchers_,
                                        .dispatcher = shared_.dispatcher,

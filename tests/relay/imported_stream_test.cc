@@ -39,6 +39,7 @@ class Imported : public testing::Test {
   }
 
   Port port_;
+  FinishedStreams finished_;
   WatchDispatcher dispatcher_;
   ImportedStream stream_{
       RemoteStream{.replica = "other"}, std::nullopt, dispatcher_, {}, port_, {}};
@@ -63,6 +64,36 @@ TEST_F(Imported, IgnoresNumbersWithoutASuccessor) {
   end.set_last_number(7);
   stream_.OnMessage(end, {});
   EXPECT_TRUE(stream_.ended());
+}
+
+TEST_F(Imported, OnlyAFinishedStreamIsRememberedWithItsLastFrame) {
+  const auto remembered_after = [this](const std::string& reason) {
+    relay::v1::LiveStream live;
+    live.set_lineage(reason);
+    ImportedStream stream(RemoteStream{.replica = "other", .stream = live}, std::nullopt,
+                          dispatcher_, {.finished = &finished_}, port_, {});
+    relay::v1::Result result;
+    result.set_number(3);
+    result.set_sequence(4);
+    result.set_fetch(port_.last_fetch);
+    result.set_first(true);
+    stream.OnMessage(result, {});
+    relay::v1::FetchEnd fetch_end;
+    fetch_end.set_fetch(port_.last_fetch);
+    fetch_end.set_last_number(3);
+    stream.OnMessage(fetch_end, {});
+    relay::v1::StreamEnd end;
+    end.set_reason(reason);
+    end.set_last_number(3);
+    stream.OnMessage(end, {});
+    EXPECT_TRUE(stream.ended());
+    return finished_.Find("", reason);
+  };
+  EXPECT_FALSE(remembered_after("PRODUCER_LOST"));
+  EXPECT_FALSE(remembered_after("DRAINING"));
+  const auto finished = remembered_after("FINISHED");
+  ASSERT_TRUE(finished);
+  EXPECT_EQ(finished->summary().last_sequence(), 4u);
 }
 
 TEST_F(Imported, ResultsRepeatTheNumberOfTheLastLoss) {

@@ -230,6 +230,48 @@ TEST_P(Watch, ALineageStaysThroughAResumeIsNoOtherStreamsAndTellsNoToken) {
   EXPECT_NE(lineage("pond"), before);
 }
 
+TEST_P(Watch, AWatcherThatWasAwayLearnsThatItsStreamHasFinished) {
+  OpenProducer();
+  std::string lineage;
+  {
+    WatchClient watcher(channel_, "tank", v1::WATCH_MODE_EVERY, 9);
+    lineage = watcher.Receive().opened().lineage();
+    for (std::uint64_t k = 0; k < 3; ++k) Produce(k);
+  }
+  producer_->HalfClose();
+  ASSERT_TRUE(producer_->Finish().ok());
+  WatchClient back(channel_);
+  v1::WatchStreamRequest request;
+  v1::OpenWatch& open = *request.mutable_open();
+  open.set_stream_name("tank");
+  open.set_credits(1);
+  open.set_lineage(lineage);
+  back.Send(request);
+  const auto opened = back.Receive().opened();
+  EXPECT_EQ(opened.lineage(), lineage);
+  EXPECT_EQ(opened.labels().at("run"), "7");
+  EXPECT_TRUE(opened.has_frames());
+  EXPECT_EQ(opened.newest_sequence(), 3u);
+  EXPECT_EQ(back.Receive().ended().reason(), "FINISHED");
+  EXPECT_TRUE(back.Finish().ok());
+  const std::vector<std::pair<std::string, std::string>> strangers = {
+      {"tank", ""}, {"tank", "no lineage"}, {"pond", lineage}};
+  for (const auto& [name, other] : strangers) {
+    WatchClient stranger(channel_);
+    open.set_stream_name(name);
+    open.set_lineage(other);
+    stranger.Send(request);
+    ExpectRefused(stranger, grpc::StatusCode::NOT_FOUND, "NO_SUCH_STREAM", "open stream");
+  }
+  producer_ = std::make_unique<StreamClient>(channel_);
+  OpenProducer();
+  WatchClient next(channel_);
+  open.set_stream_name("tank");
+  open.set_lineage(lineage);
+  next.Send(request);
+  EXPECT_NE(next.Receive().opened().lineage(), lineage) << "an open stream comes first";
+}
+
 TEST_P(Watch, WhatCannotBeWatchedIsRefusedWithItsReason) {
   OpenProducer();
   WatchClient unknown(channel_, "tonk", v1::WATCH_MODE_LATEST, 1);

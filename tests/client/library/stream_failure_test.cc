@@ -385,6 +385,58 @@ TEST(WatchFailure, FramesWithoutCreditBreakTheProtocol) {
               HasSubstr("sent frames without credit: it breaks the protocol"));
 }
 
+// Some proxies reset a call instead of delivering its last message or its status.
+TEST(WatchFailure, AFinishedStreamEndsTheWatchEvenIfItsStatusIsLost) {
+  const FakeServer server(AnswerAll, [&](grpc::ServerContext&, FakeServer::WatchRpc& rpc) {
+    v1::WatchStreamResponse response;
+    response.mutable_opened()->set_lineage("of the tank");
+    rpc.Write(response);
+    response.mutable_ended()->set_reason("FINISHED");
+    rpc.Write(response);
+    return grpc::Status(grpc::StatusCode::CANCELLED, "Received RST_STREAM with error code 8");
+  });
+  const auto watcher = Watcher::Open(server.address(), "tank", {});
+  ASSERT_TRUE(watcher.ok()) << watcher.status();
+  WatchedFrame frame;
+  const auto received = (*watcher)->Receive(frame);
+  ASSERT_TRUE(received.ok()) << received.status();
+  EXPECT_EQ(*received, Received::kEnd);
+  EXPECT_EQ((*watcher)->end().reason, "FINISHED");
+}
+
+TEST(WatchFailure, AWatchThatLostTheEndAsksForItAndCountsWhatItMissed) {
+  std::atomic<int> calls = 0;
+  const FakeServer server(AnswerAll, [&](grpc::ServerContext&, FakeServer::WatchRpc& rpc) {
+    v1::WatchStreamRequest request;
+    rpc.Read(&request);
+    v1::WatchStreamResponse response;
+    response.mutable_opened()->set_lineage("of the tank");
+    if (calls++ == 0) {
+      rpc.Write(response);
+      response.mutable_frame()->mutable_frame()->set_sequence(2);
+      rpc.Write(response);
+      return grpc::Status(grpc::StatusCode::CANCELLED, "Received RST_STREAM with error code 8");
+    }
+    EXPECT_EQ(request.open().lineage(), "of the tank");
+    response.mutable_opened()->set_has_frames(true);
+    response.mutable_opened()->set_newest_sequence(5);
+    rpc.Write(response);
+    response.mutable_ended()->set_reason("FINISHED");
+    rpc.Write(response);
+    return grpc::Status::OK;
+  });
+  const auto watcher = Watcher::Open(server.address(), "tank", {});
+  ASSERT_TRUE(watcher.ok()) << watcher.status();
+  WatchedFrame frame;
+  ASSERT_EQ((*watcher)->Receive(frame).value(), Received::kEvent);
+  ASSERT_EQ(frame.sequence, 2u);
+  const auto received = (*watcher)->Receive(frame);
+  ASSERT_TRUE(received.ok()) << received.status();
+  EXPECT_EQ(*received, Received::kEnd);
+  EXPECT_EQ((*watcher)->end().reason, "FINISHED");
+  EXPECT_EQ((*watcher)->end().dropped, 3u);
+}
+
 TEST(StreamFailure, NoticesDoNotPostponeTheDeadline) {
   FakeServer server([](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     Accept(rpc, 1);
