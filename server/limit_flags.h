@@ -25,7 +25,8 @@ void AddLimitFlags(CLI::App& app, ServerLimits& limits, LimitFlags& flags);
 /// Adds the flags of connections. `options` must live until `app` has parsed.
 void AddConnectionFlags(CLI::App& app, ServerOptions& options);
 
-/// The maximum size of a serialised frame: the given one, or the default for `limits`.
+/// The maximum size of a serialised frame in bytes: the value of the flag if it was given,
+/// otherwise the default for `limits`.
 std::uint64_t FrameBytes(const LimitFlags& flags, const ServerLimits& limits);
 
 }  // namespace partiemc::server

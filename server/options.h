@@ -14,10 +14,10 @@ namespace partiemc::server {
 
 struct CommandLine {
   ServerOptions server;
-  /// Time limit of the drain (Server::Drain), which begins with SIGTERM or after `drain_delay`.
+  /// Time limit of the drain (Server::Drain), which begins `drain_delay` after SIGTERM or SIGINT.
   std::chrono::milliseconds grace{4000};
-  /// Time after SIGTERM in which the server still serves, while its health checks report that it
-  /// does not (Server::SendAway).
+  /// Time after SIGTERM or SIGINT in which the server still serves, while its health checks report
+  /// that it does not serve (Server::SendAway).
   std::chrono::milliseconds drain_delay{0};
   /// File to which the server writes its bound address when it serves.
   std::optional<std::string> port_file;

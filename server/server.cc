@@ -127,7 +127,8 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
-// max_streams exceeds the calls of one caller, so only a flood reaches it.
+// Without a limit of unaccounted bytes, max_streams is unlimited, too (0). Otherwise it exceeds the
+// calls of one caller, so only a flood reaches it.
 ConnectionRules RulesOfConnections(const ServerOptions& options) {
   return {.unaccounted_bytes = options.unaccounted_bytes,
           .max_message_bytes = options.limits.MaxMessageBytes(),

@@ -18,7 +18,8 @@ absl::Status Invalid(std::string_view reason, std::string field, std::string val
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
 }
 
-// False if `array` is absent. Errors: reason COUNT if it has no address.
+// False if `array` is absent (PARTIEMC_NONE). Errors: reason COUNT if `array` has no address and
+// `count` is above 0.
 absl::StatusOr<bool> IsThere(const partiemc_array& array, std::size_t count,
                              const std::string& field) {
   if (array.type == PARTIEMC_NONE) return false;

@@ -13,7 +13,8 @@ namespace partiemc::c {
 
 /// Returns a view of the program's arrays. The view also refers to `attributes`, which this
 /// function fills. Errors: INVALID_ARGUMENT with a Violation. Reason UNSUPPORTED: an array has an
-/// element type that is not allowed for it. Reason COUNT: an array has no address.
+/// element type that is not allowed for it. Reason COUNT: an array, `particles` or its member
+/// `attributes` has no address.
 absl::StatusOr<client::ParticleArrays> ArraysOf(const partiemc_particles* particles,
                                                 std::vector<client::AttributeArrays>& attributes);
 

@@ -177,7 +177,7 @@ std::vector<std::string> NamesOf(const char* list) {
   return absl::StrSplit(list, ',', absl::SkipEmpty());
 }
 
-// Options that are not set come from the environment.
+// Options that are not set come from the environment, except its token if `token_file` is set.
 client::Credentials CredentialsOf(const partiemc_options& options) {
   client::Credentials result = client::CredentialsFromEnvironment();
   const auto take = [](const char* text, std::string& value) {

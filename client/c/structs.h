@@ -16,8 +16,8 @@ void Give(T ours, std::size_t size, T* theirs) {
   std::memcpy(static_cast<void*>(theirs), &ours, std::min(size, sizeof ours));
 }
 
-/// Returns a copy of the program's struct `theirs`. Members beyond its size, or all if it is null,
-/// have the values of `defaults`.
+/// Returns a copy of the program's struct `theirs`. Members beyond theirs->size have the values of
+/// `defaults`; if `theirs` is null, all members have.
 template <typename T>
 T Take(const T* theirs, T defaults) {
   if (theirs != nullptr) {

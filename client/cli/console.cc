@@ -64,7 +64,7 @@ std::string AsFlag(const absl::Status& status) {
   constexpr std::string_view kPrefix = "parameters.";
   if (!line.starts_with(kPrefix)) return line;
   line.erase(0, kPrefix.size());
-  // The index K of "sections[K]." means nothing to a user of --slice and --isolines.
+  // Removes "sections[K].", because the index K means nothing to a user of --slice and --isolines.
   if (line.starts_with("sections[")) line.erase(0, line.find('.') + 1);
   if (line.starts_with("surface.")) line.erase(0, line.find('.') + 1);
   // "walls[0].points" is the first --wall.

@@ -23,8 +23,8 @@ enum ExitCode : int {
 int Complain(ExitCode code, std::string_view message);
 int Complain(ExitCode code, const absl::Status& status);
 
-/// Writes what is left of standard output. Returns `code`, or kFailed with a message for kGood if
-/// standard output could not be written.
+/// Flushes standard output and returns `code`. If standard output could not be written and `code`
+/// is kGood, prints a message and returns kFailed.
 int EndOutput(int code);
 
 /// Makes untrusted text safe to print on one line of a terminal. Line feeds become "\n"; carriage

@@ -67,7 +67,7 @@ class FrameOutputs {
   Summary summary_;
 };
 
-/// Adds --stats and --gauge, whose help lists the kinds.
+/// Adds --stats and --gauge. The help of --gauge lists the kinds of gauges.
 void AddStatisticsFlags(CLI::App& app, FrameOutputs::Places& places, const std::string& group);
 
 }  // namespace partiemc::client

@@ -64,7 +64,7 @@ absl::StatusOr<double> EstimatedSpacing(const std::string& input, const Sequence
 
 absl::Status CheckKeepsInput(const std::string& input, const Sequence& frames,
                              const std::vector<std::string>& targets) {
-  // Without symbolic links, which AtomicFile follows.
+  // Resolves symbolic links, because AtomicFile follows them.
   const auto canonical = [](const std::string& file) {
     std::error_code error;
     std::filesystem::path path =

@@ -22,7 +22,7 @@ struct InputSource {
 };
 
 /// Errors: as Sequence::Open and RecordingReader::Open; INVALID_ARGUMENT for a recording with
-/// options of columns or times.
+/// `select`, `columns`, `times` or `time_step`.
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options);
 
 /// Estimates the spacing, to four digits, from the first frame with two different particles.

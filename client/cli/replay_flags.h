@@ -36,7 +36,8 @@ struct ReplayFlags {
   SurfaceOptions surface_options = {};
   std::string placement = "virtual-plane";
   std::string fill = "greedy";
-  /// "z=0.5" or six numbers. The first slice has the frame's outline, unless `surface` is set.
+  /// "z=0.5" or six numbers. The first slice is the plane of the frame's own outline. Each other
+  /// slice, with `surface` each slice, is a section.
   std::vector<std::string> slices;
   std::string phases;            ///< "NAME=PHASE,...": the attribute and the phases.
   std::vector<double> isolines;  ///< Isovalues of the density.
@@ -66,7 +67,7 @@ struct ReplayFlags {
   bool keep_going = false;
   bool quiet = false;
 
-  FrameOutputs::Places files;  ///< Without `surface` and `walls`.
+  FrameOutputs::Places files;  ///< The members `surface` and `walls` are not set here.
   std::string report;
   std::uint64_t report_particles = 20'000;
 };

@@ -15,11 +15,13 @@ namespace partiemc::client {
 /// The attribute that --phases names, or a --wall of particles. Empty without such a flag.
 std::string PhaseAttributeOf(const ReplayFlags& flags);
 
-/// Whether the caller must estimate the spacing before the stream opens. Surfaces and slices
-/// require a given spacing.
+/// Whether the caller must estimate the spacing before the stream opens, because surfaces and
+/// slices require a given one. True for these with --spacing first-frame, or if both --spacing and
+/// `recorded_spacing` are absent.
 bool IsEstimatedInSpace(const ReplayFlags& flags, std::optional<double> recorded_spacing);
 
-/// `spacing`: of the recording, or an estimate; unused if --spacing has a number.
+/// `spacing`: of the recording, or an estimate. Used without --spacing, and for surfaces and slices
+/// with --spacing first-frame.
 /// `recorded_box`: for --periodic without --box. Without any box the parameters have none.
 /// Errors: INVALID_ARGUMENT, one line that names the flag.
 absl::StatusOr<ReconstructionParameters> ParametersOf(

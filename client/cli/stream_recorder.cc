@@ -55,7 +55,7 @@ std::string TextOf(const SlicePlane& slice) {
   return Concat(NumberList(slice.origin), ",", NumberList(slice.normal));
 }
 
-// The recording holds the box of each frame, so its axes suffice.
+// The flags name only the periodic axes: the recording holds the box of each frame.
 std::string PeriodicFlagsOf(const PeriodicBox& box) {
   std::string flags;
   for (std::size_t k = 0; k < box.axes.size(); ++k) {
@@ -137,7 +137,7 @@ std::string ReplayFlagsOf(const ReconstructionParameters& parameters) {
   }
   std::string isovalues;
   for (const Section& section : parameters.sections) {
-    // Every slice has the same isolines.
+    // Every slice has the same isolines, so those on the slice of the first section suffice.
     if (!section.isovalue || section.slice != parameters.sections.front().slice) continue;
     AppendAll(isovalues, isovalues.empty() ? "" : ",", ShortestNumber(*section.isovalue));
   }

@@ -25,7 +25,7 @@ struct WatchFlags {
   std::uint64_t frames = 0;  ///< 0: until the stream ends.
   double deadline_seconds = 30;
   double give_up_after_seconds = 30;  ///< 0: a lost connection ends the watch.
-  FrameOutputs::Places files;         ///< Without `surface` and `walls`.
+  FrameOutputs::Places files;         ///< The members `surface` and `walls` are not set here.
   std::string record;                 ///< A recording to write; empty: none.
   bool wait = false;                  ///< Wait for the stream to start.
   bool quiet = false;

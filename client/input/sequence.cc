@@ -209,7 +209,7 @@ class FileSequence final : public Sequence {
   ParticleRows rows_;
   PlaneProjection projection_;
   absl::Status failure_;
-  std::uint64_t selected_ = 0;         // Particles of all frames.
+  std::uint64_t selected_ = 0;         // Particles that --select kept.
   std::uint64_t unselected_ = 0;       // Particles that --select left out.
   std::optional<double> former_time_;  // Of the frame that was read last.
   bool noticed_order_ = false;

@@ -143,7 +143,7 @@ class Sequence {
   /// The files that Next reads, and the file of times.
   virtual std::vector<std::string> files() const = 0;
 
-  /// Those of the notices that report lost frames: a truncated recording.
+  /// The notices that report lost frames, for example of a truncated recording.
   virtual std::vector<std::string> losses() const { return {}; }
 };
 

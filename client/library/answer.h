@@ -13,9 +13,10 @@
 
 namespace partiemc::client {
 
-/// Reads the properties of an opened stream. Limits its window, because a server may announce any.
-/// Errors: UNIMPLEMENTED if the server ignores one of the `requested` parameters, as an older one
-/// does; INVALID_ARGUMENT for parameters that cannot be decoded.
+/// Reads the properties of an opened stream. Limits the announced window to 1 to 64 frames, because
+/// each frame in flight takes memory. Errors: UNIMPLEMENTED if an older server has ignored a
+/// `requested` parameter that it does not know, such as walls; INVALID_ARGUMENT for parameters that
+/// cannot be decoded.
 absl::StatusOr<StreamInfo> ReadOpened(const v1::StreamOpened& opened,
                                       const ReconstructionParameters& requested);
 

@@ -9,7 +9,7 @@
 
 namespace partiemc::client {
 
-/// Pauses of one loss of a connection.
+/// Computes the pauses between the attempts to reconnect after one loss of a connection.
 class Backoff {
  public:
   /// `random` seeds the jitter, so that clients do not retry at the same moment.
@@ -17,8 +17,8 @@ class Backoff {
       : policy_(policy), address_count_(address_count), random_(random) {}
 
   /// Returns the pause before the next attempt. It is 0 until every address has been tried once.
-  /// Then each round over the addresses begins with a pause. The pause doubles up to the longest,
-  /// and the jitter removes up to half of it.
+  /// Then the first attempt of each round over the addresses has a pause, the others have none. The
+  /// pause doubles from round to round, up to the longest. The jitter removes up to half of it.
   std::chrono::milliseconds NextPause();
 
  private:

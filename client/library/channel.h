@@ -28,8 +28,8 @@ absl::Status CheckAddress(const std::string& address, const Credentials& credent
 absl::Status Connect(const std::shared_ptr<grpc::Channel>& channel, const std::string& address,
                      std::chrono::milliseconds timeout);
 
-/// Calls MakeChannel and Connect for calls that must end within `deadline`. Connect waits at most
-/// 2 s, enough for a server that is starting.
+/// Calls MakeChannel, then Connect with a timeout of 2 s, or of `deadline` if it is shorter. 2 s is
+/// enough for a server that is starting.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> ConnectedChannel(const std::string& address,
                                                                 const Credentials& credentials,
                                                                 std::chrono::milliseconds deadline);

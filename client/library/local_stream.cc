@@ -63,7 +63,8 @@ class Worker final : public LocalStream {
   OptionalTime Deadline(std::optional<std::chrono::milliseconds> wait) const {
     return wait ? OptionalTime(clock_.Now() + *wait) : std::nullopt;
   }
-  // Waits for a change, and returns false once `give_up` has passed.
+  // Waits for a change of the guarded members, at most until `give_up` (absent: no limit). Returns
+  // false, without waiting, if `give_up` has already passed.
   bool WaitUntil(OptionalTime give_up) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Run();
   void Process(const OwnedFrame& frame, Event& event);

@@ -17,7 +17,8 @@ namespace partiemc::client {
 class OwnedFrame {
  public:
   OwnedFrame() = default;
-  OwnedFrame(OwnedFrame&&) = default;  // Moved vectors keep the addresses of their elements.
+  // Views stay valid: moved vectors keep the addresses of their elements.
+  OwnedFrame(OwnedFrame&&) = default;
   OwnedFrame& operator=(OwnedFrame&&) = default;
 
   /// Copies `frame`, with `time` instead of its time. `number` is the caller's number of the frame.
@@ -41,8 +42,8 @@ class OwnedFrame {
     Take(rows, time, number, [](const std::byte*, std::size_t) { return false; });
   }
 
-  /// Copies only the arrays whose layout differs from a frame's. frame() refers to the other
-  /// arrays, so they must outlive its use.
+  /// Copies only the arrays of `rows` whose layout differs from a frame's. frame() refers to the
+  /// other arrays, so they must stay valid while frame() is used.
   void Adopt(const wire::FrameRows& rows) {
     Take(rows, rows.scalars.time, 0, [](const std::byte* place, std::size_t alignment) {
       return place != nullptr && reinterpret_cast<std::uintptr_t>(place) % alignment == 0;

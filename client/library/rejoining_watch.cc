@@ -173,7 +173,8 @@ void RejoiningWatch::Account(WatchedFrame& frame) {
   last_ = frame.sequence;
 }
 
-// Records the loss of the call. Returns false if a retry cannot succeed.
+// Records the loss of the call. Returns false if the watch does not rejoin: rejoining is disabled,
+// the server does not support it (no lineage), or a retry cannot succeed.
 bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   end_ = call_->end();
   end_.dropped += unreported_drops_;

@@ -51,7 +51,8 @@ class RejoiningWatch final : public Watcher {
   std::optional<std::uint64_t> From() const;
   bool Lose(const absl::StatusOr<Received>& received);
   // Continues to rejoin. Returns kEvent if the watch has rejoined, kNothingYet if it has not
-  // rejoined by `until`. Errors end the watch.
+  // rejoined by `until`. After WatcherOptions::rejoin.give_up_after, returns the end or the error
+  // of the lost call. kEnd and errors end the watch.
   absl::StatusOr<Received> Rejoin(std::optional<TimePoint> until);
   void Account(WatchedFrame& frame);
   void SetCall(std::shared_ptr<WatchCall> call) ABSL_LOCKS_EXCLUDED(mutex_);

@@ -16,7 +16,7 @@ class ResendBuffer {
   /// `first` is the sequence number of the frame that is added first.
   explicit ResendBuffer(std::uint64_t first) : first_(first) {}
 
-  /// Adds frame end().
+  /// Adds the frame with the sequence number end().
   void Add(grpc::ByteBuffer request);
   /// Drops the frames below `sequence`.
   void DropBelow(std::uint64_t sequence);

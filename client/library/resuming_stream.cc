@@ -51,7 +51,7 @@ absl::Status CheckParts(const StreamOptions& options) {
   return absl::OkStatus();
 }
 
-// A limit of 0 means no limit.
+// Whether `limit` is at least as large as `former`. A limit of 0 means no limit.
 bool AllowsAsMuch(std::uint64_t limit, std::uint64_t former) {
   return limit == 0 || (former != 0 && limit >= former);
 }
@@ -162,7 +162,8 @@ bool ResumingStream::MaySend(std::uint64_t bytes) const {
   return call_ == nullptr || call_->reads_over() || call_->backlog() == 0;
 }
 
-// The status that ended the stream. Absent if the call continues or a retry can succeed.
+// The status that ended the stream. Absent if the call continues, if it has responses that Take has
+// not returned, or if a retry can succeed.
 std::optional<absl::Status> ResumingStream::FatalEnd() const {
   AssertShared();
   if (call_ == nullptr || !call_->done() || call_->ready() > 0) return std::nullopt;
@@ -313,7 +314,8 @@ absl::Status ResumingStream::TooSlowToAnswer() const {
       Seconds(options_.deadline), ": it may be overloaded; try again later"));
 }
 
-// Fills `event` if the response is new to the caller; otherwise drops it and returns false.
+// Fills `event` and returns true if the caller must receive the response: an answer that is new to
+// the caller, or a notice if the stream does not reconnect. Otherwise returns false.
 absl::StatusOr<bool> ResumingStream::Deliver(StreamCall::Response response, Event& event) {
   AssertShared();
   const bool is_answer = IsAnswer(*response);
@@ -401,7 +403,8 @@ absl::StatusOr<bool> ResumingStream::GoOn(OptionalTime until) {
   return true;
 }
 
-// Checks that the new server accepts frames that were sent under the first server's limits.
+// Checks that the new server resumes after the checkpoint, with the same parameters and boxes of
+// frames, and accepts frames that were sent under the first server's limits.
 absl::Status ResumingStream::CheckReplica(const StreamConnector::Opened& opened,
                                           const StreamInfo& info) const {
   const std::string& address = opened.call->address();

@@ -111,13 +111,14 @@ class ResumingStream final : public Stream {
   // The first frame after the checkpoint.
   std::uint64_t checkpoint_next_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   // The next frame whose response the caller receives, and the next frame that call_ answers. After
-  // a reconnection the second is smaller: call_ repeats some responses, which are dropped.
+  // a reconnection the second may be smaller: call_ then repeats some responses, which are dropped.
   std::uint64_t next_answer_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   std::uint64_t next_of_call_ ABSL_GUARDED_BY(monitor_.mutex) = 1;
   // Parts other than 0 only: call_ does not answer frames below this number, because the server has
   // already completed them.
   std::uint64_t over_below_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
-  // When the oldest unanswered frame was sent, and when call_ was opened: deadlines start then.
+  // Starts of deadlines. `adopted_at_`: when call_ was opened. `due_since_`: then, or later when a
+  // frame was sent, or FinishSending called, while no frame was unanswered.
   TimePoint due_since_ ABSL_GUARDED_BY(monitor_.mutex);
   TimePoint adopted_at_ ABSL_GUARDED_BY(monitor_.mutex);
   bool finished_ ABSL_GUARDED_BY(monitor_.mutex) = false;  // FinishSending was called.

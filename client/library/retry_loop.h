@@ -70,8 +70,8 @@ class RetryLoop {
 
   /// Requires lost().
   Reconnecting Progress() const;
-  /// One line about the last loss: the description passed to Lose, and the address where the call
-  /// continues.
+  /// One line about the last loss: the description passed to Lose, the address where the call
+  /// continues, and the time since the loss.
   std::string LossDescription() const;
   /// Error of the last attempt.
   const absl::Status& refusal() const { return refusal_; }

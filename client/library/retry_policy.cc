@@ -10,10 +10,10 @@
 namespace partiemc::client {
 namespace {
 
+constexpr std::string_view kDraining = "DRAINING";
 // Reasons of refusals (proto/PROTOCOL.md) after which another attempt may succeed: the stream's
 // former call may release its name, its slot or the memory of its state, and another server's
 // version or keys may accept the checkpoint.
-constexpr std::string_view kDraining = "DRAINING";
 constexpr std::array<std::string_view, 9> kRetryableWhileResuming = {
     "NAME_IN_USE",          "TOO_MANY_STREAMS", "TOO_MANY_OPENING",
     "CALLER_STREAMS",       "CALLER_CALLS",     "CHECKPOINT_MISMATCH",

@@ -17,7 +17,9 @@ struct Loss {
   bool retryable = false;
 };
 
-/// True if the call lost its connection or its server, false if it was refused.
+/// True if a call with this status lost its connection or its server, false if it was refused. With
+/// a reason of the server only DRAINING counts as lost. Without one, OK, UNAVAILABLE, INTERNAL,
+/// UNKNOWN and CANCELLED do.
 bool IsLostConnection(grpc::StatusCode code, std::string_view reason);
 
 /// Purpose of a call.
@@ -34,8 +36,8 @@ enum class CallPurpose {
 /// absence of part 0 is retryable too.
 ///
 /// A status without a reason usually means a lost connection, which is retryable. Its code then
-/// depends on the intermediary: UNAVAILABLE without one; INTERNAL, UNKNOWN or CANCELLED with a
-/// proxy; OK with a proxy that closes cleanly.
+/// depends on the intermediary: UNAVAILABLE without an intermediary; INTERNAL, UNKNOWN or CANCELLED
+/// with a proxy; OK with a proxy that closes cleanly.
 Loss LossOf(const StreamCall& call, CallPurpose purpose);
 
 }  // namespace partiemc::client

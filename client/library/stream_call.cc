@@ -90,8 +90,8 @@ StreamCall::Response StreamCall::Take() {
 void StreamCall::Recycle(Response response) {
   spare_.push_back(std::move(response));
   if (reading_ != nullptr || window_ == 0) return;
-  // No read was pending, so the silence was not the server's. Notices do not count: a server that
-  // sends many would postpone the deadline.
+  // Restarts the deadline of the next answer: no read was pending, so the server could not answer.
+  // A notice does not restart the deadline, because a server can send any number of notices.
   if (IsAnswer(*spare_.back())) progress_at_ = monitor_.Now();
   ReadNext();
 }

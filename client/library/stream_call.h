@@ -41,8 +41,8 @@ struct Monitor {
   const TimeAndChance surroundings;
 };
 
-/// Time limit for the end of a call after its last message. A call that takes longer is treated as
-/// broken.
+/// Time limit for the status of a call after the end of its reads. A call that takes longer is
+/// treated as broken.
 inline constexpr std::chrono::seconds kEndTimeout(1);
 
 /// Methods that require the monitor's mutex may release it while they run.
@@ -85,8 +85,9 @@ class StreamCall final
   std::size_t ready() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) { return ready_.size(); }
   /// Whether an answer can be taken.
   bool HasAnswer() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
-  /// Time of the last answer, of StreamOpened or of the end of the reads; or of the last read that
-  /// started after a pause. Notices do not count.
+  /// Time of the latest of these: an answer or StreamOpened arrived, the reads ended, or Recycle of
+  /// an answer restarted the reads, which had paused because no message was spare. Notices do not
+  /// count.
   TimePoint progress_at() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex) {
     return progress_at_;
   }
@@ -97,7 +98,7 @@ class StreamCall final
 
   // Valid when done():
   const grpc::Status& end() const { return end_; }
-  /// The server's reason (proto/PROTOCOL.md); empty if the status is not from the server.
+  /// The server's reason (proto/PROTOCOL.md); empty without one, as after a lost connection.
   std::string reason() const;
 
  private:
@@ -123,7 +124,7 @@ class StreamCall final
   grpc::ByteBuffer request_ ABSL_GUARDED_BY(monitor_.mutex);  // The request being written.
   std::deque<grpc::ByteBuffer> queue_ ABSL_GUARDED_BY(monitor_.mutex);
   std::size_t window_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
-  // Numbers of frames.
+  // Counts of frames.
   std::uint64_t written_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
   std::uint64_t answered_ ABSL_GUARDED_BY(monitor_.mutex) = 0;
   TimePoint progress_at_ ABSL_GUARDED_BY(monitor_.mutex) = monitor_.Now();

@@ -44,7 +44,8 @@ class StreamConnector {
   /// Recovered, further losses count as part of this one.
   void Lost(const Loss& loss, v1::ResumeStream resume);
   /// Continues to reconnect: waits, connects, opens. Returns nothing if no call is open at `until`.
-  /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after.
+  /// Errors: the server's refusal; UNAVAILABLE after ReconnectPolicy::give_up_after; CANCELLED
+  /// after Cancel.
   absl::StatusOr<std::optional<Opened>> OpenAgain(std::optional<TimePoint> until)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(monitor_.mutex);
   /// Ends the loss: a new result was delivered.
@@ -54,7 +55,8 @@ class StreamConnector {
   std::optional<Reconnecting> Progress() const {
     return retry_.lost() ? std::optional(retry_.Progress()) : std::nullopt;
   }
-  /// One line about the last loss: address, cause and where the stream continues.
+  /// One line about the last loss: address, cause, where the stream continues, and the time since
+  /// the loss.
   std::string LossDescription() const { return retry_.LossDescription(); }
 
   /// Ends a call. Receiver's thread only.

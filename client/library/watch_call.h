@@ -1,6 +1,6 @@
-// One WatchStream call. Its own thread opens the call and reads messages into `ready_`; the credits
-// limit their number, and a server that ignores them ends the call. The receiver's thread decodes
-// messages and returns credits.
+// One WatchStream call. Its own thread opens the call and reads messages into `ready_`. The credits
+// limit the number of messages in `ready_`: if the server sends more, the client cancels the call.
+// The receiver's thread decodes messages and returns credits.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -39,11 +39,11 @@ class WatchCall {
   ~WatchCall();
 
   /// Starts to open the call without waiting. `from_sequence` replaces options.from_sequence.
-  /// `lineage`: of the watch that was lost; empty for a first watch.
+  /// `lineage`: lineage() of the call that was lost; empty for a first call.
   void Start(std::string_view stream_name, const WatcherOptions& options,
              std::optional<std::uint64_t> from_sequence, const std::string& lineage = {});
-  /// Waits at most until `until`; true if the server has accepted the watcher. Errors: the server's
-  /// refusal.
+  /// Waits at most until `until`. Returns true if the server has accepted the watcher, false if it
+  /// has not responded. Errors: the server's refusal.
   absl::StatusOr<bool> WaitUntilOpened(TimePoint until) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Same as Watcher::Receive. Requires: open.
   absl::StatusOr<Received> Receive(WatchedFrame& frame,
@@ -61,8 +61,9 @@ class WatchCall {
   const WatchEnd& end() const { return end_; }
   /// Reason in the call's status (proto/PROTOCOL.md); empty if there is none.
   std::string reason() ABSL_LOCKS_EXCLUDED(mutex_);
-  /// True if the connection, the server or the producer was lost. False if another call would be
-  /// refused too.
+  /// True if the call has ended because the connection, the server or the producer was lost, the
+  /// stream was taken over, or the server was short of memory. False if another call would be
+  /// refused too, if the call has not ended, and after Cancel.
   bool lost() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Short cause of the end.
   std::string why() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -78,8 +79,8 @@ class WatchCall {
   Message TakeNext(std::optional<TimePoint> until, absl::StatusOr<Received>& received)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether the watch has ended as the server's last message says. That message is enough if the
-  // status of a finished watch is lost, as happens behind some proxies.
+  // Whether the call ended with the server's WatchEnded message and status OK. After the reason
+  // FINISHED a status that means a lost connection counts, too: some proxies lose the status.
   bool HasEnd() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
   absl::Status ExceededCredit() const;

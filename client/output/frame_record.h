@@ -83,7 +83,7 @@ inline FrameRecord SectionOf(const FrameRecord& frame, std::size_t k) {
 }
 
 /// The areas of particles with these volumes. In a plane a volume is an area, except for grains:
-/// theirs is the squared diameter.
+/// the volume of a grain is its squared diameter.
 inline std::vector<float> AreasOf(std::span<const float> volumes, Boundary boundary) {
   std::vector<float> areas(volumes.begin(), volumes.end());
   if (boundary == Boundary::kGrains) {

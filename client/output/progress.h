@@ -34,8 +34,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done`: number of frames completed since the start. `detail`: text about the last frame, shown
-  /// unless it does not fit beside a bar.
+  /// `done`: number of frames completed since the start. `detail`: text about the last frame. Left
+  /// out if there is a bar and the text does not fit beside it.
   void Update(std::uint64_t done, std::string detail = {});
 
   /// Shows `text` instead of the progress, while no frame can arrive. Call it repeatedly until the

@@ -20,7 +20,7 @@ namespace partiemc::client {
 /// The kind of frames in a file.
 enum class StatisticsOf : std::uint8_t {
   kOutlines,
-  kOutlinesAtWalls,  ///< Of a stream with ReconstructionParameters::walls.
+  kOutlinesAtWalls,  ///< Of a stream with ReconstructionParameters::walls or wall_phases.
   kSurfaces
 };
 

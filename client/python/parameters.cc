@@ -52,7 +52,7 @@ void TakeNamed(py::dict& arguments, const char* field, Value& value) {
   }
 }
 
-// Reads a time in seconds. `time` may be optional.
+// Reads a time in seconds. `time` may be a std::optional.
 template <typename Time>
 void TakeTime(py::dict& arguments, const char* name, Time& time) {
   const auto seconds = Take<double>(arguments, name);
@@ -112,7 +112,7 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
   box->wraps = wraps;
 }
 
-// Reads dicts of the values that differ.
+// Reads each section: a dict of the values that differ from the parameters of the stream.
 void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
   const auto given = Take<std::vector<py::dict>>(arguments, "sections");
   if (!given) return;
@@ -240,7 +240,7 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
   TakeInto(arguments, "simplify", parameters.surface.simplify);
   TakeInto(arguments, "min_component_volume", parameters.surface.min_component_volume);
-  // The core's rule, and the function that helps to keep it.
+  // The core has the same rule. This error also names the function that estimates a spacing.
   if (!parameters.spacing && (parameters.output == Output::kSurface || parameters.slice)) {
     Raise(Invalid(kReasonOutOfRange, "parameters.spacing", "absent",
                   "must be given for surfaces and slices; partiemc.estimate_spacing(positions) "

@@ -12,20 +12,21 @@
 
 namespace partiemc::python {
 
-/// Takes the reconstruction parameters; None means not given. Raises partiemc.Error for a value of
-/// the wrong form, such as an unknown placement, and for surfaces and slices without a spacing.
-/// Raises TypeError for a value of the wrong type.
+/// Removes the reconstruction parameters from `arguments` and converts them; None means not given.
+/// Raises partiemc.Error for a value of the wrong form, such as an unknown placement, and for
+/// surfaces and slices without a spacing. Raises TypeError for a value of the wrong type.
 ReconstructionParameters TakeParameters(pybind11::dict arguments);
 /// Converts a dict of periodic axes with their bounds: {"x": (0, 10)}. Raises partiemc.Error for
 /// another dict.
 PeriodicBox BoxOf(const pybind11::dict& given);
 /// The reverse of BoxOf; None without a box.
 pybind11::object ToPython(const std::optional<PeriodicBox>& box);
-/// Takes tls, ca_file, cert_file, key_file, token and token_file. The defaults come from the
-/// environment. ca_file and cert_file enable TLS, unless `tls` is False.
+/// Removes tls, ca_file, cert_file, key_file, token and token_file from `arguments` and converts
+/// them. The defaults come from the environment. ca_file and cert_file enable TLS, unless `tls` is
+/// False.
 client::Credentials TakeCredentials(pybind11::dict arguments);
-/// Takes all options of a stream, including parameters. `latest`: the producer skips frames, so
-/// the default of give_up_after is shorter.
+/// Removes all options of a stream, including parameters, from `arguments` and converts them.
+/// `latest`: the producer skips frames, so the default of give_up_after is shorter.
 client::StreamOptions TakeStreamOptions(pybind11::dict arguments, bool latest);
 client::WatcherOptions TakeWatcherOptions(pybind11::dict arguments);
 /// Raises TypeError if arguments are left.

@@ -17,9 +17,9 @@ struct PartOf {
   const Part& part;
 };
 
-/// One number of the measures of all rings or shells, as a strided view of shape (count,). With
-/// `columns`, its shape is (count, columns), and the following numbers in memory are the other
-/// columns.
+/// The number `member` of the measures of all rings or shells, as a strided view of shape (count,).
+/// With `columns`, its shape is (count, columns): the other columns are the numbers that follow
+/// `member` in memory.
 template <typename As, typename T, typename Measures, typename Part>
 pybind11::array Column(const PartOf<Part>& of, T Measures::*member, pybind11::ssize_t columns = 0) {
   const std::vector<Measures>& measures = of.part.measures;

@@ -59,7 +59,7 @@ AttributeValues AttributeFromState(const py::handle& state) {
 }  // namespace
 
 py::tuple StateOf(PythonResult& result) {
-  const auto& sections = SectionsOf(result);  // Moved out of the frame, so encoded empty there.
+  const auto& sections = SectionsOf(result);  // Moved out of `frame`, so `message` has none.
   const client::FrameResult& frame = result.frame;
   v1::ReconstructedFrame message;
   RaiseUnlessOk(wire::EncodeResult(frame.result, {frame.times.stages_ms, frame.times.total_ms},

@@ -79,8 +79,8 @@ bool IsRecording(const std::string& path);
 /// Reads a recording. A truncated file ends after its last complete block, with a notice; a damaged
 /// block is kDataLoss. Every block is checked before its frames are delivered. Files are not
 /// trusted: blocks are limited (kMaxBlockBytes, kMaxAttributes), and memory grows with their actual
-/// content. Ids are returned unchanged. Velocities are returned only if all velocities of the frame
-/// are finite.
+/// content. Ids are returned unchanged, even if they repeat within a frame. Velocities are returned
+/// only if all velocities of the frame are finite.
 class RecordingReader final : public Sequence {
  public:
   /// `frames`, `in_space` and `max_expansion` as in SequenceOptions. Errors: as Sequence.

@@ -124,8 +124,9 @@ absl::Status Decode(const v1::ParticleFrame& message, RecordedFrame& frame) {
   return absl::OkStatus();
 }
 
-// Counts the fields of a message of `type` up to the first malformed one. Returns false if it is
-// malformed or has too many fields. A parsed field can take fifty times its serialised size.
+// Adds the number of fields of a message of `type` to `fields`, up to the first malformed one.
+// Returns false if the message is malformed or has too many fields. A parsed field can take fifty
+// times its serialised size.
 bool HasFewFields(CodedInputStream& input, const google::protobuf::Descriptor& type,
                   std::size_t& fields) {
   while (const std::uint32_t tag = input.ReadTag()) {

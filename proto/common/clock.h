@@ -17,7 +17,9 @@ class Clock {
   virtual TimePoint Now() const = 0;
   /// Time of day, comparable between machines.
   virtual std::chrono::system_clock::time_point TimeOfDay() const = 0;
-  /// As CondVar::WaitUntil of `changed`, but `until` is a time of this clock.
+  /// Waits until `changed` is notified or this clock has reached `until`; releases `mutex`
+  /// meanwhile. Returns false if `until` has passed. May also return without a reason, as
+  /// CondVar::WaitUntil.
   virtual bool WaitUntil(CondVar& changed, Mutex& mutex, TimePoint until) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) = 0;
 };

@@ -53,7 +53,8 @@ class ABSL_SCOPED_LOCKABLE MutexLock {
   Mutex& mutex_;
 };
 
-// As ABSL_UNLOCK_FUNCTION, which Clang does not reverse in a destructor.
+// For the constructor of a scoped class that releases `mutex`. With this attribute, unlike
+// ABSL_UNLOCK_FUNCTION, Clang's analysis knows that the destructor locks the mutex again.
 #ifdef __clang__
 #define PARTIEMC_RELEASE(mutex) __attribute__((release_capability(mutex)))
 #else

@@ -100,7 +100,7 @@ absl::Status CheckOptionalArrays(const v1::ParticleFrame& message, const Positio
   return absl::OkStatus();
 }
 
-// Whether a frame has an attribute. Without particles, its values are empty.
+// Whether a frame has the attribute `scalar`: if it has values, or if the frame has no particles.
 bool IsThere(const v1::NamedScalar& scalar, std::size_t particles) {
   return particles == 0 || !scalar.values().empty();
 }

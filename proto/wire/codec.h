@@ -32,7 +32,7 @@ enum class Coordinates : std::uint8_t { kFloat64, kRelativeFloat32, kCompact };
 struct Outputs {
   bool rings = true;
   bool mesh = true;
-  bool surface = true;  ///< For streams with Output::kSurface.
+  bool surface = true;  ///< Has an effect only in streams with Output::kSurface.
   bool normals = false;
   Coordinates coordinates = Coordinates::kFloat64;
   bool echo_particles = false;               ///< Watchers receive the particles, too.
@@ -56,7 +56,7 @@ struct ReconstructedFrame {
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::uint64_t surface_digest = 0;
-  std::vector<OutlineDigests> section_digests = {};  ///< By section of `result`.
+  std::vector<OutlineDigests> section_digests = {};  ///< One for each section of `result`.
 };
 
 v1::Output ToWire(Output output);
@@ -75,9 +75,10 @@ absl::StatusOr<ReconstructionParameters> DecodeParameters(
 void EncodeParameters(const ReconstructionParameters& parameters,
                       v1::ReconstructionParameters& message);
 
-/// `present`: whether the request has the message. Errors: INVALID_ARGUMENT with a Violation for an
-/// unknown format, and for more than 16 or repeated attributes. Normals require rings or surface. A
-/// format and attributes require rings, mesh or surface.
+/// `present`: whether the request has the message; if not, returns the defaults. Errors:
+/// INVALID_ARGUMENT with a Violation for an unknown format, and for more than 16 or repeated
+/// attributes. Also for normals without rings and surface, and for a format or attributes without
+/// rings, mesh and surface.
 absl::StatusOr<Outputs> DecodeOutputs(const v1::Outputs& message, bool present);
 void EncodeOutputs(const Outputs& outputs, v1::Outputs& message);
 

@@ -20,15 +20,16 @@
 namespace partiemc::wire {
 namespace {
 
-// The versions of PROTOCOL.md. They are global variables of meshoptimizer, so they are set before
-// any thread encodes.
+// Sets the codec versions that PROTOCOL.md requires. They are global variables of meshoptimizer, so
+// they are set before any thread encodes.
 [[maybe_unused]] const bool kVersionsAreSet = [] {
   meshopt_encodeVertexVersion(0);
   meshopt_encodeIndexVersion(1);
   return true;
 }();
 
-// Least number of steps per spacing. The error is then at most .0009 spacings.
+// Minimum number of steps (units of rounded coordinates) per particle spacing. Rounding then moves
+// a point by at most .0009 spacings.
 constexpr double kSteps = 1024;
 constexpr double kMostSteps = 1 << 30;
 

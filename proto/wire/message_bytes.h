@@ -17,8 +17,9 @@
 
 namespace partiemc::wire {
 
-/// Most fields of a request, nested and unknown ones included. Bounds the memory of parsing,
-/// because a parsed field can take thirty times its serialised size. Valid requests have far fewer.
+/// Maximum number of fields of a request, including nested and unknown ones. Bounds the memory of
+/// parsing, because a parsed field can take thirty times its serialised size. Valid requests have
+/// far fewer.
 inline constexpr int kMaxFields = 4096;
 
 /// Whether a message of `type` in `bytes` has at most kMaxFields fields and no groups, up to the
@@ -31,8 +32,8 @@ bool HasFewFields(grpc::ByteBuffer& bytes, const google::protobuf::Descriptor& t
 std::uint64_t ParsedBytes(std::string_view bytes, const google::protobuf::Descriptor& type);
 
 /// The number of the set field of a message that consists of a oneof with the fields 1 to `last`; 0
-/// if none is set. Empty if `bytes` is malformed or has more than kMaxFields fields. Does not check
-/// the contents of the field.
+/// if none is set. If several occur, the last one counts. Empty if `bytes` is malformed or has more
+/// than kMaxFields fields. Does not check the contents of the field.
 std::optional<int> HeldField(grpc::ByteBuffer& bytes, int last);
 
 /// The `sequence` of the ParticleFrame in `bytes`, a ReconstructRequest; 0 without a frame. Empty
@@ -43,8 +44,8 @@ std::optional<std::uint64_t> SequenceOf(grpc::ByteBuffer& bytes);
 /// `sequence` before the damage and among the first kMaxFields fields; 0 if there is none.
 std::uint64_t ReadableSequence(grpc::ByteBuffer& bytes);
 
-/// Merges `bytes` into `message`. Empty strings of `message` keep their memory. Returns false if
-/// `bytes` is malformed; `message` then holds a part of it.
+/// Merges `bytes` into `message`. Reuses the buffers of strings that `message` has cleared. Returns
+/// false if `bytes` is malformed; `message` then holds some of the fields.
 bool MergeBytes(grpc::ByteBuffer& bytes, google::protobuf::MessageLite& message);
 
 /// Serialises a message. Requires: less than 2 GiB.

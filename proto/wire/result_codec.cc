@@ -15,7 +15,7 @@
 namespace partiemc::wire {
 namespace {
 
-// The points of rings and meshes.
+// The format of the points of rings and meshes.
 PointFormat FormatOf(const v1::ReconstructedFrame& message) {
   return {.format = message.coordinate_format(), .origin = OriginOf(message), .components = 2};
 }
@@ -193,7 +193,8 @@ absl::Status DecodeRings(const v1::ReconstructedFrame& message, Rings& rings) {
   if (auto status = CheckRingCounts(from, rings.PointCount()); !status.ok()) return status;
   CopyBytes(from.offsets(), rings.offsets);
   if (auto status = CheckOffsets(rings.offsets, rings.PointCount()); !status.ok()) return status;
-  if (rings.offsets.empty()) rings.offsets.assign(1, 0);  // As without rings in process.
+  // A result of the core has the first offset even if it has no rings.
+  if (rings.offsets.empty()) rings.offsets.assign(1, 0);
   CopyBytes(from.outer_of(), rings.outer_of);
   if (auto status = CheckNesting(rings.outer_of); !status.ok()) return status;
   CopyBytes(from.normals(), rings.normals);
@@ -329,7 +330,8 @@ absl::Status EncodeShape(const Result& result, const Outputs& outputs,
   message.set_rings_digest(DigestRings(result.rings));
   message.set_mesh_digest(DigestMesh(result.mesh));
   message.set_surface_digest(DigestSurface(result.surface));
-  // A surface without bodies has the names of its attributes.
+  // A result has a surface if the surface has shells or attributes: without shells, it still sends
+  // the names of its attributes. Otherwise the result is an outline.
   if (result.surface.ShellCount() == 0 && result.surface.attributes.empty()) {
     message.clear_surface();
     return EncodeOutline(result, outputs, message);

@@ -30,7 +30,7 @@ void SetOrigin(const Origin& origin, v1::ReconstructedFrame& message);
 
 /// The format and scale of the points of a result.
 struct PointFormat {
-  v1::CoordinateFormat format;  ///< FLOAT32_RELATIVE; all others are read as FLOAT64.
+  v1::CoordinateFormat format;  ///< Any value except FLOAT32_RELATIVE means FLOAT64.
   Origin origin;
   std::size_t components;  ///< 2 or 3.
 };

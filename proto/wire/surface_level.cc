@@ -94,7 +94,7 @@ absl::Status ReplaceByLevel(const LevelOfDetail& level, SurfaceOrigin origin,
     if (!made.ok()) return made.status();
     error = *made;
   }
-  // Without a removed point the exact surface stays.
+  // `error` is 0 if no point was removed; the message then keeps the exact surface.
   if (error > 0) status = ReplaceGeometry(decoded, spacing, message);
   // The digest is over points and triangles in the order of the message.
   if (status.ok()) status = DecodeSurface(message, decoded);

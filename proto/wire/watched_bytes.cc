@@ -83,7 +83,7 @@ void WatchedBytes::EchoParticles(const v1::ParticleFrame& frame) {
   if (frame.positions().empty()) return;  // A frame without particles.
   using To = v1::ReconstructedFrame;
   std::string echo;
-  // A tag of the result may be one byte longer than that of the frame.
+  // A field's tag in the result may be one byte longer than its tag in the frame.
   echo.reserve(frame.ByteSizeLong() + static_cast<std::size_t>(frame.scalars_size()) + 16);
   const auto add_head = [&](int field, std::size_t length) {
     echo += Written([&](CodedOutputStream& out) {

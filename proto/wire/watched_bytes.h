@@ -25,8 +25,9 @@ class WatchedBytes {
   /// Takes over a serialised ReconstructedFrame. Does not check it.
   explicit WatchedBytes(std::string frame) { AppendOwn(std::move(frame)); }
 
-  /// Adds the format, positions, ids, volumes, velocities, scalars and box of `frame`. Copies them:
-  /// slices of the producer's request could keep much larger buffers of received bytes alive.
+  /// Adds the format, positions, ids, volumes, velocities, scalars and box of `frame`; nothing if
+  /// `frame` has no particles. Copies them: slices of the producer's request could keep much larger
+  /// buffers of received bytes alive.
   void EchoParticles(const v1::ParticleFrame& frame);
 
   /// Size of the serialised ReconstructedFrame.

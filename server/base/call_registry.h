@@ -71,8 +71,8 @@ class CallRegistry {
     return machines;
   }
 
-  /// Calls `end_if_late` with each call. It returns the earliest time at which the call may exceed
-  /// a limit; EndLate returns the minimum.
+  /// Calls `end_if_late` with each call. `end_if_late` returns the earliest time at which this call
+  /// may exceed a limit. EndLate returns the minimum of these times; TimePoint::max() if none.
   template <typename EndIfLate>
   TimePoint EndLate(const EndIfLate& end_if_late) ABSL_LOCKS_EXCLUDED(mutex_) {
     TimePoint look_again = TimePoint::max();

@@ -38,8 +38,8 @@ enum class Writing {
   kOpened,            ///< Writes the response to the first request.
   kResult,            ///< Writes a result or a frame error.
   kNotice,            ///< Writes the drain notice, or the end of a watch.
-  kOpenedThenNotice,  ///< The notice follows.
-  kResultThenNotice,
+  kOpenedThenNotice,  ///< As kOpened; a kNotice follows.
+  kResultThenNotice,  ///< As kResult; a kNotice follows.
 };
 
 struct CallState {

@@ -14,7 +14,8 @@ inline constexpr std::size_t kMaxStreamNameBytes = 128;
 /// product of the lengths.
 bool MatchesPattern(std::string_view pattern, std::string_view name);
 
-/// Quotes a client's text for messages and the log: escapes it and cuts it after 40 characters.
+/// Quotes a client's text for messages and the log: its first 40 bytes, escaped, between quotes. If
+/// the text is longer, "..." follows.
 std::string Quoted(std::string_view text);
 
 }  // namespace partiemc::server

@@ -31,7 +31,7 @@ class SerializedCall : public std::enable_shared_from_this<SerializedCall> {
   explicit SerializedCall(MachineKind kind) : state_{.kind = kind} {}
 
   /// The scope of an event: holds the mutex. The destructor calls Decide, releases the mutex and
-  /// runs the actions. Keeps the call alive.
+  /// runs the actions, unless another thread runs actions of this call. Keeps the call alive.
   class ABSL_SCOPED_LOCKABLE Event {
    public:
     explicit Event(SerializedCall& call) ABSL_EXCLUSIVE_LOCK_FUNCTION(call.mutex_);

@@ -88,6 +88,7 @@ class PartZero final : public FrameArrival {
   void OnFrame(std::size_t slot, grpc::ByteBuffer& request) override;
   bool MayAnswer(std::size_t slot) const override;
   std::uint64_t ComputedBytes(std::uint64_t bytes) const override;
+  /// Joins the parts only if the frame is the next one; the session refuses any other frame.
   /// Errors: PARTS_MISSING, MALFORMED, OUT_OF_MEMORY, and the errors of JoinParts.
   absl::Status Complete(std::size_t slot, const wire::Outputs& outputs,
                         v1::ReconstructRequest& request, grpc::ByteBuffer& bytes) override;

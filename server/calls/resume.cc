@@ -13,8 +13,8 @@
 namespace partiemc::server {
 namespace {
 
-// Returns a number that identifies `outputs`. Without surfaces it is the same as in versions that
-// had none, so that their checkpoints stay valid.
+// Returns a number that identifies `outputs`. For outlines, the number is the same as in versions
+// of the server that had no surfaces, so that checkpoints of these versions stay valid.
 std::uint32_t NumberOf(const wire::Outputs& outputs, bool is_surface) {
   // Lists every member. If a member is added, this statement does not compile until the author also
   // adds the member to the number.

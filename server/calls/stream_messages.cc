@@ -49,7 +49,7 @@ void EncodeLimits(const ServerLimits& limits, v1::Limits& message) {
   message.set_max_frame_bytes(limits.max_frame_bytes);
   message.set_max_tiles_per_frame(limits.frame.max_tiles);
   message.set_max_streams(limits.max_streams);
-  // Rounded up: 0 would mean none.
+  // Rounds up, because 0 would mean no limit.
   message.set_idle_timeout_seconds(static_cast<std::uint32_t>(
       std::chrono::ceil<std::chrono::seconds>(limits.idle.streaming).count()));
   message.set_max_watchers(limits.max_watchers);

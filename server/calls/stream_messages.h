@@ -20,7 +20,7 @@
 
 namespace partiemc::server {
 
-/// Reason of a refused `open` (proto/PROTOCOL.md).
+/// Reason of refusing an `open` that is too large (proto/PROTOCOL.md).
 inline constexpr std::string_view kReasonOpenBytes = "OPEN_BYTES";
 
 void EncodeLimits(const ServerLimits& limits, v1::Limits& message);
@@ -49,8 +49,9 @@ struct FrameMessages final : MessageBuffers {
   /// Takes the messages out of the worker, or creates them. So they remain if the session frees all
   /// buffers of the worker because memory is short.
   static std::unique_ptr<FrameMessages> Take(Worker& worker);
-  /// Frees the buffers if they are far larger than the last request, which had `request_bytes`.
-  /// Otherwise the buffers would add up if different fields are large in different requests.
+  /// Frees the buffers of `request` if they are far larger than the last request, which had
+  /// `request_bytes`. Otherwise the buffers would add up if different fields are large in different
+  /// requests.
   void Shrink(std::uint64_t request_bytes);
 };
 

@@ -18,7 +18,7 @@ namespace partiemc::server {
 
 class UnaryCall final : public ByteCall, private UnaryTransport {
  public:
-  /// Computes the response to a request, unless `cancelled`. It may clear the request. `worker` is
+  /// Computes the response to a request, unless `cancelled`. May clear the request. `worker` is
   /// null except for UnaryKind::kFrame.
   using Method = std::function<absl::StatusOr<grpc::ByteBuffer>(
       grpc::ByteBuffer& request, Worker* worker, const std::atomic<bool>& cancelled)>;

@@ -56,9 +56,10 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   v1::WatchStreamRequest parsed_;
   v1::WatchStreamResponse opened_;  // Filled in when the stream is found.
   WatchTerms terms_;
-  LevelQueue::Seat level_;               // Empty: the watcher receives exact results.
-  std::uint64_t finished_sequence_ = 0;  // Last frame of a finished stream; 0: it is live.
-  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Of WriteFrame, until LevelDone.
+  LevelQueue::Seat level_;  // Empty: the watcher receives exact results.
+  // Sequence number of the last result of a finished stream; 0: it has none, or the stream is live.
+  std::uint64_t finished_sequence_ = 0;
+  std::uint64_t level_dropped_ = 0, level_oldest_ = 0;  // Arguments of WriteFrame until LevelDone.
   std::string stream_name_;
   std::string end_reason_;
   std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();

@@ -25,7 +25,7 @@ inline constexpr std::string_view kReasonMemoryBudget = "MEMORY_BUDGET";
 /// becomes the field of the Violation.
 absl::Status NoRoomInBudget(std::string field, std::uint64_t bytes, std::uint64_t budget);
 
-/// The caller's quota of bytes; FairShare::kNoLimit if it has none.
+/// The caller's quota of bytes; FairShare::kNoLimit if the caller is null or has no quota.
 std::uint64_t QuotaOf(const CallerAccount* caller);
 
 /// Limits of the memory that streams and one worker may hold beyond the budget. Without this
@@ -68,7 +68,7 @@ class MemoryBudget {
 
   /// Counts bytes that `caller` holds already, even if they do not fit.
   void Take(std::uint64_t bytes, const CallerAccount* caller = nullptr) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Takes the bytes if they fit and need not wait behind a claim (see the order above). Returns
+  /// Takes the bytes if they fit and need not wait behind a claim (class comment, "Order"). Returns
   /// kYes, or the reason why they were not taken.
   FairShare::Fit TryTake(std::uint64_t bytes, const CallerAccount* caller = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
@@ -87,7 +87,8 @@ class MemoryBudget {
 
   /// Takes bytes for a worker. Blocks until they fit into the budget, or until no other worker
   /// computes beyond the budget. In the second case takes them beyond the budget, where the worker
-  /// may hold at most BeyondBudget::worker_bytes. Returns the number of bytes taken.
+  /// may hold at most BeyondBudget::worker_bytes, so it may take fewer. Returns the number of bytes
+  /// taken.
   std::uint64_t TakeForWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Takes bytes for a worker beyond the budget. Returns false if another worker computes beyond
   /// the budget, or if this worker would exceed BeyondBudget::worker_bytes.
@@ -96,9 +97,9 @@ class MemoryBudget {
   /// Gives back all `bytes` that a worker holds, both within the budget and beyond it.
   void GiveBackOfWorker(std::uint64_t bytes, const void* worker) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Sets the function that is called when the budget has no room for bytes or for a read. It is
-  /// not called if these only exceed their caller's share. Empty: no call. It is called with the
-  /// lock held, so it must not call MemoryBudget.
+  /// Sets the function that is called when the budget has no room for bytes or for a read. Bytes
+  /// that only exceed their caller's share cause no call. The function is called with the lock
+  /// held, so it must not call MemoryBudget. Empty: no call.
   void OnShortage(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::uint64_t held() const ABSL_LOCKS_EXCLUDED(mutex_);
@@ -132,8 +133,8 @@ class MemoryBudget {
   // bytes if `beyond` fewer bytes were permitted beyond the budget.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  // Returns an error if the caller's counted bytes exceed its quota, or if all counted bytes exceed
-  // the budget. They include `bytes`, which are for the error only.
+  // Returns an error if the held and planned bytes of the caller exceed its quota, or if those of
+  // all callers exceed the budget. `bytes` are already counted; only the error's text uses them.
   absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::uint64_t PlannedBy(const CallerAccount* caller) const ABSL_LOCKS_EXCLUDED(mutex_);

@@ -103,7 +103,8 @@ void ReadPermits::SetBeyond(Permit& permit, std::uint64_t bytes) {
   budget_.ChangeBeyond(std::exchange(permit.beyond, bytes), bytes);
 }
 
-// Releases the planned bytes and the slot of a permit. Its read or its frame has ended.
+// Releases the planned bytes and the slot of a permit. Called when its reader requests another
+// permit, or ends.
 void ReadPermits::Finish(Permits::value_type& item) {
   Permit& permit = item.second;
   if (permit.number == 0) return;  // The permit was just created.

@@ -107,11 +107,13 @@ class ReadPermits {
   /// thread may hold a reader's lock. Empty: no call.
   void OnWaiting(std::function<void()> tell) ABSL_LOCKS_EXCLUDED(tell_mutex_);
   /// Lets the permits of idle connections lapse if reads wait. If a read received more bytes than
-  /// planned, plans the bytes that it may still bring. Then calls Serve.
+  /// planned, plans the bytes that it may still bring, provided that they fit. Then calls Serve.
   void Look(Clock::time_point now, const ReceivedBytes& received) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Ends streams because memory is exhausted: those whose reads receive bytes that are not
-  /// planned. Keeps one such read for each largest message that fits into `free_bytes`; callers
-  /// take turns in keeping a read. Returns the number of ended streams.
+  /// Ends streams because memory is exhausted. A read is at risk if less than a largest message is
+  /// planned for it, and if it receives bytes now or has received more than planned. If the
+  /// received bytes are unknown, a read with a lapsed permit is at risk. Keeps one read at risk for
+  /// each largest message that fits into `free_bytes`; callers take turns in keeping a read. Ends
+  /// the other streams at risk, and returns their number.
   std::size_t Revoke(std::uint64_t free_bytes) ABSL_LOCKS_EXCLUDED(mutex_);
 
   std::size_t waiting() const { return waiting_; }
@@ -123,13 +125,15 @@ class ReadPermits {
     std::weak_ptr<Reader> reader;
     Read read;
     State state = State::kWaiting;
-    std::uint64_t number = 0;   // Counts requests for permits; 0 if there was none yet.
+    std::uint64_t number = 0;   // Number of the request in the order of requests; 0: none yet.
     std::uint64_t planned = 0;  // Bytes planned in the budget.
     std::uint64_t beyond = 0;   // Bytes in its slot, planned or held.
     bool has_slot = false, has_lapsed = false;
     // Measured by Look:
     std::optional<std::uint64_t> received;  // Received bytes of the connection when `came` was set.
-    std::uint64_t came = 0, grown = 0;      // Bytes from the first Look to `received`; since then.
+    // `came`: bytes received from the first Look until `received` was set. `grown`: bytes that the
+    // last Look found in addition to the previous value of `received`.
+    std::uint64_t came = 0, grown = 0;
     std::optional<Clock::time_point> moved;  // When the connection last was not idle.
   };
   using Permits = std::map<const Reader*, Permit>;

@@ -17,7 +17,7 @@ namespace partiemc::server {
 /// state are not counted. Thread-safe.
 class StateMemory {
  public:
-  /// The share of one stream. Its destructor gives the bytes back.
+  /// Counts the state of one stream. The destructor gives the counted bytes back.
   class Account {
    public:
     /// Counts nothing, and every state fits.
@@ -32,10 +32,10 @@ class StateMemory {
       return *this;
     }
 
-    /// Allows a state of `bytes` in addition to the smaller one that exists.
+    /// Raises the size of the largest allowed state to `bytes`; no effect if it is that large.
     /// Errors: RESOURCE_EXHAUSTED (MEMORY_BUDGET, CALLER_BYTES); the account is then unchanged.
     absl::Status Grow(std::uint64_t bytes);
-    /// The state has only `bytes` now.
+    /// Lowers the size of the largest allowed state to `bytes`; no effect if it is that small.
     void Shrink(std::uint64_t bytes);
     /// Size of the largest state that is allowed now.
     std::uint64_t bytes() const { return bytes_; }

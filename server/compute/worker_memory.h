@@ -38,8 +38,9 @@ class WorkerMemory {
   /// of particles. Does not block; returns false if the memory is refused. The buffers may always
   /// use kWorkerBytes and the bytes reserved before. More is granted if MemoryBudget::TryTake or
   /// TryTakeBeyond grants it. TryTakeBeyond is tried only if `bytes` are at most kWorkerBytes plus
-  /// kWorkerBytesPerParticle for each particle.
-  /// `state_bytes`: the part of `bytes` for states of the stream, which its former frames decide.
+  /// `state_bytes` plus kWorkerBytesPerParticle for each particle.
+  /// `state_bytes`: the part of `bytes` for states of the stream. Earlier frames determine their
+  /// size.
   bool Reserve(std::uint64_t bytes, std::size_t particles, std::uint64_t state_bytes = 0);
   /// Gives back reserved bytes that no frame has used since the buffers were last freed.
   void EndFrame();

@@ -17,9 +17,9 @@ constexpr std::uint64_t kCallOverhead = 1'024;
 // A client acknowledges the bytes that the server sends by WINDOW_UPDATE frames. Usually these
 // frames have a thousandth of the sent bytes; a sixteenth is allowed.
 constexpr std::uint64_t kReplyPart = 16;
-// Minimum of the bytes that a pending read allows. A message of up to twice the maximum size is
-// received completely, so that the error can state its size. A still larger message cuts the
-// connection.
+// Minimum of the bytes that a pending read allows, unless messages must be empty (maximum size 0).
+// A message of up to twice the maximum size is received completely, so that the error can state its
+// size. A still larger message cuts the connection.
 constexpr std::uint64_t kLeastReadAllowance = std::uint64_t{64} << 20;
 // Bytes that each second allows for PING and SETTINGS frames, which belong to no call.
 constexpr double kBytesPerSecond = 16 * 1'024;

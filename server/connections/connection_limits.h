@@ -43,11 +43,12 @@ class ConnectionCounts {
   /// Called when a connection of `address`, admitted as `admission`, was cut because of a flood.
   /// For ten seconds, new connections of this address may only make health checks. If the cut
   /// connection was kHealthOnly, new ones are refused for one second, because over TLS a flood is
-  /// detected only after an expensive handshake. Of the open ones, ConnectionWatch cuts the
-  /// suspects.
+  /// detected only after an expensive handshake. No effect if bans() is false. Of the address's
+  /// open connections, ConnectionWatch cuts the suspects.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
-  /// Whether OnFlood has an effect. Otherwise an address may belong to many clients.
+  /// Whether OnFlood has an effect: not if the rate of new connections is unlimited, because an
+  /// address may then belong to many clients.
   bool bans() const { return limits_.new_of_address > 0; }
 
   /// Numbers of connections that were admitted as kKept: of all addresses, of `address`.

@@ -28,8 +28,9 @@ constexpr seconds kNew(1);
 constexpr std::size_t kQuietInPeriod = 128;
 // Limits the reading of stream counts: gRPC returns them as text, which takes 20 us. The counts of
 // a connection are read again after gRPC has read this number of bytes from it, or one second after
-// the last count if gRPC has read any. A stream needs at least 22 bytes, so at most 750 streams are
-// not counted yet.
+// the last count if gRPC has read any. While headers are pending, they are also read after
+// kPendingBetweenCounts. A stream needs at least 22 bytes, so at most 750 streams are not counted
+// yet.
 constexpr std::uint64_t kBytesBetweenCounts = 16 << 10;
 constexpr std::size_t kCountsInPeriod = 64;
 constexpr milliseconds kPendingBetweenCounts(500);
@@ -39,12 +40,12 @@ constexpr milliseconds kPendingBetweenCounts(500);
 constexpr std::size_t kHealthOnlyOfAddress = 8;
 constexpr std::size_t kHealthOnly = 64;
 constexpr seconds kHealthOnlyTime(5);
-// Limits of one such connection: unaccounted bytes, and number of streams.
+// Limits of one connection that may only make health checks: unaccounted bytes, number of streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
-// Such a connection is passed to gRPC after this delay. It is ended instead if the peer has sent
-// more than kFirstBytes by then. A health check sends fewer bytes before its first reply. So a
-// flooding peer that reconnects costs little.
+// A connection that may only make health checks is passed to gRPC after this delay. It is ended
+// instead if the peer has sent more than kFirstBytes by then. A health check sends fewer bytes
+// before its first reply. So a flooding peer that reconnects costs little.
 constexpr milliseconds kHealthOnlyDelay(20);
 constexpr std::uint64_t kFirstBytes = 4 << 10;
 

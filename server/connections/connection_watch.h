@@ -35,8 +35,9 @@ class StreamCounter {
 };
 
 /// Watches connections and cuts floods. Holds a duplicate of each connection's descriptor, to read
-/// its byte counts and to end it; does not read its bytes. One thread examines the connections. New
-/// ones, and ones with an excess or pending headers, come every 5 or 20 ms, the others in turn.
+/// its byte counts and to end it; does not read its bytes. One thread examines the connections. It
+/// examines new connections, and connections with an excess or pending headers, every 5 or 20 ms;
+/// it examines some of the other connections every 20 ms, in turn.
 class ConnectionWatch {
  public:
   using Clock = std::chrono::steady_clock;

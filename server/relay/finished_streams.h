@@ -22,11 +22,11 @@ class FinishedStreams {
   /// Requires: `clock` outlives this.
   explicit FinishedStreams(const Clock& clock = SystemClock()) : clock_(clock) {}
 
-  /// Adds a stream whose last result had the number `last_sequence`; 0: it had no result. Drops the
-  /// oldest streams if there is no room.
+  /// Adds a stream whose last result had the sequence number `last_sequence`; 0: it had no result.
+  /// Drops the oldest streams if there is no room. Does not add a description above kMostBytes.
   void Add(relay::v1::LiveStream stream, std::uint64_t last_sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Returns the stream of this name and lineage, if it finished during the last 30 s. Its summary
-  /// contains the number of its last result.
+  /// contains the sequence number of its last result.
   std::optional<relay::v1::LiveStream> Find(std::string_view name, std::string_view lineage)
       ABSL_LOCKS_EXCLUDED(mutex_);
 

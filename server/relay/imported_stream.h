@@ -50,7 +50,8 @@ class ImportedStream {
   bool IsIdle(TimePoint now) const;
 
   /// Whether a watcher that starts at `from_sequence` (absent: at the newest result) receives the
-  /// same results from this import as from the owner.
+  /// same results from this import as from another import. Always true if `limits` has no history;
+  /// false after the end of the stream.
   bool Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const;
   /// Calls `ready`, at once or later.
   void Await(Ready ready);
@@ -60,15 +61,16 @@ class ImportedStream {
   void OnMessage(const relay::v1::StreamEnd& end, TimePoint now);
   /// Fetches the results and the end of the stream that may have been lost on the bus.
   void FetchAgain(TimePoint now);
-  /// The owner no longer responds. Ends the stream without waiting for fetches: with the end that
-  /// the owner reported, or with `otherwise` if it reported none.
+  /// The owner no longer responds, or no longer has the stream. Ends the stream without waiting for
+  /// fetches: with the end that the owner reported, or with `otherwise` if it reported none.
   void Lost(const WatchEnd& otherwise, TimePoint now);
   /// Ends the stream.
   void End(const WatchEnd& end);
   /// Ends all pending joins with `status`.
   void Refuse(const absl::Status& status) { AnswerWaiting(status); }
-  /// Renews the request for results each second, and ends a fetch that gets no response. Called
-  /// every 50 ms. `connected`: whether the bus is.
+  /// Renews the request for results each second, and ends a fetch that gets no response for two
+  /// seconds. If the first fetch gets none, the import ends with an error. Called every 50 ms.
+  /// `connected`: whether the bus is connected.
   void Tick(TimePoint now, bool connected);
 
  private:

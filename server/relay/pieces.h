@@ -16,8 +16,8 @@ namespace partiemc::server {
 inline constexpr std::size_t kPieceBytes = std::size_t{512} << 10;
 
 /// Calls `send` with each piece of `message`, in order, until `send` returns false. Each piece is a
-/// serialised partiemc.relay.v1.Piece of the sender `replica`, whose messages are counted by
-/// `number`. Returns whether all pieces were sent.
+/// serialised partiemc.relay.v1.Piece of the sender `replica`. `number` differs for each message of
+/// this sender. Returns whether all pieces were sent.
 bool SendInPieces(const std::string& replica, std::uint64_t number, std::string_view message,
                   absl::FunctionRef<bool(std::string_view piece)> send);
 
@@ -33,8 +33,8 @@ class PieceJoiner {
   std::optional<std::string> Add(std::string_view piece);
   /// Drops the incomplete message of this sender.
   void Forget(const std::string& replica);
-  /// Drops the incomplete messages that got no piece since the last call. Such a sender may be
-  /// lost, and its message would take room from those of others.
+  /// Drops the incomplete messages that got no piece since the last call. Their senders may be
+  /// lost, and the messages would take room from other senders.
   void ForgetIdle();
   /// Bytes of incomplete messages.
   std::size_t held_bytes() const { return held_bytes_; }

@@ -224,8 +224,8 @@ std::vector<relay::v1::LiveStream> Relay::List(const std::string& after, std::si
 void Relay::LookAtExports(TimePoint now) {
   for (auto it = exports_.begin(); it != exports_.end();) {
     ExportedStream& exported = *it->second;
-    // Keeps all exports while the bus is disconnected, because replicas cannot renew their requests
-    // for results.
+    // Keeps all exports while the bus is disconnected, for at most kBusPatience, because replicas
+    // cannot renew their requests for results.
     const bool may_be_wanted = !connected_ && now - disconnected_ < kBusPatience;
     const bool has_news = exported.ended_at() && now - *exported.ended_at() < kEndKept;
     const bool is_wanted = now < exported.wanted_until() || may_be_wanted || has_news;

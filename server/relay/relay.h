@@ -43,7 +43,7 @@ class Relay final : private RelayPort {
 
   struct Limits {
     ResultBroadcaster::Limits broadcaster;              ///< For streams of other replicas.
-    std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Maximum of waiting results per stream.
+    std::size_t watcher_bytes = std::size_t{16} << 20;  ///< Limit of a stream's waiting results.
     HistoryRoom* history = nullptr;       ///< Null: no history for streams of other replicas.
     FinishedStreams* finished = nullptr;  ///< Receives the finished streams of other replicas.
     std::size_t watches = 64;             ///< Maximum number of concurrent searches (Find).
@@ -101,7 +101,7 @@ class Relay final : private RelayPort {
   struct Import {
     std::unique_ptr<ImportedStream> stream;
     std::unique_ptr<MessageBus::Subscription> results;
-    std::optional<TimePoint> missing_since;  // When its replica stopped announcing it.
+    std::optional<TimePoint> missing_since;  // When the owner stopped announcing the stream.
   };
   struct Search {
     std::string name;

@@ -19,7 +19,7 @@ class RelayPort {
   virtual bool Send(const std::string& subject, relay::v1::RelayMessage& message) = 0;
 };
 
-/// Announcements to all replicas.
+/// The subject of announcements to all replicas.
 inline constexpr char kReplicasSubject[] = "partiemc.replicas";
 /// Two subjects of a replica: for the fetches that it receives, and for the responses to its own
 /// fetches.
@@ -27,7 +27,7 @@ inline std::string SubjectOfAsking(const std::string& replica) { return "partiem
 inline std::string SubjectOfAnswers(const std::string& replica) {
   return "partiemc.for." + replica;
 }
-/// New results of a stream.
+/// The subject of the new results of a stream.
 inline std::string SubjectOfResults(const std::string& stream_id) {
   return "partiemc.results." + stream_id;
 }

@@ -22,7 +22,7 @@ class ChannelzStreams final : public StreamCounter {
 
   std::int64_t server_ = 0;
   std::int64_t next_socket_ = 0;                // Sockets with smaller numbers were listed.
-  std::map<std::string, std::int64_t> listed_;  // Sockets by peer, until found; may be closed.
+  std::map<std::string, std::int64_t> listed_;  // By peer, until Find returns them; may be closed.
 };
 
 }  // namespace partiemc::server

@@ -32,7 +32,8 @@ class FileReloader {
   /// Starts a thread that polls the files every `interval`. Starts no thread if there are no files.
   void Start(std::chrono::milliseconds interval);
 
-  /// Looks at the files once; the thread calls this. Requires: the thread does not run.
+  /// Polls all files once, and reloads those whose change has settled. Called by the polling
+  /// thread; other threads may call it only if the polling thread does not run.
   void Look();
 
  private:

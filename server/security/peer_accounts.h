@@ -12,8 +12,8 @@ namespace partiemc::server {
 
 /// Returns the host of a peer, without its port: "ipv4:192.0.2.7:51234" -> "ipv4:192.0.2.7". Keeps
 /// only the first 64 bits of an IPv6 address, because one host can use all addresses with this
-/// prefix: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". Returns "unix" for all peers of Unix
-/// sockets, and other texts unchanged.
+/// prefix: "ipv6:[2001:db8::1]:51234" -> "ipv6:2001:db8::". Keeps all bits of an IPv4-mapped IPv6
+/// address. Returns "unix" for all peers of Unix sockets, and other texts unchanged.
 std::string HostOfPeer(std::string_view peer);
 
 /// Thread-safe.

@@ -18,9 +18,9 @@ inline constexpr char kSecretRule[] = "of 16 to 512 characters of [A-Za-z0-9-._~
 /// Bearer` (RFC 6750, 2.1).
 bool IsSecret(std::string_view text);
 
-/// Checks that the text of a file of secrets ends with a newline. Without it, the file may be half
-/// written: the rest of its last line could restrict the permissions of a token, and the beginning
-/// of a token is shorter than the token. Errors: INVALID_ARGUMENT. An empty text is valid here.
+/// Checks that the text of a file of secrets ends with a newline. Without the newline, the last
+/// line may be half written: its missing part could restrict the permissions of a token, and a
+/// truncated token is easier to guess. Errors: INVALID_ARGUMENT. An empty text is valid here.
 absl::Status CheckIsWhole(std::string_view text);
 
 }  // namespace partiemc::server

@@ -71,10 +71,10 @@ std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
     for (const double value : plane_of.normal) PutNumber(value, bytes);
   };
   if (slice) put_slice(*slice);
-  // Absent parameters and default values add no bytes. So a checkpoint that was written before
-  // these parameters existed stays valid.
+  // From here on, absent parameters and default values add no bytes. So a checkpoint that was
+  // written before these parameters existed stays valid.
   if (attribute_tolerance != ReconstructionParameters().attribute_tolerance) {
-    put_small('t');  // Distinguishes it from an isovalue.
+    put_small('t');  // Distinguishes the tolerance from an isovalue.
     PutNumber(attribute_tolerance, bytes);
   }
   if (output != Output::kOutline) {

@@ -26,7 +26,7 @@ struct StreamTerms {
   std::string lineage = {};               ///< LineageOf the stream token.
   std::string name = {};                  ///< The stream's name; generated if the client gave none.
   std::uint64_t labels = 0;               ///< FingerprintOf the labels.
-  std::uint32_t outputs = 0;              ///< A bit for each requested output.
+  std::uint32_t outputs = 0;              ///< A number that identifies the requested outputs.
   std::uint32_t checkpoint_interval = 0;  ///< In frames.
 };
 

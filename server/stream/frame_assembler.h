@@ -39,8 +39,9 @@ class AssemblyMember {
   virtual ~AssemblyMember() = default;
   /// A frame of part 0, or a part, may be ready for its response: the call should check again.
   virtual void LookAgain() = 0;
-  /// The assembler has removed this call. `status` is OK if the call of part 0 has ended with OK;
-  /// frames that it did not answer are then refused (OutcomeOf).
+  /// The assembler has removed this call. `status`: UNAVAILABLE (LEADER_GONE) or OK if the call of
+  /// part 0 has ended; ABORTED (TAKEN_OVER) if another call sends this part now. After the end of
+  /// part 0's call, the parts of frames without a response are refused (OutcomeOf).
   virtual void LeftOut(const absl::Status& status) = 0;
 };
 
@@ -56,7 +57,7 @@ class FrameAssembler {
   struct Terms {
     std::uint32_t parts = 1;
     std::size_t window = 1;                ///< Frames assembled at once, from the next answer on.
-    std::uint64_t max_frame_bytes = 0;     ///< Limit for a frame without its part 0.
+    std::uint64_t max_frame_bytes = 0;     ///< Limit of parts 1 and above of a frame together.
     std::chrono::milliseconds timeout{0};  ///< Time for all parts of a frame, from the first on.
     bool has_checkpoints = false;          ///< Responses may have checkpoints.
     std::uint64_t next_sequence = 1;       ///< Number of the first frame.
@@ -78,8 +79,9 @@ class FrameAssembler {
   /// outside the window.
   void LeaderSent(std::uint64_t sequence);
   /// Whether the server can respond to frame `sequence`, whose part 0 arrived at `since`. True if
-  /// the frame is complete, its timeout has passed by `now`, or it is not the next frame (and is
-  /// refused). The timeout starts when the first part of the frame arrives, from any rank.
+  /// the frame is complete, has failed (IsOver), has passed its timeout by `now`, or is not the
+  /// next frame (and is refused). The timeout starts when the first part of the frame arrives, from
+  /// any rank.
   bool IsReady(std::uint64_t sequence, Clock::time_point since, Clock::time_point now) const;
   /// Size of the next frame without part 0, in bytes.
   std::uint64_t BytesOfNext() const;
@@ -116,8 +118,9 @@ class FrameAssembler {
   /// Drops a stored part, unless Take has returned it.
   void Withdraw(const Seat& seat, std::uint64_t sequence);
   /// Whether the server can respond to the parts of frame `sequence`: the frame was answered or has
-  /// failed. If part 0 has not arrived within the timeout after the first part, this function
-  /// closes the frame. It drops the parts, and part 0 will be refused.
+  /// failed, or the call of part 0 has ended. If part 0 has not arrived within the timeout after
+  /// the first part, the frame fails now: this function drops its parts, and part 0 will be
+  /// refused.
   bool IsOver(std::uint64_t sequence, Clock::time_point now);
   /// The outcome of a frame for the sender of a part. OK: the frame was answered, perhaps by an
   /// error.
@@ -154,7 +157,8 @@ class FrameAssembler {
   absl::Status CheckOffer(std::uint32_t part, std::uint64_t sequence, std::uint64_t bytes) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Drop(Gathered& frame, std::uint32_t part);
-  // Removes a part that may come again. Returns the next frame.
+  // Removes a part, which its call may send again, from the frame `found`. Then erases the frame if
+  // it has no part left and has not failed. Returns the next frame.
   Frames::iterator Withdraw(Frames::iterator found, std::uint32_t part)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void DropAll(std::uint32_t part) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -22,8 +22,8 @@ namespace partiemc::server {
 /// call that sends its request at once is hardly ever evicted. Watchers are evicted last.
 ///
 /// Bytes that arrive for open streams are planned in advance (ReadPermits), so open streams
-/// continue. A stream is ended only if memory is exhausted and its read receives more bytes than
-/// planned.
+/// continue. A stream is ended only if memory is exhausted and its read may bring more bytes than
+/// planned (ReadPermits::Revoke).
 class IntakeGuard {
  public:
   /// Access to the memory of the process. Tests replace it.

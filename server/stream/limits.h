@@ -109,8 +109,8 @@ struct ServerLimits {
   /// it holds memory.
   UnaryLimits unary{.request = std::chrono::seconds(30), .answer = std::chrono::minutes(2)};
 
-  /// Limits of watchers of ended streams, because such a watcher keeps the stream's history. A
-  /// write may wait for a level of detail, so its limit is longer.
+  /// Limits of watchers of ended streams, because such a watcher keeps the stream's history. The
+  /// time of a write includes the wait for a level of detail.
   PauseLimits paused{.pause = std::chrono::minutes(10), .write = std::chrono::minutes(2)};
 
   /// Maximum number of watchers of all streams together.

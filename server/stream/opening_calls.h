@@ -41,7 +41,7 @@ class OpeningCalls {
   class Lines {
    public:
     void Add(const CallerAccount* caller, std::uint64_t number, GiveWay give_way);
-    /// Returns an empty function if the call was removed before.
+    /// Removes a call and returns its function; an empty one if the call was removed before.
     GiveWay Remove(const CallerAccount* caller, std::uint64_t number);
     /// Removes the oldest call of the caller with the most calls. Requires: not empty.
     GiveWay RemoveNext();

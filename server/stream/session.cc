@@ -18,7 +18,8 @@ class FrameMemory final : public MemoryGuard {
   FrameMemory(WorkerMemory& account, std::size_t particles, std::uint64_t state_bytes)
       : account_(account), particles_(particles), state_bytes_(state_bytes) {}
   bool Reserve(std::uint64_t bytes) override {
-    // Worker::next_state, and the copy of it that becomes the stream's state.
+    // Also reserves memory for two states: Worker::next_state, and its copy that becomes the state
+    // of the stream.
     return account_.Reserve(bytes + 2 * state_bytes_, particles_, 2 * state_bytes_);
   }
 

@@ -67,7 +67,7 @@ class Session {
   /// observer of `worker` and returns `why`. next_sequence() stays the same.
   absl::Status Refuse(absl::Status why, Worker& worker) const;
 
-  /// 1 for a new stream.
+  /// The sequence number that the next frame must have; 1 for a new stream.
   std::uint64_t next_sequence() const { return next_sequence_; }
   /// With defaults resolved.
   const ReconstructionParameters& parameters() const { return reconstructor_.parameters(); }

@@ -83,7 +83,8 @@ struct StreamEntry : CallEntry<StreamStateMachine> {
   std::optional<StreamSummary> stream;  ///< Set from Open to Close; its `counts` are out of date.
   std::string token;                    ///< The stream token.
   bool taken_over = false;              ///< Whether another entry continues the stream.
-  /// The name of the stream whose parts it sends, and its part. No name: it sends no parts.
+  /// The name of the stream whose parts this call sends, and the number of the part. Empty name:
+  /// the call sends no parts.
   std::string part_of;
   std::uint32_t part = 0;
 
@@ -143,8 +144,8 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
 
   /// Sets the addresses of other servers, which this server sends to its clients when it drains.
   void SetElsewhere(std::vector<std::string> addresses) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Returns these addresses. Each call rotates the list by one, so that clients spread evenly over
-  /// the servers.
+  /// Returns the addresses of SetElsewhere. Each call rotates the list by one, so that clients
+  /// spread evenly over the servers.
   std::vector<std::string> TakeElsewhere() ABSL_LOCKS_EXCLUDED(mutex_);
   /// Drains the present state machines one after the other in the order of their arrival, evenly
   /// distributed over the time `within`. Blocks for this time. New calls are still admitted.
@@ -190,8 +191,8 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
   Entry* FindOpen(std::string_view token) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckPart(const StreamDescription& stream, const PartTerms& terms) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Lets `entry` send a part, unless `max_parts` calls do. Does not count calls that sent this part
-  // before: Join ends them, or their stream has ended.
+  // Lets `entry` send a part, unless `max_parts` other calls send parts. Does not count earlier
+  // calls for the same part: Join ends them, or their stream has ended.
   absl::Status TakePart(Entry& entry, const PartTerms& terms) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::vector<Published> BeginHistory(const StreamDescription& description, const Entry* former)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -81,7 +81,7 @@ class StreamHandler {
   /// waits for parts is checked again when StreamStateMachine::LookAgain is called, and at
   /// intervals of LookEvery. Called with the stream's lock held, so it must not call the stream.
   virtual bool MayAnswer(std::size_t /*slot*/) { return true; }
-  /// Interval of these checks. 0: only LookAgain triggers a check.
+  /// Interval of the checks of a frame that waits for parts. 0: only LookAgain triggers a check.
   virtual std::chrono::milliseconds LookEvery() const { return std::chrono::milliseconds(0); }
   /// Size of the whole frame in `slot`; `bytes` is the size of its own message. Returns 0 if this
   /// call computes nothing. Called with the stream's lock held.
@@ -162,8 +162,9 @@ class StreamStateMachine final : public SerializedCall,
   void TakenOver();
   /// Ends this stream with this error if it has not received its `open`. Otherwise has no effect.
   void GiveWay(const absl::Status& status);
-  /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read, and
-  /// ends the stream with UNAVAILABLE.
+  /// Stops reading frames, sends Outgoing::kDraining, responds to the frames that were read (except
+  /// frames with missing parts), and ends the stream with UNAVAILABLE. A stream that is not serving
+  /// gets no kDraining.
   void Drain();
   /// Ends the stream with DEADLINE_EXCEEDED (IDLE) if the client has exceeded a limit at `now`. The
   /// client has either not sent a request, or not received a response; in the second case the call
@@ -216,7 +217,7 @@ class StreamStateMachine final : public SerializedCall,
   const std::shared_ptr<const CallerAccount> caller_;
   const std::size_t window_;
 
-  BusyStreams::Mark busy_mark_;       // The pool's.
+  BusyStreams::Mark busy_mark_;       // Used by the pool only.
   std::optional<Answered> answered_;  // Passed from Compute to Computed, which runs after it.
   std::atomic<bool> cancelled_ = false;
 

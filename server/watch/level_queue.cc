@@ -91,7 +91,8 @@ void LevelQueue::Request(const Seat& seat, Frame exact, bool may_skip, Waiter& w
   job_came_.NotifyOne();
 }
 
-// Ends the requests of the queue that may be skipped. Their watchers take the newest frame instead.
+// Ends the requests of `group` that wait and may be skipped. Their watchers take the newest frame
+// instead.
 void LevelQueue::SkipOlder(Group& group) {
   for (Job& job : group.jobs) {
     std::erase_if(job.requests, [this](const Asked& request) {

@@ -117,7 +117,8 @@ class LevelQueue final : public Dispatched {
   /// of the running level and of finished levels may get it after Stop.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Number of levels that were computed, and of requests that another request's level has served.
+  /// `computed`: number of levels that were computed. `shared`: number of requests that needed no
+  /// computation of their own, because another request has the same level.
   std::uint64_t computed() const { return computed_; }
   std::uint64_t shared() const { return shared_; }
   /// Bytes of the levels that are kept.

@@ -72,8 +72,9 @@ class ResultHistory {
   ResultHistory(const ResultHistory&) = delete;
   ResultHistory& operator=(const ResultHistory&) = delete;
 
-  /// Adds the newest frame. Drops the oldest frames until the new frame fits. If it does not fit at
-  /// all, drops all frames.
+  /// Adds the newest frame. Drops all older frames if the result numbers have a gap before the new
+  /// frame. Drops the oldest frames until the new frame fits. If it does not fit at all, drops all
+  /// frames.
   void Add(const Published& published);
   /// Drops the oldest frames until the history fits into its share, which may have become smaller.
   void Shrink() { DropUntilFits(0); }

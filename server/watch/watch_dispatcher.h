@@ -36,8 +36,8 @@ class WatchDispatcher {
   WatchDispatcher(const WatchDispatcher&) = delete;
   WatchDispatcher& operator=(const WatchDispatcher&) = delete;
 
-  /// Makes the dispatcher's thread call Serve of `dispatched`, which begins after this call. Calls
-  /// of Wake before that share this one Serve. Lock-free and thread-safe.
+  /// Makes the dispatcher's thread call Serve of `dispatched` soon. All calls of Wake before that
+  /// Serve begins share it. Lock-free and thread-safe.
   void Wake(Dispatched& dispatched);
   /// Waits until every object that was woken before this call has been served.
   void Flush();

@@ -46,8 +46,8 @@ class WatchRegistry : private CallRegistry<WatchStateMachine, CallEntry<WatchSta
   std::chrono::steady_clock::time_point EndSilent(std::chrono::milliseconds limit,
                                                   std::chrono::steady_clock::time_point now);
 
-  /// Ends the watchers that are ending and exceed `limits`. Returns the earliest time at which
-  /// another watcher can exceed a limit.
+  /// Ends the watchers whose stream has ended and whose clients exceed `limits` at `now`. Returns
+  /// the earliest time at which another watcher can exceed a limit.
   std::chrono::steady_clock::time_point EndPaused(const PauseLimits& limits,
                                                   std::chrono::steady_clock::time_point now);
 
@@ -58,7 +58,7 @@ class WatchRegistry : private CallRegistry<WatchStateMachine, CallEntry<WatchSta
 
  private:
   const std::uint32_t max_watchers_;
-  // Open, not closed.
+  // Watchers with a slot: from Open to Close.
   std::map<const WatchStateMachine*, CallerAccount::Place> placed_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -55,7 +55,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   /// Closes the connection after `time`, and counts this as a timeout. A later call replaces the
   /// deadline.
   void CloseAfter(std::chrono::milliseconds time) { CloseAfter(time, /*is_refusal=*/true); }
-  /// Same, but counts nothing, because the client has no request in progress.
+  /// Same as CloseAfter, but counts no timeout, because the client has no request in progress.
   void CloseIdleAfter(std::chrono::milliseconds time) { CloseAfter(time, /*is_refusal=*/false); }
   void CloseNever() { deadline_.expires_at(std::chrono::steady_clock::time_point::max()); }
 

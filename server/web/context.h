@@ -36,7 +36,7 @@ class WebRefusals {
   std::array<prometheus::Counter*, kWebRefusals> counters_{};
 };
 
-/// References must outlive it. Thread-safe.
+/// The referenced objects must outlive the context. Thread-safe.
 struct WebContext {
   const Methods& methods;
   const ServerLimits& limits;

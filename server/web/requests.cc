@@ -76,7 +76,7 @@ bool IsFileCharacter(char c) {
 }
 
 // Normalises the value of "Host", or the part of an origin after "://". Removes the port if it is
-// the scheme's default port.
+// `usual_port`, the scheme's default port. Returns nothing for text that is no host.
 std::optional<std::string> NormalHost(std::string_view text, std::string_view usual_port) {
   std::string host = Lower(text);
   if (host.empty() || host.size() > 300) return std::nullopt;

@@ -96,8 +96,8 @@ class SocketCall final : public WebChannel {
     Pump();
   }
 
-  // The client has closed the WebSocket without the message "end". Closes this side too, and ends
-  // the call at once.
+  // The client has closed the WebSocket. If the call has not finished, closes this side too, and
+  // cancels the call.
   void OnClientClose() {
     if (is_finished()) return;
     client_closed_ = true;
@@ -105,8 +105,10 @@ class SocketCall final : public WebChannel {
     CancelCall();
   }
 
-  // Delivers the message that was read ahead, if any and if the call waits for one. Then starts a
-  // read if the call waits for a message, or if fewer than kReadAhead bytes were read ahead.
+  // Delivers a complete message that was read ahead, if the call waits for one. After the client's
+  // "end", reports the end of the requests instead. Then starts a read. Starts none while a
+  // complete message waits, or while kReadAhead bytes were read ahead and the call waits for no
+  // message.
   void Pump() {
     if (reading_ || is_gone() || is_finished() || is_broken()) return;
     if (half_closed_) {

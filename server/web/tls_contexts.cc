@@ -13,8 +13,8 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-// ALPN callback of OpenSSL: selects HTTP/1.1 if the client offers protocols, because the gateway
-// does not support HTTP/2.
+// ALPN callback of OpenSSL: selects HTTP/1.1 if the client offers it. Otherwise the connection
+// continues without ALPN. The gateway does not support HTTP/2.
 int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_bytes,
                    const unsigned char* offered, unsigned int offered_bytes, void*) {
   static constexpr std::string_view kOurs = "\x08http/1.1";

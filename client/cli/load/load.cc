@@ -111,8 +111,9 @@ class LoadedStream {
   // Processor time of the two threads, which includes most of gRPC's work.
   double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
-  // Arrival time of the response to a frame. Empty if the response has not arrived, except after
-  // kRemembered frames: then the time of the frame kRemembered earlier.
+  // Arrival time of the response to a frame that has been sent. Empty if the response has not
+  // arrived. Once kRemembered later frames have been sent, returns the time of a later frame, or
+  // empty.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
     const auto at = answered_at_[sequence % kRemembered].load();
     if (at == Clock::duration::rep{0}) return std::nullopt;
@@ -136,7 +137,7 @@ class LoadedStream {
         std::this_thread::sleep_until(due);
       }
       due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
-      answered_at_[(k + 1) % kRemembered] = 0;  // That of an earlier frame.
+      answered_at_[(k + 1) % kRemembered] = 0;  // Removes the time of an earlier frame.
       const std::vector<float>& frame = shared_.frames[k % shared_.frames.size()];
       const auto sent = stream_->Send({.positions = std::span<const float>(frame),
                                        .components = shared_.flags.surface ? 3 : 2,

@@ -8,9 +8,9 @@
 
 namespace partiemc::client {
 
-/// Frames of a disc of particles on a lattice of spacing 1, x0, y0, x1, y1, ..., or with three
-/// `dimensions` of a ball, x0, y0, z0, x1, ... Its centre moves on a circle by one spacing per
-/// frame. Requires: particles > 0.
+/// Returns 16 frames of `particles` particles on a lattice of spacing 1. They form a disc (x0, y0,
+/// x1, ...), or with 3 `dimensions` a ball (x0, y0, z0, x1, ...). Its centre moves on a circle by
+/// one spacing per frame. Requires: particles > 0.
 inline std::vector<std::vector<float>> LoadFrames(int particles, std::size_t dimensions = 2) {
   constexpr int kFrames = 16;
   constexpr double kOrbit = kFrames / (2 * std::numbers::pi);

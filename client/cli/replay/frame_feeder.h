@@ -31,8 +31,8 @@ enum class SendPolicy {
   kLatest,  ///< Send the newest frame, skip and count the others.
 };
 
-/// Checks that the periodic axes of `of_stream` have bounds in the box of `frame`; without
-/// `of_stream`, only that the frame has an orthogonal box. Errors: FAILED_PRECONDITION.
+/// Checks that `frame` has an orthogonal box. With `of_stream`, also that the box is periodic along
+/// each periodic axis of `of_stream`. Errors: FAILED_PRECONDITION.
 absl::Status CheckBox(const RecordedFrame& frame,
                       const std::optional<PeriodicBox>& of_stream = std::nullopt);
 
@@ -96,7 +96,7 @@ class FrameFeeder {
   mutable Mutex mutex_;
   CondVar stopped_;
   bool stop_ ABSL_GUARDED_BY(mutex_) = false;
-  std::deque<FramePointer> offered_ ABSL_GUARDED_BY(mutex_);  // kLatest: not sent or skipped.
+  std::deque<FramePointer> offered_ ABSL_GUARDED_BY(mutex_);  // kLatest: neither sent nor skipped.
   std::deque<FramePointer> unanswered_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t skipped_ ABSL_GUARDED_BY(mutex_) = 0;
   std::vector<FramePointer> free_ ABSL_GUARDED_BY(mutex_);

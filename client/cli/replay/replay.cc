@@ -161,8 +161,8 @@ class Receiver {
     return frame.positions;
   }
 
-  /// The areas of the particles in the plane: of discs with the attribute `radius` or `diameter`,
-  /// else their volumes; empty if no gauge needs them.
+  /// The areas of the particles in the plane, for gauges: of discs with the attribute `radius` or
+  /// `diameter`, else from the volumes (AreasOf). Empty without gauges, and for 3D particles.
   std::vector<float> ParticleAreas(const RecordedFrame& frame) const {
     if (flags_.files.gauges.empty() || frame.components != 2) return {};
     for (const ParticleAttribute& attribute : frame.attributes) {

@@ -167,7 +167,8 @@ def _run_matter(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Seq[str] | None = None) -> int:
-    """Exit code: 0; 1 if an input cannot be read or measured; 2 for a wrong flag."""
+    """Runs the command. Returns 0, or 1 if an input cannot be read or measured. A wrong flag exits
+    with code 2."""
     options = _parser().parse_args(arguments)
     try:
         if options.verb == "surfaces":

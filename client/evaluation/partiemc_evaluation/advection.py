@@ -99,8 +99,9 @@ class Advection(NamedTuple):
 
     @staticmethod
     def between(before: Frame, after: Frame, spacing: float) -> Advection | None:
-        """By ids if both frames have them, else by the velocities of the frame from which points move. None if `before`
-        has no velocities either, or no id is in both frames. If only `after` lacks them, `back` is None."""
+        """Displacements are from ids if both frames have ids, otherwise from the velocities of the
+        frame that points leave. None if both frames have ids but none in common, or if ids are
+        missing and `before` has no velocities. If only `after` has none, `back` is None."""
         there = _field(before, after, spacing)
         return Advection(there, _field(after, before, spacing), spacing) if there else None
 
@@ -110,9 +111,10 @@ class Advection(NamedTuple):
         return dense.moved(dense.points + self.there(dense.points)[0])
 
     def follow(self, points: Points, forward: bool) -> tuple[Points, Floats]:
-        """Moves points (P, d) from the frame before to the frame after, or the reverse. Returns their positions and the
-        uncertainty of each, a length (P,): the largest of both standard errors and the distance between the start and
-        the point carried forward and back."""
+        """Moves points (P, d) from the frame before to the frame after, or the reverse. Returns
+        their positions and the uncertainty of each, a length (P,): the largest of both standard
+        errors and the distance between the start and the point carried there and back. Without
+        displacements in one direction, points stay and uncertainties are infinite."""
         there, back = (self.there, self.back) if forward else (self.back, self.there)
         if there is None or back is None:
             return points, np.full(len(points), np.inf)

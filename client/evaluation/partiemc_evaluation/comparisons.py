@@ -62,8 +62,8 @@ def ratio_of_means(pairs: Floats) -> float:
 
 
 def match(method: Seq[Row], baseline: Seq[Row], metric: str) -> Floats:
-    """(N, 2) numbers of method and baseline, for judged sequences that have both, in the order of `method`. Known
-    jitter only above STILL_JITTER."""
+    """(N, 2) numbers of method and baseline, for judged sequences that have both, in the order of
+    `method`. Pairs of a known jitter are left out if the baseline's is at most STILL_JITTER."""
     numbers = {row.sequence: row[metric] for row in baseline}
     pairs = np.array([(row[metric], numbers[row.sequence]) for row in method
                       if row.judged and row.sequence in numbers], float).reshape(-1, 2)

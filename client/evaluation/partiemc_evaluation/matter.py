@@ -48,7 +48,8 @@ def _measure_rows(recipe: Recipe) -> tuple[list[Row], list[Shot]]:
 
 
 def run_matter(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None] = lambda done: None) -> Found:
-    """All scenes; the same rows for any number of jobs. The last state of each pictured kind has a picture."""
+    """Measures all scenes; the same rows for any number of jobs. The last scene of each kind in
+    _PICTURED has pictures."""
     rows: list[Row] = []
     shots: dict[str, dict[str, list[Shot]]] = {}
     for (of_scene, of_pictures), recipe in zip(map_in_processes(_measure_rows, recipes, jobs, progress), recipes):
@@ -59,7 +60,7 @@ def run_matter(recipes: Seq[Recipe], jobs: int, progress: Callable[[int], None] 
 
 
 def target_of(group: str, kind: str, state: str, metric: str) -> tuple[float, float] | None:
-    """Must and aim; None if the metric has no limit."""
+    """The required and the wanted limit of a metric (must, aim); None if it has none."""
     for of_group, kinds, of_metric, noisy, must, aim in _TARGETS:
         if (group, metric) == (of_group, of_metric) and kind.startswith(kinds) and noisy in (None, state != "at rest"):
             return must, aim

@@ -50,7 +50,8 @@ class Measured(NamedTuple):
 
 
 def _reconstruct(positions: Points, **arguments: Any) -> Any:
-    """The result of one frame. Without the feature, doubts about the spacing are expected."""
+    """The result of one frame. Ignores warnings: doubts about the spacing are expected without the
+    feature."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", partiemc.PartiemcWarning)
         return partiemc.reconstruct(positions, threads=1, **arguments)
@@ -77,7 +78,7 @@ def _sampled(region: Any, seed: int, rng: Rng) -> Points:
     return SAMPLERS[("relaxed", "settled")[seed % 2]](Curve(Outline.of_shapely(region), 1.0), False, rng)
 
 
-# Sizes, in root mean squares.
+# Sizes. Lengths are in root mean squares of the particles' sizes.
 
 def _of_two(large: float, share: float) -> Draw:
     """Sizes `large` and 1. share: the share of the area that the large particles have."""
@@ -90,7 +91,7 @@ def _uniform(largest: float) -> Draw:
 
 
 def _zones(rng: Rng, points: Points) -> Floats:
-    """Large particles on the left of the origin, a quarter as many per area."""
+    """Sizes 1 at x > 0, and 2 elsewhere, with a quarter as many particles per area."""
     return np.where(points[:, 0] > 0, 1.0, np.where(rng.random(len(points)) < 0.25, 2.0, 0.0))
 
 
@@ -123,7 +124,7 @@ def _sizes(recipe: Recipe, rng: Rng) -> Measured:
     return _with_and_without(positions, truth, run)
 
 
-# Grains, in diameters of the smallest.
+# Grains. Lengths are in diameters of the smallest grain.
 
 def _grains(recipe: Recipe, rng: Rng) -> Measured:
     kind, ratio = recipe.kind.split(" 1:")
@@ -165,7 +166,7 @@ def _areas_at(points: Points, outline: Outline) -> Floats:
 
 # Phases.
 
-_MARGIN = 3.5  # Interfaces are measured this far inside the body.
+_MARGIN = 3.5  # Interfaces are measured at least this far inside the body, in spacings.
 
 
 def _half_plane(x: float, y: float, angle: float) -> Any:
@@ -357,7 +358,7 @@ def _shear_flow(recipe: Recipe, rng: Rng) -> Measured:
 
 
 def _layer(recipe: Recipe, rng: Rng) -> Measured:
-    """A wavy layer that reaches its own image."""
+    """A wavy layer across the whole periodic box, so that it is connected with its own image."""
     length, phases = 44.0, rng.uniform(0, 2 * np.pi, 2)
     x = np.linspace(0, length, 500)
     low, high = (height + rise * np.sin(2 * np.pi * x / length + phase)
@@ -391,7 +392,7 @@ _FIRST_SEED = 52_000_000
 
 
 def measure(recipe: Recipe) -> Measured:
-    """Cost: about a second."""
+    """Makes a scene and measures it with the feature and without it. Cost: about a second."""
     return _GROUPS[recipe.group](recipe, np.random.default_rng(recipe.seed))
 
 

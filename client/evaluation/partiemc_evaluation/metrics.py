@@ -112,8 +112,8 @@ def find_defects(result: Any, truth: Curve | None) -> dict[str, float]:
 
     self_intersections: pairs of ring segments that cross. folds: triangles that are clockwise or degenerate.
     spurious_components: outer rings without a particle. component_error, hole_error: difference of the numbers of outer
-    rings and of holes from the truth. wrong_normals: share of vertices whose normal is more than a right angle from the
-    true normal at the nearest point. 0 without the truth.
+    rings and of holes from the truth. wrong_normals: share of vertices whose normal is more than a
+    right angle from the true normal at the nearest point. Without the truth, the last three are 0.
     """
     rings, mesh = result.rings, result.mesh
     outer = rings.outer_of < 0

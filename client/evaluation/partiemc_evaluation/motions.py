@@ -117,8 +117,9 @@ class BodiesMotion:
             for body in self.bodies]))
 
     def particles(self, samples: Sequence[Points], frame: int) -> tuple[Points, Indices]:
-        """The particles of the union, (N, 2), and their ids, (N,). samples[k]: the particles of body k, relative to its
-        centre. Where bodies overlap, only the first of them keeps its particles. An id is the number of the sample."""
+        """The particles of the union, (N, 2), and their ids, (N,). samples[k]: the particles of
+        body k, relative to its centre. Where bodies overlap, only the first of them keeps its
+        particles. An id is the index of a particle in all samples, one body after the other."""
         moved = [body.center(frame) + points for body, points in zip(self.bodies, samples)]
         free = [np.all([before.distance(frame, points) >= 0 for before in self.bodies[:k]], axis=0)
                 & np.ones(len(points), np.bool_) for k, points in enumerate(moved)]

@@ -22,7 +22,7 @@ from .study import BASELINE, DEFAULT, PAPER, Evaluator, Method, Row, Study, outl
 
 SUBJECTS, SHARES, GRIDS = (PAPER, DEFAULT), (1.0, 0.8, 0.5, 0.3), (32, 64)
 FILLS = ("grid", "greedy", "conforming", "polygon")
-_SEED, _REPETITIONS, _CELLS = 5_310, 3, (0.25, 4.0)  # Smallest and largest cell that the core accepts.
+_SEED, _REPETITIONS, _CELLS = 5_310, 3, (0.25, 4.0)  # _CELLS: limits of cell sizes, in spacings.
 
 
 # A row of the paper's Tables 2 to 4, with the placement and the fill of PartiEMC that correspond to it.
@@ -172,8 +172,9 @@ def _run_grid(sequence: Sequence, t: int, placement: str, side: float, cells: in
 
 
 def _run_grids(runs: PaperRuns) -> None:
-    """Figures 11 and 13: two grids over one frame. The frame is halved from the middle of the film until the bounding
-    square is small enough for the coarsest cells. The square is around the largest ring, so spray does not count."""
+    """Figures 11 and 13: two grids over one frame. The number of the frame is in the middle of the
+    film, and is halved until the bounding square is small enough for the coarsest cells. The square
+    is around the largest ring, so spray does not count."""
     film, t, side = runs.film, len(runs.film.frames), np.inf
     while t > 0 and side > GRIDS[0] * _CELLS[1] * film.spacing:
         t //= 2

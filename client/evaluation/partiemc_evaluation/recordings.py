@@ -53,7 +53,7 @@ def _messages(path: pathlib.Path) -> Iterator[dict[int, Any]]:
 
 
 def _frame(fields: dict[int, Any]) -> Frame:
-    kinds = {1: "<f4", 2: "<f8"}  # Positions of the plane.
+    kinds = {1: "<f4", 2: "<f8"}  # Position formats with two coordinates.
     if fields.get(3) not in kinds or not fields.get(4):
         raise ValueError("is not a recording of the plane, or has a frame without particles")
 
@@ -131,13 +131,15 @@ def moment_ellipse(positions: Points, spacing: float, area: float) -> Outline:
     return Outline.of([units(ellipse_ring((0, 0), ratio * b, b, angle, CURVE_STEP))])
 
 
-# Length of a piece of a wall, and height of particles that wet it, in spacings; wet pieces required on either side.
+# Length of a piece of a wall, in spacings; wet pieces required on either side of a piece; a
+# particle nearer to the wall than this, in spacings, wets its piece.
 _PIECE, _WET_PIECES, _WET_HEIGHT = 2.0, 2, 1.25
 _SAMPLES, _HIGHEST, _FEWEST = 20, 1.5, 30         # Samples of a piece; largest height, in spacings; fewest samples.
 
 
 def wall_roughness(outline: Outline, positions: Points, walls: Floats, spacing: float) -> float:
-    """Standard deviation of an outline's distance from each wall, in spacings.
+    """Standard deviation of an outline's distance from its walls, in spacings: the root mean
+    square, over the samples of all walls, of the deviation from the mean of the same wall.
 
     Samples lie every tenth of a spacing where the wall is wet: a piece of two spacings, and two pieces on either side,
     have particles within 1.25 spacings. This leaves out contact lines and corners, for every method. Distances are

@@ -150,7 +150,7 @@ def _growing(recipe: Recipe, rng: Rng) -> _Draft:
     outline = make_shape(recipe.shape, recipe.particles, _STRAIGHT_STEP)
     points = SAMPLERS[recipe.sampler](Curve(outline, 1.0), fits_lattice(recipe.shape), rng)
     motion = SimilarityMotion([Similarity.plane(scale=_AREA_GROWTH ** 0.5)] * (recipe.frames - 1))
-    per_area = len(points) / outline.area  # A lattice does not have exactly one particle each.
+    per_area = len(points) / outline.area  # Not exactly 1 for a lattice.
     frames: _Draft = [(outline, points, None)], motion
     for t in range(recipe.frames - 1):
         outline, points = outline.moved(motion.carry(t, outline.points)), motion.carry(t, points)
@@ -214,8 +214,8 @@ def make_scene(recipe: Recipe) -> Sequence:
 
 
 def digest(sequence: Sequence) -> str:
-    """16 hexadecimal digits of all positions, in thousandths of a spacing, because libm differs between machines in
-    its last bits."""
+    """A hash, in 16 hexadecimal digits, of all positions relative to the first one, rounded to
+    thousandths of a spacing, because libm differs between machines in its last bits."""
     total, origin = hashlib.sha256(), sequence.frames[0].positions[0]
     for frame in sequence.frames:
         total.update(np.rint((frame.positions - origin) / sequence.spacing * 1e3).astype("<i8").tobytes())

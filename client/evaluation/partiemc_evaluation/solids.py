@@ -18,7 +18,7 @@ from .shapes import make_shape
 
 _BAND = 0.25            # Samples of a solid are the feet of random points within this distance.
 _SAMPLES_PER_AREA = 6.0  # Samples for each squared spacing of the boundary.
-_CREASE = 0.05          # A point outside that is farther than this from the normal of its foot has the foot on an edge.
+_CREASE = 0.05          # Distance from the foot's normal above which the foot is on an edge.
 _NEWTON_STEPS = 60      # Bisections for the nearest point of an ellipsoid: to 1e-15 of its size.
 
 
@@ -218,8 +218,8 @@ class Solid:
 
     @cached_property
     def samples(self) -> Samples:
-        """middles: the feet of random points of a thin band inside, even over smooth parts. corners: the feet on edges
-        of points outside."""
+        """middles: the nearest boundary points of random points in a thin band inside, even over
+        smooth parts. corners: those of points outside, if they are on edges or tips."""
         rng = np.random.default_rng(1)
         size = np.ptp(self.bounds, axis=0) + 2 * _BAND
         count = int(np.prod(size) * _SAMPLES_PER_AREA / _BAND)
@@ -233,7 +233,8 @@ class Solid:
 
 
 class Mesh:
-    """The `Boundary` of triangles: points (V, 3), triangles (T, 3). It has no `contains`: no metric needs it."""
+    """The `Boundary` of triangles: points (V, 3), triangles (T, 3). step: square root of the area
+    for each sample. `contains` raises an error, because no metric needs it."""
 
     def __init__(self, points: Points, triangles: Indices, step: float = 0.35) -> None:
         self.points, self.triangles, self.step = points, triangles, step
@@ -276,7 +277,8 @@ class Mesh:
         return Samples(middles, self.points[np.unique(self.triangles)])
 
     def nearest(self, points: Points) -> tuple[Floats, Points, Points]:
-        """Exact, by the rule of Curve.nearest."""
+        """Exact: examines the k triangles with the nearest centroids. Increases k for points to
+        which another triangle may be nearer. Requires: not empty."""
         count = len(points)
         distance, foot, piece = np.empty(count), np.empty((count, 3)), np.empty(count, np.int64)
         pending, k = np.arange(count), min(8, len(self._a))

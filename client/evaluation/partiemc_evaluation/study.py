@@ -28,7 +28,7 @@ METRICS = (
     "bias", "area_deviation",           # |mean of area_error|; Eq. 29-30 on area / true area, frames after the first.
     "hausdorff_jitter", "mean_jitter",  # From the outline before, carried along.
     "known_hausdorff_jitter", "known_mean_jitter",    # Where particles determine the motion; recordings.
-    "known_share", "area_error_size",                 # Share of the samples of these two, their weight; |area_error|.
+    "known_share", "area_error_size",                 # Share of samples used; |area_error|.
     "wall_roughness", "area_error",     # Standard deviation of the distance from straight walls; area / true area - 1.
     "center_hausdorff", "center_mean",  # To the curve through the outermost centres, where it is defined.
     "triangles", "triangle_deviation",  # Of the mesh; their standard deviation over the frames.

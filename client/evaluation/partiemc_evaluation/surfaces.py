@@ -27,7 +27,7 @@ _PARTICLES, _FRAMES = 1200, 5
 _NOISE = {"noise-5": 0.05, "noise-10": 0.10}
 _KEPT_SHARE, _STRETCH = 0.85, 1.05
 _SHIFT, _TURN = (0.5, 3.0), 0.1     # Rigid motion in each frame: range in spacings; largest turn, radians.
-_GAP, _DEPTH = 3.1, 6.0             # Balls come from this gap and end this deep in each other.
+_GAP, _DEPTH = 3.1, 6.0             # Gap of balls at first, depth in each other at last; spacings.
 _SPRAY_SIZES, _LONE = (2, 3, 5, 8, 12, 20, 30, 60), 30
 _RAGGED_MARGIN = 2.0
 _APART = 3.0                        # Points nearer than this to both balls, in spacings, may merge.
@@ -198,7 +198,7 @@ def surface_sets() -> dict[str, list[Recipe]]:
 
 
 def surface_digest(recipe: Recipe) -> str:
-    """16 hexadecimal digits of all positions, in thousandths of a spacing."""
+    """A hash, in 16 hexadecimal digits, of all positions, rounded to thousandths of a spacing."""
     total = hashlib.sha256()
     for frame in make_frames(recipe):
         total.update(np.round(1000 * frame.positions).astype(np.int64).tobytes())

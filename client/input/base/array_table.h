@@ -38,18 +38,21 @@ struct StoredArray {
   std::function<absl::Status(std::vector<char>& bytes)> load;
 };
 
-/// Fills `rows` with the particles of `arrays`, which have `row_count` rows each. `request` and
-/// `source` have the same meaning as in the overload below.
+/// Fills `rows` with the particles of `arrays`, which have `row_count` rows each. Loads only the
+/// needed arrays. If request.columns has one entry, it may be the name of an array: it selects the
+/// components of the array. Error messages begin with `source`, which also becomes rows.source.
 absl::Status FillRows(std::span<const StoredArray> arrays, std::size_t row_count,
                       const ColumnRequest& request, const std::string& source, ParticleRows& rows);
 
-/// The index of the array with the first axis of the positions. Uses only request.columns.
+/// Returns the index in `arrays` of the array that holds the first axis of the positions (x, or y
+/// without x). Uses only request.columns.
 /// Errors: as PlanNamedColumns.
 absl::StatusOr<std::size_t> PositionArray(std::span<const StoredArray> arrays,
                                           const ColumnRequest& request);
 
-/// Fills `rows` with the particles of `table`. The name of an array in request.columns selects the
-/// components of the array. Error messages begin with `source`, which also becomes rows.source.
+/// Fills `rows` with the particles of `table`. If request.columns has one entry, it may be the name
+/// of an array: it selects the components of the array. Error messages begin with `source`, which
+/// also becomes rows.source.
 absl::Status FillRows(const ArrayTable& table, const ColumnRequest& request,
                       const std::string& source, ParticleRows& rows);
 

@@ -85,8 +85,8 @@ struct ColumnPlan {
 /// lower case, with any of " _.:-" between the parts and an optional unit in brackets. An attribute
 /// is a column with its name, or an array NAME:0, NAME:1 or NAME_x, NAME_y; "velocity" means the
 /// velocities. Errors: kFailedPrecondition without positions or without a requested column, and if
-/// the positions would be fractions of a box (xs ys) outside of a LAMMPS dump; there
-/// ColumnRequest::columns takes them as they are.
+/// the only positions are fractions of a box (xs ys) outside of a LAMMPS dump. If
+/// ColumnRequest::columns names such columns there, they are used as coordinates.
 absl::StatusOr<ColumnPlan> PlanNamedColumns(const std::vector<std::string>& names,
                                             const ColumnRequest& request);
 

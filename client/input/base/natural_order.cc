@@ -80,9 +80,10 @@ std::vector<RunsAfterPoint> RunsOf(const std::vector<std::string>& names) {
   return all;
 }
 
-// NaturalLess where the runs after a point with the ordinals that `is_fraction` selects are
-// fractions. Whether a run is after a point depends only on the text before it, which is equal in
-// both names, so that this is a strict weak order.
+// NaturalLess, except that a run of digits after "<digits>." compares as a fraction if
+// `is_fraction` is set for its ordinal among such runs (from 0). Whether a run is after a point
+// depends only on the text before it, which is equal in both names, so that this is a strict weak
+// order.
 bool Less(std::string_view a, std::string_view b, const std::vector<bool>& is_fraction) {
   const std::string_view whole_a = a;
   const std::string_view whole_b = b;

@@ -11,11 +11,11 @@ namespace partiemc::client {
 /// A strict weak order; names that differ only in leading zeros are ordered as text.
 bool NaturalLess(std::string_view a, std::string_view b);
 
-/// Sorts names of a series by NaturalLess, but compares digits after "<digits>." as the fraction of
-/// a decimal number where they have different lengths: "p_0.05" < "p_0.1". They are whole numbers
-/// if they are part of three or more numbers ("1.2.10"), or if one of them ends with 0 and none
-/// longer than the shortest begins with 0 ("run1.9" < "run1.10"). Returns true if the two ways
-/// differ in the order and no name decides between them.
+/// Sorts names of a series by NaturalLess. Exception: digits after "<digits>." compare as a decimal
+/// fraction if their lengths differ between names: "p_0.05" < "p_0.1". They still compare as whole
+/// numbers in two cases. Points join three or more numbers ("1.2.10"). Or digits of one name end
+/// with 0, and no digits longer than the shortest begin with 0 ("run1.9" < "run1.10"). Returns true
+/// if fractions change the order and the names do not show that they are fractions.
 bool SortNaturally(std::vector<std::string>& names);
 
 }  // namespace partiemc::client

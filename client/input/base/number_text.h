@@ -18,7 +18,7 @@ std::optional<std::uint64_t> ParseCount(std::string_view text);
 /// ("3.000e+00", as NumPy's savetxt writes it).
 std::optional<std::uint64_t> ParseId(std::string_view text);
 
-/// ParseId of a parsed number.
+/// The identity that `number` stands for; absent unless it is an integer in [0, 2^53).
 std::optional<std::uint64_t> IdOfNumber(double number);
 
 }  // namespace partiemc::client::input

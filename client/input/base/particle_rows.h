@@ -40,8 +40,9 @@ struct ParticleRows {
 };
 
 /// Adds one row of a text table if it fulfils the conditions of `request`. Requires:
-/// rows.Begin(plan). Errors: kDataLoss if cells are missing or not numbers. The message does not
-/// state the file and the line; the caller adds them.
+/// rows.Begin(plan). Errors: kDataLoss if cells are missing, surplus or not numbers, or above
+/// kMaxParticles rows. An invalid id is no error (has_ids). The message does not state the file and
+/// the line; the caller adds them.
 absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
                            const ColumnRequest& request, ParticleRows& rows);
 
@@ -78,7 +79,7 @@ absl::Status CheckParticleCount(std::size_t count);
 
 /// Adds the rows of a binary table that fulfil the conditions of `request`. Requires:
 /// rows.Begin(plan); every column of the plan has `row_count` elements. Errors: kFailedPrecondition
-/// if a condition compares a column with text.
+/// if a condition compares a column with text; kDataLoss if `row_count` is above kMaxParticles.
 absl::Status AppendArrayRows(std::span<const ArrayColumn> columns, std::size_t row_count,
                              const ColumnPlan& plan, const ColumnRequest& request,
                              ParticleRows& rows);

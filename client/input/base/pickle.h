@@ -51,8 +51,8 @@ class Pickle {
   const PickleValue* root_ = nullptr;
 };
 
-/// Sets `column` to an array of numbers with one extent, and `rows` to its length. Returns false
-/// for other values.
+/// If `value` is a one-dimensional array of numbers, sets `column` to a view of it and `rows` to
+/// its length, and returns true. Returns false for other values.
 bool ColumnOf(const PickleValue& value, ArrayColumn& column, std::size_t& rows);
 
 }  // namespace partiemc::client::input

@@ -52,7 +52,8 @@ char Separator(std::string_view line) {
   return ' ';
 }
 
-// Keeps an empty cell behind a separator at the end of the line.
+// Splits a line into trimmed cells. A separator other than blanks at the end of the line adds an
+// empty cell.
 void SplitAllCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
   if (separator == ' ') {
@@ -74,14 +75,14 @@ void SplitAllCells(std::string_view line, char separator, std::vector<std::strin
   }
 }
 
-// Splits the first line of a table. A separator may end it.
+// Splits the first line of a table. Drops an empty cell behind a separator at the end of the line.
 void SplitCells(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   SplitAllCells(line, separator, cells);
   if (cells.size() > 1 && cells.back().empty()) cells.pop_back();
 }
 
-// Splits a row of a table. A separator that ends the row follows the last column; an empty cell of
-// the last column stays.
+// Splits a row of a table. Drops an empty cell behind a separator at the end of the row, but only
+// if the row has one cell more than the table has columns.
 void SplitRow(std::string_view line, char separator, std::size_t column_count,
               std::vector<std::string_view>& cells) {
   SplitAllCells(line, separator, cells);

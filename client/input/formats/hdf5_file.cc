@@ -138,7 +138,7 @@ std::optional<Hdf5Array> DescribeOpen(hid_t dataset) {
 }
 
 // Refuses filters that allocate what their parameters declare, and stacked compression, whose
-// ratios multiply. Deflate makes at most 1,032 bytes of one.
+// ratios multiply. Deflate unpacks one byte to at most 1,032.
 absl::Status CheckFilters(hid_t creation, const std::string& place) {
   int compressions = 0;
   for (int k = 0; k < H5Pget_nfilters(creation); ++k) {

@@ -48,8 +48,8 @@ class Hdf5File {
   /// group. Errors: kDataLoss if it has more than 2^20 members.
   absl::StatusOr<std::vector<std::string>> Members(const std::string& group) const;
 
-  /// The first `most` members of a group in the order of the file, "" for the root. Empty if there
-  /// is no such group.
+  /// Selects the first `most` members of a group ("" for the root) in the order of the file.
+  /// Returns them in natural order. Empty if there is no such group.
   Hdf5Members FirstMembers(const std::string& group, std::size_t most) const;
 
   bool IsGroup(const std::string& path) const;

@@ -16,7 +16,7 @@ namespace partiemc::client::input {
 namespace {
 
 constexpr std::size_t kMaxListed = 12;  // Datasets that a message lists.
-// Bytes of the names in the list of frames.
+// Limit on the bytes of the names in the list of frames.
 constexpr std::uint64_t kMaxFrameListBytes = std::uint64_t{256} << 20;
 constexpr std::uint64_t kMaxVtkPoints = std::uint64_t{1} << 48;  // Points of all frames.
 constexpr std::size_t kMaxVisited = 10000;                       // Objects that Listed visits.

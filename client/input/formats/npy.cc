@@ -38,8 +38,8 @@ bool TakePythonString(std::string_view& rest, char quote, std::string& text) {
   return true;
 }
 
-// The text after "'key':" in the header, a Python dict with three known keys. Fields of a
-// structured array, which are inside a value, can have the name of a key.
+// The text after "'key':" in the header, a Python dict with three known keys. Skips names inside a
+// value, because a field of a structured array can have the name of a key.
 std::optional<std::string_view> ValueOf(std::string_view header, std::string_view key) {
   std::string_view rest = header;
   std::string text;

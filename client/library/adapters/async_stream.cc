@@ -36,7 +36,8 @@ class AsyncStream::Receiving {
 
   /// Queues `answered`, then calls `send`, which sends the frame. The callback is queued first,
   /// because the answer may arrive before `send` returns. Frames are answered in order, so the
-  /// front of the queue is answered next.
+  /// front of the queue is answered next. If `send` fails, removes the callback and calls it with
+  /// the error.
   template <typename Sending>
   void Send(Answered answered, const Sending& send) ABSL_LOCKS_EXCLUDED(mutex_) {
     {

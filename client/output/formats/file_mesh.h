@@ -42,7 +42,7 @@ class FileMesh {
   const Rings& rings() const;
   /// Index of the vertex that is the first point of the rings.
   std::uint32_t first_of_rings() const { return first_of_rings_; }
-  /// Two vertices for each segment of the rings.
+  /// Two vertex indices for each segment of the rings.
   std::vector<std::uint32_t> Sides() const;
 
  private:

@@ -12,8 +12,8 @@
 namespace partiemc::client {
 
 /// Calls visit(ring, points, is_closed) for each stretch of the rings between cuts (Rings::cuts).
-/// `points` has the indices of its points, along the ring, at least two. A ring without cuts is one
-/// closed stretch; its first point is not repeated.
+/// `points` has the indices of the points of the stretch, along the ring, at least two. A ring
+/// without cuts is one closed stretch; its first point is not repeated.
 template <typename Visit>
 void ForEachStretch(const Rings& rings, const Visit& visit) {
   std::vector<std::uint32_t> points;

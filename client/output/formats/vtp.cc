@@ -58,7 +58,7 @@ void AddPoints(const FileMesh& mesh, vtkPolyData* data) {
     data->GetPointData()->SetNormals(FloatArray(kNormals, 3, mesh.normals()));
   }
   for (const AttributeValues& one : mesh.attributes()) {
-    // VTK replaces an array by another one with the same name.
+    // Renames attributes with a name that another array can have: VTK would replace the array.
     std::string name = mesh.surface() ? one.name : NameBesideWalls(one.name);
     if (mesh.surface() && name == kNormals) name += '_';
     data->GetPointData()->AddArray(FloatArray(name, one.components, one.values));
@@ -74,7 +74,7 @@ void AddPolygons(const FileMesh& mesh, vtkPolyData* data) {
   data->SetPolys(polygons);
 }
 
-// Adds the rings as lines, without cuts, and the cell data of an outline.
+// Adds the rings as lines, without the segments in Rings::cuts, and the cell data of an outline.
 void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) {
   // VTK numbers the lines of polygonal data before its polygons, so the values for rings come
   // first.

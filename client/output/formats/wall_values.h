@@ -15,8 +15,8 @@ namespace partiemc::client {
 inline constexpr const char* kWetted = "wetted";
 inline constexpr const char* kContactAngle = "contact_angle";
 
-/// The name of an attribute in a file where these two names belong to the values of walls. The same
-/// in all frames, whether they touch a wall or not.
+/// The name of an attribute in a file: `name`, with "_" appended if it is kWetted or kContactAngle,
+/// the names of the values of walls. The same in all frames, whether they touch a wall or not.
 inline std::string NameBesideWalls(const std::string& name) {
   return name == kWetted || name == kContactAngle ? name + '_' : name;
 }

@@ -17,11 +17,12 @@ enum class Doubt : std::uint8_t {
   /// (core/METHOD.md, "How the paper is read", 10; core/SURFACES.md, "Doubts"). Not checked for
   /// slices and grains.
   kSpacingContradicted,
-  /// More than half of the volumes are above twice the squared spacing, or more than half are below
-  /// half of it. For a slice or a surface, the cubed spacing counts. Not checked for own sizes.
+  /// More than half of the volumes (Frame::volumes) are above twice the squared spacing, or more
+  /// than half are below half of the squared spacing. For a slice or a surface, the cubed spacing
+  /// replaces the squared spacing. Not checked for own sizes.
   kVolumesContradictSpacing,
-  /// Positions are float32, and the step to the next float at these coordinates exceeds 1/16 of the
-  /// spacing. Not checked for slices.
+  /// Positions are float32, and the step to the next float at the coordinate farthest from 0
+  /// exceeds 1/16 of the spacing (own sizes: of the smallest size). Not checked for slices.
   kPositionsCoarse,
 };
 

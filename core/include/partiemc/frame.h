@@ -35,20 +35,22 @@ struct Frame {
   int components = 2;
 
   /// Area of each particle in world units squared; for slices and surfaces its volume in world
-  /// units cubed. Positive and finite. Empty: h^2, or h^3. Sizes::kOwn requires volumes.
+  /// units cubed. Positive and finite. If empty, each particle counts as h^2, for slices and
+  /// surfaces as h^3, with the spacing h. Sizes::kOwn requires volumes.
   std::span<const float> volumes = {};
 
   /// Distinct numbers that particles keep from frame to frame. Empty if the particles have no
-  /// numbers. They influence only identities and parents (core/IDENTITIES.md), and positions with
-  /// ReconstructionParameters::noise_filter, which requires them.
+  /// numbers. Ids influence only identities and parents (core/IDENTITIES.md), and the filtered
+  /// positions if ReconstructionParameters::noise_filter is set, which requires ids.
   std::span<const std::uint64_t> ids = {};
 
   /// Interleaved like `positions`, in world units per unit of `time`. Finite. Empty if the frame
-  /// has no velocities. They influence only identities and parents.
+  /// has no velocities. Velocities influence only identities and parents.
   std::span<const float> velocities = {};
 
   /// Quantities to interpolate to the vertices (Result::attributes, Surface::attributes), and the
-  /// phases. Quantities change only the mesh of Fill::kGreedy
+  /// phase of each particle (ReconstructionParameters::phase_attribute). Interpolated quantities do
+  /// not change the geometry, except the mesh of Fill::kGreedy
   /// (ReconstructionParameters::attribute_tolerance).
   std::span<const Attribute> attributes = {};
 
@@ -71,8 +73,8 @@ struct Frame {
 inline constexpr std::string_view kVelocityAttribute = "velocity";
 
 /// Sets `chosen` to views of the attributes with these names, in the order of the names.
-/// kVelocityAttribute selects Frame::velocities if the frame has them. A frame without particles
-/// accepts every name.
+/// kVelocityAttribute selects Frame::velocities if the frame has them. In a frame without
+/// particles, an unknown name selects an attribute with one component and no values.
 /// Errors: INVALID_ARGUMENT with reason NO_SUCH_ATTRIBUTE; `chosen` is then incomplete.
 absl::Status ChooseAttributes(const Frame& frame, std::span<const std::string> names,
                               std::vector<Attribute>& chosen);
@@ -86,7 +88,7 @@ struct FrameLimits {
   std::size_t max_particles = 16'000'000;
   /// A tile is a square of 32 x 32 lattice nodes; tiles exist only near particles. A tile costs
   /// about 10 kB of memory, and each of its cells that the outline crosses 1 kB more. For surfaces,
-  /// the limit of bricks of 8 x 8 x 8 nodes.
+  /// the limit applies to bricks of 8 x 8 x 8 nodes.
   std::size_t max_tiles = 131'072;
 };
 

@@ -36,7 +36,8 @@ enum class Placement : std::uint8_t {
 enum class Fill : std::uint8_t {
   kNone,    ///< No mesh.
   kGrid,    ///< Two triangles for each interior cell: the paper's mesh before merging.
-  kGreedy,  ///< Interior cells merged to rectangles, as in the paper; with attributes, to blocks.
+  kGreedy,  ///< Interior cells merged to rectangles, as in the paper. If the frame has attributes
+            ///< and `attribute_tolerance` is below 1: to square blocks of 1 to 32 cells a side.
   kConforming,  ///< Few triangles, like greedy, but without T-junctions.
   kPolygon,     ///< The rings triangulated, without interior vertices.
 };
@@ -51,7 +52,7 @@ enum class SpacingRule : std::uint8_t {
 /// The size h_i of a particle: the spacing that it needs between its neighbours and itself.
 enum class Sizes : std::uint8_t {
   kEqual,  ///< The spacing h, for all particles.
-  kOwn,    ///< h_i = sqrt(v_i), of a surface cbrt(v_i), with the volume v_i (core/SIZES.md).
+  kOwn,    ///< h_i = sqrt(v_i), for surfaces cbrt(v_i), with v_i of Frame::volumes (core/SIZES.md).
 };
 
 /// The shape that the outline surrounds.
@@ -79,8 +80,9 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// A further outline of the same particles, with the other parameters of the stream. At most one
-/// member is present, except that a slice and an isovalue may be combined.
+/// A further outline of the same particles. The members replace parameters of the stream; all other
+/// parameters are the same. At most one member is present, except that a slice and an isovalue may
+/// be combined.
 struct Section {
   /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
   /// present only if the stream has a slice.
@@ -148,10 +150,11 @@ struct SurfaceOptions {
   std::uint64_t max_drop_particles = 30;
 
   /// Removes points while the root mean square error stays below this many spacings. No removed
-  /// point is farther than twice this from the surface. In [0, 1]; 0 keeps all points. S1 to S5
-  /// hold: where they would not, triangles stay as they are. Shells lose some of their volume
-  /// (core/SURFACES.md, "Simplification"). meshoptimizer allocates memory by its own allocator
-  /// (meshopt_setAllocator), so frames allocate memory also with a warm workspace.
+  /// point is farther than twice this many spacings from the surface. In [0, 1]; 0 keeps all
+  /// points. The guarantees S1 to S5 (surface.h) hold: where a removal would break one, triangles
+  /// stay as they are. Shells lose some of their volume (core/SURFACES.md, "Simplification").
+  /// meshoptimizer allocates memory by its own allocator (meshopt_setAllocator), so frames allocate
+  /// memory also with a warm workspace.
   double simplify = 0;
 
   /// Spray: drops bodies whose particles have less volume than this, in cubed spacings. At least 0;
@@ -181,10 +184,10 @@ struct ReconstructionParameters {
   SpacingRule spacing_rule = SpacingRule::kFirstFrame;
 
   /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
-  /// local size. Frames must have volumes. An absent spacing is estimated as the root mean square
-  /// of the sizes. A size must be within a factor of `kMostSizeRatio` of the spacing, and its
-  /// kernel radius at most 32 cells. Excludes slices, walls, `box`, `noise_filter` and
-  /// Placement::kFarthestParticle.
+  /// local size. Frames must have volumes. Except with grains, an absent spacing is estimated as
+  /// the root mean square of the sizes. A size must be within a factor of `kMostSizeRatio` of the
+  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `box`, `noise_filter`
+  /// and Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 
@@ -223,7 +226,7 @@ struct ReconstructionParameters {
   double attribute_tolerance = 0.01;
 
   /// Orients the normal of a cell by its normal in the last frame (Eq. 11), not by the outline
-  /// alone. Used by `farthest-particle` and `qef` only.
+  /// alone. Used only by `farthest-particle` and `qef`, and only without `box`.
   bool normal_memory = true;
 
   /// Closes holes below 2 squared spacings (grains: 0.5; surfaces: 2 cubed spacings), with
@@ -277,19 +280,19 @@ struct ReconstructionParameters {
   /// slices, phases, walls and own sizes. A frame may have another box (Frame::box).
   std::optional<PeriodicBox> box = std::nullopt;
 
-  /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md):
-  /// the weight, in (0, 1], of the given position of a particle against the position that the last
-  /// frame and the motion of its neighbours predict. 0.5 is a good value; 1 filters nothing. Frames
-  /// must have ids. A new particle keeps its given position. Until the stream has a spacing, no
-  /// position is filtered.
+  /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md).
+  /// The value w, in (0, 1], is the weight of a given position: the filtered position is w given +
+  /// (1 - w) predicted. The last frame and the motion of the neighbours predict the position of a
+  /// particle. 0.5 is a good value; 1 filters nothing. Frames must have ids. A new particle keeps
+  /// its given position. Until the stream has a spacing, no position is filtered.
   std::optional<double> noise_filter = std::nullopt;
 
   static constexpr std::size_t kMaxWallPoints = 1024;
 
   /// Walls, of at most 1024 points together, at which the outline is cut (core/WALLS.md). The fluid
-  /// is where all walls have it. An outline nearer than half a spacing to a wall runs along it.
-  /// Obstacles narrower than a cell may be missed. Requires Placement::kVirtualPlane; excludes
-  /// surfaces, slices, isovalues, sections, own sizes and `box`.
+  /// lies on the fluid side of every wall. An outline nearer than half a spacing to a wall runs
+  /// along the wall. Obstacles narrower than a cell may be missed. Requires
+  /// Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections, own sizes and `box`.
   std::vector<Wall> walls = {};
 
   static constexpr std::size_t kMaxWallPhases = 16;
@@ -303,8 +306,8 @@ struct ReconstructionParameters {
   static constexpr std::size_t kMaxWallPlanes = 6;
 
   /// Walls at which a surface is cut (core/WALLS.md, "Surfaces"): for each axis at most one with
-  /// the fluid above and one with the fluid below, at least a kernel radius apart. The fluid is
-  /// where all walls have it. The triangles on walls are in Surface::cuts. Requires
+  /// the fluid above and one with the fluid below, at least a kernel radius apart. The fluid lies
+  /// on the fluid side of every wall. The triangles on walls are in Surface::cuts. Requires
   /// Output::kSurface; excludes sections, own sizes and `box`.
   std::vector<WallPlane> wall_planes = {};
 
@@ -315,8 +318,9 @@ struct ReconstructionParameters {
 /// Checks every field. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status Validate(const ReconstructionParameters& parameters);
 
-/// Checks a box. `kernel_radius` is in spacings, `spacing` in world units. With spacing 0
-/// (unknown), lengths must only be positive. Errors: as above.
+/// Checks the limits of a box, and that it has a periodic axis. `kernel_radius` is in spacings,
+/// `spacing` in world units. With spacing 0 (unknown), a length only has to be positive and at most
+/// 1e69. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spacing);
 
 /// Fills in `reference_radius` and `clean` if they are absent. With grains, replaces

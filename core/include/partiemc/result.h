@@ -82,7 +82,8 @@ enum class TriangleClass : std::uint8_t {
 ///   M1 every triangle is counter-clockwise, none is folded or degenerate;
 ///   M2 triangles do not overlap and together cover exactly the inside of the rings;
 ///   M3 the first points of the mesh are the points of the rings, bit for bit, in their order;
-///   M4 no vertex lies inside a side of a triangle or ring (Fill::kConforming, kPolygon, blocks).
+///   M4 no vertex lies on a side of a triangle or ring between the ends of the side. Only for
+///      Fill::kConforming, kPolygon, and kGreedy with blocks (attribute_tolerance).
 struct Mesh {
   std::vector<double> points;            ///< x0, y0, x1, y1, ... in world units.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each.
@@ -99,7 +100,7 @@ struct FrameStatistics {
   /// Tiles of 32 x 32 nodes that were allocated; for surfaces, bricks of 8 x 8 x 8 nodes.
   std::uint64_t tiles = 0;
   std::uint64_t active_cells = 0;        ///< Cells that the outline crosses; 0 for surfaces.
-  std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed.
+  std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed; for surfaces, cavities.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
   std::uint64_t dropped_spray = 0;       ///< Components below the minimum size in the parameters.
   /// Bodies that were cut at faces of the periodic box, because they percolate or because they are
@@ -107,13 +108,16 @@ struct FrameStatistics {
   std::uint64_t cut_bodies = 0;
   std::uint64_t triangles = 0;           ///< Triangles of the mesh or of the surface.
   std::uint64_t triangles_grid = 0;      ///< Triangles of a mesh by Fill::kGrid of the same rings.
-  std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross or touch.
-  std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate.
-  double area = 0;  ///< Rings: sum of their signed areas. Surfaces: sum of the areas of shells.
+  std::uint64_t self_intersections = 0;  ///< Pairs of segments of rings that cross or touch. Only
+                                         ///< counted for Placement::kFarthestParticle, else 0.
+  std::uint64_t folded_triangles = 0;    ///< Triangles that are clockwise or degenerate. Only
+                                         ///< counted for Placement::kFarthestParticle, else 0.
+  double area = 0;  ///< World units squared. Sum of signed ring areas; surfaces: of shell areas.
   double perimeter = 0;  ///< Sum over rings, world units; 0 for surfaces.
-  double volume = 0;     ///< Sum over shells of their signed volumes; 0 for outlines.
+  double volume = 0;     ///< Sum of signed shell volumes, world units cubed; 0 for outlines.
   double spacing = 0;    ///< Spacing used in this frame, world units; 0: unknown.
-  double cell_size = 0;  ///< Lattice spacing, world units; constant in a stream unless provisional.
+  double cell_size = 0;  ///< Lattice spacing, world units. Constant in a stream, except in frames
+                         ///< with Doubt::kSpacingProvisional.
   Doubts doubts;         ///< Reasons to distrust the result.
 
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
@@ -125,7 +129,7 @@ struct Result {
   Rings rings;
   Mesh mesh;  ///< Empty for Fill::kNone.
   Surface surface;
-  std::vector<AttributeValues> attributes;  ///< In the order of Frame::attributes.
+  std::vector<AttributeValues> attributes;  ///< In the order of Frame::attributes, without phases.
   FrameStatistics statistics;
   /// The results of ReconstructionParameters::sections. Each is the same as if its outline were the
   /// only one, except that phases divide the outline of the stream (Section::phase).
@@ -137,8 +141,9 @@ struct Result {
   friend bool operator==(const Result&, const Result&) = default;
 };
 
-/// 64-bit digests of the geometry: equal digests mean equal bits. proto/PROTOCOL.md defines them,
-/// so that any client can compute them.
+/// 64-bit digests of the points and of rings, shells and triangles with their nesting and classes.
+/// Normals, measures and attributes are left out. Equal digests mean equal bits, except for
+/// collisions. proto/PROTOCOL.md defines the digests, so that any client can compute them.
 std::uint64_t DigestRings(const Rings& rings);
 std::uint64_t DigestMesh(const Mesh& mesh);
 std::uint64_t DigestSurface(const Surface& surface);

@@ -43,7 +43,7 @@ struct NodeRun {
   friend bool operator==(const NodeRun&, const NodeRun&) = default;
 };
 
-/// Most particle samples of one outer ring.
+/// Most particle samples of one outer ring or outer shell.
 inline constexpr std::uint32_t kMaxSamples = 16;
 
 /// A particle of the last frame: a hash of its id, different from the hashes of all other samples,

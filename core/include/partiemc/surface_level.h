@@ -19,8 +19,9 @@ struct LevelOfDetail {
   /// Limit of the root mean square distance of the level to the exact surface, in spacings, in
   /// (0, 1]. No removed point is farther than twice this from the level.
   std::optional<double> max_error;
-  /// Limit of triangles; at least 1. The level has the smallest error that meets the limit, of 0
-  /// and a fixed list up to 0.35. If none does, the level has error 0.35 and more triangles.
+  /// Limit of triangles; at least 1. The error of the level is 0 or from a fixed list up to 0.35
+  /// spacings: the smallest error that meets the limit. If no error does, the level has the error
+  /// 0.35 and more triangles than the limit.
   std::optional<std::uint64_t> max_triangles;
 
   friend auto operator<=>(const LevelOfDetail&, const LevelOfDetail&) = default;
@@ -49,9 +50,9 @@ std::uint64_t LevelBytes(std::uint64_t points, std::uint64_t triangles,
                          std::uint64_t attribute_values);
 
 /// Simplifies `surface` to a level, and returns SurfaceLevel::error. `spacing` is in world units.
-/// The remaining points keep their bits, normals and attributes; shells keep the measures of the
-/// exact surface. S1 and S2 hold, S4 as in the exact surface, and S3 between all triangles that the
-/// simplification has changed.
+/// The remaining points keep their bits, normals and attributes; shells keep their measures. Of the
+/// guarantees in surface.h, S1 and S2 hold, S4 as in the given surface, and S3 between all
+/// triangles that the simplification has changed.
 /// Requires: a valid level; indices, offsets and sizes of arrays as in a Surface; normals may be
 /// absent. Coordinates may be rounded: triangles that break S3 stay.
 /// Runs in the caller's Arena. Deterministic for any number of threads. Errors: CANCELLED after

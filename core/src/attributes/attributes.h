@@ -24,7 +24,7 @@ struct CarryingParticle {
 /// Warm buffers of InterpolateAttributes.
 struct AttributeScratch {
   std::vector<std::uint32_t> tile_of;   ///< By vertex: its tile, or kNoTile.
-  std::vector<float> inverse_size;      ///< By particle: 1 / own size in spacings; else empty.
+  std::vector<float> inverse_size;      ///< By particle: 1 / size in spacings; empty: equal sizes.
   std::vector<std::uint8_t> is_wanted;  ///< By tile: not 0 if the tile or a neighbour has a vertex.
   std::vector<std::uint8_t> sorted;     ///< By tile: whether its particles are sorted already.
   std::vector<std::uint32_t> buckets;   ///< By tile and bucket: first particle.
@@ -40,7 +40,7 @@ struct AttributeScratch {
 /// the weights w k of the field (moving least squares; Lancaster and Salkauskas, Math. Comp. 37,
 /// 1981). A weighted mean would be wrong at the rim of a body, where all particles lie on one side.
 /// The fit damps slopes that the particles barely determine, such as in a drop of two particles. A
-/// vertex without a particle within the kernel radius gets the value 0.
+/// vertex without a particle of `subset` within the kernel radius gets the value 0.
 ///
 /// Requires: a checked frame (frame/frame_view.h). Several calls may share `scratch` and its sorted
 /// particles; before the first call for other bins, the caller clears `scratch.sorted`.

@@ -25,7 +25,7 @@ template <typename Thing>
 class HashIndex {
  public:
   /// Requires: `things` are sorted by hash, and their hashes are distinct. `bucket` is scratch.
-  /// Both must outlive the index.
+  /// `things` and `bucket` must outlive the index.
   HashIndex(std::span<const Thing> things, std::vector<std::uint32_t>& bucket)
       : things_(things),
         bucket_(bucket),

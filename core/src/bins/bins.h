@@ -59,7 +59,7 @@ struct ParticleBins {
   TileDirectory tiles;
   std::vector<std::uint32_t> offsets;     ///< Tile t has particles [offsets[t], offsets[t + 1]).
   std::vector<BinnedParticle> particles;  ///< Tile after tile.
-  std::vector<float> weight;              ///< By particle: its weight w; empty if all are equal.
+  std::vector<float> weight;              ///< By particle: its weight w; empty without volumes.
   std::vector<float> height;              ///< By particle of a slice: height in cells; else empty.
   std::vector<float> size;                ///< By particle: size in spacings; empty for equal sizes.
   BinScratch scratch;
@@ -68,9 +68,9 @@ struct ParticleBins {
   void Clear();
 };
 
-/// Checks that all particles are within 2^30 cells of the origin. `scale`: `cell_size` and
-/// `is_slice` are set. Errors: INVALID_ARGUMENT with a Violation that names the first other
-/// particle. Cost: linear, serial.
+/// Checks that all coordinates are within 2^30 cells of the origin. `scale`: `cell_size` and
+/// `is_slice` are set. Errors: INVALID_ARGUMENT with a Violation for the first particle that is too
+/// far. For a slice, the Violation names only `positions`. Cost: linear, serial.
 absl::Status CheckDistances(const Frame& frame, Plane plane, const Scale& scale);
 
 /// Sorts the particles of a checked frame by tile, in the order of the frame within a tile.

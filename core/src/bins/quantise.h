@@ -18,8 +18,8 @@ double UnitsPerWorld(const Scale& scale);
 /// A length in cells, rounded up to whole units.
 float RoundedUp(double cells);
 
-/// Whether a coordinate in units is at most 2^30 cells from the origin. Farther away, the step
-/// between two doubles exceeds a millionth of a cell.
+/// Whether a coordinate in units (2^-17 cells) is at most 2^30 cells from the origin. Farther away,
+/// the step between two doubles exceeds 2e-7 cells.
 bool IsNearOrigin(double units);
 
 /// For each coordinate: its tile column or row, and its position in that tile in cells. Returns

@@ -18,7 +18,8 @@ absl::Status Broken(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-/// Checks that all coordinates are in the domain of predicates.h. `guarantee`: for errors, "R1".
+/// Checks that all coordinates are in the domain of predicates.h. `guarantee`: the name of the
+/// broken guarantee in an error, such as "R1".
 absl::Status CheckPoints(absl::string_view guarantee, std::span<const double> points);
 
 /// Checks R1-R4, and Rings::contacts with their angles. Cost: n log n in the points.

@@ -18,7 +18,8 @@ bool AreCollinear(const Vec3& a, const Vec3& b, const Vec3& c);
 bool SegmentTouchesTriangle(const Vec3& p, const Vec3& q, const std::array<Vec3, 3>& abc);
 
 /// Whether two triangles intersect anywhere except at the points and the edge that they share by
-/// index. Requires: neither triangle is degenerate.
+/// index. True if they share all three points. Exact in the domain of predicates_in_space.h.
+/// Requires: neither triangle is degenerate.
 bool TrianglesCollide(std::span<const double> points, const Triangle& first,
                       const Triangle& second);
 

@@ -26,7 +26,8 @@ class TriangleGrid {
   /// Replaces the triangles, and keeps the buffers. Requires: finite coordinates.
   void Build(std::span<const double> points, std::span<const std::uint32_t> triangles);
 
-  /// The number of pairs of triangles that ForEachPair examines: those with a common cell.
+  /// The number of pairs of triangles that ForEachPair examines: the pairs in each cell, summed
+  /// over the cells. A pair with several common cells counts once for each.
   std::uint64_t PairsOfCells() const;
 
   /// Calls visit(a, b), a < b, once for each pair of triangles whose boxes intersect, until `visit`

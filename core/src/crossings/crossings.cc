@@ -45,8 +45,9 @@ constexpr EdgePair kSaddles[2][2][2] = {
     {{{kBottom, kLeft}, {kTop, kRight}}, {{kBottom, kRight}, {kTop, kLeft}}},   // 5: parted, joined
     {{{kRight, kBottom}, {kLeft, kTop}}, {{kLeft, kBottom}, {kRight, kTop}}}};  // 10
 
-// Whether the inside corners of a saddle are joined: the sign of F at the stationary point of its
-// bilinear interpolant, (F0 F2 - F1 F3) / (F0 + F2 - F1 - F3). 0 counts as outside.
+// Whether the inside corners of a saddle are joined: whether F < 0 at the stationary point of its
+// bilinear interpolant, (F0 F2 - F1 F3) / (F0 + F2 - F1 - F3). The denominator is negative in case
+// 5 and positive in case 10.
 bool AreInsideCornersJoined(const std::array<float, 4>& f, unsigned corners) {
   // Products of two floats are exact in double.
   const double numerator = static_cast<double>(f[0]) * f[2] - static_cast<double>(f[1]) * f[3];

@@ -21,7 +21,7 @@ struct AxisLine {
 
 struct LoopPoint {
   Point at;
-  Point root;  ///< Its root (PlacedVertices::roots), or `at`.
+  Point root;  ///< Its root (PlacedVertices::roots); equals `at` if it has none.
   float normal_x = 0, normal_y = 0;
   bool is_cut = false;  ///< The segment to the next point lies on a line at which a ring was cut.
 };
@@ -30,7 +30,7 @@ struct LoopPoint {
 struct Loops {
   struct Loop {
     std::uint32_t first = 0, last = 0;  ///< Its points, [first, last).
-    std::uint32_t ring = kNoSource;     ///< The ring, if it is uncut; kNoSource: a piece of rings.
+    std::uint32_t ring = kNoSource;     ///< The ring if the loop is a whole ring, else kNoSource.
     std::uint32_t outer = kNoSource;    ///< The outer ring of its component before the cut.
   };
   std::vector<LoopPoint> points;

@@ -13,12 +13,12 @@
 namespace partiemc {
 namespace {
 
-// Sides move by at most this number of steps.
+// Number of attempts. Attempt k, from 0, moves the sides by k steps.
 constexpr int kMostShifts = 16;
 // Sides with a smaller coordinate than this, in spacings, move to 0: predicates are not exact for
 // tiny coordinates (vertices.cc).
 constexpr double kAxisReach = 0x1p-96;
-// A step, in spacings and in last bits of the coordinate.
+// A step is the sum of both: a part in spacings, and a part in last bits of the farther side.
 constexpr double kShiftSpacings = 1e-9, kShiftBits = 8;
 
 bool IsCut(const RingCutInput& input, const RingCutScratch& s, std::size_t ring) {

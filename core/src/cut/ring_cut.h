@@ -40,10 +40,10 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
                      PlacedVertices& placed, Rings& rings);
 
 /// Replaces the rings of components with Fate::kCut by their parts in the window. `rings.cuts`
-/// lists the segments on its sides; perimeters do not count them. The largest piece of a body has
-/// its identity, parents and number of particles; the other pieces have none. Sets
-/// `placed.group_of_ring`, keeps `placed.roots` parallel to the points, and counts the bodies that
-/// have pieces.
+/// lists the segments on the window's sides; perimeters do not count these segments. The largest
+/// piece of a body has the identity, parents and number of particles of the body; the other pieces
+/// have none. Holes that are not cut keep theirs. Sets `placed.group_of_ring`, keeps `placed.roots`
+/// parallel to the points, and sets `cut_bodies` to the number of bodies with a ring that is cut.
 ///
 /// If a ring has a vertex on a side, or pieces would touch, all sides move by up to some billionths
 /// of the spacing (kMostShifts in ring_cut.cc), opposite sides in the same direction. Returns false

@@ -21,7 +21,8 @@ enum Passes : std::uint8_t { kNone, kSummed, kClassified, kSampled };
 // Tiles per task: enough that most tiles have all neighbours in the same task.
 constexpr std::size_t kTilesAtOnce = 64;
 
-// Whether the density is a sum of equal weights. Particles of different sizes have equal weights.
+// Whether all particles have the same weight in the density. With own sizes they do: the density
+// then does not use `bins.weight`.
 bool HasUniformWeights(const ParticleBins& bins) {
   return bins.weight.empty() || !bins.size.empty();
 }
@@ -94,8 +95,8 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
-// Lowers F at the requested nodes to the distance from the nearest grain. Returns `inside` and the
-// nodes that are inside now.
+// Lowers F at the requested nodes to the distance from the surface of the nearest grain, if this is
+// less. Returns `inside` with the nodes at which F is then negative.
 BitRows JoinGrains(const NodeBlocks& blocks, const GrainDistances& distances, BitRows inside,
                    float* values) {
   for (int b = 0; b < blocks.count; ++b) {

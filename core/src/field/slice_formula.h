@@ -47,9 +47,10 @@ struct SliceSums {
     return std::sqrt(x * x + y * y + z * z) / kernel - scale.reference_radius;
   }
 
-  /// sigma: an upper bound of the largest eigenvalue of the moments. The bound is exact if one axis
-  /// along the plane is independent of the height, as between two flat bodies in any position.
-  /// Inside bodies, where moments are isotropic, there is no difference.
+  /// sigma: an upper bound of the largest eigenvalue of the moments, divided by R^2 sum k. The
+  /// bound is exact if the height is correlated only with the larger principal axis of the moments
+  /// in the plane, as between two flat bodies in any position. The bound is also exact inside
+  /// bodies, where moments are isotropic.
   double Spread(const Scale& scale) const {
     const double along = LargerEigenvalue(xx, xy, yy);
     const double across = std::sqrt(xz * xz + yz * yz);
@@ -64,8 +65,8 @@ struct SliceSums {
   }
 };
 
-/// Sums for the gradients of SliceSums along the plane. Add the same particles. With t = 1 - s^2:
-/// grad k = 6 t^2 D / R^2.
+/// Sums for the gradients of SliceSums along the plane, over the same particles. With
+/// t = 1 - abs(D)^2 / R^2: grad k = 6 t^2 D / R^2.
 struct SliceSlopes {
   double x = 0, y = 0;            ///< sum t^2 D
   double xx = 0, xy = 0, yy = 0;  ///< sum t^2 D D^T

@@ -89,8 +89,8 @@ struct TileParticles {
   std::size_t count;
 };
 
-/// Adds the weighted kernels of a tile's own particles to `sums`, including the margin. Requires:
-/// the largest kernel radius is at most kSumMargin.
+/// Adds the kernels of a tile's own particles to `sums`, including the margin; times their weights
+/// if `tile.weight` is not null. Requires: the largest kernel radius is at most kSumMargin.
 void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 
 /// Adds the kernels of particles in and around a tile to the tile's own nodes, for any radius.

@@ -26,8 +26,9 @@ inline constexpr int kMotionReach = 2;
 /// different bodies and do not contribute to each other.
 inline constexpr double kMotionDifference = .7;
 
-/// Added to the variance of positions along each axis, in squared spacings. Few particles thus
-/// have nearly their mean displacement, and particles on a line have a solution.
+/// Added to the variance of positions along each axis, in squared spacings, to damp the slope of a
+/// fit. A fit to particles close together is thus nearly their mean displacement, and a fit to
+/// particles on a line has a solution.
 inline constexpr double kMotionRidge = .25;
 
 /// The grid of cells. Lengths in spacings. With two axes, the third coordinate is 0.

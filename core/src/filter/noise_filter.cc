@@ -48,7 +48,7 @@ void ResizeExactly(std::size_t count, std::vector<Value>& values) {
   values.resize(count);
 }
 
-// Sets the rank of each particle in the order of the ids: a radix sort by the digits in which ids
+// Sorts the particles by id, which gives their ranks: a radix sort by the digits in which ids
 // differ.
 void SortById(const Frame& frame, NoiseFilterScratch& s) {
   constexpr int kDigit = 11;

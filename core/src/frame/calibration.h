@@ -15,11 +15,13 @@ double CalibratedReferenceRadius(Placement placement, double kernel_radius);
 /// grains. If it is larger, the outline has shallower dimples and smaller voids.
 inline constexpr double kGrainKernelRadius = 1.6, kGrainReferenceRadius = 0.3;
 
-/// The reference radius of slices, for every placement. The lattice value needs no factor, as tests
-/// with balls and tori cut at many heights show (core/METHOD.md, "Slices").
+/// The reference radius of slices in spacings, for every placement: the value for an axis-aligned
+/// lattice in space. The value needs no factor, as tests with balls and tori cut at many heights
+/// show (core/METHOD.md, "Slices").
 double CalibratedSliceRadius(double kernel_radius);
 
-/// The reference radius of surfaces, for every placement (core/SURFACES.md, "Calibration").
+/// The reference radius of surfaces in spacings, for every placement: 1.065 times the radius of
+/// slices (core/SURFACES.md, "Calibration").
 double CalibratedSurfaceRadius(double kernel_radius);
 
 }  // namespace partiemc

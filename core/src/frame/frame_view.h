@@ -97,18 +97,20 @@ absl::Status InvalidFrame(std::string_view reason, std::string field, std::strin
 /// Checks the attributes of a frame. Errors: as CheckFrame.
 absl::Status CheckAttributes(const Frame& frame);
 
-/// Checks that every number of the frame is usable: coordinates finite and, without a slice, in one
-/// plane; volumes positive; ids distinct; velocities and attributes finite.
+/// Checks that every array has the right size and every number is usable: coordinates at most 1e69
+/// in magnitude and, without a slice, in one plane; volumes positive, and present for Sizes::kOwn;
+/// ids distinct; velocities and attributes finite.
 /// `parameters.slice` must be set if particles fill space, also for a surface. Errors:
 /// INVALID_ARGUMENT, RESOURCE_EXHAUSTED for too many particles. The Violation names the first
-/// particle at fault; outside a plane, the particle with the largest coordinate.
+/// particle at fault. If the particles lie in no plane, the Violation names the particle with the
+/// largest coordinate along the normal of the plane.
 absl::Status CheckFrame(const Frame& frame, const ReconstructionParameters& parameters,
                         const FrameLimits& limits, DistinctIdsScratch& scratch);
 
 /// Sets `phases` to the values of the attribute `name`, one whole number for each particle, and
 /// `others` to the other attributes. Errors: INVALID_ARGUMENT if a frame with particles lacks the
-/// attribute, or if its values are not one whole number each. Requires: CheckFrame has passed the
-/// frame.
+/// attribute, or if its values are not one whole number per particle. Requires: CheckFrame has
+/// passed the frame.
 absl::Status TakePhaseValues(const Frame& frame, const std::string& name,
                              std::span<const float>& phases, std::vector<Attribute>& others);
 

@@ -6,8 +6,8 @@
 
 namespace partiemc {
 
-/// Runs a stage between its reports to `observer`, which may be null. Throws Cancelled instead if
-/// the frame is cancelled.
+/// Returns run(), after StageBegins and before StageEnds of `observer`, which may be null. If the
+/// frame is cancelled, throws Cancelled and calls none of them.
 template <typename Run>
 auto InStage(StageObserver* observer, Stage stage, Run run) {
   ThrowIfCancelled();

@@ -82,8 +82,9 @@ constexpr bool AreEnough(std::size_t surrounded, std::size_t asked) {
 /// kCauseToAsk of them contradict the spacing.
 inline constexpr std::size_t kAsked = 64, kAskedFirst = 16, kCauseToAsk = 3;
 
-/// Whether enough of the sampled particles contradict the spacing. `count`: all particles.
-/// probe.Contradicts(particle) examines one; if probe.IsExhausted(), no further one is examined.
+/// Whether enough of the sampled particles contradict the spacing (AreEnough). `count`: number of
+/// all particles. probe.Contradicts(particle) examines a particle. Once probe.IsExhausted(), the
+/// particles examined so far decide.
 template <typename Probe>
 bool SamplesContradict(std::size_t count, Probe& probe) {
   const std::size_t most = count < kAsked ? count : kAsked;

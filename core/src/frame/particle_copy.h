@@ -9,8 +9,8 @@
 
 namespace partiemc {
 
-/// The volumes, ids and attributes of chosen particles. The names of attributes are views of the
-/// frame. The next copy reuses the memory.
+/// The volumes, ids and attributes of chosen particles, and the time of their frame. The names of
+/// attributes are views of the frame. The next Take reuses the memory.
 class ParticleCopy {
  public:
   /// Copies from `frame` the particles `sources`, in this order. Cost: linear.

@@ -8,10 +8,12 @@
 
 namespace partiemc {
 
-/// Checks the number of a phase. Errors: INVALID_ARGUMENT for the parameter `field`.
+/// Checks that a phase is at most 2^24 in magnitude. Errors: INVALID_ARGUMENT for the parameter
+/// `field`.
 absl::Status CheckPhaseNumber(const std::string& field, std::int32_t phase);
 
-/// Checks the name of the attribute of phases. `reason`: why the parameters need it.
+/// Checks that the name of the attribute with the phases is printable ASCII and not empty.
+/// `reason`: why the parameters need the attribute; part of the error.
 absl::Status CheckPhaseAttribute(const std::string& name, const std::string& reason);
 
 }  // namespace partiemc

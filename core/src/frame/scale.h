@@ -32,7 +32,7 @@ struct Scale {
   double gap_slope = 0;          ///< R / 0.45: converts spread to a length.
 };
 
-/// The unit of ReconstructionParameters::cell_size, in spacings.
+/// The unit of ReconstructionParameters::cell_size, in spacings: 0.5 for grains, else 1.
 double CellUnit(const ReconstructionParameters& parameters);
 
 /// Arguments in world units. `lightest_volume`: the smallest area of a particle (h^2 without

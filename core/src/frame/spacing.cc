@@ -150,8 +150,9 @@ struct KernelSums {
 };
 
 // The kernel sum at a point; 0 if particles do not surround the point. Where a minority of the
-// particles is dense, `radius` may contain a large part of the frame. The sum over groups, which
-// keeps the number of positions, then costs no more than kMostTerms.
+// particles is dense, `radius` may contain a large part of the frame. A sum of more than kMostTerms
+// terms is repeated over groups of positions, each group at one place, in at most kMostGroups
+// terms.
 template <typename Place>
 double FilledWeight(std::span<const Place> tree, const Place& point, double radius) {
   std::size_t most_terms = InDimension<Place>::kMostTerms;
@@ -285,7 +286,7 @@ std::optional<SpacingEstimate> EstimateOfPositions(SpacingScratch& scratch) {
   const double spacing = refined(*nearest);
   const std::optional<double> around = AgreedDistance(tree, asked, in_company, scratch.distances);
   if (!around) return SpacingEstimate{spacing, false};
-  // Nearest neighbours closer than half the agreed distance are pairs.
+  // If the spacing is below half the agreed distance, nearest neighbours are pairs.
   const bool is_doubled = 2 * spacing < *around;
   return SpacingEstimate{is_doubled ? refined(*around) : spacing, true};
 }

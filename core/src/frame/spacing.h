@@ -31,9 +31,9 @@ struct SpacingEstimate {
 /// - If bodies are too thin to surround a point, the result is the median distance to the nearest
 ///   neighbour. The median is also the result on lattices, where it is exact. Particles more than
 ///   four medians from their neighbours (spray) are left out.
-/// - `is_agreed`: enough of the other particles are surrounded (near_ring.h) at distances within a
-///   factor of two of their median. If nearest neighbours are much closer than the surrounding
-///   ring, as in pairs of particles, the estimate starts from the distance of the ring.
+/// - `is_agreed`: of the particles that are not spray, enough are surrounded (near_ring.h) at
+///   distances within a factor of two of their median. If the estimate is then below half this
+///   median, as for pairs of particles, the estimate is repeated from the median.
 /// Large frames are sampled by a hash of the positions, so the order of the particles does not
 /// matter.
 /// Requires: a checked frame. Cost: n log n for the tree, and queries for about 2^14 particles.

@@ -13,8 +13,9 @@ namespace partiemc {
 /// points of a polygon, at most 1024.
 absl::Status CheckWalls(const ReconstructionParameters& parameters);
 
-/// Checks the walls of a surface, but not whether other parameters exclude them. `kernel_radius` is
-/// in spacings, `spacing` in world units; 0 if it is absent. Errors: as above.
+/// Checks the walls of a surface, but not whether other parameters exclude walls. `kernel_radius`
+/// is in spacings. `spacing` is in world units, 0 if unknown: then walls of an axis may be closer
+/// than a kernel radius. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_radius,
                              double spacing);
 

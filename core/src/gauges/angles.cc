@@ -40,9 +40,10 @@ struct Contact {
   double place = NAN, angle = NAN;
 };
 
-// Finds one contact point and its angle; both are NaN if no circle can be fitted. `points`:
-// coordinates along the wall and heights above the wall. `first`: +1 for the start of the contact,
-// -1 for its end.
+// Finds one contact point and its angle, in degrees, by a circle through the points within `reach`
+// of the contact. Both are NaN if no circle can be fitted, or if the circle does not meet the wall.
+// `points`: coordinates along the wall and heights above the wall. Points lower than `rounded` are
+// ignored. `first`: +1 for the start of the contact, -1 for its end.
 Contact FindContact(std::span<const Point> points, double reach, double rounded, int first) {
   std::vector<Point> arc;
   for (const Point& p : points) {

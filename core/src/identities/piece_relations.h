@@ -21,7 +21,8 @@ namespace partiemc {
 /// A sample of the last frame whose particle is in a piece of this frame.
 template <typename Pieces>
 struct FoundSample {
-  std::uint32_t before = 0, now = 0;              ///< Its pieces: index in the history; number.
+  /// Index of its piece in the history, and number of its piece in this frame.
+  std::uint32_t before = 0, now = 0;
   CellShift<Pieces::kDimensions> displacement{};  ///< From the last frame to this one.
 };
 
@@ -133,8 +134,8 @@ class PieceRelations {
     }
   }
 
-  // The shift of a piece by its velocity; 0 if it is too large. `cells`: the shift in cells of the
-  // velocity 1.
+  // The shift of a piece by its velocity; 0 if a component exceeds kMaxShift. `cells`: the shift in
+  // cells of the velocity 1.
   static Shift ShiftOf(const Known& piece, double cells) {
     Shift shift{};
     const auto velocity = VelocityOf(piece);

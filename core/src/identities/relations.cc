@@ -19,9 +19,9 @@ constexpr std::uint64_t kSmallestPart = 4;
 // splits in halves.
 constexpr std::uint64_t kTolerance = 6;
 
-// A piece of the last frame may share nodes with a new piece, but have no samples in it. It is then
-// not a parent if the samples of other pieces account for at least three quarters of the new
-// piece's nodes.
+// A piece of the last frame may share nodes with a new piece, but have no samples in it. The old
+// piece is then not a parent if the samples of other pieces account for at least three quarters of
+// the new piece's nodes.
 constexpr std::uint64_t kAccountedQuarters = 3;
 
 // Estimates the nodes that a piece passed to another piece: its number of nodes, times the share of
@@ -35,7 +35,8 @@ std::uint64_t NodesBySamples(const Relation& relation, const Evidence& s) {
 }
 
 // Whether the samples of a piece agree with its nodes, within the statistical error. False for
-// fewer than kMaxSamples: they are all particles of the piece, so they are exact and decide alone.
+// fewer than kMaxSamples: the samples are then all particles of the piece, so they are exact and
+// decide alone.
 bool SamplesAgree(std::span<const Relation> of_one, const Evidence& s) {
   const std::uint32_t piece = of_one.front().before;
   if (s.sample_count[piece] < kMaxSamples) return false;

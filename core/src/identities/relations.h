@@ -64,10 +64,10 @@ void MarkCounting(Evidence& evidence, std::vector<Relation>& relations);
 /// Removes each relation that does not count if one of its pieces has a relation that counts.
 void DropNeighbours(const Evidence& evidence, std::vector<Relation>& relations);
 
-/// Passes on identities, first along the relations with most nodes. Sets `continues`, by number, to
-/// the piece of the last frame whose identity the piece gets, or to kNoIndex. Ties: the lower
-/// `before`, then the lower `now`. Sorts `relations` by `now`, then `before`. `is_continued` is
-/// scratch.
+/// Passes on each identity at most once, first along the relations with most nodes. Sets
+/// `continues`, by number, to the piece of the last frame whose identity the piece gets, or to
+/// kNoIndex. Ties: the lower `before`, then the lower `now`. Sorts `relations` by `now`, then
+/// `before`. `is_continued` is scratch.
 void FindContinued(std::size_t pieces_before, std::size_t pieces_now,
                    std::vector<std::uint8_t>& is_continued, std::vector<Relation>& relations,
                    std::vector<std::uint32_t>& continues);

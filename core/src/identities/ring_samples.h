@@ -26,7 +26,7 @@ struct RingSamples {
   std::vector<std::uint64_t> known;                       // Bits of KnownHashes.
   std::vector<std::uint64_t> ring_limit, tile_limit;  // Largest accepted hash by number, by tile.
   struct Stretch {
-    std::vector<std::uint64_t> home_limit;  // By home of the stretch: limit of its tile.
+    std::vector<std::uint64_t> home_limit;  // By tile of the stretch: largest accepted hash.
     std::vector<std::uint32_t> chosen;      // Particles.
   };
   std::vector<Stretch> stretches;  // By stretch of the bins.

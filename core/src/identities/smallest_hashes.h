@@ -12,8 +12,9 @@
 
 namespace partiemc {
 
-/// Adds a sample to the `count` samples from `first` on: a heap with the largest hash on top. A
-/// heap of kMaxSamples drops its top. Requires: space for one more sample if there are fewer.
+/// Adds a sample to the `count` samples from `first` on: a heap with the largest hash on top. If
+/// the heap has kMaxSamples, drops the sample with the largest hash, which may be the new one.
+/// Requires: space for one more sample if there are fewer than kMaxSamples.
 template <typename Sample>
 void AddToHeap(const Sample& sample, Sample* first, std::uint32_t& count) {
   const auto has_less_hash = [](const Sample& a, const Sample& b) { return a.hash < b.hash; };

@@ -278,7 +278,7 @@ class SmallerCells {
   SmallerCells(const TileDirectory& directory, const Blocks& blocks, int level)
       : directory_(directory), blocks_(blocks), level_(level) {}
 
-  // Whether such a cell lies along one of the four edges of a block.
+  // Whether a cell of this set lies along one of the four edges of a block, outside of the block.
   bool Beside(std::uint32_t tile, int i, int j, int side) const {
     const std::uint32_t span = Span(i, side);
     if ((Row(tile, i, j - 1) & span) != 0 || (Row(tile, i, j + side) & span) != 0) return true;

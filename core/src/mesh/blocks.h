@@ -17,7 +17,7 @@
 
 namespace partiemc {
 
-/// A block of level l has 2^l cells along each side; the largest one is a tile.
+/// Number of levels. A block of level l has 2^l cells along each side; the largest one is a tile.
 inline constexpr int kBlockLevels = kTileShift + 1;
 
 /// The attributes of a frame.
@@ -27,7 +27,9 @@ struct AttributeSource {
   /// Interpolates all attributes to points in world units, interleaved. The result is valid until
   /// the next call.
   absl::FunctionRef<std::span<const AttributeValues>(std::span<const double>)> at_points;
-  double tolerance;  ///< Largest error, a fraction of the attribute's range over the particles.
+  /// Largest error, a fraction of the attribute's range over the particles. The range of a vector
+  /// is the range of the component that varies most.
+  double tolerance;
 };
 
 /// The blocks that cover the interior cells. Reuses its memory.
@@ -35,10 +37,11 @@ struct Blocks {
   using Levels = std::array<BitRows, kBlockLevels>;
   std::vector<Levels> at_least;  ///< By tile and level: the cells in blocks of this level or more.
   // Scratch:
-  std::vector<Levels> linear;            ///< By tile, level: cells in blocks that meet rule 1.
+  /// By tile, level: cells in blocks of this level or more that meet rule 1 of FindBlocks.
+  std::vector<Levels> linear;
   std::vector<std::uint32_t> window_of;  ///< By tile: its first window, if it has windows.
-  std::vector<double> windows;           ///< Sums over the particles of each window.
-  std::vector<double> tolerances;        ///< By part of an attribute.
+  std::vector<double> windows;           ///< Sums over the particles in windows of 4 x 4 cells.
+  std::vector<double> tolerances;        ///< By component; also for the length of each vector.
   NodeVertices nodes;                    ///< Nodes of one level.
   std::vector<double> node_points;       ///< Positions of `nodes`.
 };

@@ -28,7 +28,7 @@ class LoopGroups {
   void AddPoints(std::span<const std::uint32_t> points) {
     points_.insert(points_.end(), points.begin(), points.end());
   }
-  /// Ends the current loop. `reversed` reverses its direction.
+  /// Ends the current loop and adds it to `group`. `reversed` reverses the direction of the loop.
   void EndLoop(std::uint32_t group, bool reversed = false);
 
   /// Appends the triangles of all groups, in the order of the groups, and removes the loops. Groups

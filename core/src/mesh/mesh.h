@@ -53,15 +53,17 @@ inline bool HasBlocks(const ReconstructionParameters& parameters) {
 }
 
 /// Fills the rings with triangles by `parameters.fill`. Sets `triangles`, `triangles_grid` and
-/// `folded_triangles` of the statistics.
+/// `folded_triangles` of the statistics. `none` makes no triangles; `polygon` triangulates the
+/// whole inside of the rings and does not use interior cells.
 ///
-/// The band between the rings and the staircase of the interior cells is triangulated without new
-/// points. The band is the same for `grid`, `greedy` without blocks, and `conforming`. With blocks,
-/// it also has the corners of blocks along the staircase, so the mesh has no T-junctions. If
-/// vertices are particles (placement_traits.h), the middles of the segments are triangulated and
-/// then moved to the vertices, which may fold triangles. Returns false if a component cannot be
-/// triangulated. That is a bug: rings are simple, and the remaining interior cells lie inside the
-/// rings. Cost: n log n in the points of rings and staircases, linear in cells.
+/// The other fills triangulate the band between the rings and the staircase of the interior cells
+/// without new points. The band is the same for `grid`, `greedy` without blocks, and `conforming`.
+/// With blocks, the band also has the corners of blocks along the staircase, so the mesh has no
+/// T-junctions. If vertices are particles (placement_traits.h), the middles of the segments are
+/// triangulated and then moved to the vertices, which may fold triangles. Returns false if a
+/// component cannot be triangulated. That is a bug: rings are simple, and the remaining interior
+/// cells lie inside the rings. Cost: n log n in the points of rings and staircases, linear in
+/// cells.
 [[nodiscard]] bool BuildMesh(const MeshInput& input, MeshScratch& scratch, Mesh& mesh,
                              FrameStatistics& statistics);
 

@@ -46,8 +46,8 @@ class NodeVertices {
  private:
   struct Tile {
     BitRows nodes{};
-    std::array<std::uint16_t, kTileSize> before_row;  // Number of nodes of the tile in lower rows.
-    std::uint32_t first;                              // Number of its first node.
+    std::array<std::uint16_t, kTileSize> before_row;  // Count of the tile's nodes in lower rows.
+    std::uint32_t first;                              // Vertex number of the tile's first node.
   };
 
   std::vector<Tile> tiles_;

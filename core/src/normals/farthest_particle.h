@@ -20,9 +20,10 @@ class FarthestParticle {
   /// mean, the gradient is 0.
   void SampleAtMean(CellPlane& plane) const;
 
-  /// The vertex of a plane, in world units: the position of the particle farthest along its normal,
-  /// plus the surface offset. Candidates are not below the plane, and lie within one cell and
-  /// within the kernel radius of its point. Without one, the middle of the segment is used.
+  /// The vertex of a plane, in world units: the position of the particle farthest along the plane's
+  /// normal, moved along the normal by the surface offset. Candidates are not below the plane, and
+  /// lie within one cell and within the kernel radius of the plane's point. Without a candidate,
+  /// the middle of the segment is moved instead.
   Point Vertex(const CellPlane& plane, const Frame& frame,
                const ReconstructionParameters& parameters, const Scale& scale) const;
 

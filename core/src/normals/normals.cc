@@ -14,8 +14,8 @@
 namespace partiemc {
 namespace {
 
-// A key that orders cells by row, then column: the order of State::normals. For each row and
-// column of 32 bits it is in range.
+// A key that orders cells by row, then column: the order of State::normals. The key does not
+// overflow for any row and column of 32 bits.
 std::int64_t KeyOf(const CellNormal& normal) {
   constexpr std::int64_t kColumns = std::int64_t{1} << 32;
   return normal.row * kColumns + (normal.column + kColumns / 2);

@@ -65,8 +65,8 @@ struct NormalInput {
 /// `previous` are the cell normals of the last frame (State::normals); `next` receives the normals
 /// of this frame in the same order. A normal is oriented by the previous normal of its cell, if
 /// there is one and `parameters.normal_memory` is set, else by the segment. If the gradient is
-/// weak, the normal is the previous one, else the mean of the reliable neighbours on the ring, else
-/// the normal of the segment.
+/// weak, the normal is the previous normal of the cell, else the mean of the reliable normals of
+/// the two neighbours on the ring, else the normal of the segment.
 ///
 /// Deterministic. Parallel over segments. Cost: one or two field samples for each segment.
 void EstimateNormals(const NormalInput& input, std::span<const CellNormal> previous,

@@ -48,7 +48,7 @@ class CellGroups {
   // Hash table of the occupied cells, at most half full: after Find the first item of the cell,
   // after Sort the index of its group.
   std::vector<std::uint32_t> slots_;
-  std::vector<std::uint32_t> number_of_;  // By item: number of its cell, by first item.
+  std::vector<std::uint32_t> number_of_;  // By item: number of its cell, in order of first items.
   std::vector<std::uint32_t> place_of_;   // By number: index in `groups_`.
   std::vector<Group> groups_;
   std::vector<std::uint32_t> items_;

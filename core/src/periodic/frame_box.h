@@ -16,18 +16,19 @@
 
 namespace partiemc {
 
-/// Sets Frame::box to the box that the stages use: the given one with `wraps` of the stream, or the
-/// box of the stream if the frame has none. Errors: INVALID_ARGUMENT (OUT_OF_RANGE) if the given
-/// box has other periodic axes than the box of the stream, if the stream has no box, or if Validate
-/// refuses an axis.
+/// Sets Frame::box to the box that the stages use: the box of the frame with `wraps` of the
+/// stream's box, or the box of the stream if the frame has none. Errors, only if the frame has a
+/// box: INVALID_ARGUMENT (OUT_OF_RANGE) if the stream has no box, if the two boxes have different
+/// periodic axes, or if Validate refuses an axis.
 absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& frame);
 
-/// Checks the lengths of the box of a frame after ResolveBox. Errors: as Validate. They name
-/// `parameters.box` if it is the box of the stream, else `box`.
+/// Checks the lengths of the box of a frame after ResolveBox. Errors: as Validate; they name
+/// `parameters.box` if `box` is the box of the stream, else `box`.
 absl::Status CheckBoxLengths(const std::optional<PeriodicBox>& of_stream, const PeriodicBox& box,
                              double kernel_radius, double spacing);
 
-/// The box that a history stores: absent if it is the box of the stream. `box`: after ResolveBox.
+/// The box that a history stores: absent if `box` is absent or the box of the stream. `box`: the
+/// box of the frame after ResolveBox.
 std::optional<PeriodicBox> BoxToStore(const std::optional<PeriodicBox>& of_stream,
                                       const std::optional<PeriodicBox>& box);
 
@@ -53,7 +54,8 @@ struct BoxMotion {
     return static_cast<std::int32_t>(at > -kMost ? std::min(at, kMost) : -kMost);
   }
 
-  /// Moves the run of nodes [first, last] with its middle node; its length stays. The same unit.
+  /// Moves the run of nodes [first, last] with its middle node; the length of the run stays.
+  /// Requires: the unit is a cell.
   void MoveRun(std::size_t axis, std::int32_t& first, std::int32_t& last) const {
     constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
     const std::int64_t nodes = std::int64_t{last} - first;
@@ -65,7 +67,7 @@ struct BoxMotion {
 };
 
 /// The motion from the box of a history to the box of a frame. `before` is absent for the box of
-/// the stream; `now` is absent without a box. An axis that only one of them has does not move.
+/// the stream; `now` is absent without a box. An axis that only one of the boxes has does not move.
 /// Divides lengths by `unit`, so that positions are in this unit.
 BoxMotion MotionOf(const std::optional<PeriodicBox>& of_stream,
                    const std::optional<PeriodicBox>& before, const std::optional<PeriodicBox>& now,

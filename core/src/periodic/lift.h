@@ -60,13 +60,13 @@ struct LiftInput {
   /// Particles at most this far apart are in one cluster. World units.
   double range;
   /// Copies of percolating clusters reach this far beyond the faces, along each axis at most one
-  /// length. World units. 0: such clusters are refused.
+  /// length of the box. World units. 0: such clusters are refused.
   double margin;
-  /// Treats all particles as percolating along all periodic axes: none is lifted, and particles
-  /// near a face get copies.
+  /// Treats all particles as percolating along all periodic axes: every particle is wrapped into
+  /// the box, and particles within `margin` of a face get copies.
   bool wraps = false;
-  /// Called two or three times with the bytes that the scratch requires, before they are allocated:
-  /// for particles, with cells, and with copies if there are any. Its error ends Lift.
+  /// Called two or three times with all bytes that the scratch requires so far, before they are
+  /// allocated: for particles, with cells, and with copies if there are any. Its error ends Lift.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
 };
 
@@ -84,15 +84,16 @@ struct LiftedFrame {
 };
 
 /// Moves each particle by whole lengths of the box, so that clusters are contiguous and the centre
-/// of the bounding box of each lies in the box. A cluster is a set of particles that are connected
-/// by distances of at most `range` in the periodic box. Sets `lifted` to the frame with the new
-/// positions, a view of `scratch`. A particle that does not move keeps the bits of its position.
+/// of each cluster's bounding box lies in the box. A cluster is a set of particles that are
+/// connected by distances of at most `range` in the periodic box. Sets `lifted` to the frame with
+/// the new positions, a view of `scratch`. A particle that does not move keeps the bits of its
+/// position.
 ///
 /// A cluster percolates along an axis if it reaches its own image along this axis. Along such axes,
 /// its particles are wrapped into the box, and those within `margin` of a face get copies beyond
-/// the opposite face. If clusters percolate along different axes, as they can in space, each of
-/// them counts as percolating along all these axes. A copy has the id, volume, velocity and
-/// attributes of its particle.
+/// the opposite face. If clusters percolate along different axes, as they can in space, each
+/// percolating cluster counts as percolating along all these axes. A copy has the id, volume,
+/// velocity and attributes of its particle.
 ///
 /// Two cells of the grid with very many particles may be joined although their particles are up to
 /// two ranges apart, so that the cost is bounded (kMostPairs in lift.cc).

@@ -11,16 +11,17 @@
 
 namespace partiemc {
 
-/// Distances from the junction along the interface, in spacings. Points from kCurveNearest on
-/// determine the curve of an interface; nearer points lie on a rounded corner.
+/// Distance from the junction along the interface, in spacings. The fit of a curve ignores nearer
+/// points, because the kernel rounds the corner of each phase at the junction.
 inline constexpr double kCurveNearest = 1.5;
-/// Points up to kCurveFarthest determine the place and the direction, up to kCurvatureFarthest the
-/// curvature.
+/// Distances as kCurveNearest, in spacings. Points up to kCurveFarthest determine the place and the
+/// direction of the curve, points up to kCurvatureFarthest its curvature.
 inline constexpr double kCurveFarthest = 5, kCurvatureFarthest = 9;
 
-/// Where a curve determines a place, a bend below ten standard errors, the square root of this
-/// number, counts as noise. The standard error is too small by far: smoothing makes the deviations
-/// of neighbours alike, and a place is extrapolated.
+/// `noise` of ArcCurveFit::Fit for a curve that determines the place of a junction: a bend below
+/// ten standard errors, the square root of this number, becomes 0. The limit is that high for two
+/// reasons. Smoothing correlates the deviations of neighbouring points, so the standard error is
+/// too small. And the curve is extrapolated to the junction.
 inline constexpr double kPlaceNoise = 100;
 
 struct Line {
@@ -34,11 +35,13 @@ struct ArcCurve {
   Point along;  ///< Unit. From the origin towards the points.
   double offset = 0, slope = 0, bend = 0;
 
-  /// The tangent at the point of the curve nearest to `at`, up to the second order in the distance.
+  /// The tangent at the point of the curve nearest to `at`, by one Newton step. Its error is of the
+  /// second order in the distance of `at` from the curve. `at` and the tangent are relative to the
+  /// origin of the curve.
   Line TangentNear(const Point& at) const;
-  /// The direction of this tangent, away from the origin.
+  /// The direction of TangentNear(at), of unit length, with the sign that agrees with `along`.
   Point DirectionAt(const Point& at) const;
-  /// The height of a point above the curve, to the first order.
+  /// The distance of a point from the curve, to the first order; positive on the left of `along`.
   double MisfitOf(const Point& at) const;
 };
 
@@ -50,8 +53,10 @@ class ArcCurveFit {
   void Add(const Point& at, double distance);
   /// Adds the junction itself.
   void AddEnd(const Point& at);
-  /// Absent with fewer than two points up to kCurveFarthest. The bend is fitted to the points up to
-  /// kCurvatureFarthest, times 1 - noise variance / bend^2, or 0 if this is negative.
+  /// Absent if fewer than two points are up to kCurveFarthest away, or if these coincide. The bend
+  /// is fitted to the points up to kCurvatureFarthest. It is then multiplied by
+  /// max(0, 1 - noise * v / bend^2), with the variance v of the fitted bend. With fewer than five
+  /// points, the bend is 0.
   std::optional<ArcCurve> Fit(double noise) const;
 
  private:
@@ -89,7 +94,7 @@ std::optional<ArcCurve> CurveAlong(const Path& path, const Point& junction, doub
   return fit.Fit(kPlaceNoise);
 }
 
-/// The inner points of an arc in the order of their distance from one of its ends.
+/// The inner points of an arc in order from its start (`is_start`), or in reverse from its end.
 class ArcPath {
  public:
   ArcPath(std::span<const std::uint32_t> inner, bool is_start)

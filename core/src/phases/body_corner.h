@@ -14,11 +14,13 @@
 
 namespace partiemc {
 
-/// Values of JunctionScratch::has_moved.
+/// Values of JunctionScratch::has_moved: the vertex has moved; the vertex has moved and is a corner
+/// of the outline (CornerOf) where interfaces end. 0: it has not moved.
 inline constexpr std::uint8_t kMoved = 1, kMovedCorner = 2;
 
-/// The vertices of a ring of the body after a vertex (`is_ahead`) or before it, up to
-/// kCurvatureFarthest or the next contact.
+/// The vertices of a ring of the body after a vertex (`is_ahead`) or before it, nearest first. The
+/// path ends at kCurvatureFarthest spacings along the ring, or before the next contact, which is a
+/// vertex where interfaces end.
 class RingPath {
  public:
   /// Lengths are in cells. `is_contact`: by vertex, whether interfaces end there.
@@ -43,12 +45,14 @@ struct BodyCorner {
 std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
                                    double spacing, std::span<const Point> positions);
 
-/// The signed area of each ring of the body, holes negative.
+/// Sets `areas` to the signed area of each ring of the body, holes negative, in squared units of
+/// `positions`.
 void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas);
 
-/// Moves all vertices of each ring with corners along their normals by one offset, at most `limit`
-/// cells, that restores the given area to first order. `has_moved`: by vertex, kMovedCorner at
-/// corners; the other vertices of such a ring are set to kMoved.
+/// For each ring with a corner: moves all its vertices along their normals by one offset, at most
+/// `limit` cells in both directions. The offset restores, to first order, the area of the ring in
+/// `areas`. `has_moved`: by vertex, kMovedCorner at corners; sets the elements of such a ring that
+/// are 0 to kMoved.
 void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
                       std::span<std::uint8_t> has_moved, SharedPoints& points);
 

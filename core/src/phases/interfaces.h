@@ -22,7 +22,8 @@ struct PhaseArc {
   std::uint32_t first = 0, last = 0;  ///< Its inner points are Interfaces::points[first, last).
   std::uint32_t start = kNoEnd, end = kNoEnd;  ///< Shared points; kNoEnd: a closed arc.
   PhaseLabel left = 0, right = 0;
-  std::uint32_t left_component = 0, right_component = 0;  ///< Of their phases' topologies.
+  /// Connected components of these two phases (PhaseRings::topology).
+  std::uint32_t left_component = 0, right_component = 0;
 
   bool IsClosed() const { return start == kNoEnd; }
 };
@@ -31,8 +32,9 @@ struct PhaseArc {
 struct SharedPoints {
   std::vector<Point> position;
   std::vector<Point> anchor;  ///< With all points at their anchors, the outlines are valid.
-  /// Unit. Of the body's points: outward; of the interface: from the lower to the higher label. 0
-  /// for a cell, until SmoothInterfaces copies a neighbour's; junctions stay at 0.
+  /// Unit normals. At points of the body: outward. On edges: from the phase with the lower label to
+  /// the phase with the higher one. At points of cells (PhaseCell): 0, until SmoothInterfaces
+  /// copies the normal of a neighbour; at junctions always 0.
   std::vector<VertexNormal> normal;
 };
 
@@ -40,17 +42,18 @@ struct Interfaces {
   std::vector<PhaseArc> arcs;
   std::vector<std::uint32_t> points;  ///< Numbers of shared points.
   PeriodicRings rings;                ///< Scratch of SmoothInterfaces.
-  std::vector<Point> ring;            ///< The same.
+  std::vector<Point> ring;            ///< Scratch of SmoothInterfaces.
 
   std::span<const std::uint32_t> InnerPoints(const PhaseArc& arc) const {
     return std::span(points).subspan(arc.first, arc.last - arc.first);
   }
 };
 
-/// Sets the points of edges and cells. The point of an edge is where its phases are equal. The
-/// point of a junction's cell is the middle, of another cell halfway from the vertex of the body to
-/// PhaseCell::corner. Requires: the body's points are set. Parallel over edges. Cost: six kernel
-/// sums for each edge.
+/// Sets the points of edges and cells. The point of an edge is where the phases of its nodes have
+/// equal g (PhaseField), but at least kEdgeMargin cells away from the nodes. It is the middle of
+/// the edge unless at each node the phase of this node has the larger g. The point of a junction's
+/// cell is the middle, of another cell halfway from the vertex of the body to PhaseCell::corner.
+/// Requires: the body's points are set. Parallel over edges. Cost: six kernel sums for each edge.
 void FindInterfacePoints(const TileDirectory& directory, const PhaseMap& map,
                          const PhaseField& field, const PointNumbers& numbers,
                          const BodyVertices& vertices, SharedPoints& points);
@@ -59,11 +62,13 @@ void FindInterfacePoints(const TileDirectory& directory, const PhaseMap& map,
 void CollectArcs(const TileDirectory& directory, const PhaseMap& map, const PointNumbers& numbers,
                  std::span<const PhaseRings> phases, Interfaces& interfaces);
 
-/// Smooths the arcs as steps 2 and 3 of the default placement smooth rings (core/METHOD.md),
-/// without supports. A closed arc is smoothed as a ring. An open arc continues beyond a straight
-/// end as itself, backwards. Beyond a bent end this would move the end towards the middle of its
-/// circle, so there it continues as its mirror image across a normal of its curve (arc_curve.h).
-/// Arcs whose ring is shorter than VirtualPlaneConstants::ShortestRing stay. Parallel over arcs.
+/// Smooths the arcs, and their normals, as steps 2 and 3 of the default placement smooth rings
+/// (core/METHOD.md), but without the support of particles. A closed arc is smoothed as a ring. An
+/// open arc continues beyond a straight end with its own points in reverse order. Beyond a bent end
+/// this would move the end towards the middle of its circle. There the arc continues as its mirror
+/// image across the normal of its curve (arc_curve.h) at the end. Arcs of fewer than three points
+/// stay, and arcs whose ring is shorter than VirtualPlaneConstants::ShortestRing. The ring of an
+/// open arc leads along the arc and back. Parallel over arcs.
 void SmoothInterfaces(const Scale& scale, const VirtualPlaneConstants& constants,
                       Interfaces& interfaces, SharedPoints& points);
 

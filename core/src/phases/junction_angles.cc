@@ -14,9 +14,10 @@ constexpr int kFewestPoints = 4;
 // As kPlaceNoise, for directions.
 constexpr double kDirectionNoise = 20;
 
-/// The direction in which a side leaves the junction at point `k`, if it is long enough; `step` is
-/// 1 for the side after it, -1 for the side before it. Inside of the body, the junction is one of
-/// the points. On the body's outline it is not, since its place is less certain there.
+/// The direction in which a side of the ring leaves the junction at point `k`; absent if the side
+/// is too short. `step`: 1 for the side after the junction, -1 for the side before it. Inside of
+/// the body, the junction is one of the fitted points. On the outline of the body it is not,
+/// because its place is less certain there.
 std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int step, bool is_inside,
                                    double h) {
   const std::size_t count = ring.points.size();

@@ -19,8 +19,8 @@ struct PhaseRing {
 /// The angle of the phase inside of the ring at its point `k`, a junction, in radians, in [0, 2
 /// pi]. Each side of the ring has a curve (arc_curve.h), fitted to its points before the next
 /// junction. The junction counts as a point if it lies inside of the body (`is_inside`). Absent if
-/// a side has fewer than four points from 1.5 to 9 spacings away. `spacing`: world units. Cost:
-/// linear in these points.
+/// a side has fewer than four points from 1.5 to 9 spacings away along the ring, or no curve.
+/// `spacing`: world units. Cost: linear in these points.
 std::optional<float> JunctionAngle(const PhaseRing& ring, std::size_t k, bool is_inside,
                                    double spacing);
 

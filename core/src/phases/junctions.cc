@@ -30,7 +30,7 @@ Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
 // Puts the points of a path that are nearer than kCurveNearest onto a parabola from the junction to
 // the first farther point, with the bend of the curve. Calls on_move(number, direction) for each. A
-// short path stays, because its other end may move the same points.
+// path without such a point in its first half stays: its other end may move the same points.
 template <typename Path, typename OnMove>
 void Reshape(const Path& path, const Point& before, const Point& junction, double h,
              const std::optional<ArcCurve>& curve, SharedPoints& points, OnMove on_move) {

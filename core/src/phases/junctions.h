@@ -26,10 +26,12 @@ struct JunctionScratch {
 /// Moves each junction, by at most 1.5 spacings, to the point nearest to the curves of its arcs.
 /// The field of each phase rounds its corner near a junction, so a curve is fitted to points 1.5 to
 /// 9 spacings away (arc_curve.h). Nearer points of an arc go onto a parabola to the new place.
-/// - A junction that is a vertex of the body moves along its ring, at most to the next vertices.
+/// - A junction inside of the body with fewer than two curves stays, as does a junction on the
+///   outline of the body without any curve.
+/// - A junction that is a vertex of the body moves along its ring, not beyond the next vertices.
 /// - If the body has a corner there (body_corner.h), the curves of both sides of the ring count,
-///   too. The junction then moves freely, and the ring's vertices before 1.5 spacings follow, with
-///   turned normals.
+///   too. The junction may then move in any direction. The vertices of the ring up to about 1.5
+///   spacings away follow, with turned normals.
 /// Sets has_moved of the body's points that move. Requires: has_moved has an element for each point
 /// of the body. Cost: linear in the points near junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,

@@ -22,10 +22,11 @@ inline constexpr std::size_t kMostPhases = ReconstructionParameters::kMaxSection
 struct PhaseSums {
   double density = 0;   ///< f: kernel values times weights.
   double sum = 0;       ///< Kernel values.
-  double x = 0, y = 0;  ///< Kernel values times displacements, in the particles' sizes.
+  double x = 0, y = 0;  ///< Kernel values times offsets to the particles, in particle sizes.
 };
 
-/// g of one phase less g of another at a point, in spacings: positive in the first one.
+/// g (core/PHASES.md) of one phase less g of another at a point, in spacings: positive in the first
+/// phase. g grows by about 1 for each spacing that the point lies deeper in its phase.
 struct PhaseDifference {
   double value = 0;
   double gradient_x = 0, gradient_y = 0;  ///< Per cell.
@@ -48,13 +49,14 @@ class PhaseField {
   /// radius) from it along x and y. Requires: several phases are around the tile.
   void PhasesAroundCells(std::uint32_t tile, std::array<std::uint32_t, kTileNodes>& phases) const;
 
-  /// The phase with the largest g at (x, y), in cells relative to a tile; kNoPhase without
-  /// particles. Of equal ones, the lowest.
+  /// The phase with the largest g at (x, y), in cells relative to a tile; the lowest label at a
+  /// tie. kNoPhase if no kernel reaches the point.
   PhaseLabel LargestAt(std::uint32_t tile, double x, double y) const;
 
-  /// g of phase `a` less g of phase `b`.
+  /// g of phase `a` less g of phase `b` at (x, y), in cells relative to a tile. g is -1e30 for a
+  /// phase whose kernels do not reach the point.
   double Difference(std::uint32_t tile, double x, double y, PhaseLabel a, PhaseLabel b) const;
-  /// The same with its gradient.
+  /// `Difference` with its gradient.
   PhaseDifference DifferenceAt(std::uint32_t tile, double x, double y, PhaseLabel a,
                                PhaseLabel b) const;
 

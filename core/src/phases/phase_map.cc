@@ -17,8 +17,9 @@ std::uint32_t IndexOf(const Items& items, std::uint64_t key) {
                                                : static_cast<std::uint32_t>(at - items.begin());
 }
 
-// The labels of inside nodes without a particle in reach: the label of the last node with one, by
-// row. Such nodes lie in holes that cleaning closed.
+// Gives each inside node without a label the label of the last inside node before it in row order,
+// or `usual` if there is none. Such nodes are all nodes of a tile with one phase around it, and
+// nodes in holes that cleaning closed.
 void FillGaps(const BitRows& inside, PhaseLabel usual, std::array<PhaseLabel, kTileNodes>& labels) {
   for (int j = 0; j < kTileSize; ++j) {
     for (std::uint32_t bits = inside[j]; bits != 0; bits &= bits - 1) {

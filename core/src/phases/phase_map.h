@@ -43,7 +43,8 @@ struct PhaseMap {
   std::vector<std::array<PhaseLabel, kTileNodes>> labels;  ///< By tile; kNoPhase: outside.
   std::vector<PhaseEdge> edges;                            ///< In the order of their keys.
   std::vector<PhaseCell> cells;                            ///< In the order of their keys.
-  /// Saddles between two phases, ascending by key, with the phase whose corners are joined.
+  /// Saddle cells with two phases, by ascending PhaseCell::Key, and the phase whose two opposite
+  /// corners are joined.
   std::vector<std::pair<std::uint64_t, PhaseLabel>> joined;
 
   PhaseLabel At(const TilePlace& node) const {
@@ -59,8 +60,8 @@ struct PhaseMap {
                                       int j) const;
 
   /// Labels the inside nodes of `body`, and finds edges and cells. Deterministic. Cost: linear in
-  /// nodes; the kernel sums at nodes with several phases within reach, and at a few points of each
-  /// edge and cell.
+  /// nodes; the kernel sums at nodes with several phases within reach, and in the middle of each
+  /// saddle between two phases.
   void Build(const TileDirectory& directory, const Crossings& body, const PhaseField& field);
 
   /// Whether the two corners of phase `label` are joined in a saddle of its outline. `key`: of the

@@ -24,10 +24,11 @@ struct PhaseRepairScratch {
 /// valid: rings are simple, do not touch, and are nested by their topologies. Then no two phases
 /// overlap, and none leaves the body (core/PHASES.md, "Why phases do not overlap").
 ///
-/// Points that touch return half way, from the fifth round on all the way. An outline with
-/// misplaced rings returns as a whole. After 24 rounds all points return. `points`, `roots`:
-/// interleaved, in world units. Returns false if outlines cross with all points at their roots,
-/// which is a bug. Cost: for each round and outline as CountTouchingPairs and RingDepths.
+/// In each round, the ends of touching segments and their neighbours return half way, from the
+/// fifth round on all the way. If no segments touch, an outline with misplaced rings returns as a
+/// whole. After 24 rounds all points return. `points`, `roots`: by shared point, interleaved, in
+/// world units. Returns false if outlines are not valid with all points at their roots, which is a
+/// bug. Cost: for each round and outline as CountTouchingPairs and RingDepths.
 [[nodiscard]] bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
                                 std::span<const double> roots, PhaseRepairScratch& scratch,
                                 std::span<double> points);

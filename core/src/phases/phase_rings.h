@@ -23,7 +23,8 @@ struct BodyOutline {
   const RingVertices& vertices;
 };
 
-/// Finds the vertices of the outline of a body by the lattice edges that it crosses.
+/// Finds vertices of the outline of a body by their cell, and by the edge of the cell through which
+/// the outline enters or leaves.
 class BodyVertices {
  public:
   /// Cost: linear in segments.
@@ -40,8 +41,8 @@ class BodyVertices {
   /// The segment of a cell that has only one in the topology.
   std::uint32_t In(const TilePlace& cell) const;
 
-  /// Index in Rings::points of a segment's vertex in its cell, and of its vertex on its entry edge:
-  /// kNone if thinning has dropped it.
+  /// Index in Rings::points of a segment's vertex in its cell; and of the vertex on the edge where
+  /// the segment enters the cell, or kNone if thinning has dropped the vertex on the edge.
   std::uint32_t CellVertex(std::uint32_t at) const { return body_->placed.point_of_segment[at]; }
   std::uint32_t EdgeVertex(std::uint32_t at) const {
     return body_->vertices.is_kept[2 * std::size_t{at}] ? CellVertex(at) - 1 : kNone;

@@ -59,25 +59,28 @@ inline bool HasPhases(const ReconstructionParameters& parameters) {
   return CountPhases(parameters) > 0;
 }
 
-/// Labels the particles of a frame by their phases. Sets `others` to the other attributes.
-/// Errors: INVALID_ARGUMENT if a frame with particles lacks the attribute, or if it does not hold
-/// one whole number per particle. Requires: CheckFrame has passed the frame.
+/// Labels the particles of a frame by their phases. All phases without a section have one label,
+/// the last. Sets `others` to the attributes other than `phase_attribute`. Errors: INVALID_ARGUMENT
+/// if a frame with particles lacks `phase_attribute`, or if that attribute does not hold one whole
+/// number per particle. Requires: CheckFrame has passed the frame.
 absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters,
                         Phases& phases, std::vector<Attribute>& others);
 
 /// Labels the nodes of the body by phase. Requires: TakePhases.
 void MapPhases(const PhaseInput& input, Phases& phases);
 
-/// Number of points of all interfaces.
+/// Number of points that interfaces add to the vertices of the body: on edges and in cells.
 inline std::uint64_t InterfacePointsOf(const Phases& phases) {
   return phases.map.edges.size() + phases.map.cells.size();
 }
 
 /// Divides the body among the phases. Vertices of `body` where interfaces end move (MoveJunctions),
-/// and rings with corners there move to keep their areas. The repair returns vertices to their
-/// roots where needed. The rings of `body` are then measured again. Returns false if the repair
-/// failed, which is a bug. Requires: MapPhases; the default placement. Deterministic. Cost: for
-/// each phase, linear in tiles; the rest linear in the points and particles near interfaces.
+/// and rings with corners there move to keep their areas. If the spacing is given or the frame has
+/// volumes, interfaces move to match areas (MatchPhaseAreas). RepairPhases returns points to their
+/// roots where outlines are not valid. The rings of `body` are then measured again. Returns false
+/// if RepairPhases fails, which is a bug. Requires: MapPhases; the default placement.
+/// Deterministic. Cost: for each phase, linear in tiles; the rest linear in the points and
+/// particles near interfaces.
 [[nodiscard]] bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed,
                                Phases& phases, Rings& body);
 

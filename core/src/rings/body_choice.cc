@@ -53,7 +53,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
   }
 }
 
-// Whether a ring of the topology lies in the window and its margin.
+// Whether a ring of the topology lies in the window, widened by `input.reach`.
 bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::uint32_t ring) {
   for (std::uint32_t k = topology.offsets[ring]; k < topology.offsets[ring + 1]; ++k) {
     const Point& point = topology.entry_points[k];
@@ -68,7 +68,7 @@ bool IsWhole(const BodyChoiceInput& input, const RingTopology& topology, std::ui
   return true;
 }
 
-// Adds up the particles of each body, and finds its largest image.
+// Adds up the particles of each body, and finds the area of its largest image.
 void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.largest.assign(components, 0);
@@ -83,7 +83,8 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   }
 }
 
-// Finds the image of each body that stays whole: it is complete and has all particles of the body.
+// Finds the image of each body that stays whole: the complete image with the most given particles.
+// There is none if this image lacks particles of the body.
 void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.best.assign(components, kNoComponent);
@@ -97,7 +98,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   for (std::uint32_t root = 0; root < components; ++root) {
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent) continue;
-    // An image that has both a particle and its copy has more particles.
+    // An image that has both a particle and its copy has more particles than the body.
     if (topology.particle_count[topology.outer_ring[best]] != c.total[root]) best = kNoComponent;
   }
 }

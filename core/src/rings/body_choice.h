@@ -24,8 +24,10 @@ struct BodyChoice {
   std::vector<std::uint32_t> component_of;  // By particle, with the copies.
   std::vector<std::uint32_t> set;           // By component: its parent in the set (union-find).
   std::vector<std::uint64_t> given_count;   // By component: its given particles.
-  std::vector<double> given_weight;         // By component: their summed weight; 0 if uniform.
-  std::vector<std::uint8_t> has_copies;     // By component; at a root: of the set.
+  std::vector<double> given_weight;         // By component: summed weight of its given particles;
+                                            // 0 if weights are uniform.
+  std::vector<std::uint8_t> has_copies;     // By component: whether it has copied particles; at a
+                                            // root: whether its set has.
   std::vector<std::uint32_t> best;          // By root: the component that stays whole.
   std::vector<std::uint64_t> total;         // By root: particles of the body.
   std::vector<double> largest;              // By root: area of the largest image, squared cells.
@@ -34,7 +36,7 @@ struct BodyChoice {
 struct BodyChoiceInput {
   const LiftedFrame& lifted;
   const Window& window;         ///< The box along the axes along which bodies percolate.
-  std::array<double, 2> reach;  ///< Images up to this far beyond it are complete. World units.
+  std::array<double, 2> reach;  ///< World units: images up to this beyond `window` are complete.
   const ReconstructionParameters& parameters;
   double spacing, cell_size;  ///< World units.
   const ParticleBins& bins;
@@ -47,8 +49,8 @@ struct BodyChoiceInput {
 ///   image's, or h^2 per particle if this is more.
 /// - If the box wraps, all other bodies are cut.
 /// - A body without copies stays whole.
-/// - An image within `reach` of the window is complete. Of the complete images, the one with the
-///   most given particles stays whole; ties: the lowest component. The others go.
+/// - An image that lies in the window, widened by `reach`, is complete. Of the complete images, the
+///   one with the most given particles stays whole; ties: the lowest component. The others go.
 /// - If no image is complete, the body percolates or is too long: all its images are cut.
 /// - If the chosen image lacks particles of the body, all images are cut, too. Bodies less than a
 ///   cell apart may be one component in one image and two in another.

@@ -14,9 +14,9 @@ namespace partiemc {
 
 /// The fate of a component of inside nodes (rings/components.h).
 enum class Fate : std::uint8_t {
-  kWhole,  ///< It remains as it is.
-  kCut,    ///< Its part in the box remains.
-  kGone,   ///< It is spray, or another image of the body remains.
+  kWhole,  ///< The component remains as it is.
+  kCut,    ///< Only the part in the box (Window) remains.
+  kGone,   ///< The component is removed: it is spray, or another image of the body remains.
 };
 
 /// The part of the plane in which cut bodies remain. World units.

@@ -151,7 +151,8 @@ void FillRing(const TileDirectory& directory, const RingTopology& rings, std::si
   }
 }
 
-// Removes the rings that no longer separate inside and outside nodes.
+// Removes the rings whose nodes have been cleared or filled: both sides are inside, or both are
+// outside.
 void KeepSurvivors(const TileDirectory& directory, const Crossings& crossings, RingScratch& scratch,
                    RingTopology& rings) {
   std::size_t kept = 0;

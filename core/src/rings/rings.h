@@ -22,7 +22,8 @@ struct RingTopology {
   std::vector<std::uint32_t> offsets;   ///< Ring k has segments [offsets[k], offsets[k + 1]).
   std::vector<std::uint32_t> outer_of;  ///< Per ring: a hole's outer ring, else kNoRing.
   std::vector<std::uint64_t> particle_count;  ///< Per ring: particles of its component; 0: hole.
-  std::vector<double> particle_weight;        ///< Per ring: their summed weight; 0 if uniform.
+  std::vector<double> particle_weight;        ///< Per ring: summed weight of the particles of its
+                                              ///< component; 0: hole, or uniform weights.
   Components components;                      ///< Of inside nodes; each has one outer ring.
   std::vector<std::uint32_t> component_of_ring;
   std::vector<std::uint32_t> outer_ring;  ///< By component.

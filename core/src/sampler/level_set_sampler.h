@@ -83,8 +83,8 @@ class LevelSetSampler {
     double radius, per_size;
   };
 
-  /// Sets `near` to the particles within `range` of any of `points`, and some farther away. It is
-  /// valid until the next Build. Points have members x and y, in cells relative to the tile.
+  /// Sets `near` to the particles within `range` of any of `points`, and some farther away. `near`
+  /// is valid until the next Build. Points have members x and y, in cells relative to the tile.
   /// Particles beyond Scale::reach may be missing. Requires: at least one point.
   template <typename Member>
   void FindNear(std::uint32_t tile, std::span<const Member> points, const Range& range,
@@ -95,8 +95,8 @@ class LevelSetSampler {
 
   bool IsIndexed(std::uint32_t tile) const { return tiles_[tile].is_asked; }
 
-  /// Whether a sample at a point of a tile, 0 <= x, y < 32, misses no particle: an active cell is
-  /// near enough.
+  /// Whether a sample at a point of a tile, 0 <= x, y < 32, misses no particle: the cell of the
+  /// point is at most `wander` cells (Build) from an active cell.
   bool Covers(std::uint32_t tile, double x, double y) const {
     return IsIndexed(tile) && (asked_[tile][static_cast<int>(y)] >> static_cast<int>(x) & 1) != 0;
   }
@@ -155,13 +155,13 @@ class LevelSetSampler {
   NeighbourGrid grid_;
   std::vector<Tile> tiles_;
   std::vector<BitRows> asked_;   // By tile: cells in which points may lie.
-  std::vector<BitRows> wanted_;  // By tile: cells with particles that such points need.
+  std::vector<BitRows> wanted_;  // By tile: cells with particles that points in `asked_` need.
   std::vector<Run> runs_;
   std::vector<std::uint32_t> run_of_;  // By tile, or kNoRun.
   std::vector<std::uint32_t> bucket_offsets_;
   // The selected particles of each run, tile by tile. The particles of a tile end at chosen_end_.
   struct Chosen {
-    std::uint32_t bucket, particle;  // In the run; in the bins.
+    std::uint32_t bucket, particle;  // Indices: of its bucket in the run, and in the bins.
   };
   std::vector<Chosen> chosen_;
   std::vector<std::uint32_t> chosen_end_;

@@ -106,7 +106,7 @@ class NeighbourDisc {
   Vector column_, centre_x_, centre_y_, reach_square_, reach_, reach_per_size_;
 };
 
-// Appends the dummies, which fill the last vector.
+// Appends distant dummies with kernels of 0, which fill the last vector.
 template <Factor kFactor>
 HWY_INLINE void Close(NeighbourChunk& chunk) {
   const Lanes d;
@@ -118,9 +118,9 @@ HWY_INLINE void Close(NeighbourChunk& chunk) {
   }
 }
 
-// Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(). It
-// uses the chunk's particles and returns true, or returns false: then Collect stops and returns
-// false.
+// Collects the particles of `near` in a chunk. When the chunk may be full, calls make_room(). If
+// that returns true, make_room has used the particles, and Collect begins the chunk anew. If that
+// returns false, Collect stops and returns false.
 template <Factor kFactor, typename MakeRoom>
 HWY_INLINE bool Collect(const NeighbourRows& near, NeighbourChunk& chunk, MakeRoom make_room) {
   const NeighbourDisc disc(near);

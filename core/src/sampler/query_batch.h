@@ -21,8 +21,9 @@ struct PointGroup {
 };
 
 /// Collects points of consecutive vertices in groups. Passes up to kQueriesAtOnce groups at a time
-/// to a sink, a function of std::span<const PointGroup<Member>>. Only the points between two calls
-/// of Part determine the groups there, so samples do not depend on how groups are passed on.
+/// to a sink, a function of std::span<const PointGroup<Member>>. The points between two calls of
+/// Part are grouped regardless of all other points, so samples do not depend on how groups are
+/// passed on.
 template <typename Member, typename Sink>
 class QueryBatch {
  public:

@@ -14,9 +14,9 @@ struct BlockLimits {
 
 /// Collapses edges of `triangles`, triples of indices into `points`. Points on the border of the
 /// triangles stay. Guarantees neither manifold triangles nor the error.
-/// meshoptimizer sums floats relative to the extent of its input, so a larger input is cut into
-/// blocks. Their borders stay. Then other blocks, moved by half a side, simplify these borders.
-/// Deterministic for any number of threads.
+/// meshoptimizer sums floats relative to the extent of its input, so an input larger than a block
+/// is cut into blocks, whose borders stay. A second pass, with blocks moved by half a side,
+/// simplifies these borders. Deterministic for any number of threads.
 void SimplifyInBlocks(std::span<const double> points, const BlockLimits& limits,
                       std::vector<std::uint32_t>& triangles);
 

@@ -28,14 +28,15 @@ void FindManifoldFaults(std::span<const double> points, std::span<const std::uin
 /// Whether triangles (at least one) are connected and have this number of different points.
 bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points);
 
-/// Two triangles that break S3, or one that is degenerate (a == b).
+/// Two triangles that intersect, or one degenerate triangle (a == b). Both break S3.
 struct Contact {
   std::uint32_t a, b;
-  Box box;  ///< They can touch only there.
+  Box box;  ///< The triangles can touch only in this box.
 };
 
-/// Given triangles keep S3 among themselves. FindContacts therefore compares kNew triangles with
-/// all others, and kKept with kChanged triangles.
+/// Given triangles, those of the surface before the simplification, do not intersect each other
+/// (S3). FindContacts therefore compares kNew triangles with all others, and kKept with kChanged
+/// triangles.
 enum TriangleKind : std::uint8_t {
   kOld = 0,      ///< Given, in a shell that was compared before.
   kNew = 1,      ///< Made from given triangles, and not compared before.

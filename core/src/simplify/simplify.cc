@@ -102,7 +102,7 @@ class Simplifier {
     progress_[shell] = Progress::kToSimplify;
   }
 
-  // These return whether they found faults: then another round follows.
+  // These return whether another round must follow.
   bool RepeatFaultyShells();
   bool RepeatTouchingShells(const Surface& simplified);
   bool GiveUpMovedShells(const Surface& simplified);
@@ -114,7 +114,7 @@ class Simplifier {
   /// shell begin where its certified triangles do.
   std::vector<std::uint32_t> triangles_;
   std::vector<std::size_t> triangle_count_;  // By shell, as all below.
-  /// The number of triangles that may differ from the certified ones. They come first.
+  /// The number of triangles that may differ from the certified ones. These triangles come first.
   std::vector<std::size_t> changed_count_;
   std::vector<int> attempts_;  // Above kMostAttempts: the shell has its certified triangles.
   std::vector<Progress> progress_;
@@ -271,7 +271,8 @@ bool Simplifier::RepeatTouchingShells(const Surface& simplified) {
 }
 
 /// Gives up shells that were turned inside out or have passed another shell, and the shells around
-/// them. A shell that passed another one may not touch it now.
+/// them; all shells if these were given up before. A shell that passed another shell may not touch
+/// that shell now, so RepeatTouchingShells may miss it.
 bool Simplifier::GiveUpMovedShells(const Surface& simplified) {
   if (around_.empty()) around_ = ShellsAround(certified_, limits_.work);
   const std::vector<int> turns = OrientationsOf(simplified);

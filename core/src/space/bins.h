@@ -42,14 +42,16 @@ struct SpaceBins {
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   /// kBinPadding values follow the last particle, so that vectors may read beyond it.
   std::vector<float> x, y, z;
-  std::vector<float> weight;          ///< Padded; empty if the frame has no volumes, or own sizes.
+  std::vector<float> weight;          ///< Padded. Empty without volumes, and with own sizes.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
   /// Images: particles of the frame from this index on, which are mirror images behind walls or
   /// copies beyond the faces of a periodic box. They count for F, but not as particles of a body.
   /// kNoIndex: no images.
   std::uint32_t first_image = kNoIndex;
-  bool are_images_mirrored = true;  ///< Attributes of mirror images are ignored, of copies used.
+  /// True: images are mirror images, and their attributes are ignored. False: images are copies,
+  /// and their attributes count.
+  bool are_images_mirrored = true;
 
   bool IsImage(std::uint32_t particle) const { return source[particle] >= first_image; }
 

@@ -66,8 +66,9 @@ struct Bodies {
 };
 
 /// Finds the bodies, in the order of their first parts, and counts their particles. A particle
-/// belongs to the body of the nearest inside corner of its cell. If it has none, it belongs to the
-/// body of the nearest inside node in the first layer of nodes around the cell, then in the second.
+/// belongs to the body of the nearest inside corner of its cell. If no corner is inside, it belongs
+/// to the body of the nearest inside node in the first layer of nodes around the cell, else in the
+/// second layer, else to no body.
 /// `spacing` is in world units; without volumes, each particle has the volume spacing^3.
 void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
                 Bodies& bodies);

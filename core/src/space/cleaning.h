@@ -33,6 +33,7 @@ struct BodyLimits {
   std::uint64_t least_particles = 0;
 };
 
+/// Numbers of dropped bodies: without particles; below the least volume or number of particles.
 struct DroppedBodies {
   std::uint64_t empty = 0, spray = 0;
 };

@@ -24,7 +24,9 @@ struct ActiveCell {
 };
 
 struct SpaceCrossings {
-  /// Crossed edges of a brick, by axis and layer, as bits at their lower nodes; active cells.
+  /// Crossed edges of a brick, by axis and layer, as bits at their lower nodes; active cells. Then
+  /// the first vertex on an edge and the first active cell of the brick. Also the numbers of its
+  /// crossed edges before an axis and layer, and of its active cells before a layer.
   struct Brick {
     std::array<BrickBits, 3> crossed{};
     BrickBits active{};
@@ -70,7 +72,8 @@ struct SpaceCrossings {
   }
 };
 
-/// Finds all but the steps. Deterministic, parallel over bricks. Cost: linear in nodes.
+/// Sets all members of `crossings` except the steps (ListSteps). Deterministic, parallel over
+/// bricks. Cost: linear in nodes.
 void FindCrossings(const BrickDirectory& bricks, const SpaceField& field,
                    SpaceCrossings& crossings);
 

@@ -11,7 +11,7 @@
 namespace partiemc::space {
 
 struct SpaceField {
-  /// F in cells, by brick, layer, row, column. Only the sign is right unless `exact` is set.
+  /// F in cells, by brick, layer, row, column. Where `exact` is not set, only the sign is right.
   std::vector<std::array<float, kBrickNodes>> values;
   std::vector<BrickBits> inside;  ///< The nodes with F < 0; then changed by cleaning.
   std::vector<BrickBits> exact;   ///< The nodes where `values` is F.
@@ -28,7 +28,7 @@ struct SpaceField {
 void SampleField(const SpaceBins& bins, const Scale& scale, SpaceField& field);
 
 /// Evaluates F at the nodes among `nodes`, by brick, where F is not exact yet. Nodes stay inside or
-/// outside as before.
+/// outside as before: if rounding gives F the other sign, F becomes 0 or just below 0.
 void EvaluateNodes(const SpaceBins& bins, const Scale& scale, const std::vector<BrickBits>& nodes,
                    SpaceField& field);
 

@@ -28,8 +28,9 @@ struct BrickCoordinate {
   friend auto operator<=>(const BrickCoordinate&, const BrickCoordinate&) = default;
 };
 
-/// The neighbour of a brick at distance (dx, dy, dz) has index ((dz + 1) * 3 + dy + 1) * 3 + dx +
-/// 1; kNoIndex if it does not exist. Nodes of bricks that do not exist are outside.
+/// The bricks around a brick. The brick at the offset (dx, dy, dz), each -1, 0 or 1 brick, has the
+/// index ((dz + 1) * 3 + dy + 1) * 3 + dx + 1; 13 is the brick itself. kNoIndex if a brick does not
+/// exist. The nodes of such a brick are outside.
 using BrickNeighbours = std::array<std::uint32_t, 27>;
 
 /// The bricks of a frame, sorted, with their neighbours.

@@ -87,8 +87,8 @@ inline double SpreadOf(const Sums& sums, const Scale& scale) {
   return LargestEigenvalue(sums.second) / (scale.kernel_radius * scale.kernel_radius * sums.kernel);
 }
 
-/// True only if the gap term of F is below `value`. Saves most eigenvalues near surfaces: in
-/// the notation of LargestEigenvalue, the eigenvalue is at most q + 2 p.
+/// If true, the gap term of F is below `value`; if false, nothing is known. Saves most eigenvalues
+/// near surfaces: in the notation of LargestEigenvalue, the eigenvalue is at most q + 2 p.
 inline bool IsGapBelow(const Sums& sums, const Scale& scale, double value) {
   // Above the error of LargestEigenvalue and all rounding.
   constexpr double kMargin = 1e-6;

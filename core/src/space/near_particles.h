@@ -41,8 +41,9 @@ struct NearBlock {
   bool has_sizes = false;
   bool has_weights = true;  ///< Ignored with own sizes.
 
-  /// Adds the particles of a run from `first` on, at most kLanes. Returns their number. Always
-  /// copies kLanes values; the next Append or Pad overwrites those beyond `count`.
+  /// Adds the particles of a run from `first` on: at most kLanes, and only those that fit. Returns
+  /// the number of added particles. Always copies kLanes values; the next Append or Pad overwrites
+  /// the values beyond `count`.
   std::uint32_t Append(const SpaceBins& bins, const NearRun& run, std::uint32_t first) {
     const auto most = static_cast<std::uint32_t>(std::min(kLanes, kCapacity - count));
     const std::uint32_t added = std::min(run.last - first, most);
@@ -78,7 +79,9 @@ struct NearBlock {
 
 /// Calls visit(NearRun) for runs that contain all particles of a size class within `radius` of the
 /// box, in the order of the bins: brick by brick, row by row. Runs may also contain other particles
-/// of the class. `box` and `radius` are in cells of the class.
+/// of the class. `box` and `radius` are in cells of the class, which are 2^shift lattice cells
+/// wide. The shifts of the runs are in lattice cells. `kHasCoarseCells` may be false if the shift
+/// of the class is 0.
 template <bool kHasCoarseCells, typename Visit>
 void ForEachNearRunOf(const SpaceBins& bins, std::size_t of_class, std::uint32_t brick,
                       const NearBox& box, float radius, Visit visit) {

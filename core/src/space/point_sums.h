@@ -10,7 +10,8 @@
 
 namespace partiemc::space {
 
-/// Partial sums by quantity and lane. A term goes to the lane of its index modulo kLanes.
+/// Partial sums by quantity and lane. The term of particle k of a block goes to lane k modulo
+/// kLanes.
 template <int kQuantities>
 struct PartialSums {
   alignas(32) std::array<std::array<float, NearBlock::kLanes>, kQuantities> lanes{};

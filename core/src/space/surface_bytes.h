@@ -55,8 +55,8 @@ inline constexpr std::uint64_t kMostPointsOfDrop = 42;
 inline constexpr std::uint64_t kPointsOfSmallDrop = 12;
 inline constexpr double kSmallDropVolume = 1.7;
 
-/// If more drops reach a brick, all of them keep their surfaces. This limits the compared pairs and
-/// the ellipsoids.
+/// If more drops reach a brick, none of them becomes an ellipsoid. This limits the compared pairs
+/// and the ellipsoids.
 inline constexpr std::uint32_t kMostDropsOfBrick = 256;
 
 /// Bytes of the drop of a lone particle, and of a point of its ellipsoid. A small drop reaches at

@@ -33,7 +33,9 @@ enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 struct Certificate {
   /// By active cell: the mode of the quad on its upper face along each axis.
   std::vector<std::array<QuadMode, 3>> modes;
-  std::uint32_t returned = 0;  ///< First setbacks of vertices since Certify.
+  /// Number of vertices that were set back since Certify. A vertex counts again after
+  /// SaveOrReturnSetbacks has set its setbacks to 0.
+  std::uint32_t returned = 0;
 
   MovedNodes nodes;
   std::vector<std::uint8_t> setbacks;  ///< By vertex: how often it was set back (moved_nodes.h).
@@ -65,8 +67,8 @@ bool CertifyAgain(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                   const std::vector<Vec3>& anchors, std::vector<Vec3>& positions,
                   Certificate& certificate);
 
-/// The change of a body before CertifyAgain: none; its positions are saved as the best; it returns
-/// to the saved positions.
+/// The change of a body before CertifyAgain: it stays; its positions were saved as the best, and it
+/// may move on; it returns to the saved positions.
 enum class BodyStep : std::uint8_t { kGoesOn, kIsSaved, kReturns };
 
 /// Finds the body of each node that may move. Requires: Certify.

@@ -60,18 +60,19 @@ class FaceChecker {
   /// Makes FindMode take every sign from exact predicates.
   void UseExactSigns() { bound_ = std::numeric_limits<double>::infinity(); }
 
-  /// A face of a cell, which is relative to the brick. Faces are numbered as in cell_loops.h.
+  /// The face with the number `face` (cell_loops.h) of a cell. `cell`: relative to the brick.
   Face FaceOf(const std::array<int, 3>& cell, int face);
 
   /// Returns true for most valid faces without crossings, and false for all other faces. Cheaper
   /// than FaceOf and FindMode.
   bool IsPlainlyValid(const std::array<int, 3>& cell, int face);
 
-  /// Returns whether the face is valid. If it has crossings, sets `mode` to a valid mode; otherwise
-  /// `mode` has no meaning.
+  /// Returns whether the face has a valid mode, and sets `mode` to it. If the face has no crossings
+  /// or no valid mode, or a cell beside it has several loops, `mode` is kAlongFace.
   bool FindMode(const Face& face, QuadMode& mode) const;
 
-  /// Calls visit(item) for the vertices and nodes of a bipyramid that may move.
+  /// Calls visit(item) for each vertex and each node that may move, of the bipyramid over the face.
+  /// Items are as in Face::item. An item may be visited twice.
   template <typename Visit>
   void ForEachItem(const Face& face, Visit visit) {
     for (int k = 0; k < face.count; ++k) {

@@ -42,7 +42,7 @@ struct CutMesh {
   std::vector<float> normals;            ///< Per point, interleaved.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each.
   std::vector<std::uint32_t> shell_of;   ///< Per triangle: any number; its parts get the same.
-  std::vector<std::uint8_t> is_clipped;  ///< Per triangle: 1 if it is a part of a given one.
+  std::vector<std::uint8_t> is_clipped;  ///< Per triangle: 1 if it is a part of a cut triangle.
   std::vector<Cap> caps;                 ///< One for each plane, in the order of the calls.
   /// Set by CapPlanes. Cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]). Triangles of
   /// no cap come first.

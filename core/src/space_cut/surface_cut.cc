@@ -267,7 +267,8 @@ void Assembly::CopyPoints() {
   }
 }
 
-/// Copies the triangles, those on planes last, and lists the latter in Surface::cuts.
+/// Copies the triangles of each piece, the triangles on planes last. Lists in Surface::cuts the
+/// triangles on planes, and the triangles that the given surface has listed there.
 void Assembly::CopyTriangles() {
   const CutMesh& mesh = s_.mesh;
   to_.triangle_offsets.assign(pieces_.sources.size() + 1, 0);

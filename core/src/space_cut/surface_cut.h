@@ -18,13 +18,13 @@ struct SurfaceCutInput {
   /// By shell: whether it is cut. Empty: all are. Requires: the same value for a shell and its
   /// cavities.
   std::span<const std::uint8_t> is_cut;
-  /// By shell: the first outer shell of its body; images of a body have the same. Empty: each outer
-  /// shell is a body.
+  /// By shell: the first outer shell of its body, the same one for all images of a body. Empty:
+  /// each outer shell is a body.
   std::span<const std::uint32_t> body_of;
   double spacing = 1;  ///< World units.
   /// The planes are walls: if they must move (see CutSurface), they move to the side that is kept.
-  /// The points on a moved plane then return to the wall, if Validate accepts the surface. If it
-  /// accepts none, these points stay on the moved plane.
+  /// The points on a moved plane then return to the wall, if Validate accepts this surface. If
+  /// Validate rejects the surface for every move, these points stay on the moved plane.
   bool are_walls = false;
 };
 
@@ -50,7 +50,8 @@ struct SurfaceCutScratch {
 
 /// By shell of the new surface.
 struct SurfacePieces {
-  /// The given shell that it is a part of; the outer shell if it has triangles on a plane.
+  /// The given shell of which the new shell is a part. If the new shell has triangles on a plane:
+  /// the outer shell of that given shell.
   std::vector<std::uint32_t> sources;
   std::vector<std::uint8_t> has_cuts;  ///< Whether it has triangles on a plane.
 };
@@ -61,8 +62,9 @@ struct SurfacePieces {
 /// centroid. The parts of a shell take its place; parts without a point of the given surface come
 /// last.
 ///
-/// Drops dust: parts smaller than 1e-9 of their distance from the origin, or thinner than rounding.
-/// Their measures would have no correct digits.
+/// Drops dust: parts with triangles on a plane whose size is below 1e-9 of their distance from the
+/// origin, or whose volume is below 1e-14 of their cubed size. Their measures would have no correct
+/// digits.
 ///
 /// Of the outer parts of a body, the largest gets the particles, identity and parents of the body's
 /// first outer shell; the others get none. Whole cavities keep theirs.

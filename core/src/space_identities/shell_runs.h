@@ -28,7 +28,7 @@ struct ShellInput {
   const SpaceCrossings& crossings;
   const Bodies& bodies;
   const Drops& drops;
-  std::span<const ThinQuad> thin;           ///< As for AssembleSurface.
+  std::span<const ThinQuad> thin;           ///< As MeshInput::thin.
   std::span<const std::uint32_t> shell_of;  ///< By vertex, also of drops (MeshScratch).
   double cell_size;                         ///< World units.
   LatticePeriods periods = {};
@@ -61,10 +61,11 @@ struct NumberedShells {
 
 /// Collects the runs of the shells, with numbers, and sets all members of `shells`.
 ///
-/// A run lies between two crossed edges of a row. A run of a body belongs to its outer shell. A run
-/// of outside nodes belongs to a cavity if one of its ends is on the shell of the cavity. An
-/// ellipsoid has the nodes of its body. If it replaces a particle without a body, it has one node,
-/// the lowest of the particle's cell (space_vertices/drops.h).
+/// A run is the consecutive nodes of a row between two crossed edges. A run of inside nodes belongs
+/// to the outer shell of its body. A run of outside nodes belongs to a cavity if one of the crossed
+/// edges at its ends is on the shell of the cavity. An ellipsoid has the nodes of its body. If it
+/// replaces a particle without a body, it has one node, the lowest of the particle's cell
+/// (space_vertices/drops.h).
 ///
 /// If a body will be cut, only its nodes in the box count, and all its images have one number.
 /// Cost: n log n in the crossed edges along x, linear in particles and shells.

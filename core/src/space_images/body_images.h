@@ -18,7 +18,7 @@ namespace partiemc::space {
 struct BodyImageInput {
   const LiftedFrame& lifted;
   const SpaceBins& bins;
-  /// The planes, as corners of a box. A body within them is as if the copies of particles had no
+  /// The planes, as corners of a box. In this box the surface is the same as with copies without
   /// end. Infinite along axes without copies. World units.
   Vec3 low, high;
   double spacing, cell_size;  ///< World units.
@@ -30,7 +30,7 @@ struct BodyImageScratch {
   struct Image {
     Vec3 low, high;                ///< Bounding box of its nodes, in cells.
     std::uint32_t set = kNoIndex;  ///< Union-find: an image of the same body, or itself.
-    std::uint64_t given = 0;       ///< Its given particles, without copies.
+    std::uint64_t given = 0;       ///< Number of its particles that are not copies.
     bool has_copies = false;       ///< Whether it has copies; for the first image: whether any has.
     // Set for the first image only, over all images:
     std::uint64_t particles = 0;
@@ -46,12 +46,12 @@ struct BodyImageScratch {
 ///   - A body without copies remains whole.
 ///   - Among the images within the planes, the image with the most given particles remains whole,
 ///     at a tie the first one. The other images are dropped.
-///   - If there is no such image, or it lacks particles of the body, all images are cut. If the box
-///     wraps, all images of bodies with copies are cut.
+///   - All images are cut if there is no such image, or if it has more or fewer particles than the
+///     body. If the box wraps, all images of bodies with copies are cut.
 /// Sets the particles and the volume of each image to the sum over all images. If a given particle
-/// has no body but a copy of it has one, the particle counts for that body. To prevent a drop
-/// there, it gets the body kDroppedBody. In a box that wraps, so do copies without a body whose
-/// particle has one.
+/// has no body but a copy of it has one, the particle counts for the body of the copy. In
+/// body_of_particle it gets kDroppedBody, so that no ellipsoid (drops.h) replaces it. In a box that
+/// wraps, copies without a body get kDroppedBody, too, if their particle or another copy has one.
 /// Requires: FindBodies. Deterministic. Cost: linear in particles and parts.
 void ChooseImages(const BodyImageInput& input, BodyImageScratch& scratch, Bodies& bodies);
 
@@ -62,8 +62,9 @@ struct CutShells {
   /// body. The ellipsoid's node counts for identities even outside of the box.
   std::vector<std::uint8_t> is_cut;
   static constexpr std::uint8_t kLoneDrop = 2;
-  std::vector<std::uint32_t> outer_of;  ///< By shell: the first outer shell of its body.
-  std::vector<std::uint32_t> first;     ///< Scratch: by body.
+  /// By shell: its outer shell; for a shell of a cut body, the first outer shell of all images.
+  std::vector<std::uint32_t> outer_of;
+  std::vector<std::uint32_t> first;  ///< Scratch: by body.
 };
 
 /// Finds the shells of bodies that are cut, cavities included. `body_of_shell`: by shell, its body;

@@ -78,8 +78,10 @@ struct VolumeStep {
 };
 
 /// Moves the vertices of each body along their normals by one offset, times their local sizes. The
-/// offset is (volume of its particles - its volume) / area, at most `limit`. Bodies without
-/// particles stay. Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit` 1.
+/// offset is (volume of its particles - its volume) / area, at most `step.limit` in both
+/// directions. Bodies stay if they have no particles, or if the relative error of their volume is
+/// at most `step.tolerance`. Requires: MeasureBodies of `positions`, or MeasureTriangles for `unit`
+/// 1.
 void MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);
 

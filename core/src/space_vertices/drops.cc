@@ -253,7 +253,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
   }
 }
 
-/// Lists the taken drops by brick. Drops that reach too many bricks are no longer taken.
+/// Lists the taken drops by brick. Drops that reach too many bricks keep their surfaces.
 void ListDrops(double cell_size, Drops& drops) {
   drops.bricks.Clear();
   drops.reaches.clear();
@@ -271,7 +271,8 @@ void ListDrops(double cell_size, Drops& drops) {
   for (std::size_t k = 1; k < drops.first.size(); ++k) drops.first[k] += drops.first[k - 1];
 }
 
-/// Drops whose boxes touch each other keep their surfaces.
+/// Drops whose boxes touch each other keep their surfaces, as do all drops that reach a brick with
+/// more than kMostDropsOfBrick of them.
 void CompareDrops(Drops& drops) {
   for (std::size_t brick = 0; brick + 1 < drops.first.size(); ++brick) {
     ThrowIfCancelled();

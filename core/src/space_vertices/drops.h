@@ -23,8 +23,9 @@
 namespace partiemc::space {
 
 struct DropLimits {
-  std::uint64_t most_particles = 0;  ///< Bodies with more particles keep their surfaces.
-  /// Limits of cleaning (BodyLimits). A particle without a body below them gets no ellipsoid.
+  /// Bodies with more particles keep their surfaces. 0: no ellipsoids.
+  std::uint64_t most_particles = 0;
+  /// Limits of cleaning (BodyLimits). Below them, a particle without a body gets no ellipsoid.
   std::uint64_t least_particles = 0;
   double least_volume = 0;  ///< World units cubed.
 };
@@ -48,11 +49,12 @@ struct Drops {
     std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
     double volume = 0;   ///< Cells cubed; of its particles, images included.
-    Vec3 origin, first;  ///< A place in the drop; the first moment relative to it.
-    /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls.
+    Vec3 origin, first;  ///< In cells: a place in the drop; the first moment about `origin`.
+    /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls. In cells.
     std::array<double, 6> second{};
-    /// Holds the ellipsoid, and the former surface or a fixed outside node of the cell of a
-    /// particle without a body. World units.
+    /// Box around the ellipsoid and, for a body, its former surface. For a particle without a body:
+    /// around the ellipsoid and the lowest node of the particle's cell, an outside node that has
+    /// not moved. World units.
     Box box;
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
     std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
@@ -70,8 +72,9 @@ struct Drops {
   std::vector<std::uint32_t> first;  ///< Scratch: by brick, its first index in `reaches`.
 };
 
-/// Removes the triangles of drops, and appends ellipsoids to positions, normals and triangles.
-/// World units. Cost: linear in particles and triangles.
+/// Removes the triangles of the drops that ellipsoids replace (Drop::is_taken), and appends these
+/// ellipsoids to positions, normals and triangles. World units. Cost: linear in particles and
+/// triangles.
 void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
                   std::vector<Vec3>& positions, std::vector<Vec3>& normals,
                   std::vector<VertexTriangle>& triangles);

@@ -11,8 +11,8 @@
 namespace partiemc::space {
 
 /// Moves each vertex on an edge from its anchor e to the surface through the four loops around the
-/// edge. These have vertices c_j with normals n_j. Means have the weights 1 / |c_j - e|^2. The
-/// normal n is the normalised mean of n_j. The vertex moves along n by the mean of
+/// edge. These have vertices c_j with normals n_j. Means have the weights 1 / (|c_j - e|^2 + .01).
+/// The normal n is the normalised mean of n_j. The vertex moves along n by the mean of
 /// (n + n_j) / 2 . (c_j - e). Exact on spheres and planes. If `sizes` is not empty, the local size
 /// is the mean of the sizes at c_j. Requires: positions, normals and sizes of the vertices in cells
 /// are set. Lengths are in cells. Parallel over bricks.

@@ -18,7 +18,8 @@ namespace partiemc::space {
 
 struct LoopWindows {
   static constexpr std::uint32_t kMostLoopsOfChunk = 64;
-  /// Most loops near a chunk: those the fewest links away. Bounds the memory if cells are small.
+  /// Limit of the number of loops near a chunk, which bounds the memory if cells are small. The
+  /// loops with the fewest links to the chunk are kept; windows lack the others.
   static constexpr std::size_t kMostNear = 2048;
 
   static constexpr std::size_t kWordBits = 32;

@@ -22,10 +22,11 @@ struct TangentPlane {
 /// with normals n.
 Vec3 LeastSquarePoint(std::span<const TangentPlane> planes, const Vec3& mean);
 
-/// Sets the normals of vertices on edges to the direction of the gradient. Moves each vertex in a
-/// cell to the LeastSquarePoint of the crossings of its loop, but at most to kAnchorMargin from the
-/// faces of the cell. Its normal is the normalised mean of the normals of these crossings. Lengths
-/// are in cells. Parallel over bricks and cells. Requires: PlaceOnCrossings has set the positions.
+/// Sets the normals of vertices on edges to the direction of the gradient, or of the edge, outward,
+/// if the gradient is 0. Moves each vertex in a cell to the LeastSquarePoint of the crossings of
+/// its loop, but at most to kAnchorMargin from the faces of the cell. Its normal is the normalised
+/// mean of the normals of these crossings. Lengths are in cells. Parallel over bricks and cells.
+/// Requires: PlaceOnCrossings has set the positions.
 void PlaceByQef(const SpaceBins& bins, const Scale& scale, const SpaceCrossings& crossings,
                 std::vector<Vec3>& positions, std::vector<Vec3>& normals);
 

@@ -22,8 +22,8 @@ namespace partiemc::space {
 /// Finds the vertices on edges that can be dropped and are at most `distance`, in cells, from the
 /// triangles that replace them. Sets `thin` by vertex on an edge, empty if the vertex stays. Takes
 /// the nearer of two valid cuts. `distance` 0 drops none. `sizes`: by vertex, factors of the
-/// distance, or empty. Positions are in world units. Requires: Certify of them. Parallel over
-/// bricks.
+/// distance, or empty. Positions are in world units. Requires: Certify has accepted them.
+/// Parallel over bricks.
 void FindThinEdges(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Certificate& certificate, const std::vector<Vec3>& positions,
                    double distance, std::vector<ThinQuad>& thin, std::span<const float> sizes = {});

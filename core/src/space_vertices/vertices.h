@@ -15,8 +15,9 @@ namespace partiemc::space {
 /// Least distance of a linear crossing from the ends of its edge, in cells. Rounding to world
 /// coordinates then cannot move it to a node.
 inline constexpr double kEdgeMargin = 1.0 / 4096;
-/// Least distance for the anchors of vertices that move. Tetrahedra at a node then have room for
-/// the displacements: 1 % of the vertices of balls, tori and boxes are set back, 2 % with .02.
+/// Least distance of an anchor from the ends of its edge, or of a vertex in a cell from the faces
+/// of the cell, in cells. For vertices that move: tetrahedra at a node then have room for the
+/// displacements. 1 % of the vertices of balls, tori and boxes are set back, 2 % with .02.
 inline constexpr double kAnchorMargin = .12;
 
 /// The point nearest to `point` that is at least kAnchorMargin away from the faces of the cell at

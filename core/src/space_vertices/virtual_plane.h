@@ -15,7 +15,7 @@
 
 namespace partiemc::space {
 
-/// Lengths in spacings; with own sizes in local sizes.
+/// Lengths in spacings, with own sizes in local sizes; in `root` in cells.
 struct VirtualPlaneConstants {
   RootConstants root;
   double normal_reach = 2.5;

@@ -13,9 +13,9 @@
 
 namespace partiemc {
 
-/// A parabola along a free stretch of an outline, in cells from the origin of the world. Its
-/// parameter s, in cells, is the length along the stretch's chord. It grows away from the wall and
-/// is 0 at the first fitted point.
+/// A parabola, or a line for few points, along a free stretch: a part of an outline that is on no
+/// wall. In cells from the origin of the world. The parameter s, in cells, is the length along the
+/// chord of the fitted points. s grows away from the wall and is 0 at the first fitted point.
 class ContactCurve {
  public:
   Point At(double s) const {
@@ -44,9 +44,10 @@ class ContactCurve {
     std::uint32_t tile;
   };
 
-  /// Fits the part of the stretch from 1.5 h above the wall by least squares. `spacing`: h in
-  /// cells. Empty if this part is too short, or if the curve does not meet the wall nearby at ten
-  /// degrees or more. Empty also if another solid covers the wall between the contact and the foot.
+  /// Fits a curve by least squares to the part of the stretch from 1.5 h above the wall, up to 6 h
+  /// long. `spacing`: the particle spacing h in cells. Empty if this part is too short, or if the
+  /// curve does not meet the wall nearby at ten degrees or more. Empty also if another solid covers
+  /// the wall between the contact and the foot, the point where the curve meets the wall.
   /// Cost: linear in the points and in the lines near the contact.
   static std::optional<ContactCurve> Fit(const Surroundings& around, const WallPlace& contact,
                                          double spacing, StretchPoint point);

@@ -84,10 +84,10 @@ class ContactFitter {
   // 1 if the wet side is ahead in the direction of the wall, else -1. A ring runs along its wall in
   // the wall's direction.
   double WetSign() const { return is_wet_after_ ? 1 : -1; }
-  // The signed length along the wall from the contact's first place.
+  // The signed length along the wall from the contact's first place to the length `along`.
   double From(double along) const { return lines_.Between(loop_, start_, along); }
 
-  // Moves the contact to the foot of its curve. Returns false if it stops before.
+  // Moves the contact to the foot of its curve. Returns false if the contact stops before the foot.
   bool MoveContact(const WallPlace& foot) {
     const double wanted = From(lines_.Along(foot));
     double move = wanted;
@@ -98,7 +98,7 @@ class ContactFitter {
     return is_free;
   }
 
-  // The part of a move up to the first sharp corner of the wall.
+  // The part of a move up to the first sharp corner of the wall; the whole move without a corner.
   double ToCorner(double move) const {
     const auto of = lines_.EdgesOfLoop(loop_);
     if (of.front().is_endless) return move;
@@ -117,8 +117,8 @@ class ContactFitter {
     return move;
   }
 
-  // Moves the points on the wall that the contact passes ahead of it. Returns the part of the move
-  // that ends before the next contact and before another wall.
+  // Moves the points on the wall that the contact passes to places ahead of the contact. Returns
+  // `move`, shortened if needed to end before the next contact and before another wall.
   double PassWetPoints(double move) {
     const double sign = WetSign();
     if (sign * move <= 0) return move;

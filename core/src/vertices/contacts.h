@@ -8,21 +8,25 @@ namespace partiemc {
 
 struct VertexInput;
 
-/// Moves each contact to where the curve of its stretch (contact_curve.h) meets the wall, and the
-/// vertices below the fitted part onto the curve. Vertices on the wall that the contact passes move
-/// ahead of it. A contact stops at sharp corners of its wall and before the next contact; then a
-/// straight line replaces the curve. Without a curve a contact stays. Sets the angles of contacts.
+/// Moves each contact, the end of a free stretch on a wall, to where the curve of the stretch
+/// (contact_curve.h) meets the wall. The vertices between the contact and the fitted part move onto
+/// the curve. Vertices on the wall that the contact passes move ahead of it. A contact stops at
+/// sharp corners of its wall, before the next contact and before another wall; then a straight line
+/// replaces the curve. Without a curve a contact stays. Sets the angles of contacts: by the curve,
+/// or by a chord of two spacings for a contact that stopped or stayed.
 ///
-/// Call it before the area step, whose target counts the wetted area, and after it, because that
-/// step moves the curves. `points` has the points of `rings`. Cost: for each contact, linear in the
-/// lines near it and in the vertices of its stretch.
+/// Call it before the area step (CorrectVolume), whose target counts the wetted area, and after the
+/// area step, because that step moves the curves. `points` has the points of `rings`. Cost: for
+/// each contact, linear in the lines near it and in the vertices of its stretch.
 void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings);
 
-/// Moves points on walls to their places, and free points in a solid, or too close to it, out of
-/// it.
+/// Moves points on walls to their places (WallVertices::place). Moves free points that are in a
+/// solid, or closer to it than .02 spacings, to this distance before its wall. Free points deeper
+/// than WallField::kMostHeight stay.
 void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rings);
 
-/// Appends to Rings::wetted, contacts and contact_angles.
+/// Appends the wet points (WallVertices::is_wet) to Rings::wetted, and the contacts and their
+/// angles to Rings::contacts and contact_angles.
 void ListContacts(const WallVertices& points, Rings& rings);
 
 }  // namespace partiemc

@@ -38,8 +38,8 @@ class HierarchicalGrid {
     for (int level = 0; level < kGridLevels; ++level) per_length_[level] = 1 / CellSize(level);
   }
 
-  /// The first level whose cells can hold a box of `extent`; at most 28, because of the second
-  /// bound of finest_.
+  /// The first level whose cells can hold a box of `extent`; at most 28, because the finest cells
+  /// have at least 2^-27 of the extent of `bounds`.
   int LevelFor(double extent) const {
     int level = 0;
     while (level + 1 < kGridLevels && CellSize(level) < kGridSlack * extent) ++level;

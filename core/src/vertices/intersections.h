@@ -35,17 +35,18 @@ struct TouchingPairsBuffers {
   std::vector<Block> blocks;
   std::vector<std::uint32_t> slots;
 
-  /// The pairs, as indices of segments. At most one pair for each segment; further pairs are
-  /// counted but not stored.
+  /// The pairs, as indices of segments. The number of pairs is at most the number of all segments;
+  /// further pairs are counted but not stored.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
 };
 
-/// Counts the pairs of segments, over all rings, that have a point in common, and lists them in
-/// `buffers.pairs`. Exact.
+/// Counts the pairs of segments, over all rings, that have a point in common. Exact. Lists them in
+/// `buffers.pairs`, but no more pairs than there are segments.
 ///
 /// Ring k has the points [ring_offsets[k], ring_offsets[k + 1]) of the interleaved `points`, and is
 /// closed by a segment from its last point to its first. Successive segments of a ring share a
-/// point by construction. They count only if they overlap in more, where the ring folds back.
+/// point by construction. Such pairs count only if they overlap in more than this point, where the
+/// ring folds back.
 ///
 /// Requires: offsets ascend from 0 to points.size() / 2; coordinates in the domain of predicates.h.
 /// Allocates nothing for an input no larger than an earlier one.

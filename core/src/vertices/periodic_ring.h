@@ -40,8 +40,8 @@ inline std::int32_t LengthInUnits(std::int32_t step_x, std::int32_t step_y) {
   return static_cast<std::int32_t>(std::sqrt(x * x + y * y));
 }
 
-/// The length between two vertices divided by the mean of their local sizes.
-/// Requires: sizes are at least 1/16.
+/// `length` between two vertices, in units, divided by the mean of their local particle sizes, in
+/// spacings. Requires: sizes are at least 1/16.
 inline std::int32_t LengthInSizes(std::int32_t length, float from_size, float to_size) {
   return static_cast<std::int32_t>(static_cast<float>(length) * (2 / (from_size + to_size)));
 }
@@ -77,12 +77,12 @@ struct PeriodicRing {
 
   std::ptrdiff_t count, margin;
   std::int32_t *x, *y;         ///< Position relative to the origin of the world, in units.
-  std::int32_t* arc;           ///< Arc length up to the vertex, in units, with own sizes divided by
-                               ///< the local size. It does not repeat in the margins; it continues.
+  std::int32_t* arc;           ///< Arc length up to the vertex, in units; divided by the local size
+                               ///< if sizes differ. Does not repeat in the margins, but continues.
   float *normal_x, *normal_y;  ///< Unit, outward.
   float *next_x, *next_y;      ///< Scratch: next normals; later next_x: variances of supports.
-  float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells; with
-                  ///< own sizes divided by the local size.
+  float* weight;  ///< l: half the arc length of the two segments at the vertex, in cells; divided
+                  ///< by the local size if sizes differ.
   float* base;    ///< Shift of the vertex's plane along the normal, in cells.
   float* shift;   ///< Scratch of the steps; margins are not set.
 

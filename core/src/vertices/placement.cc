@@ -11,7 +11,7 @@ int CornerOf(const Segment& segment) {
   return ((segment.entry + 1) & 3) == segment.exit ? segment.exit : segment.entry;
 }
 
-// In cells.
+// SnapToAxes sets coordinates nearer to 0 than this, in cells, to 0.
 constexpr double kAxisReach = 0x1p-96;
 
 }  // namespace

@@ -8,7 +8,7 @@
 
 namespace partiemc {
 
-/// Distance between clamped vertices and the sides of their cells, in cells. With this distance,
+/// Least distance between clamped vertices and the sides of their cells, in cells. With this limit,
 /// rounding to world coordinates neither joins neighbouring vertices nor moves one across a side.
 inline constexpr double kCellMargin = 1.0 / 1024;
 
@@ -16,8 +16,9 @@ inline constexpr double kCellMargin = 1.0 / 1024;
 /// ones. `coordinates` and `cell_size` are in world units.
 void SnapToAxes(double cell_size, std::span<double> coordinates);
 
-/// Moves a point of a saddle cell into the half of the cell that belongs to `segment`. `point` is
-/// in cells relative to the cell, at least kCellMargin away from its sides.
+/// Moves a point of a saddle cell into the half of the cell that belongs to `segment`: the half
+/// with the corner that the segment cuts off. `point` is in cells relative to the cell, at least
+/// kCellMargin away from the sides of the cell.
 Point ClampToHalf(const Segment& segment, Point point);
 
 /// Moves `point`, in cells from the origin of the world, into `cell`, at least kCellMargin away

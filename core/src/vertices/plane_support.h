@@ -12,12 +12,13 @@ namespace partiemc {
 
 /// Selects and weighs the particles that support a plane. A particle supports a plane if it is
 /// nearer to the plane's point than `radius`, and less than `height` above the plane. With the
-/// height u above the bent plane, its weight is B(distance, radius) max(0, u / spacing + depth)^8.
-/// Here B(d, r) = max(0, 1 - d^2 / r^2)^2. Lengths are in cells.
+/// height u above the bent plane, the particle's weight is the product of B(distance, radius) and
+/// max(0, u / spacing + depth)^8. Here B(d, r) = max(0, 1 - d^2 / r^2)^2. Lengths are in cells.
 ///
 /// If sizes differ, all distances are divided by the plane's size. The height of a particle is then
-/// the height of its boundary, half its size above its centre, less half a spacing. Its size over
-/// the plane's is a factor of its weight, because a large particle covers more of the boundary.
+/// the height of its boundary, half its size above its centre, less half a spacing. The weight has
+/// the further factor particle's size / plane's size, because a large particle covers more of the
+/// boundary.
 struct SupportShape {
   double radius;
   /// Half a spacing if sizes differ, else 0. Heights of boundaries differ from heights of centres

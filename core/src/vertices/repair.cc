@@ -9,7 +9,7 @@
 namespace partiemc {
 namespace {
 
-// Rounds in which points move half way only.
+// In this number of rounds, the ends of touching segments move only half way to their roots.
 constexpr int kGentleRounds = 4;
 
 // After this number of rounds all points return at once, because adversarial frames could need a
@@ -66,8 +66,9 @@ void FindMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   }
 }
 
-// Marks the misplaced rings, and the rings whose boxes begin before them and hold their leftmost
-// points. Marks all rings if many are misplaced, because each one is compared with all rings.
+// Marks each misplaced ring and the rings that may surround it: their boxes begin farther left and
+// hold its leftmost point. Marks all rings if many are misplaced, because each misplaced ring is
+// compared with all rings.
 void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
   if (scratch.misplaced.size() > kMostMisplaced) {
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});

@@ -26,8 +26,9 @@ struct RepairScratch {
 ///
 /// If segments cross or touch, a round moves their ends, and the points next to these, half way
 /// back; from the fifth round on all the way. Without such segments, misplaced rings return as a
-/// whole, with the rings around them. A ring is misplaced if it is turned inside out, or if another
-/// ring has passed over it. Ordinary frames need no round. After 24 rounds, all points return.
+/// whole, with the rings that may surround them; all rings return if more than 100 are misplaced. A
+/// ring is misplaced if it is turned inside out, or if another ring has passed over it. Ordinary
+/// frames need no round. After 24 rounds, or if a round would move no point, all points return.
 ///
 /// Returns false if rings cross or are misplaced with every point at its root. This is a bug,
 /// because rings through the roots are simple and nested (core/METHOD.md, "Why rings are simple";

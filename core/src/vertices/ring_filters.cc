@@ -45,10 +45,10 @@ HWY_INLINE Vector CellsBetween(hn::Vec<Units> from, const std::int32_t* to) {
   return hn::Mul(hn::ConvertTo(d, units), hn::Set(d, static_cast<float>(1 / kRingUnitsPerCell)));
 }
 
-// Processes the vertices [begin, end) in blocks. For each block, calls start(first vertex). Then
-// calls add(j, w) for each offset at which a vertex of the block has a neighbour in its window, and
-// finish(block) at the end. Index j is the neighbour of the first vertex, w has the weight of each
-// vertex's neighbour, 0 beyond its window.
+// Processes the vertices [begin, end) in blocks. For each block, calls start(first), with the first
+// vertex of the block. Then calls add(j, w) for each offset j - first at which a vertex of the
+// block has a neighbour in its window, and finish(block) at the end. Lane k of w is the weight of
+// vertex j + k for vertex first + k, 0 beyond the window.
 template <typename Start, typename Add, typename Finish>
 HWY_INLINE void ForEachWindow(const PeriodicRing& ring, std::ptrdiff_t begin, std::ptrdiff_t end,
                               double reach, Start start, Add add, Finish finish) {

@@ -8,13 +8,13 @@
 
 namespace partiemc {
 
-/// Calls `visit` for each free stretch of a ring that meets walls. `vertices.stretch` then has the
-/// stretch's vertices, without contacts. At both ends follow points on the curve of the contact
-/// (contact_curve.h), from the wall to `reach` cells beyond it. If a contact has no curve, the
-/// stretch ends at its last vertex. Skips stretches with fewer than three points.
+/// Calls `visit` for each free stretch of a ring that meets walls: a part between two contacts with
+/// walls. `vertices.stretch` then has the stretch's vertices, without contacts. Points on the curve
+/// of a contact (contact_curve.h) extend each end, from the wall to `reach` cells beyond the wall.
+/// An end whose contact has no curve is not extended. Skips stretches with fewer than three points.
 ///
-/// First moves the vertices below the fitted part of a curve, and their normals, onto the curve:
-/// kernels near a wall see no particles beyond it.
+/// Before `visit`, moves the vertices between a contact and the fitted part of its curve, and their
+/// normals, onto the curve: kernels near a wall see no particles beyond the wall.
 void ForEachStretch(const VertexInput& input, std::size_t ring, double reach,
                     RingVertices& vertices, absl::FunctionRef<void()> visit);
 

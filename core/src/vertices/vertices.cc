@@ -197,7 +197,7 @@ void PlaceRings(const VertexInput& input, VertexScratch& scratch, PlacedVertices
     if (outer != kNoRing) outer = placed.kept_as[outer];
   }
   MeasureRings(rings);
-  // Other rings do not cross, so only Validate counts.
+  // The rings of the other placements are simple, so only Validate counts their touching pairs.
   if (!traits.takes_particles) return;
   placed.self_intersections = CountTouchingPairs(rings.points, rings.offsets, scratch.repair.pairs);
 }

@@ -47,7 +47,7 @@ struct VertexNormal {
 
 /// A point of a free stretch between walls, or of its continuation beyond a wall.
 struct StretchPoint {
-  Point point;  ///< As RingVertices::point.
+  Point point;  ///< In cells from the origin of the world.
   VertexNormal normal;
   std::size_t vertex;  ///< Index in RingVertices; kNoVertex beyond a wall.
 };
@@ -66,7 +66,7 @@ struct RingVertices {
   WallVertices walls;
   std::vector<std::uint8_t> meets_wall;  ///< By ring; unused without walls.
   std::vector<StretchPoint> stretch;     ///< Scratch of the stretches between walls.
-  std::vector<Point> stretch_path;       ///< The same.
+  std::vector<Point> stretch_path;       ///< Scratch: the points of `stretch`, there and back.
 
   double SizeOf(std::size_t vertex) const { return size.empty() ? 1.0 : double{size[vertex]}; }
 
@@ -115,7 +115,7 @@ struct VertexInput {
 ///
 /// The rings of marching-squares and qef are simple because each vertex stays in its cell or on its
 /// edge (core/METHOD.md, "Why rings are simple"). Vertices of virtual-plane may leave their cells;
-/// its repair makes rings simple. farthest-particle drops consecutive equal vertices, and then
+/// the repair makes the rings simple. farthest-particle drops consecutive equal vertices, and then
 /// rings with fewer than three points.
 ///
 /// `area_offset`, used by virtual-plane only, is the offset of the last frame and becomes the

@@ -175,7 +175,7 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   return size;
 }
 
-// The local size at a vertex of a run; walls exclude own sizes.
+// The local size at a vertex of a run; 1 on an OpenRun, because sizes are equal if there are walls.
 template <typename Run>
 double SizeAt(const RingVertices& v, const Run& run, std::ptrdiff_t k) {
   return Run::kHasOnlyVertices ? v.SizeOf(run.VertexAt(k)) : 1.0;
@@ -271,8 +271,8 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 
 // Step 3: computes the shift `base` of each vertex's plane along its normal. The mean of the
 // estimates along the ring is subtracted: it depends on the arrangement of the particles, not on
-// the shape. A larger variance of the supporting particles reduces the weight of the estimates.
-// Estimates, their mean and `shift` are divided by the local size.
+// the shape. A larger variance of the supporting particles' heights reduces the weight of the
+// estimates. Estimates, their mean and `shift` are divided by the local size.
 template <typename Run>
 void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
                  const RingVertices& v) {

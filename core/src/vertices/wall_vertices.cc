@@ -85,7 +85,8 @@ class WallVertexFinder {
     return out < 0 || in >= 0 || above / (above - below) <= in / (in - out);
   }
 
-  // Where the edge, from its inside node on, first meets a wall.
+  // Where the edge, from its inside node on, first meets a wall; if no line near the tile crosses
+  // the edge, the place nearest to the outside node.
   WallPlace PlaceOn(std::uint32_t tile, const CrossedEdge& edge) const {
     const Point way = Minus(edge.to, edge.from);
     std::optional<WallPlace> place;
@@ -150,8 +151,9 @@ class WallVertexFinder {
                     input_.crossings.segments[input_.topology.segments[segment]], v_.point[vertex]);
   }
 
-  // The sharpest corner of the walls in a cell that is not at `a` or `b`, the edge vertices of the
-  // cell. Without one, the place nearest to the middle between them.
+  // The sharpest corner of the walls in a cell that is behind no wall and not at `a` or `b`, the
+  // edge vertices of the cell. Without such a corner, the place nearest to the middle of `a` and
+  // `b`.
   WallPlace PlaceInCell(const ActiveCell& cell, const Point& a, const Point& b) const {
     constexpr std::size_t kMostLines = 16;  // Crossings of further lines are not found.
     const Point origin = CellOrigin(input_.bins.tiles, cell);
@@ -203,8 +205,8 @@ class WallVertexFinder {
     if (is_on(a, on_a) && is_on(b, on_b)) consider(WallPlace{of_a, on_a}, a, b);
   }
 
-  // In a corner of a tank, a few vertices of the fluid's outline may be just off the walls. They
-  // become vertices on walls, and so do the contacts at their ends.
+  // In a corner of a tank, a few vertices of the fluid's outline may be just off the walls. Makes
+  // these vertices, and the contacts before and after them, vertices on walls.
   void WetShortStretches(std::size_t first, std::size_t last) {
     const std::size_t count = last - first;
     const auto at = [&](std::size_t k) { return first + k % count; };

@@ -22,11 +22,13 @@ struct WallCornerScratch {
   std::vector<std::uint32_t> offsets;
 };
 
-/// The field rounds corners by about .8 h. An arm is the part of a ring from 1.5 to 4.5 h away from
-/// a point. If both arms are straight and differ by more than 30 degrees, their lines meet in a
-/// corner, which replaces the points between the arms. Arms that bend by more than a seventh of the
-/// turn are part of a curve, which stays. Changes only the points and offsets of `rings`.
-/// `spacing`: h in world units. Cost: near-linear in the points.
+/// Replaces rounded parts of rings by corners, because the field rounds corners by about .8 h. An
+/// arm is the part of a ring from 1.5 to 4.5 h before or after a point. If both arms are straight
+/// and differ by more than 30 degrees, their lines meet in a corner. The corner replaces the points
+/// between the arms if it is less than 1.5 h away from the point. Arms that bend by more than a
+/// seventh of the turn are part of a curve, which stays. Rings of at most 9 h stay. Changes only
+/// the points and offsets of `rings`. `spacing`: the particle spacing h in world units. Cost:
+/// near-linear in the points.
 void SharpenCorners(double spacing, WallCornerScratch& scratch, Rings& rings);
 
 }  // namespace partiemc

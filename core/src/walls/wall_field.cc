@@ -138,7 +138,8 @@ BitRows SolidNodes(const WallLines& lines, std::span<const std::uint32_t> edges,
   return rows;
 }
 
-// Lowers the distances of the nodes of a tile to a line.
+// Lowers `distance` of each node of a tile to the node's distance from a line, if that is smaller.
+// Skips nodes that are farther than WallField::kMostHeight from the line's bounding box.
 void MeasureDistances(const WallLines& lines, std::uint32_t edge, const Point& origin,
                       std::array<float, kTileNodes>& distance) {
   const WallEdge& line = lines.edges()[edge];

@@ -43,8 +43,8 @@ class WallField {
   /// tiles, and in the product of tiles and long lines.
   void FindTiles(const TileDirectory& directory);
 
-  /// Replaces F at the nodes of the tiles near walls and in solids. Parallel over tiles. Cost:
-  /// linear in these nodes, near walls times the lines near their tiles.
+  /// Replaces F, and the bits of inside nodes, in the tiles near walls and in solids. Parallel over
+  /// tiles. Cost: linear in the nodes of these tiles, near walls times the lines near their tiles.
   void Apply(const TileDirectory& directory, double spacing, LevelSet& level_set);
 
   const WallLines& lines() const { return lines_; }

@@ -19,7 +19,7 @@ struct WallEdge {
   Point unit;             ///< Its direction.
   double length = 0;      ///< In cells.
   double start = 0;       ///< Length of the loop up to `from`, in cells.
-  double share_size = 0;  ///< Length that counts along the loop, in cells.
+  double share_size = 0;  ///< Length that counts along the loop, in cells; limited for long lines.
   std::uint32_t loop = 0, solid = 0;
   bool is_endless = false;  ///< The only line of its loop, and not limited to the two points.
 
@@ -73,7 +73,8 @@ class WallLines {
   Point At(const WallPlace& place) const;
   Point InWorld(const WallPlace& place) const;
 
-  /// The length of the loop up to a place, in cells. Lines far from the window count as shorter.
+  /// The length of the loop up to a place, in cells. Long lines outside of the window count as
+  /// shorter (WallEdge::share_size).
   double Along(const WallPlace& place) const {
     const WallEdge& edge = edges_[place.edge];
     return edge.start + place.share * edge.share_size;
@@ -84,13 +85,13 @@ class WallLines {
   /// The place of a loop at a length. Cost: the logarithm of its lines.
   WallPlace PlaceAt(std::size_t loop, double along) const;
 
-  /// The place on one line nearest to a point, and the signed distance.
+  /// The place on one line nearest to a point, and the distance, negative to the right of the line.
   NearestWall NearestOn(std::uint32_t edge, const Point& point) const;
   /// The nearest place on some lines. If a corner is nearest, two lines are equally near; the line
   /// whose endless extension is farther from the point counts. Cost: linear in the lines.
   NearestWall Nearest(std::span<const std::uint32_t> edges, const Point& point) const;
-  /// The same on the part of a loop within `reach` cells along it from a place. Cost: linear in its
-  /// lines there.
+  /// The place nearest to `point` on the part of a loop within `reach` cells of `place`, measured
+  /// along the loop, with ties as in Nearest. Cost: linear in the lines of this part.
   NearestWall NearestAlong(const WallPlace& place, double reach, const Point& point) const;
 
   /// Whether a point is in the solid of an endless line, or on the line.

@@ -40,8 +40,9 @@ enum {
 
 /* Describes this thread's last call that returned a partiemc_code; PARTIEMC_OK if it succeeded.
  * Strings are never NULL and stay valid until the thread's next call. An error of partiemc_send
- * with a `reason` refuses only that frame, and the stream continues. An error without a reason has
- * ended the stream. proto/PROTOCOL.md lists the reasons. */
+ * with a `reason` refuses only that frame, and the stream continues. After an error of
+ * partiemc_send without a reason the stream has ended, except for FAILED_PRECONDITION after
+ * partiemc_finish. proto/PROTOCOL.md lists the reasons. */
 typedef struct partiemc_error {
   partiemc_code code;
   const char* message; /* One line for people. */
@@ -95,12 +96,12 @@ typedef struct partiemc_options {
   const char* token;      /* The token itself, instead of a file. */
   double connect_timeout; /* Seconds to reach the server; 0: 2. Of the times only `give_up_after`
                              may be negative. */
-  double deadline;        /* Seconds for each response; 0: 30. */
-  double give_up_after;   /* Seconds to reconnect before the stream ends; 0: 300, with `latest`
-                             30. Negative: do not reconnect. */
-  /* Seconds that partiemc_send waits for a slot in the window, below `deadline`. Then the frame is
-   * refused (SEND_TIMEOUT), and the stream continues. 0: waits for `deadline`, after a loss
-   * `give_up_after` longer; then the stream ends. In process 0 means no limit. */
+  double deadline; /* Seconds for a server to accept the stream, and for each response; 0: 30. */
+  double give_up_after; /* Seconds to reconnect before the stream ends; 0: 300, with `latest`
+                           30. Negative: do not reconnect. */
+  /* Longest wait of partiemc_send for a slot in the window, in seconds. Then the frame is refused
+   * (SEND_TIMEOUT), and the stream continues. 0 or more than `deadline`: the stream ends after
+   * `deadline`, while the connection is lost `give_up_after` later. Ignored in process. */
   double send_timeout;
   /* For a simulator with several processes. Each opens a stream with the same `name` and sends its
    * particles of every frame, even if it has none. Part 0 receives the results, the other parts
@@ -146,14 +147,16 @@ typedef struct partiemc_options {
                               float64. NULL: float64. */
   const double* box; /* Six numbers: lower end and length of a periodic box along x, y and z; length
                         0: the axis is not periodic. A body that crosses a face is one body; an
-                        outline or surface that reaches its image is cut there. NULL: no box. */
+                        outline or surface that reaches its own periodic image is cut at the face.
+                        NULL: no box. */
   int32_t wrap;      /* 1: every outline or surface is cut at the faces of the box. */
   const char* sizes; /* "equal", or "own": each particle has the size sqrt(volume), for a surface
                         cbrt(volume). NULL: equal. */
   const char* boundary; /* "bulk", or "grains" with own sizes: particles are discs of the diameter
                            sqrt(volume), and the outline follows their surfaces. NULL: bulk. */
-  /* Outlines of these phases, after `sections`: they divide the outline of all particles and share
-   * the points of their interfaces. At most 16 with the sections. */
+  /* Phases whose outlines are additional sections of each result (partiemc_event_section), numbered
+   * after `sections`. The outlines divide the outline of all particles and share the points of
+   * their interfaces. At most 16 phases and sections together. */
   const int32_t* phases;
   size_t phase_count;
   const char* phase_attribute; /* The attribute with the phase of each particle. NULL: "phase". */
@@ -280,7 +283,7 @@ typedef struct partiemc_ring {
 
 enum {
   PARTIEMC_RESULT = 0,      /* Outline and mesh, or surface, of frame `sequence`. */
-  PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and left no trace. */
+  PARTIEMC_REFUSAL = 1,     /* Frame `sequence` broke a rule and changed nothing. */
   PARTIEMC_NOTICE = 2,      /* A notice from the server in `message`. */
   PARTIEMC_NOTHING_YET = 3, /* No event within the time to wait. */
   PARTIEMC_END = 4,         /* After partiemc_finish: every frame has been answered. */
@@ -311,7 +314,7 @@ typedef struct partiemc_surface {
   const uint32_t* triangle_offsets; /* The same for triangles. */
   const uint32_t* outer_of; /* shell_count: a cavity's outer shell, otherwise PARTIEMC_NO_SHELL. */
   const partiemc_shell* shells; /* shell_count. */
-  /* Identities of the shells of the frame before that shell k continues:
+  /* Identities, in the previous frame, of the shells that shell k continues:
    * parents[parent_offsets[k]] to, not including, parents[parent_offsets[k + 1]]. NULL if shells
    * are not tracked. */
   const uint64_t* parents;
@@ -378,10 +381,11 @@ typedef struct partiemc_event {
   const uint32_t* cuts;
   uint64_t cut_bodies; /* Number of bodies that were cut. */
 
-  /* With `walls`: wetted_count points, ascending, whose segment to the next point of the ring lies
-   * on a wall; contact_count points, ascending, where an outline meets a wall, and the angle of the
-   * fluid at each, between the wall and the outline, in radians. Contacts of a phase are
-   * the points where it meets two other phases, or one and the outside, with its angles. */
+  /* With `walls` or `wall_phases`: wetted_count points, ascending, whose segment to the next point
+   * of the ring lies on a wall; contact_count points, ascending, where an outline meets a wall, and
+   * the angle of the fluid at each, between the wall and the outline, in radians. In the outline of
+   * a phase, contacts are the points where the phase meets two other phases, or one other phase and
+   * the outside, and the angles are those of the phase. */
   size_t wetted_count;
   const uint32_t* wetted;
   size_t contact_count;
@@ -397,12 +401,13 @@ partiemc_code partiemc_receive(partiemc_stream* stream, double wait, partiemc_ev
 
 /* Fills `event` with section `index` of the stream's last event, which must be a result. `event` is
  * then a result with one outline; `milliseconds` is 0. Its pointers are valid as long as those of
- * the last event. Errors: INVALID_ARGUMENT unless `index` is below section_count. */
+ * the last event. Errors: INVALID_ARGUMENT if the last event is no result, or `index` is not below
+ * its section_count. */
 partiemc_code partiemc_event_section(partiemc_stream* stream, size_t index, partiemc_event* event);
 
-/* Sends a frame and waits for its result or refusal. For programs with one thread. Errors: see
- * partiemc_send and partiemc_receive; FAILED_PRECONDITION with `latest`, or while earlier frames
- * are in flight. */
+/* Sends a frame and waits for its result or refusal; in a part other than 0, for
+ * PARTIEMC_PART_TAKEN or a refusal. For programs with one thread. Errors: see partiemc_send and
+ * partiemc_receive; FAILED_PRECONDITION with `latest`, or while earlier frames are in flight. */
 partiemc_code partiemc_reconstruct(partiemc_stream* stream, const partiemc_particles* particles,
                                    double time, partiemc_event* event);
 

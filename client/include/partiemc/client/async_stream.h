@@ -43,10 +43,10 @@ class AsyncStream {
   std::future<Answer> Send(const Frame& frame, double time);
   std::future<Answer> SendArrays(const ParticleArrays& particles, double time);
 
-  /// Sends like the methods above, but passes the answer to `answered`, which is called once. It is
-  /// called on the receiving thread, in the order of the frames, or before Send returns if the
-  /// stream does not accept the frame. Until `answered` returns, later answers wait. `answered`
-  /// must not call this object.
+  /// Sends like the methods above, but passes the answer to `answered`, which is called once. The
+  /// receiving thread makes the call, in the order of the frames. If the stream does not accept the
+  /// frame, Send makes the call before it returns. Until `answered` returns, later answers wait.
+  /// `answered` must not call this object.
   void Send(const Frame& frame, double time, Answered answered);
   void SendArrays(const ParticleArrays& particles, double time, Answered answered);
 

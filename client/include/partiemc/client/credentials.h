@@ -25,9 +25,9 @@ struct Credentials {
   std::string token_file = {};
 };
 
-/// Reads PARTIEMC_TLS (0, false, no, off or empty: disabled), PARTIEMC_TLS_CA, PARTIEMC_TLS_CERT,
-/// PARTIEMC_TLS_KEY, PARTIEMC_TOKEN and PARTIEMC_TOKEN_FILE, like the command line. Each of the
-/// three files enables TLS.
+/// Reads PARTIEMC_TLS (empty, 0, false, f, no, n, off or disable: disabled), PARTIEMC_TLS_CA,
+/// PARTIEMC_TLS_CERT, PARTIEMC_TLS_KEY, PARTIEMC_TOKEN and PARTIEMC_TOKEN_FILE, like the command
+/// line. Each of the three files enables TLS.
 Credentials CredentialsFromEnvironment();
 
 /// The value of PARTIEMC_SERVER; 127.0.0.1:50051 if it is not set.

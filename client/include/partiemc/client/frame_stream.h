@@ -35,7 +35,7 @@ struct FrameTimes {
 struct FrameResult {
   Result result;  ///< Outputs that were not requested are empty.
   FrameTimes times;
-  // Digests of the geometry in float64, for any Outputs:
+  // Digests of the geometry in float64. They do not depend on Outputs:
   std::uint64_t rings_digest = 0;                    ///< DigestRings.
   std::uint64_t mesh_digest = 0;                     ///< DigestMesh.
   std::uint64_t surface_digest = 0;                  ///< DigestSurface.
@@ -48,7 +48,8 @@ struct Event {
   enum class Kind : std::uint8_t {
     kResult,   ///< `frame` holds the result of frame `sequence`.
     kRefusal,  ///< Frame `sequence` broke `violation` and changed nothing. The stream continues.
-    kNotice,   ///< `message` is a notice from the server, for example that it drains.
+    kNotice,   ///< `message` is a notice from the server, for example that it drains. Delivered
+               ///< only by streams that do not reconnect.
     kReconnected,  ///< The stream continues after the loss that `message` describes. Nothing is
                    ///< missing.
     kPartTaken,    ///< A part of frame `sequence` was accepted. Part 0 receives the result.
@@ -88,7 +89,8 @@ struct Reconnecting {
 enum class Received : std::uint8_t {
   kEvent,       ///< The event was filled.
   kNothingYet,  ///< `wait` has passed without an event.
-  kEnd,         ///< After FinishSending: every frame has been answered.
+  kEnd,         ///< Stream: after FinishSending, every frame has been answered. Watcher: the watch
+                ///< has ended.
 };
 
 class FrameStream {
@@ -126,7 +128,8 @@ class FrameStream {
   /// Number of frames sent whose answer has not been received.
   virtual std::size_t InFlight() const = 0;
 
-  /// Ends the stream at once: current and later calls return CANCELLED.
+  /// Ends the stream at once: current and later calls return CANCELLED. If the stream had already
+  /// ended with an error, calls return this error.
   virtual void Cancel() = 0;
 };
 

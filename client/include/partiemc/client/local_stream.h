@@ -16,7 +16,7 @@ struct LocalStreamOptions {
   ReconstructionParameters parameters = {};
   std::vector<std::string> attributes = {};  ///< As Outputs::attributes (stream.h).
   FrameLimits limits = {};
-  /// Compute threads, at least 1; 0: one per processor.
+  /// Number of compute threads; 0 or less: one per processor.
   int threads = 0;
   /// Maximum number of frames that wait or are being computed, at least 1. With 2, the caller can
   /// read the next frame while the current one is computed.

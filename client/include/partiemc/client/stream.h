@@ -60,9 +60,9 @@ inline constexpr std::chrono::seconds kShortPatience{30};
 
 /// How a stream reconnects after it lost its connection or its server.
 struct ReconnectPolicy {
-  /// Maximum time to reconnect, after which the stream ends with an error. The time starts at the
-  /// detection of a loss, within 10 s. Losses before the next new result count as one loss. 0: do
-  /// not reconnect.
+  /// Maximum time to reconnect, after which the stream ends with an error. The time starts when the
+  /// loss is detected, which takes at most 10 s. Further losses before the next new result do not
+  /// restart the time. 0: do not reconnect.
   std::chrono::milliseconds give_up_after{kPatience};
   /// Each address is first tried once without a pause. Then a pause precedes each round over the
   /// addresses: `first_pause`, doubled in each round up to `longest_pause`. Up to half of each
@@ -121,7 +121,8 @@ struct StreamOptions {
   std::uint32_t checkpoint_interval = 4;
   ReconnectPolicy reconnect = {};
   /// Settings for frames in parts; they require a name. Each part sets its own credentials,
-  /// addresses and times. All other options are read from part 0 only.
+  /// addresses and times. The server reads parameters, outputs, labels and `checkpoint_interval`
+  /// from part 0 only.
   FrameParts parts = {};
   /// Maximum total bytes of the frames held for resending (up to `checkpoint_interval` frames plus
   /// the window). Send waits until responses free memory. A frame that does not fit after all
@@ -129,9 +130,9 @@ struct StreamOptions {
   std::uint64_t max_held_bytes = std::uint64_t{1} << 30;
 };
 
-/// Never drops frames: Send waits while the server's window is full. A frame above the server's
-/// limits is refused before anything is sent. Responses are read in the background, so the sender
-/// waits for the receiver only while the window is full.
+/// Never drops frames: Send waits while the server's window is full. A frame with more particles or
+/// bytes than the server allows is refused before anything is sent. Responses are read in the
+/// background, so the sender waits for the receiver only while the window is full.
 ///
 /// Survives the loss of its connection and its server: Receive reconnects, beginning with the next
 /// address, and resumes from the last checkpoint. Every frame is still answered once, in order,

@@ -38,8 +38,8 @@ struct WatcherOptions {
   std::uint32_t credits = 2;
   /// First frame to receive: this sequence number, or the oldest frame of the server's history if
   /// that is newer. In either mode, frames of the history come in order and without gaps; live
-  /// frames follow. If the whole history is older, only live frames are received. Absent: starts
-  /// with the newest frame.
+  /// frames follow. If the whole history is older than this number, only live frames are received.
+  /// Absent: starts with the newest frame.
   std::optional<std::uint64_t> from_sequence = {};
   /// For streams of surfaces: receive simplified surfaces. Absent: exact ones. Servers without the
   /// capability "surface-levels" send exact ones, too.
@@ -97,13 +97,13 @@ struct WatchedFrame {
   std::vector<AttributeValues> particle_attributes;
   /// The periodic box of the frame, along the axes of `particles`. Absent without particles.
   std::optional<PeriodicBox> particle_box;
-  std::uint64_t dropped = 0;  ///< Frames dropped since the previous one.
+  std::uint64_t dropped = 0;  ///< Frames dropped since the previous received frame.
   /// Set for the first frame after a loss: one line with the lost address, the cause, the address
   /// where the watch continues, and the duration. Otherwise empty.
   std::string rejoined;
   /// Set together with `rejoined`: number of sequence numbers between the previous frame and this
   /// one. They belong to missed results and to refused frames. `dropped` is then 0. Without a
-  /// previous frame, `gap` is 0 and `dropped` counts.
+  /// previous frame, `gap` is 0 and `dropped` counts the dropped frames.
   std::uint64_t gap = 0;
   /// The oldest frame that WatcherOptions::from_sequence could request when this one was sent; 0 if
   /// the server has no histories.
@@ -149,7 +149,8 @@ class Watcher {
   /// Set while the watch looks for its stream after a loss. Receiver's thread only.
   virtual std::optional<Reconnecting> reconnecting() const { return std::nullopt; }
 
-  /// Ends the watch at once: current and later calls return CANCELLED.
+  /// Ends the watch at once: current and later calls return CANCELLED. If Receive has already
+  /// reported the end of the watch, later calls report the same end.
   virtual void Cancel() = 0;
 };
 

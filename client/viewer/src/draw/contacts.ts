@@ -8,7 +8,7 @@ export interface ContactMark { x: number; y: number; text: string }
 const MOST_TEXTS = 24;
 const MOST_MARKS = 1000;
 
-/** The contacts in a picture. The text is the angle in degrees; empty if there are more than MOST_TEXTS contacts. */
+/** The first MOST_MARKS contacts in the picture. Texts are angles in degrees; all are empty above MOST_TEXTS marks. */
 export function contactMarks({ rings, origin }: Frame, view: View, size: Size): ContactMark[] {
   const marks: ContactMark[] = [];
   rings.contacts.forEach((point, k) => {

@@ -8,7 +8,7 @@ const SAMPLES = 16;
  * Finds outer rings of a later frame that continue the `chosen` rings of an earlier frame under
  * another identity. Used if frames in between were missed, so that parents are unknown. A vanished
  * ring continues in the ring that covers its position. A new ring continues the ring at whose
- * position it lies. At least half of a ring's samples must agree.
+ * position it lies. At least half of the SAMPLES vertices compared must lie in the other ring.
  */
 export function continuations(before: Frame, chosen: readonly number[], after: Frame): number[] {
   const surviving = new Set(after.rings.identities);

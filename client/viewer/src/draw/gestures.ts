@@ -1,6 +1,6 @@
 /** The effects of gestures on a canvas. All lengths are in CSS pixels. */
 export interface Gestures {
-  /** A pointer is pressed. False ignores it. */
+  /** A pointer is pressed. If this returns false, the pointer is ignored until it is pressed again. */
   press(event: PointerEvent): boolean;
   /** The pressed pointer, or the middle of two fingers (`hasTwo`), has moved by this distance. */
   drag(right: number, down: number, hasTwo: boolean): void;
@@ -12,7 +12,7 @@ export interface Gestures {
 
 /** Exponent of the zoom per CSS pixel of the wheel. A notch of 100 pixels zooms by 1.22. */
 const WHEEL_RATE = 0.002;
-/** The same for a pinch on a touchpad, which arrives as a wheel event with Ctrl. */
+/** Exponent of the zoom per pixel of a pinch on a touchpad, which arrives as a wheel event with Ctrl. */
 const PINCH_RATE = 0.01;
 const LINE_PIXELS = 16;
 const PAGE_PIXELS = 400;

@@ -2,7 +2,7 @@ import { NO_RING, type Rings } from '../protocol/frame';
 
 const SEGMENTS_PER_BUCKET = 4;
 const MOST_BUCKETS = 8192;
-/** Limit on bucket entries per segment. Above it, fewer buckets are used. Bounds the memory. */
+/** Limit on the mean number of bucket entries per segment, to bound the memory. Above it, fewer buckets are used. */
 const MOST_ENTRIES = 8;
 
 /**
@@ -67,7 +67,7 @@ export class RingIndex {
     return inner !== null && this.rings.outerOf[inner] === NO_RING ? inner : null;
   }
 
-  /** The smallest ring around a position, by counting its segments to the right. */
+  /** Of the rings around a position, the one with the smallest area, or null. Counts crossings to the right. */
   innermost(x: number, y: number): number | null {
     const { points, area } = this.rings;
     const around = new Set<number>();

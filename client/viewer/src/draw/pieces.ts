@@ -34,7 +34,7 @@ export function pieceTints(
   return pieces;
 }
 
-/** For each point, the smallest point in its connected component. */
+/** For each point, the smallest index of a point in its connected component. */
 function piecesOf(count: number, triangles: Uint32Array): Uint32Array {
   const parent = new Uint32Array(count);
   for (let k = 0; k < count; ++k) parent[k] = k;

@@ -61,8 +61,8 @@ export function shareOf({ min, max }: Range, value: number): number {
 
 /**
  * The range of the colours. `all`: the range of the numbers. `from` and `to`: the chosen ends; null: as
- * of `all`. If a chosen end is beyond all numbers, the other end moves beyond it, so that all numbers
- * have the colour of the nearer end.
+ * of `all`. If the only chosen end is beyond all numbers, the other end moves beyond it, so that all
+ * numbers have the colour of the nearer end. If both are chosen and `from` is not below `to`: `all`.
  */
 export function chosenRange(all: Range, from: number | null, to: number | null): Range {
   const width = all.max - all.min || 1;
@@ -83,7 +83,7 @@ export function rangeOf(values: Float32Array): Range | null {
   return min <= max ? { min, max } : null;
 }
 
-/** A range with the finite numbers of more values. Null: a range without numbers. */
+/** `range`, extended by the finite numbers of `values`. A null range has no numbers. */
 export function widened(range: Range | null, values: Float32Array): Range | null {
   const more = rangeOf(values);
   if (!range || !more) return range ?? more;

@@ -103,7 +103,7 @@ export class Scene {
     this.prepare();
   }
 
-  /** Fits the view to the frame, unless it is empty. */
+  /** Fits the view to the frame's rings, or to its particles if there are no rings. Without both, keeps the view. */
   fit(): void {
     if (!this.frame) return;
     const { rings, particles, origin } = this.frame;
@@ -188,7 +188,7 @@ export class Scene {
     return chosenRange(this.fixedRange ?? this.range, this.look.from, this.look.to);
   }
 
-  /** The attribute's values: of the mesh (or of the rings, without a mesh), and of the particles. */
+  /** The values of the look's attribute: of the mesh (or of the rings, if no mesh has them), and of the particles. */
   private attributes(): Float32Array[] {
     const name = attributeOf(this.look);
     if (name === null || !this.frame) return [];
@@ -197,7 +197,7 @@ export class Scene {
       .filter((values) => values !== undefined);
   }
 
-  /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
+  /** Adds the frame's numbers to the range, so that a colour keeps its meaning. `restart`: drops the range so far. */
   private widenRange(restart: boolean): void {
     if (restart) this.range = null;
     for (const values of this.attributes()) this.range = widened(this.range, values);

@@ -1,6 +1,6 @@
 /** Sizes of screen and exported pictures, in CSS pixels unless stated otherwise. */
 
-/** Edge between two triangles. */
+/** Width of an edge between two triangles, in CSS pixels. */
 export const EDGE_WIDTH = 1;
 export const EDGE_ALPHA = 0.8;
 
@@ -10,27 +10,27 @@ export const INTERIOR_TINT = 0.34;
 export const EDGE_TINT = 0.8;
 
 export const NORMAL_WIDTH = 1.5;
-/** Length of a normal in spacings; limits in pixels. */
+/** Length of a drawn normal in particle spacings, and its limits in CSS pixels. */
 const NORMAL_SPACINGS = 1.2;
 const SHORTEST_NORMAL = 6;
 const LONGEST_NORMAL = 40;
-/** Smallest distance between drawn normals. */
+/** Smallest distance between drawn normals, in CSS pixels. */
 const NORMAL_GAP = 4;
 
 export const ISOLINE_WIDTH = 1.2;
 
 export const PARTICLE_ALPHA = 0.85;
-/** Diameter of a particle's dot in spacings; limits in pixels. */
+/** Diameter of a particle's dot in particle spacings, and its limits in CSS pixels. */
 const DOT_SPACINGS = 0.4;
 const SMALLEST_DOT = 1.25;
 const LARGEST_DOT = 12;
 
-/** Diameter of a particle's dot, from the spacing in pixels. */
+/** Diameter of a particle's dot, from the spacing of the particles; both in pixels. */
 export function dotDiameter(spacing: number): number {
   return Math.min(Math.max(DOT_SPACINGS * spacing, SMALLEST_DOT), LARGEST_DOT);
 }
 
-/** Length of a normal, from the spacing in pixels. */
+/** Length of a drawn normal, from the spacing of the particles; both in pixels. */
 export function normalLength(spacing: number): number {
   return Math.min(Math.max(NORMAL_SPACINGS * spacing, SHORTEST_NORMAL), LONGEST_NORMAL);
 }

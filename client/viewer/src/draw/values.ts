@@ -3,7 +3,7 @@ import type { Frame } from '../protocol/frame';
 /** A number of the frame at a position. */
 export interface Value { name: string; value: number }
 
-/** Weights of a triangle's corners at a position; null outside. */
+/** Barycentric coordinates of a position in a triangle; null outside it, and for a triangle without area. */
 function weightsAt(ax: number, ay: number, bx: number, by: number, cx: number, cy: number,
                    x: number, y: number): [number, number, number] | null {
   const whole = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);

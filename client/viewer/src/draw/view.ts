@@ -21,7 +21,7 @@ export interface Bounds {
   top: number;
 }
 
-/** Limits of the single precision of shaders, with a margin. */
+/** Limits of View.scale: shaders compute in single precision. */
 const SMALLEST_SCALE = 1e-30;
 const LARGEST_SCALE = 1e30;
 

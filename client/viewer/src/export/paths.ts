@@ -20,7 +20,7 @@ export class Projection {
     return this.top - points[2 * k + 1] * this.scale;
   }
 
-  /** Coordinates in a path. */
+  /** Coordinates of point `k` as text in a path. */
   text(points: Float32Array, k: number): string {
     return `${short(this.x(points, k))} ${short(this.y(points, k))}`;
   }
@@ -55,7 +55,7 @@ export function ringPath(rings: Rings, which: Iterable<number>, at: Projection):
   return path;
 }
 
-/** Path of the rings without their cuts. Rings outside the picture are left out. */
+/** Path of the rings without segments on a face of the periodic box. Rings outside the picture are left out. */
 export function outlinePath(rings: Rings, which: Iterable<number>, at: Projection): string {
   const cuts = new Set(rings.cuts);
   let path = '';

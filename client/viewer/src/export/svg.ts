@@ -14,7 +14,7 @@ import {
   bandPaths, dotPath, edgePaths, normalPath, outlinePath, Projection, ringPath, segmentPaths, short, trianglePaths,
 } from './paths';
 
-/** Colours of an attribute. */
+/** Number of different colours of an attribute. */
 const RAMP_STEPS = 64;
 
 /**
@@ -59,8 +59,8 @@ export function svg(
 }
 
 /**
- * The inside in the colour of the band, with the merged triangles on top as one path, so that no
- * seams appear between triangles.
+ * The inside of the outline in the colour of the band, and on it the merged triangles, one path for each
+ * colour, so that no seams appear. If the mesh has the look's attribute: the mesh in its colours.
  */
 function areas(
   frame: Frame, look: Look, ringColour: (ring: number) => number, range: Range | null,

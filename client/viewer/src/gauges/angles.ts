@@ -65,9 +65,9 @@ function fitSlope(points: readonly Point[]): number {
 interface Contact { place: number; angle: number }
 
 /**
- * One contact point and its angle, by a circle. `points`: coordinates along the wall and heights above it. `reach`:
- * radius of the fit. `rounded`: height below which points are left out. `first`: 1 for the start of the contact, -1 for
- * its end.
+ * One contact point and its angle in degrees, by a circle. `points`: coordinates along the wall and heights above it.
+ * `rounded`: height below which points are left out. `reach`: only points within this distance of the outermost of the
+ * lowest points left are fitted. `first`: 1 for the start of the contact, -1 for its end. NaN without a contact.
  */
 function findContact(points: readonly Point[], reach: number, rounded: number, first: 1 | -1): Contact {
   const none = { place: NaN, angle: NaN };
@@ -89,7 +89,10 @@ function findContact(points: readonly Point[], reach: number, rounded: number, f
   };
 }
 
-/** Start and end angle, start and end of the largest body on the left of a wall. */
+/**
+ * The contact of the largest body with a wall, whose body side is the left of `direction`. Returns the angles at start
+ * and end of the contact, in degrees, then their places along the wall from `origin`. NaN without a contact.
+ */
 export function contactAngles({ largest, spacing }: MeasuredRings, origin: Point, direction: Point, reach: number): number[] {
   if (!largest) return [NaN, NaN, NaN, NaN];
   const length = Math.hypot(...direction);
@@ -101,7 +104,7 @@ export function contactAngles({ largest, spacing }: MeasuredRings, origin: Point
   return [start.angle, end.angle, start.place, end.place];
 }
 
-/** Slopes of the left and the right flank of the largest body. */
+/** Angles of the left and the right flank of the largest body, in degrees; NaN without a flank. */
 export function anglesOfRepose({ largest }: MeasuredRings): number[] {
   if (!largest) return [NaN, NaN];
   let [left, right, base] = [Infinity, -Infinity, Infinity];

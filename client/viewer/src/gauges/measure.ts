@@ -58,7 +58,7 @@ function clipped(polygon: readonly Point[], depth: (point: Point) => number): Po
 /** If a box lies in a hole, the areas of the clipped outer ring and hole cancel, up to this share of both. */
 const ROUNDING = 1e-14;
 
-/** Area and centroid. */
+/** Area of the outline within a box, and its centroid. Without area: 0 and NaN. */
 function areaInBox(rings: readonly Point[][], min: Point, max: Point): number[] {
   // Relative to the middle of the box, so that the sums lose no digits far from the origin.
   const middle: Point = [min[0] + (max[0] - min[0]) / 2, min[1] + (max[1] - min[1]) / 2];

@@ -7,13 +7,13 @@ export interface ColumnPlan {
   velocities: (number | null)[];
   id: number | null;
   volume: number | null;
-  /** All other columns with a name that the server accepts; of equal names the first. */
+  /** The first MOST_SCALARS other columns with a name that the server accepts; of equal names the first. */
   scalars: { name: string; column: number }[];
   /** Positions are fractions of the box (LAMMPS xs, ys, zs). */
   scaled: boolean;
   /** Columns ix iy iz of LAMMPS: how often the particle has crossed the periodic box along each axis. */
   images: (number | null)[];
-  /** The conditions of the request. */
+  /** The conditions of the request, with the columns that they name. */
   conditions: { column: number; condition: Condition }[];
 }
 
@@ -24,7 +24,7 @@ const VELOCITIES = ['v', 'vel', 'velocity', 'velocities'];
 const IDS = ['id', 'ids', 'idp', 'particleid', 'particleids', 'originalid', 'pid', 'gid', 'tag'];
 const VOLUMES = ['volume', 'volumes', 'vol', 'area', 'areas', 'particlevolume', 'particlearea',
   'volumetricmeasure'];
-/** Limit, because every scalar is sent to the server. */
+/** Limit of scalars in a frame, because every scalar is sent to the server. */
 export const MOST_SCALARS = 8;
 /** Names that the server accepts for scalars (core/src/frame/frame_attributes.cc). Columns with other names are not sent. */
 export const SCALAR_NAME = /^[ -~]{1,64}$/;
@@ -56,7 +56,7 @@ const FAMILIES: ((axis: number) => string[])[] = [
   (axis) => [`${AXES[axis]}su`],
 ];
 const FIRST_SCALED_FAMILY = 3;
-/** The families that image flags unwrap: x and xs. The request names positions that stay as they are. */
+/** Families (indices) that image flags unwrap: x and xs. Positions that the request names are not unwrapped. */
 const WRAPPED_FAMILIES = [0, 3];
 
 /** Number of axes with a column. */
@@ -96,7 +96,7 @@ function recognisedPositions(names: string[], given: string[]): PositionPlan {
   throw new FieldError('columns', `No position columns in ${list(given)}. Name the columns of x and y.`);
 }
 
-/** The columns of the request. If their names have axes in rising order (x and z), these are their axes. */
+/** The columns of the request. Their axes follow from their names if these are in rising order (x, z); else x, y, z. */
 function askedPositions(names: string[], given: string[], asked: readonly string[]): PositionPlan {
   if (asked.length !== 2 && asked.length !== 3) {
     throw new FieldError('columns', `Name two or three columns, not ${asked.length}.`);
@@ -140,8 +140,9 @@ export function planNamedColumns(given: string[], request: ColumnRequest = ALL_C
 }
 
 /**
- * Names for the columns of a table without names: x y of two, x y z of three. The request names more
- * of them, by numbers (2,3) or by names in the order of the columns (id,x,y).
+ * Names for the columns of a table without names: x y or x y z if the request names none. If it has
+ * numbers (2,3), the names are 1, 2, 3, ... If it has names (id,x,y), these are of the first columns.
+ * Throws FieldError.
  */
 export function namesOfUnnamed(count: number, request: ColumnRequest): { names: string[]; request: ColumnRequest } {
   const { columns } = request;

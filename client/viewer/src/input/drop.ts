@@ -40,7 +40,7 @@ export async function filesOfDrop(transfer: DataTransfer): Promise<File[]> {
   return (await Promise.all(entries.map(filesOfEntry))).flat();
 }
 
-/** Bytes that show the kind of a file. */
+/** Number of first bytes of a file that determine its kind. */
 const HEAD_BYTES = 4096;
 
 async function headOf(file: File): Promise<Uint8Array> {
@@ -93,7 +93,7 @@ export interface FileInput {
   open(options: FileOptions): Promise<FrameSource>;
 }
 
-/** Determines the kind and the facts of dropped files. Throws InputError. */
+/** Determines the kind and the facts of dropped files. Files of other kinds are ignored. Throws InputError. */
 export async function inspectFiles(dropped: File[]): Promise<FileInput> {
   const visible = dropped.filter((file) => !file.name.startsWith('.'));
   const files = sortNaturally(visible, (file) => file.webkitRelativePath || file.name);

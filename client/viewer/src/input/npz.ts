@@ -11,7 +11,7 @@ const ENTRY_MAGIC = 0x02014b50;
 const END_BYTES = 22;
 const ENTRY_BYTES = 46;
 const LOCAL_BYTES = 30;
-/** The end of an archive is searched in its last bytes, because a comment may follow. */
+/** Largest comment after the end mark of an archive, in bytes. The mark is searched backwards over this distance. */
 const MOST_COMMENT_BYTES = 65_535;
 const STORED = 0;
 const DEFLATED = 8;

@@ -6,7 +6,7 @@ import { CHOOSE_SPACE, FieldError, NOT_IN_SPACE } from './options';
 import { boxAlong, type RecordedBox } from './periodic';
 import type { Rows } from './rows';
 
-/** An axis with an extent below this share of the largest one is flat. Above the rounding of six-digit text. */
+/** An axis with an extent up to this share of the largest one is flat. The share allows for text of six digits. */
 const FLAT = 1e-6;
 
 type Axes = (Float64Array | null)[];
@@ -90,7 +90,10 @@ export function positionsOf({ rows, place }: ParticleTable, plan: ColumnPlan): A
   return axes;
 }
 
-/** Converts table rows to a frame. `inSpace`: keeps three coordinates. `periodic`: axes of its box. Throws InputError. */
+/**
+ * Converts table rows to a frame. `inSpace`: keeps three coordinates. `periodic`: axes of its box. Leaves out ids,
+ * volumes, velocities and scalars with an invalid value. Throws InputError.
+ */
 export function particlesOf(table: ParticleTable, plan: ColumnPlan, inSpace: boolean, periodic: readonly number[]): Particles {
   const rows = table.rows.where(plan.conditions);
   const { time, step, index, name, box } = table;

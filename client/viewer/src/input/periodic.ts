@@ -25,7 +25,10 @@ export function parsePeriodic(text: string, isSurface: boolean): number[] {
   return axes;
 }
 
-/** The box of a frame along the periodic axes of its stream. Throws FieldError for other boxes. */
+/**
+ * The box of a frame along the periodic axes of its stream. Throws FieldError without a box, for a triclinic box, and
+ * for a box that is not periodic along one of the axes.
+ */
 export function boxAlong(axes: readonly number[], box: RecordedBox | undefined, name: string): PeriodicBox {
   const refuse = (fault: string) => new FieldError('periodic', `${name} ${fault}`);
   if (!box) throw refuse('has no box. Leave the periodic axes empty.');
@@ -37,7 +40,7 @@ export function boxAlong(axes: readonly number[], box: RecordedBox | undefined, 
   })));
 }
 
-/** A frame without its box, if this is the box of its stream. */
+/** The frame without `box` if this equals the box of its stream, otherwise the frame itself. */
 export function withOwnBox(frame: Particles, ofStream: PeriodicBox | undefined): Particles {
   const isSame = frame.box && AXES.every((axis) => {
     const [own, other] = [frame.box?.[axis], ofStream?.[axis]];

@@ -53,7 +53,7 @@ function messagesOf(block: Uint8Array): Uint8Array[] {
 
 type Scalars = NonNullable<Particles['scalars']>;
 
-/** The attributes that the server accepts: with printable names and finite numbers. Throws InputError for wrong sizes. */
+/** Attributes with printable names and finite numbers; of equal names the first. Throws InputError for wrong sizes. */
 function scalarsOf({ scalars, positions, positionFormat }: ParticleFrame, name: string): Scalars {
   const count = positions.length / particleBytes(positionFormat);
   const all = scalars.map((scalar) => {
@@ -162,7 +162,7 @@ export class RecordingSource implements FrameSource {
     return frame;
   }
 
-  /** Names of the scalars that all frames have: the server refuses a frame that lacks a requested one. */
+  /** Names of the scalars of all frames that have particles: the server refuses a frame without a requested scalar. */
   private commonScalars(name: string): string[] {
     const all: Set<string>[] = [];
     for (let index = 0; index < this.count; ++index) {
@@ -183,7 +183,7 @@ export class RecordingSource implements FrameSource {
   }
 }
 
-/** Starts of the whole blocks, and the end of the last one. `isWhole`: whether the tail follows them. */
+/** Starts of the whole blocks, and the end of the last one. `isWhole`: whether the closing mark follows them. */
 function blocksOf(bytes: Uint8Array): { blocks: number[]; isWhole: boolean } {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const blocks = [MARK_BYTES];

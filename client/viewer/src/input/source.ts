@@ -19,7 +19,7 @@ export interface FrameSource {
   readonly scalars: string[];
   /** A warning about the files for the user, such as their truncation; empty without one. */
   readonly notice: string;
-  /** Reads frame `index`, starting at 0. It has a box if this differs from the box of the stream. Throws InputError. */
+  /** Reads frame `index`, starting at 0. The frame has a box only if that differs from `box`. Throws InputError. */
   frame(index: number): Promise<Particles>;
 }
 

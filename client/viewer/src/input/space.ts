@@ -36,7 +36,7 @@ export function middlePlane(axes: readonly Float64Array[]): string {
   return `${AXES[axis]}=${Number((Math.round(middle / unit) * unit).toPrecision(12))}`;
 }
 
-/** The median distance of a sample of particles to their nearest neighbours, as text; empty for one particle. */
+/** The median distance of a sample of particles to their nearest neighbours, as text; empty if all coincide. */
 export function spacingOf([x, y, z]: readonly Float64Array[]): string {
   const count = x.length;
   const samples = Math.max(1, Math.min(SAMPLES, count, Math.floor(MOST_DISTANCES / count)));

@@ -39,7 +39,7 @@ function splitter(line: string): (line: string) => string[] {
   return (other) => splitAtBlanks(other).map(unquoted);
 }
 
-/** Throws InputError if a row has fewer cells than the first one. */
+/** Parses a text table. Throws InputError if it is empty, or if a row has fewer cells than the first line. */
 export function parseTable(text: string, name: string): Table {
   const lines = text.split(/\r?\n|\r/);
   const first = lines.findIndex((line) => line.trim() !== '' && !isComment(line.trim()));

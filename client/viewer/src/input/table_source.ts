@@ -95,7 +95,7 @@ function planOf({ names, columnCount, name, place }: FrameTable, request: Column
   }
 }
 
-/** Most values of a column that can be a type of particles. */
+/** A column with more distinct values than this is not offered as a filter by the type of particles. */
 const MOST_TYPES = 8;
 
 /** Facts of the first frame, for the defaults of the options. Throws InputError if the frame cannot be read. */

@@ -25,7 +25,10 @@ function columns({ name, components, type, little, bytes }: VtkArray): NamedColu
   }, name, bytes);
 }
 
-/** The points and their arrays. `fields`: arrays of the whole file, which may have the time. */
+/**
+ * The table of a frame: the points, and the arrays that have a row for each point. `fields`: arrays of the whole file,
+ * one of which may be the time.
+ */
 export function tableOf(points: VtkArray | null, arrays: readonly VtkArray[], fields: readonly VtkArray[],
                         index: number, name: string): FrameTable {
   if (!points) throw new InputError(`${name} has no points.`);
@@ -47,7 +50,7 @@ export function tableOf(points: VtkArray | null, arrays: readonly VtkArray[], fi
   };
 }
 
-/** Numbers of text as an array. */
+/** Numbers of text as an array: int64 if `isWhole` and all words are whole numbers, else float64. */
 export function textArray(name: string, components: number, words: readonly string[], isWhole: boolean): VtkArray {
   const bytes = isWhole && words.every((word) => /^-?\d+$/.test(word))
     ? BigInt64Array.from(words, BigInt) : Float64Array.from(words, Number);

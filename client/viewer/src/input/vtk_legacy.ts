@@ -117,7 +117,7 @@ class Parser {
     this.array('', 1, size, other ?? type);
   }
 
-  /** Reads numbers from here on. */
+  /** Reads `components` * `rows` numbers at the current position. */
   private array(name: string, components: number, rows: number, typeName: string): VtkArray {
     const type = TYPES[typeName.toLowerCase()];
     const count = components * rows;

@@ -41,7 +41,7 @@ class Document {
   private readonly little: boolean;
   private readonly headerBytes: number;
   private readonly isPacked: boolean;
-  /** Place of the appended bytes. */
+  /** Offset of the appended bytes in the file. */
   private appended = -1;
   private isBase64 = false;
 
@@ -119,7 +119,7 @@ class Document {
     return this.headerBytes === 8 ? Number(view.getBigUint64(8 * k, this.little)) : view.getUint32(4 * k, this.little);
   }
 
-  /** A length, then the bytes. */
+  /** The bytes of an uncompressed array. Their length, in bytes, is before them. */
   private plain(raw: Uint8Array | null, letters: string): Uint8Array {
     const { headerBytes } = this;
     const length = this.number(raw ?? fromBase64(letters, headerBytes), 0);
@@ -128,7 +128,7 @@ class Document {
     return bytes.slice(headerBytes, headerBytes + length);
   }
 
-  /** The number of blocks, their length, the length of the last one, and their packed lengths; then the blocks. */
+  /** Decompresses an array: number of blocks, their length, length of the last one, packed lengths; then the blocks. */
   private async unpack(raw: Uint8Array | null, letters: string): Promise<Uint8Array> {
     const { headerBytes } = this;
     const count = this.number(raw ?? fromBase64(letters, headerBytes), 0);
@@ -152,7 +152,7 @@ async function inflated(bytes: Uint8Array): Promise<Uint8Array> {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** The first bytes of a base64 text, which ends at the first other character. */
+/** Decodes the first `bytes` bytes, rounded up to threes, of a base64 text, which ends at the first other character. */
 function fromBase64(text: string, bytes: number): Uint8Array {
   const letters = /^[A-Za-z0-9+/]*={0,2}/.exec(text.slice(0, 4 * Math.ceil(bytes / 3)))?.[0] ?? '';
   return Uint8Array.from(atob(letters), (letter) => letter.charCodeAt(0));

@@ -8,7 +8,7 @@ import type { FrameTable, TableReader } from './table_source';
 const PLAIN_COLUMNS = ['type', 'x', 'y', 'z'];
 const MOST_COLUMNS = 4096;
 
-/** Whether the first lines are of an XYZ file: a count, and a comment without a row of numbers. */
+/** Whether a file is XYZ text: its first line is a count, and its extension or a comment of LAMMPS says so. */
 export function isXyz(head: string, extension: string): boolean {
   const [count, comment = ''] = head.split(/\r?\n/);
   return /^\s*\d+\s*$/.test(count) &&

@@ -1,8 +1,9 @@
 import { arrayOf } from './arrays';
 
 /**
- * Numbers per point to colour by, by the name of a channel. A scalar `p` has the channel `p`. A
- * vector `v` has the channels `v`, its magnitude, and `v x`, `v y` and `v z`, its components.
+ * Numbers to colour points by: for each named channel, one number per point. A scalar `p` has the
+ * channel `p`. A vector `v` has the channel `v`, its magnitude, and one for each of its two or three
+ * components: `v x`, `v y`, `v z`.
  */
 export interface Channels {
   get(channel: string): Float32Array | undefined;
@@ -20,7 +21,7 @@ export function channelsOf(name: string, components: number): string[] {
   return [name, ...AXES.slice(0, components).map((axis) => `${name} ${axis}`)];
 }
 
-/** Name of a channel for the user. `all`: the channels of the frame. */
+/** Name of a channel for the user: adds `, magnitude` to that of a vector. `all`: the channels of the frame. */
 export function channelLabel(channel: string, all: Iterable<string>): string {
   return [...all].includes(`${channel} x`) ? `${channel}, magnitude` : channel;
 }
@@ -49,7 +50,7 @@ export class AttributeChannels implements Channels {
   }
 }
 
-/** `channel`: 0 for a scalar or the magnitude, then the components. */
+/** `channel`: 0 for a scalar or the magnitude of a vector, k for component k - 1. */
 function decode({ values, components = 1 }: NamedValues, channel: number): Float32Array {
   const numbers = arrayOf(Float32Array, values);
   if (components <= 1) return numbers;

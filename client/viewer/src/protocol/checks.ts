@@ -13,7 +13,10 @@ export function lost(field: string, rule: string): Error {
   return new Error(`${field} ${rule}.`);
 }
 
-/** Reads offsets, and checks that each ring or shell has at least `fewest` elements. A view of `bytes` if they are aligned. */
+/**
+ * Reads offsets: a view of `bytes` if they are aligned, else a copy. Throws unless the first offset is 0 and each ring
+ * or shell has at least `fewest` points or triangles.
+ */
 export function offsetsOf(bytes: Uint8Array, field: string, owner: Owner, fewest: number): Uint32Array {
   if (bytes.length % 4 !== 0) throw lost(field, 'is no array of uint32');
   const offsets = arrayOf(Uint32Array, bytes);
@@ -31,7 +34,7 @@ export function countCheck(owner: Owner, count: number): (isRight: boolean, fiel
   };
 }
 
-/** Checks that holes and cavities are in outer rings and shells. */
+/** Throws unless `outerOf` names an outer ring or shell for each hole or cavity. */
 export function checkNesting(outerOf: Uint32Array, field: string, owner: Owner): void {
   outerOf.forEach((outer, k) => {
     if (outer === NO_OUTER || (outer < outerOf.length && outerOf[outer] === NO_OUTER)) return;

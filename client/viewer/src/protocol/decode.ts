@@ -45,8 +45,8 @@ class Relative {
 }
 
 /**
- * The mesh of a message. Arrays of a message are rarely aligned, and a copy takes longer than an
- * upload. They are therefore copied when they are first read as numbers.
+ * The mesh of a message. Arrays of a message are rarely aligned, and copying an array takes longer
+ * than its upload. An array is therefore copied only when it is first read as numbers.
  */
 class MessageMesh implements Mesh {
   readonly classes: Uint8Array;
@@ -161,7 +161,7 @@ function decodeSection(section: ReconstructedFrame, { sequence, time }: Reconstr
   return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }
 
-/** The echoed particles, as they were sent. */
+/** The input particles that the server returned in a result, as they were sent. */
 export function echoedParticles(message: ReconstructedFrame): Particles {
   return {
     time: message.time, positionFormat: message.particleFormat, positions: message.particles,
@@ -171,14 +171,14 @@ export function echoedParticles(message: ReconstructedFrame): Particles {
   };
 }
 
-/** Numbers of the echoed particles to colour by; null without them. */
+/** Numbers of the returned input particles to colour by; null without particles or without such numbers. */
 function echoedChannels(message: ReconstructedFrame): Channels | null {
   if (message.particles.length === 0) return null;
   const channels = particleChannels(echoedParticles(message));
   return [...channels.keys()].length > 0 ? channels : null;
 }
 
-/** Decodes a result. `plane`: the plane of echoed particles with three components. */
+/** Decodes a result. `plane`: the coordinate plane onto which returned input particles with x, y, z are projected. */
 export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
   const relative = new Relative(message);
   return {

@@ -2,7 +2,7 @@ import { AttributeChannels, type Channels } from './channels';
 import { NO_OUTER } from './checks';
 import type { SurfaceMessage } from './surface';
 
-/** Class of a mesh triangle. */
+/** Class of a mesh triangle: in the band of cells along the outline, or in the interior. */
 export const TRIANGLE_CLASS = { band: 0, interior: 1 } as const;
 
 export interface Rings {
@@ -22,7 +22,7 @@ export interface Rings {
   cuts: Uint32Array;
   /** Vertices, ascending, whose segment to the next one lies on a wall. */
   wetted: Uint32Array;
-  /** Vertices, ascending, where an outline meets a wall, or where a phase meets two others, or one and the outside. */
+  /** Vertices, ascending, where an outline meets a wall, or a phase meets two other phases, or one and the outside. */
   contacts: Uint32Array;
   /** Of each contact: the angle of the fluid or phase there, in radians. */
   contactAngles: Float32Array;
@@ -46,7 +46,7 @@ export interface Mesh {
 export interface Statistics {
   particles: number;
   triangles: number;
-  /** Triangles that fill `grid` would make of the same rings. */
+  /** Number of triangles that the fill method `grid` would make of the same rings. */
   trianglesGrid: number;
   area: number;
   perimeter: number;

@@ -1,7 +1,7 @@
 import { Plane, PositionFormat } from '@proto/v1/reconstruction_pb';
 import { arrayOf } from './arrays';
 
-/** The two of three components that span a plane. */
+/** Indices of the two components that span a coordinate plane; x and y if no plane is specified. */
 function axesOf(plane: Plane): [number, number] {
   if (plane === Plane.XZ) return [0, 2];
   if (plane === Plane.YZ) return [1, 2];
@@ -23,7 +23,7 @@ export function particleBytes(format: PositionFormat): number {
   return componentsOf(format) * (wide ? 8 : 4);
 }
 
-/** x, y of every particle relative to `origin`. */
+/** Two coordinates of every particle, relative to `origin`. Positions with x, y, z are projected onto `plane`. */
 export function relativePositions(format: PositionFormat, bytes: Uint8Array, plane: Plane,
                                   origin: [number, number]): Float32Array {
   const numbers = numbersOf(format, bytes);
@@ -38,7 +38,7 @@ export function relativePositions(format: PositionFormat, bytes: Uint8Array, pla
   return points;
 }
 
-/** x, y, z of every particle relative to `origin`; null for particles in a plane. */
+/** x, y, z of every particle relative to `origin`; null for positions with two components. */
 export function positionsInSpace(format: PositionFormat, bytes: Uint8Array,
                                  origin: readonly [number, number, number]): Float32Array | null {
   if (componentsOf(format) !== 3) return null;

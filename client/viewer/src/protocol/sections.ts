@@ -50,8 +50,8 @@ function planeOf(slice: SlicePlane | undefined): SectionPlane | undefined {
 }
 
 /**
- * The picture of outline `shown` of a frame: that outline, with all outlines in parallel planes as
- * isolines. The frame itself if it lacks the outline.
+ * The picture of outline `shown` of a frame, or of outline 0 if `shown` is missing. All other outlines
+ * in parallel planes become its isolines. A frame without sections is returned unchanged.
  */
 export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: number): Frame {
   const { sections } = frame;
@@ -83,8 +83,9 @@ function moved(points: Float32Array | null, from: [number, number], to: [number,
 }
 
 /**
- * World coordinates in plane `to` of the point (0, 0) of plane `from`, projected along the normal.
- * Null if the planes are not parallel, or have opposite normals.
+ * Coordinates in plane `to` of the point (0, 0) of plane `from`, projected along the normal. Zeros if
+ * both planes are missing. Null if one is missing, or if the planes are not parallel or have opposite
+ * normals.
  */
 export function shiftBetween(
   from: SectionPlane | null | undefined, to: SectionPlane | null | undefined,
@@ -124,7 +125,7 @@ export function inSpace({ origin, normal }: SectionPlane, u: number, v: number):
   ];
 }
 
-/** Coordinates of a point in a plane, and its height above it. */
+/** The two coordinates in a plane of a point's projection, and the point's signed height above the plane. */
 export function inPlane({ origin, normal }: SectionPlane, [x, y, z]: Vector): Vector {
   const up = unit(normal);
   const [first, second] = axesOf(up);

@@ -13,7 +13,7 @@ const FEWEST_OF_SHELL = 4;
 const MOST_STEPS = 2 ** 30;
 /** The vertex codec stores at least 2 bits for 16 bytes. */
 const MOST_EXPANSION = 64;
-/** Limit of one array after decompression. */
+/** Limit of one array after decompression, in bytes. */
 const MOST_BYTES = 1 << 30;
 const NORMAL_BYTES = 4;
 
@@ -90,7 +90,7 @@ function lost(field: string, rule: string): Error {
   return lostField(`surface.${field}`, rule);
 }
 
-/** Handles of all shells: a shell has the Euler characteristic points - triangles / 2 = 2 - 2 genus. */
+/** Sum of the genus of all shells; 0 without a surface. For each shell, points - triangles / 2 = 2 - 2 genus. */
 export function genusOf(message: SurfaceMessage | undefined): number {
   const lastOf = (bytes: Uint8Array) => (bytes.length < 4 ? 0 : arrayOf(Uint32Array, bytes.subarray(bytes.length - 4))[0]);
   if (!message) return 0;
@@ -236,7 +236,10 @@ function decodePlain(message: SurfaceMessage, points: number, triangles: number)
   };
 }
 
-/** Checks that every shell uses only its own points. Returns the edges, each once: two triangles share it. */
+/**
+ * Throws unless every shell uses only its own points. Returns the two points of each edge. Two triangles share an edge
+ * in opposite directions; the triangle with the ascending direction adds the edge.
+ */
 function checkTriangles(triangles: Uint32Array, { pointOffsets, triangleOffsets }: Shells): Uint32Array {
   const edges = new Uint32Array(triangles.length);
   let count = 0;
@@ -261,7 +264,7 @@ function checkTriangles(triangles: Uint32Array, { pointOffsets, triangleOffsets 
   return edges.subarray(0, count).slice();
 }
 
-/** Marks the points of the triangles that cut a body. */
+/** Marks the points of triangles on walls and on faces of the periodic box. `bytes`: the numbers of these triangles. */
 function pointsInCut(bytes: Uint8Array, triangles: Uint32Array, points: number): Uint8Array | null {
   if (bytes.length === 0) return null;
   const cuts = bytes.length % 4 === 0 ? copyOf(Uint32Array, bytes) : null;
@@ -293,7 +296,7 @@ function boxesOf(positions: Float32Array, offsets: Uint32Array): Float32Array {
   return boxes;
 }
 
-/** Normals of a surface without them: the mean of the triangles at a point, by area. */
+/** Point normals for a surface that has none: the sum of the normals of the triangles at a point, weighted by area. */
 function meanNormals(positions: Float32Array, triangles: Uint32Array): Float32Array {
   const normals = new Float32Array(positions.length);
   for (let i = 0; i < triangles.length; i += 3) {
@@ -344,7 +347,7 @@ export function decodeSurface(message: SurfaceMessage, codec: Codec): Surface {
   return { ...surface, particles };
 }
 
-/** The arrays of a surface, to hand over to another thread. */
+/** The buffers to transfer to another thread, each once. Arrays per shell, except `boxes`, are left out and copied. */
 export function buffersOf(surface: Surface): ArrayBuffer[] {
   const { positions, normals, triangles, edges, inCut, boxes, attributes, particles } = surface;
   const all = [positions, normals, triangles, edges, inCut, boxes, particles, ...attributes.map(({ values }) => values)];

@@ -81,7 +81,7 @@ class ReportMesh implements Mesh {
   attribute(name: string): Float32Array | undefined { return this.attributes.get(name); }
 }
 
-/** Points of the mesh follow the points of the rings, even if the mesh does not share them. */
+/** The mesh. Its points begin with the points of the rings, even if no triangle uses these. */
 function decodeMesh(reader: Reader, ringPoints: Float32Array): ReportMesh | null {
   const ownPoints = reader.points(reader.count());
   const isShared = reader.count() === 1;

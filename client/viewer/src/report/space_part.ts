@@ -1,7 +1,7 @@
 // Draws the surfaces of a report. Bundled as client/output/report_space.txt, which a report with surfaces holds.
 import { create, fromBinary } from '@bufbuild/protobuf';
 import { PositionFormat, ReconstructedFrameSchema } from '@proto/v1/reconstruction_pb';
-// Without WebAssembly, which the report's Content-Security-Policy refuses.
+// It uses no WebAssembly, which the report's Content-Security-Policy refuses.
 import { MeshoptDecoder } from '../../node_modules/meshoptimizer/meshopt_decoder_reference.js';
 import { bytesOf } from '../protocol/arrays';
 import { decodeSpaceFrame } from '../protocol/decode';

@@ -72,7 +72,7 @@ export class ReportTrack implements Track {
   readonly bounds: Bounds | null;
   /** Range of each channel of the attribute `color` in all frames. */
   readonly colorRanges: ReadonlyMap<string, ValueRange>;
-  /** Distinct texts of doubts. A doubt is an index. */
+  /** Distinct texts of doubts. The number of a doubt is its index here. */
   private readonly doubts: string[];
   private latest: { sequence: number; frame: Frame } | null = null;
 
@@ -200,7 +200,7 @@ function measured(rings: Rings, measures: Measures): Rings {
   };
 }
 
-/** The bounds of all frames, without frames in which the scene has exploded. */
+/** The bounds of all frames that are at most LARGEST_FRAME times as large as the median one; null without bounds. */
 function boundsOfAll(numbers: FrameNumbers[]): Bounds | null {
   const boxes = numbers.map(({ box }) => box).filter((box) => box !== null)
     .map(([left, bottom, right, top]): Bounds => ({ left, bottom, right, top }));

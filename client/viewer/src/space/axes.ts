@@ -11,11 +11,11 @@ export interface AxesDrawing {
 const NAMES = ['x', 'y', 'z'];
 const TICK_PIXELS = 6;
 const LABEL_PIXELS = 18;
-/** An axis that is shorter than this on the screen has no numbers. */
+/** An axis that is shorter than this on the screen, in CSS pixels, has no numbers. */
 const SHORTEST_AXIS = 60;
 const LABEL_GAP = 44;
 
-/** The edges of a box in the direction of an axis: their first points. */
+/** The first points of the four edges of a box along an axis. */
 function edgesAlong(axis: number, { low, high }: Box): Vector[] {
   const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
   return [0, 1, 2, 3].map((k): Vector => {

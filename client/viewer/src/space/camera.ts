@@ -31,7 +31,7 @@ const STEEPEST = Math.PI / 2;
 /** Limits of the picture's height, as shares of the content's diagonal. float32 resolves nothing smaller. */
 const NEAREST_ZOOM = 1e-4;
 const FARTHEST_ZOOM = 100;
-/** The same in world units, for any content. */
+/** Limits of the picture's height for any content, in world units. */
 const SMALLEST_HEIGHT = 1e-30;
 const LARGEST_HEIGHT = 1e30;
 
@@ -80,7 +80,7 @@ export function pointAt(camera: Camera, x: number, y: number): Vector {
 
 /**
  * The view zoomed by `factor`. The point under the CSS position stays there. `content`: the box of the content, which
- * bounds the zoom; a view beyond the bounds only comes back. Null: unknown.
+ * bounds the zoom; null: unknown. A view beyond these bounds can only zoom back towards them.
  */
 export function zoomAt(camera: Camera, x: number, y: number, factor: number, content: Box | null = null): SpaceView {
   const { view } = camera;
@@ -125,7 +125,7 @@ export function project(camera: Camera, point: Vector): { x: number; y: number; 
   return { x: size.width / 2 + dot(apart, right) * scale, y: size.height / 2 - dot(apart, up) * scale, nearer };
 }
 
-/** The ray of a CSS position: where it begins, and its direction of any length. */
+/** The ray through a CSS position, from the camera or (parallel view) from the target's plane. `along`: any length. */
 export function rayAt(camera: Camera, x: number, y: number): { from: Vector; along: Vector } {
   const { view, isPerspective } = camera;
   const { back } = axesOf(view);
@@ -142,7 +142,7 @@ export function unionOf(a: Box | null, b: Box): Box {
   return { low: pick(Math.min, a.low, b.low), high: pick(Math.max, a.high, b.high) };
 }
 
-/** `1,2,3,-1.05,0.42,10` for an address. */
+/** Text of a view for the page's address: `1,2,3,-1.05,0.42,10` has target, turn, tilt and height. */
 export function viewText({ target, turn, tilt, height }: SpaceView): string {
   return [...target, turn, tilt, height].map((value) => Number(value.toPrecision(6))).join(',');
 }

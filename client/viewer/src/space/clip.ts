@@ -20,7 +20,7 @@ function directionOf({ clipAxis, clipHeld }: SpaceLook, view: SpaceView): Vector
   return plus([0, 0, 0], along, 1 / Math.hypot(...along));
 }
 
-/** The clip plane in a box, for a surface with this origin. */
+/** The clip plane of a look, at its place in a box. `origin`: of the surface. Null: the look has no clip plane. */
 export function clipOf(look: SpaceLook, view: SpaceView, box: Box, origin: Vector): Clip | null {
   const along = directionOf(look, view);
   if (!along) return null;
@@ -31,8 +31,8 @@ export function clipOf(look: SpaceLook, view: SpaceView, box: Box, origin: Vecto
 }
 
 /**
- * The cut face that a camera sees; null if the camera is on the side that stays, or if the look has no cut faces.
- * Where the plane cuts a body, the camera then sees the inside of the nearest surface behind the cut face.
+ * The cut face that a camera sees. Null without a clip plane, if the look is translucent or has no cut faces, or if the
+ * camera is on the side that stays. From the other side, a ray that passes the plane in a body first hits an inside.
  */
 export function cutFaceOf(clip: Clip | null, look: SpaceLook, { view, isPerspective }: Camera, box: Box, origin: Vector): CutFace | null {
   if (!clip || !look.hasCutFaces || look.isTranslucent) return null;

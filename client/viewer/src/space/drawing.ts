@@ -56,7 +56,7 @@ export interface SpaceState {
 
 /** The part of the drawing that the page loads when it shows a surface (renderer.ts). */
 export interface SpaceDrawing {
-  /** Uploads a surface, or removes the former one. */
+  /** Uploads a surface in place of the former one. Null: only removes the former one. */
   show(surface: Surface | null): void;
   /** RGBA of each point; alpha is a sum of SELECTED. */
   setTints(tints: Uint8Array): void;

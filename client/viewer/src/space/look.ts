@@ -9,9 +9,9 @@ export interface SpaceLook {
   clipAxis: 'none' | 'x' | 'y' | 'z' | 'view';
   /** With the axis `view`: the direction to the camera that the plane keeps. Null: the plane turns with the camera. */
   clipHeld: Vector | null;
-  /** Place of the plane, from 0 to 1 along the axis of the box around all frames so far. */
+  /** Place of the plane along its normal, from 0 to 1 across the box around all frames so far. */
   clipAt: number;
-  /** Cuts away the side with the smaller coordinates. */
+  /** Cuts away the side with the smaller coordinates instead of the larger. */
   isClipFlipped: boolean;
   /** Closes cut bodies in the clip plane. */
   hasCutFaces: boolean;
@@ -26,7 +26,7 @@ export const DEFAULT_SPACE_LOOK: Readonly<SpaceLook> = {
 
 export const CLIP_AXES = ['none', 'x', 'y', 'z', 'view'] as const;
 
-/** Directions of a link have length 1 but for their rounding. */
+/** Largest difference from 1 of the length of a direction in a link, whose numbers are rounded. */
 const ROUNDING = 1e-3;
 
 /** `flat,translucent,parallel,clip:view:0.5:flipped,held:1:0:0,hollow,planes` for an address; empty for the default. */

@@ -22,7 +22,7 @@ function meets(boxes: Float32Array, shell: number, from: Vector, along: Vector):
   return first <= last;
 }
 
-/** The body that a shell bounds: itself, or the body around a cavity. */
+/** The outer shell of the body that a shell bounds: the shell itself, or for a cavity the shell around it. */
 export function bodyOf({ outerOf }: Pick<Surface, 'outerOf'>, shell: number): number {
   return outerOf[shell] === NO_SHELL ? shell : outerOf[shell];
 }

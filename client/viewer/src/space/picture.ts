@@ -17,7 +17,7 @@ import { type PickedShell, spaceFrameOf, SpaceScene } from './scene';
 import { shellAt } from './shells';
 
 export interface SpaceEvents {
-  /** The view changed, by the user or because the picture has grown. */
+  /** The view changed: by the user, or to keep the content in view. */
   moved(byUser: boolean): void;
   /** The user selected the body at a world position, or none. */
   selected(point: Vector | null): void;
@@ -55,7 +55,7 @@ export class SpacePicture {
   private dirty = true;
   private isClosed = false;
   private isDecoding = false;
-  /** Counts calls of `clear`: a frame that was decoded before one is dropped. */
+  /** Counts calls of `clear`. A frame is dropped if `clear` was called after its decoding had begun. */
   private era = 0;
   private waiting: { frame: Frame; outlines: readonly Outline[] } | null = null;
 
@@ -161,7 +161,7 @@ export class SpacePicture {
     this.element.remove();
   }
 
-  /** For the scale bar, which is right at the target. */
+  /** A view with the scale at the camera's target, for the scale bar. */
   private get flatView() {
     return { x: 0, y: 0, scale: 1 / unitsPerPixel(this.scene.camera) };
   }

@@ -43,7 +43,7 @@ function commonUniforms(): Uniforms {
   };
 }
 
-/** Replaces the numbers of an attribute, and keeps its buffer: three.js deletes buffers with their geometry only. */
+/** Replaces numbers of an attribute, in the same buffer if their count stays: three.js frees buffers by geometry. */
 function setNumbers(geometry: BufferGeometry, name: string, numbers: Float32Array | Uint8Array, size: number): void {
   const held = geometry.getAttribute(name) as BufferAttribute | undefined;
   if (held?.array === numbers) return;
@@ -127,12 +127,13 @@ class Drawing implements SpaceDrawing {
   private geometry = new BufferGeometry();
   private edgeGeometry = new BufferGeometry();
   private pointGeometry = new BufferGeometry();
-  /** Inside and outside of the surface. One that is translucent or has a cut face is drawn in two steps. */
+  /** A surface that is translucent or has a cut face is drawn in two steps, inside first. Others: `outside` alone. */
   private readonly inside: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly outside: Mesh<BufferGeometry, ShaderMaterial>;
   /**
-   * Writes the depth of the clip plane where it cuts a body, so that the cut face hides the content of the body. The
-   * surface draws its colour. `inside` sets the stencil, `outside` clears it: it stays set where the inside is in front.
+   * Writes the depth of the clip plane where the plane cuts a body, so that the cut face hides the body's content. The
+   * surface draws the face's colour. `inside` sets the stencil and `outside` clears it. The stencil therefore stays set
+   * at pixels where an inside is in front.
    */
   private readonly cutFace = new Mesh(new PlaneGeometry(2, 2), new ShaderMaterial({
     vertexShader: CUT_FACE_VERTEX, fragmentShader: CUT_FACE_FRAGMENT, side: DoubleSide, colorWrite: false,
@@ -147,7 +148,7 @@ class Drawing implements SpaceDrawing {
   constructor(canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: false, stencil: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
-    // Parts are drawn in the order of `add`. Sorting would compute the bounding sphere of each frame: 4 ms of 200,000 triangles.
+    // Parts are drawn in the order of `add`. Sorting would compute bounding spheres: 4 ms a frame of 200,000 triangles.
     this.renderer.sortObjects = false;
     this.renderer.localClippingEnabled = true;
     const material = (side: Side, stencilRef: number) => new ShaderMaterial({

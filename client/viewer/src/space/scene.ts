@@ -128,7 +128,7 @@ export class SpaceScene {
     if (isOtherTheme || hasOtherSections) this.showSections();
   }
 
-  /** Shows everything from the same direction. */
+  /** Fits the view to the frame shown, from the same direction. Forgets the boxes of earlier frames. */
   fit(): void {
     const box = this.shown && boxOf(this.shown.surface);
     if (this.shown) this.extent = box;
@@ -136,7 +136,7 @@ export class SpaceScene {
     this.showSections();
   }
 
-  /** While the view follows the content: shows the box of all frames so far. */
+  /** Fits the view to the box around all frames so far. */
   fitExtent(): void {
     if (this.extent) this.view = fitBox(this.camera, this.extent);
   }
@@ -169,7 +169,7 @@ export class SpaceScene {
     this.tint();
   }
 
-  /** The shell at a CSS position. */
+  /** The nearest shell at a CSS position; null without one, or if the look does not draw the surface. */
   pick(x: number, y: number): PickedShell | null {
     if (!this.shown || !this.look.fill) return null;
     const { surface } = this.shown;
@@ -253,7 +253,7 @@ export class SpaceScene {
     return this.range && chosenRange(this.range, this.look.from, this.look.to);
   }
 
-  /** The range grows from frame to frame, so that a colour keeps its meaning in a stream. */
+  /** Adds the frame's numbers to the range, so that a colour keeps its meaning. `restart`: drops the range so far. */
   private widenRange(restart: boolean): void {
     if (restart) this.range = null;
     const name = attributeOf(this.look);

@@ -1,7 +1,7 @@
 import type { Surface } from '../protocol/surface';
 import type { Vector } from './camera';
 
-/** The part of a surface that finds its shells by place. */
+/** The part of a surface that a search for its shells by position needs. */
 export type PlacedShells = Pick<Surface, 'origin' | 'boxes' | 'outerOf' | 'identities'>;
 
 /** Whether the box of a shell contains a world position. `room`: how far it may lie outside, as a share of the box. */
@@ -20,7 +20,7 @@ function sizeOf({ boxes }: PlacedShells, shell: number): number {
   return length(0) * length(1) * length(2);
 }
 
-/** The smallest shell whose box contains a world position; null for none. Cost: linear in the shells. */
+/** Of the shells whose boxes contain a world position, the one with the smallest box; null without one. */
 export function shellAt(surface: PlacedShells, point: Vector, room = 0): number | null {
   let [best, least]: [number | null, number] = [null, Infinity];
   for (let shell = 0; shell < surface.outerOf.length; ++shell) {
@@ -37,7 +37,10 @@ function middleOf({ boxes, origin }: PlacedShells, shell: number): Vector {
   return [at(0), at(1), at(2)];
 }
 
-/** Shells that continue chosen ones of an earlier frame, if frames between them were missed: by the place of their boxes. */
+/**
+ * Shells of `now` that continue the `chosen` shells of the earlier frame `old` under another identity. Used if frames
+ * in between were missed. Two shells match if the box of one contains the middle of the box of the other.
+ */
 export function shellsByPlace(old: PlacedShells, chosen: readonly number[], now: PlacedShells): number[] {
   const known = new Set(old.identities);
   const surviving = new Set(now.identities);

@@ -15,7 +15,7 @@ scope.onmessage = ({ data: { id, message } }) => {
   void decode(id, message);
 };
 
-/** Browsers can refuse WebAssembly, which only compact surfaces need. */
+/** Waits for the decoder of compact surfaces. Throws an Error with a sentence if the browser refuses WebAssembly. */
 async function start(): Promise<void> {
   try {
     await MeshoptDecoder.ready;

@@ -72,7 +72,7 @@ export class FileTrack implements Track {
     return this.hasAttributes ? frame : { ...frame, scalars: [] };
   }
 
-  /** The server does not return the particles of its producer. */
+  /** Reads the particles from the files, because the server does not return particles to their producer. */
   async drawnParticles(sequence: number, origin: [number, number]): Promise<DrawnParticles> {
     let particles = shareOf(await this.source.frame(sequence - 1), this.settings.share);
     const [plane] = this.source.slices;

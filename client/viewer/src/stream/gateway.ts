@@ -103,7 +103,7 @@ export class Gateway {
     return this.known;
   }
 
-  /** The server's explanation of a doubt; its number until the server has answered `info`. */
+  /** The server's text on a doubt, a suspicion about the input. Until `info` is answered: `Doubt` and its number. */
   doubtText(doubt: number): string {
     return sentence(this.doubts.find((one) => one.doubt === doubt)?.explanation ?? `Doubt ${doubt}`);
   }

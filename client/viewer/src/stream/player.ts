@@ -30,7 +30,7 @@ export class Player {
     return this.position === null ? null : Math.floor(this.position);
   }
 
-  /** Advances to `now`, in milliseconds. */
+  /** Advances to `now`, in milliseconds. Returns the sequence to show. */
   tick(now: number): number | null {
     const passed = this.lastTick === null ? 0 : Math.max(0, now - this.lastTick);
     this.lastTick = now;
@@ -42,7 +42,7 @@ export class Player {
     return this.sequence;
   }
 
-  /** Pauses at `shown`, the last visible frame, which is older than the position in a gap. */
+  /** Pauses at `shown`, the visible frame. If the frame at the position is missing, `shown` is an older one. */
   pause(shown: number | null = this.sequence): void {
     this.position = shown;
     this.mode = 'paused';
@@ -70,7 +70,7 @@ export class Player {
     this.mode = 'paused';
   }
 
-  /** Starts again at the first frame. */
+  /** Starts again: at the newest frame of a live stream, else at the first frame. */
   restart(): void {
     this.position = null;
     this.mode = this.live ? 'live' : 'playing';

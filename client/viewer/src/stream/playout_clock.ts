@@ -6,7 +6,7 @@ interface Arrival { sequence: number; at: number }
 
 /** Arrivals in the fit: about a second of a fast stream. */
 const WINDOW = 64;
-/** A pause of this many milliseconds or intervals starts a new line. */
+/** A pause above both limits, in milliseconds and in mean intervals between frames, starts a new line. */
 const LONG_PAUSE_MS = 1000;
 const LONG_PAUSE_INTERVALS = 8;
 /** Frames per second before the second arrival. */
@@ -15,7 +15,7 @@ const FIRST_RATE = 30;
 export class PlayoutClock {
   private arrivals: Arrival[] = [];
   private shown = -Infinity;
-  /** The sequence of the last arrival, of an earlier line too. */
+  /** The sequence of the last arrival. A new line keeps it. */
   private newest = -Infinity;
 
   /** `latencyMs`: delay of drawing after arrival. */
@@ -34,13 +34,13 @@ export class PlayoutClock {
     if (this.arrivals.length > WINDOW) this.arrivals.shift();
   }
 
-  /** A frame of the history may be drawn at once. No earlier frame is drawn after it. */
+  /** A frame of the server's history has arrived, and may be drawn at once. `position` then returns no earlier one. */
   passed(sequence: number): void {
     this.shown = Math.max(this.shown, sequence);
     this.newest = Math.max(this.newest, sequence);
   }
 
-  /** Frames per second. */
+  /** Mean frames per second of the arrivals in the fit; FIRST_RATE before the second one. */
   get rate(): number {
     const n = this.arrivals.length;
     if (n < 2) return FIRST_RATE;

@@ -33,7 +33,7 @@ export const SHARES = [100, 80, 50, 30];
 /** Limits of the cell size, in spacings. */
 const CELL_SIZES = [0.25, 4] as const;
 
-/** The cell size with which `cells` cells span a length, as far as the limits allow. */
+/** The cell size, in spacings, with which `cells` cells span a length, limited to CELL_SIZES. */
 export function cellSizeOf(cells: number, length: number, spacing: number): number {
   const size = Number((length / cells / spacing).toPrecision(4));
   return Math.min(CELL_SIZES[1], Math.max(CELL_SIZES[0], size));
@@ -66,7 +66,7 @@ export function wallsText(walls: readonly number[][] | null): string {
   return walls?.map((points) => points.join(',')).join(' ') ?? '';
 }
 
-/** The inverse of wallsText; null without walls. Throws if a wall does not have two points or more. */
+/** The inverse of wallsText; null without walls. Throws if a wall has fewer than two points or a wrong coordinate. */
 export function parseWalls(text: string): number[][] | null {
   const walls = text.split(/\s+/).filter((wall) => wall !== '').map((wall) => wall.split(',').map(parseDecimal));
   if (walls.some((points) => points.length < 4 || points.length % 2 !== 0 || !points.every(isOfWalls))) {
@@ -160,7 +160,10 @@ export function methodWith(method: Method | null, { placement, fill }: Settings)
   };
 }
 
-/** Sets the box. Chooses surfaces of 3D particles, or the plane of their outline. The other planes are sections. */
+/**
+ * Sets the box, the output and the planes of a source in `parameters`, and returns them. For surfaces, all planes are
+ * sections. Otherwise the first plane is the plane of the outline, and the others are sections.
+ */
 export function withSource(parameters: ReconstructionParameters, { isSurface, slices, box }: FrameSource) {
   parameters.box = box;
   const planes = slices.map(({ origin, normal }) => create(SlicePlaneSchema, {
@@ -173,8 +176,8 @@ export function withSource(parameters: ReconstructionParameters, { isSurface, sl
   return parameters;
 }
 
-/** Parameters of a stream or frame: `base`, overridden by the settings. `spacing`: the spacing that
- * `base` estimated. */
+/** Parameters of a stream or frame: `base`, overridden by the settings. `spacing`: for a `base` without
+ * one, in world units; null: the server estimates it. */
 export function parametersOf(settings: Settings, base: ReconstructionParameters | null,
                              spacing: number | null): ReconstructionParameters {
   const placement = settings.placement || (base?.placement ?? Placement.UNSPECIFIED);

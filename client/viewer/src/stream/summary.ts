@@ -34,7 +34,7 @@ export function summaryOf({ statistics, rings, surface }: Frame): Summary {
   };
 }
 
-/** `counts`: null for a frame fetched from the server's history. */
+/** The figures of a result. `counts`: of its track at its arrival; null for a frame from the server's history. */
 export function summarise(frame: ReconstructedFrame, counts: Counts | null): Summary {
   const statistics = frame.statistics;
   const stages = STAGES.map(

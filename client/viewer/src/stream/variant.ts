@@ -10,7 +10,7 @@ import { sentence } from './status';
 import type { Track } from './track';
 import { NO_PARTICLES } from './variant_stream';
 
-/** Computes one frame of files, without state, while their stream lacks its result. Sends one request at a time. */
+/** Requests single frames of a file track that its stream lacks. Each is computed alone. One request at a time. */
 export class Variant {
   result: Frame | null = null;
   /** The last error, or empty. */
@@ -22,7 +22,7 @@ export class Variant {
 
   constructor(private readonly gateway: Gateway, private readonly changed: () => void) {}
 
-  /** Requests a frame, unless it was the last one requested. */
+  /** Requests a frame, unless a request is in progress, or the same frame and settings were requested last. */
   request(track: Track, sequence: number, settings: Settings): void {
     const key = `${track.title}|${sequence}|${settingsText(settings)}`;
     if (this.busy || key === this.requested) return;

@@ -24,7 +24,7 @@ const REST_MS = 200;
 export const NO_PARTICLES = 'Other settings need the particles, which this stream does not send. ' +
   'Start its producer with --echo-particles.';
 
-/** The first frame of a variant that shows `target`, given the first frame available. */
+/** The first frame to send, so that `target` can be shown: WARM_UP frames before it, or the first one available. */
 export function firstOf(target: number, available: number): number {
   return Math.min(target, Math.max(available, target - WARM_UP));
 }
@@ -76,12 +76,12 @@ export class VariantStream implements CurveSource {
       (this.track.kind !== 'watch' || this.history.size === 0 || this.track.history.size > 0);
   }
 
-  /** The frame of the track at a position. */
+  /** Sequence of the track's frame at a position: in a watched stream, of the newest frame up to it. */
   frameAt(position: number): number {
     return this.track.kind === 'watch' ? this.track.entryAt(position)?.sequence ?? position : position;
   }
 
-  /** The newest frame up to a position. */
+  /** The newest frame of this variant up to a position. */
   entryAt(position: number): Entry | null {
     return this.history.atOrBefore(position);
   }

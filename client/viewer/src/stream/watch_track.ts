@@ -146,7 +146,7 @@ export class WatchTrack implements Track {
     return last >= first ? { first, last } : null;
   }
 
-  /** Share of the history before a position, which may be evicted. */
+  /** Share of the history that lies before a position, so that it may be evicted. */
   private passedShare(position: number): number {
     const first = this.history.first?.sequence ?? position;
     const last = this.history.last?.sequence ?? position;

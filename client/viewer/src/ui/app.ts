@@ -205,7 +205,7 @@ export class App {
     this.writeAddress();
   }
 
-  /** Offers a file that no pane shows any more. */
+  /** Offers the file of a closed track for reopening, unless another track has the same file. */
   private released(track: Track): void {
     const file = this.opened.get(track);
     this.opened.delete(track);

@@ -80,7 +80,7 @@ function valuesOf({ lines, total }: Curve, entries: readonly (Entry | null)[]): 
   return values.map((row) => row.map((value) => (Number.isFinite(value) ? value : null)));
 }
 
-/** Indices of values without a neighbour, which no line shows. */
+/** Indices of values both of whose neighbours are missing, so that no line shows them. */
 function isolated(values: ArrayLike<number | null | undefined>): number[] {
   const isThere = (k: number) => values[k] !== null && values[k] !== undefined;
   return [...Array(values.length).keys()].filter((k) => isThere(k) && !isThere(k - 1) && !isThere(k + 1));
@@ -140,7 +140,7 @@ export class CurvesPanel {
     });
   }
 
-  /** Shows these curves, and no others, before the ones that are always there. */
+  /** Shows `first` before the permanent curves. Replaces the curves of an earlier call. */
   setFirst(first: readonly Curve[]): void {
     for (const { figure, plot } of this.items.splice(0, this.items.length - this.curves.length)) {
       plot.destroy();

@@ -22,7 +22,7 @@ export class FollowedView {
     this.extent = null;
   }
 
-  /** Grows the view to include these bounds. */
+  /** Grows the view to include these bounds, unless the user has moved it. */
   include(bounds: Bounds | null): void {
     if (!this.isFree || !bounds) return;
     const extent = this.extent ? union(this.extent, bounds) : bounds;

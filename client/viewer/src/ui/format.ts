@@ -1,4 +1,4 @@
-/** A number with `digits` significant digits, without trailing zeros. */
+/** A number with `digits` significant digits, without trailing zeros; a dash if it is not finite. */
 export function number(value: number, digits = 5): string {
   if (!Number.isFinite(value)) return '–';
   if (value === 0) return '0';

@@ -66,7 +66,7 @@ export class LookPanel {
 
   /**
    * Offers the attributes of a frame, and of earlier frames of its track: a frame can be without its
-   * attributes for a moment. The chosen one remains; a frame without it has one colour.
+   * attributes for a moment. The chosen attribute stays on offer; a frame without it has one colour.
    */
   setAttributes(ofFrame: readonly string[], track: object | null): void {
     if (track !== this.offeredOf) this.offered.clear();

@@ -18,7 +18,7 @@ export function angleOf(a: Point, b: Point, c: Point): number {
 /** Number of points of a measurement. */
 const POINTS: Record<MeasureMode, number> = { off: 0, distance: 2, angle: 3, ring: 1 };
 
-/** One measurement in world coordinates: the points clicked, and the ring of `ring`. */
+/** One measurement in world coordinates: the points clicked, and in the mode `ring` the ring clicked. */
 export class Measurement {
   points: Point[] = [];
   /** Identity of the ring that was clicked; null without one. */

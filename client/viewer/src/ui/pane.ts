@@ -33,7 +33,7 @@ export interface PaneEvents {
   /** The user chose the pane: settings and time apply to it. */
   chosen(pane: Pane): void;
   closed(pane: Pane): void;
-  /** The view changed, by the user or because the picture has grown. */
+  /** The view changed: by the user, or to keep the content in view. */
   moved(pane: Pane, byUser: boolean): void;
   /** The user selected the ring or the body at a world position, or none. */
   selected?(pane: Pane, point: Point | Vector | null): void;
@@ -353,7 +353,7 @@ export class Pane {
     return !this.hasSurfaces && isOther && !isAsStreamed(this.settings);
   }
 
-  /** Shows the frame of the variant's stream. While this frame is computed, the picture stays as it is. */
+  /** Shows the frame of the variant's stream, or nothing if it is refused. While it is computed, the picture stays. */
   private updateVariant(stream: VariantStream, sequence: number, now: number): void {
     stream.refresh(sequence, now);
     this.refusal = stream.refusalOf(sequence);

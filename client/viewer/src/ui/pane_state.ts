@@ -1,6 +1,6 @@
 import type { Track } from '../stream/track';
 
-/** States of a pane, in order of severity. */
+/** States of a pane, the most severe last. */
 export const PANE_STATES = ['live', 'waiting', 'ended', 'doubtful', 'lost', 'refused'] as const;
 
 export interface PaneState {

@@ -9,7 +9,7 @@ export function stored(key: string): string | null {
   }
 }
 
-/** Keeps a choice; without storage, until the page closes. */
+/** Stores a choice. If the browser refuses storage, only the caller has the choice, until the page closes. */
 export function store(key: string, choice: string): void {
   try {
     localStorage.setItem(key, choice);

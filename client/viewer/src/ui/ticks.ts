@@ -1,7 +1,10 @@
 /** Fewest ticks of an axis. */
 const FEWEST = 3;
 
-/** Round numbers in a range: the fewest of equal steps 1, 2 or 5 times a power of ten, but at least three. */
+/**
+ * Round numbers in a range: the fewest of equal steps 1, 2 or 5 times a power of ten, but at least three. Only `min` if
+ * the range is empty.
+ */
 export function ticks(min: number, max: number): number[] {
   if (!(max > min)) return [min];
   for (let power = Math.ceil(Math.log10(max - min)); ; --power) {
@@ -16,7 +19,7 @@ export function ticks(min: number, max: number): number[] {
   }
 }
 
-/** Digits with which neighbouring ticks differ. */
+/** Number of significant digits with which neighbouring ticks differ, at least 3. */
 export function tickDigits(all: readonly number[]): number {
   if (all.length < 2) return 3;
   const largest = Math.max(...all.map(Math.abs));

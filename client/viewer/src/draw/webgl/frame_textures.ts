@@ -68,7 +68,7 @@ export class RingTextures {
 /** A frame on the graphics card. Uploads only the parts that the look needs, once per frame. */
 export class FrameTextures {
   readonly outline: RingTextures;
-  /** Grows to the largest number of lines so far. */
+  /** One for each isoline drawn. The array never shrinks. */
   readonly isolines: RingTextures[] = [];
   readonly triangles: DataTexture;
   readonly classes: DataTexture;

@@ -49,7 +49,7 @@ export class NormalPass {
     this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
-  /** Draws `count` normals. `spacing` of particles and `gap` between vertices in CSS pixels. */
+  /** Draws normals of `count` vertices, or every n-th. `spacing` of particles and `gap` of vertices: in CSS pixels. */
   draw(
     textures: FrameTextures, camera: Camera, count: number, spacing: number, gap: number,
     dark: boolean, ratio: number,

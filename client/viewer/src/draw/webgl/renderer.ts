@@ -26,7 +26,7 @@ export interface Picture {
   view: View;
   /** Device pixels per CSS pixel. */
   ratio: number;
-  /** Range of the attribute that the look colours by; null if the frame lacks it. */
+  /** Range of the attribute that the look colours by; null without an attribute, or if the frame lacks it. */
   range: Range | null;
   /** Rings to highlight. */
   selected: readonly number[];
@@ -150,7 +150,7 @@ export class Renderer implements Drawing {
     if (hovered !== null && !selected.includes(hovered)) draw(line, hovered);
   }
 
-  /** Draws a range of vertices of the rings, or all. */
+  /** Draws the segments that begin at a range of vertices of the rings, or all segments. */
   private line(camera: Camera, style: LineStyle, range?: readonly [number, number]): void {
     this.lines.draw(this.textures.outline, this.textures, camera, style, range);
   }

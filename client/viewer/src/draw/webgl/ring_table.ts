@@ -25,7 +25,7 @@ export class RingTable {
     return this.ringOfPoint.subarray(0, count);
   }
 
-  /** ROW numbers per ring. Valid until the next call. */
+  /** For each ring its first vertex, end vertex and colour, and an unused number. Valid until the next call. */
   styles(rings: Rings, look: Look): Uint32Array {
     const count = rings.offsets.length - 1;
     if (this.rows.length < ROW * count) this.rows = new Uint32Array(2 * ROW * count);
