@@ -22,7 +22,11 @@ ExportedStream::ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster
       port_(port),
       clock_(clock),
       machine_(
-          std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), max_bytes)) {}
+          std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), max_bytes)) {
+  broadcaster_->HoldHistory();
+}
+
+ExportedStream::~ExportedStream() { broadcaster_->ReleaseHistory(); }
 
 void ExportedStream::Begin() {
   self_ = shared_from_this();
@@ -38,8 +42,7 @@ void ExportedStream::StartRead() {
 void ExportedStream::StartOpen() {
   machine_->Opened(WatchTerms{.broadcaster = broadcaster_,
                               .mode = WatchMode::kEvery,
-                              .credit = std::numeric_limits<std::uint64_t>::max(),
-                              .keeps_history = true});
+                              .credit = std::numeric_limits<std::uint64_t>::max()});
 }
 
 void ExportedStream::WriteOpened(const HeldFrames&) {

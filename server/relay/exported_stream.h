@@ -18,6 +18,7 @@
 
 namespace partiemc::server {
 
+/// Keeps the history of the stream for later fetches, also after the end of the stream.
 /// Watches the local stream in mode `every`, with the limits of an ordinary watcher. So a slow or
 /// disconnected bus does not delay the producer. The public functions are called by the relay
 /// thread only.
@@ -30,6 +31,7 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   /// until live() is false; this object is held by shared_ptr.
   ExportedStream(std::string id, std::shared_ptr<ResultBroadcaster> broadcaster,
                  std::size_t max_bytes, RelayPort& port, const Clock& clock);
+  ~ExportedStream() override;
 
   /// Starts to publish new results.
   void Begin();
@@ -47,8 +49,9 @@ class ExportedStream final : public std::enable_shared_from_this<ExportedStream>
   /// The time at which the end of the stream was published; empty if it has not ended. The end is
   /// sent again in response to each later fetch.
   std::optional<TimePoint> ended_at() const { return ended_at_; }
-  /// Sends the response to a `fetch` of `replica`: the held results that it requests, up to 4 MiB
-  /// or one larger result, then a FetchEnd.
+  /// Sends the response to a `fetch` of `replica`: the held results that `fetch` requests, up to 4
+  /// MiB or one larger result, then a FetchEnd, then the end of the stream if it has ended. Stops
+  /// at the first send that fails.
   void Answer(const relay::v1::Fetch& fetch, const std::string& replica);
 
  private:

@@ -48,6 +48,19 @@ std::vector<Published> ResultBroadcaster::BeginHistory(HistoryRoom& room, Result
   return dropped;
 }
 
+void ResultBroadcaster::HoldHistory() {
+  const MutexLock lock(mutex_);
+  ++history_holds_;
+}
+
+void ResultBroadcaster::ReleaseHistory() {
+  {
+    const MutexLock lock(mutex_);
+    if (--history_holds_ > 0 || !end_ || !history_) return;
+  }
+  dispatcher_.Wake(*this);
+}
+
 std::unique_ptr<ResultHistory> ResultBroadcaster::HandOver(std::uint64_t next_sequence,
                                                            std::vector<Published>& dropped) {
   const MutexLock lock(mutex_);
@@ -224,7 +237,7 @@ void ResultBroadcaster::Serve() {
   if (end) DropHistoryUnlessRead(watchers);
 }
 
-// Drops the history of an ended stream, unless a watcher still reads it.
+// Drops the history of an ended stream, unless a watcher still reads it or HoldHistory keeps it.
 void ResultBroadcaster::DropHistoryUnlessRead(
     const std::vector<std::shared_ptr<WatchStateMachine>>& watchers) {
   if (std::ranges::any_of(watchers, [](const auto& machine) { return machine->goes_back(); })) {
@@ -232,7 +245,7 @@ void ResultBroadcaster::DropHistoryUnlessRead(
   }
   std::unique_ptr<ResultHistory> dropped;  // Freed without the lock.
   const MutexLock lock(mutex_);
-  if (watchers_ != watchers) return;
+  if (history_holds_ > 0 || watchers_ != watchers) return;
   dropped = std::move(history_);
   NoteOldest();
 }

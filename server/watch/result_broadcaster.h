@@ -22,7 +22,8 @@ namespace partiemc::server {
 class ResultBroadcaster final : public Dispatched, public HistoryOwner {
  public:
   struct Limits {
-    /// Maximum bytes of frames that the dispatcher has not taken yet. A frame beyond it drops them.
+    /// Maximum bytes of frames that the dispatcher has not taken yet. If a new frame would exceed
+    /// the limit, these frames are dropped; the new frame is kept, whatever its size.
     std::size_t mailbox_bytes = std::size_t{16} << 20;
     /// If there are no watchers and no history, the newest frame is kept for later watchers if it
     /// is at most this large.
@@ -40,6 +41,10 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   std::vector<Published> BeginHistory(HistoryRoom& room, ResultBroadcaster* former,
                                       std::uint64_t next_sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   void ShareRoom() override { dispatcher_.Wake(*this); }
+  /// Keeps the history after the end of the stream, also without a watcher that reads it, until
+  /// ReleaseHistory. Calls nest.
+  void HoldHistory() ABSL_LOCKS_EXCLUDED(mutex_);
+  void ReleaseHistory() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// Publishes the result of the frame `sequence`. Wait-free: takes the lock only if it is free.
   /// Returns whether there are watchers; if so, the caller must call Announce. Requires: `sequence`
@@ -78,8 +83,8 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   /// Returns the first frame of the history whose result number is at least `number`; empty if all
   /// are older.
   Published Held(std::uint64_t number) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Returns the first frame whose sequence number is at least `sequence`, of the history or, if it
-  /// has none, the newest one; empty if all are older.
+  /// Returns the first frame of the history whose sequence number is at least `sequence`. If the
+  /// history has none, returns the newest frame if its number suffices, otherwise an empty result.
   Published HeldFrom(std::uint64_t sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   /// The newest frame, if it is kept.
   Published Newest() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -141,6 +146,7 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   std::vector<Published> news_ ABSL_GUARDED_BY(mutex_);
   std::size_t news_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<ResultHistory> history_ ABSL_GUARDED_BY(mutex_);
+  int history_holds_ ABSL_GUARDED_BY(mutex_) = 0;  // HoldHistory without ReleaseHistory.
   Published newest_ ABSL_GUARDED_BY(mutex_);  // Kept if it is in the history, small, or watched.
   std::optional<WatchEnd> end_ ABSL_GUARDED_BY(mutex_);
 };

@@ -62,7 +62,6 @@ void WatchStateMachine::Opened(const absl::StatusOr<WatchTerms>& terms) {
   state_.phase = Phase::kServing;
   mode_ = terms->mode;
   credit_ = terms->credit;
-  keeps_history_ = terms->keeps_history;
   Join(*terms);
 }
 
@@ -291,7 +290,7 @@ std::size_t WatchStateMachine::held_bytes() const {
 
 bool WatchStateMachine::goes_back() const {
   const MutexLock lock(mutex_);
-  return next_held_ != 0 || keeps_history_;
+  return next_held_ != 0;
 }
 
 void WatchStateMachine::DropPending() {

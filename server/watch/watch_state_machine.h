@@ -33,9 +33,6 @@ struct WatchTerms {
   std::uint64_t credit = 1;
   /// Start with this sequence number, from the history. Absent: start with the newest frame.
   std::optional<std::uint64_t> from_sequence = {};
-  /// Keep the history after the end of the stream, for other watchers, until the broadcaster is
-  /// destroyed.
-  bool keeps_history = false;
 };
 
 /// Limits of a watch whose stream has ended.
@@ -139,6 +136,7 @@ class WatchStateMachine final : public SerializedCall {
   /// The stream has ended.
   void StreamEnded(const WatchEnd& end);
   /// Sends the message `ended` with the reason of the drain and finishes. Does not wait for credit.
+  /// The client of a watch that is not open receives only the status.
   void Drain();
   /// Ends the watch with DEADLINE_EXCEEDED (IDLE) if it has received no `open` within `limit`, at
   /// the time `now`. `limit` 0: no limit. Returns the time of the next check.
@@ -161,7 +159,7 @@ class WatchStateMachine final : public SerializedCall {
   WatchCounts counts() const;
   /// Bytes of pending frames.
   std::size_t held_bytes() const;
-  /// Whether this watch reads the history, or keeps the history for other watchers.
+  /// Whether this watch reads the history.
   bool goes_back() const;
 
   std::shared_ptr<WatchStateMachine> shared_from_this() {
@@ -196,19 +194,18 @@ class WatchStateMachine final : public SerializedCall {
 
   const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
 
-  // When the client of a watch that ends last gave credit or accepted a write.
+  // While the watch is ending: the last time at which the client gave credit or accepted a write.
   std::chrono::steady_clock::time_point moved_ ABSL_GUARDED_BY(mutex_);
   WatchEnd end_ ABSL_GUARDED_BY(mutex_);  // Set from kEnding on.
   std::shared_ptr<ResultBroadcaster> broadcaster_ ABSL_GUARDED_BY(mutex_);
   WatchMode mode_ ABSL_GUARDED_BY(mutex_) = WatchMode::kLatest;
-  bool keeps_history_ ABSL_GUARDED_BY(mutex_) = false;
   std::uint64_t credit_ ABSL_GUARDED_BY(mutex_) = 0;
   std::deque<Published> pending_ ABSL_GUARDED_BY(mutex_);
   Published in_write_ ABSL_GUARDED_BY(mutex_);
   std::size_t held_bytes_ ABSL_GUARDED_BY(mutex_) = 0;     // Of pending_ and in_write_.
   std::uint64_t offered_ ABSL_GUARDED_BY(mutex_) = 0;      // Last offered number; 0: none.
   std::uint64_t next_held_ ABSL_GUARDED_BY(mutex_) = 0;    // Next number of the history; 0: live.
-  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;    // Next number if none is dropped.
+  std::uint64_t next_told_ ABSL_GUARDED_BY(mutex_) = 0;    // Number after the last written frame.
   std::uint64_t told_before_ ABSL_GUARDED_BY(mutex_) = 0;  // next_told_ before in_write_.
   WatchCounts counts_ ABSL_GUARDED_BY(mutex_);
 };

@@ -243,6 +243,23 @@ TEST_P(WatchBack, AnEndedStreamDropsItsHistoryAfterItsLastReader) {
   EXPECT_EQ(room_.held(), 0u);
 }
 
+TEST_P(WatchBack, AnEndedStreamKeepsAHeldHistory) {
+  broadcaster_->HoldHistory();
+  PublishAll(1, 3);
+  const auto paused = Join(1, std::nullopt);
+  paused->WaitForFrames(1);
+  Publish(4);  // `paused` has no credit for it, and does not go back.
+  auto leaver = Join(kMany, std::nullopt);
+  EndStream();
+  EXPECT_TRUE(leaver->status().ok());
+  leaver.reset();
+  dispatcher_.Flush();
+  EXPECT_EQ(broadcaster_->Held(1).number, 1u);
+  broadcaster_->ReleaseHistory();
+  dispatcher_.Flush();
+  EXPECT_EQ(broadcaster_->Held(1).frame, nullptr);
+}
+
 TEST_P(WatchBack, AnEndedStreamSharesTheRoomWithOpenOnes) {
   PublishAll(1, 10);
   const auto paused = Join(1, 1);
