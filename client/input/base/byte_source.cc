@@ -15,6 +15,9 @@
 namespace partiemc::client::input {
 namespace {
 
+// Sizes of the first read from a file and of the largest one. Each read is twice as large as the
+// one before it, so that small files need little memory.
+constexpr std::size_t kFirstBlockBytes = std::size_t{16} << 10;
 constexpr std::size_t kBlockBytes = std::size_t{256} << 10;
 constexpr std::size_t kMaxLineBytes = std::size_t{1} << 20;
 
@@ -123,14 +126,18 @@ absl::StatusOr<std::unique_ptr<InputStream>> InputStream::Open(const std::string
 }
 
 InputStream::InputStream(std::string path, std::unique_ptr<ByteSource> source, bool compressed)
-    : path_(std::move(path)), source_(std::move(source)), compressed_(compressed) {}
+    : path_(std::move(path)),
+      source_(std::move(source)),
+      compressed_(compressed),
+      block_bytes_(kFirstBlockBytes) {}
 
 bool InputStream::Fill() {
   if (at_end_) return false;
   buffer_.erase(0, std::exchange(position_, 0));
   const std::size_t size = buffer_.size();
-  buffer_.resize(size + kBlockBytes);
-  const auto count = source_->Read(buffer_.data() + size, kBlockBytes);
+  const std::size_t block = std::exchange(block_bytes_, std::min(2 * block_bytes_, kBlockBytes));
+  buffer_.resize(size + block);
+  const auto count = source_->Read(buffer_.data() + size, block);
   buffer_.resize(size + count.value_or(0));
   if (!count.ok()) failure_ = count.status();
   at_end_ = count.value_or(0) == 0;
@@ -186,7 +193,7 @@ absl::Status ReadUpTo(ByteSource& source, std::size_t size, std::vector<char>& b
   while (bytes.size() < size) {
     const std::size_t old_size = bytes.size();
     // Doubling keeps the allocation within twice the bytes that have arrived.
-    const std::size_t step = std::min(size - old_size, std::max(kBlockBytes, old_size));
+    const std::size_t step = std::min(size - old_size, std::max(kFirstBlockBytes, old_size));
     bytes.resize(old_size + step);
     // A source may return less at a time. A resize for each of its parts would fill all of `step`
     // with zeros again and again.

@@ -45,8 +45,8 @@ absl::StatusOr<std::string> ReadFilePart(const std::string& path, std::uint64_t 
                                          std::size_t size);
 
 /// A file of text or binary data, plain, gzip or zstd (recognised by its first bytes, not its
-/// name). Reads ahead by blocks of 256 KiB. The bytes before a damaged place are delivered
-/// first.
+/// name). Reads ahead by blocks of at most 256 KiB. If the data is damaged, the bytes before the
+/// damage are delivered before the error.
 class InputStream final : public ByteSource {
  public:
   /// Errors: as OpenFile. Reading fails with kResourceExhausted once the file has expanded too
@@ -69,7 +69,7 @@ class InputStream final : public ByteSource {
   /// Number of the last line read, from 1.
   std::size_t line_number() const { return line_number_; }
 
-  /// "PATH:LINE: message" with the last line read.
+  /// "PATH:LINE: message" with the number of the last line read.
   absl::Status ErrorAtLine(absl::StatusCode code, std::string_view message) const;
 
  private:
@@ -82,6 +82,7 @@ class InputStream final : public ByteSource {
   std::string path_;
   std::unique_ptr<ByteSource> source_;
   bool compressed_;
+  std::size_t block_bytes_;  // Size of the next read.
   bool at_end_ = false;
   absl::Status failure_;
   std::string buffer_;
