@@ -58,6 +58,13 @@ test('a position between frames is the previous frame', () => {
   assert.equal(history.get(4), null);
 });
 
+test('a frame that does not fit evicts nothing', () => {
+  const history = new History(5 * (400 + ENTRY));
+  for (let k = 1; k <= 5; ++k) history.insert(entry(k), Infinity);
+  assert.ok(!history.insert(entry(6, 1300), 2), 'without frame 1 it would still be too large');
+  assert.deepEqual(sequences(history), [1, 2, 3, 4, 5]);
+});
+
 test('a frame larger than the whole limit is kept alone', () => {
   const history = new History(1000);
   history.insert(entry(1), Infinity);

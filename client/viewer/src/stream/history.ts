@@ -54,19 +54,21 @@ export class History<E extends Entry = Entry> {
   /**
    * Adds an entry, or keeps the existing one of the same sequence. Evicts the oldest entries to stay
    * within the limit, but only entries before `keepFrom` and before the new entry. Returns false if the
-   * entry does not fit.
+   * entry does not fit, and then evicts nothing. An empty history accepts an entry of any size.
    */
   insert(entry: E, keepFrom: number): boolean {
     if (this.get(entry.sequence)) return true;
     const bytes = entry.bytes + ENTRY_BYTES;
     const evictBefore = Math.min(keepFrom, entry.sequence);
-    while (this.heldBytes + bytes > this.limitBytes && this.entries[0]?.sequence < evictBefore) {
-      this.heldBytes -= this.entries[0].bytes + ENTRY_BYTES;
-      this.entries.shift();
+    let evicted = 0;
+    let left = this.heldBytes;
+    while (left + bytes > this.limitBytes && this.entries[evicted]?.sequence < evictBefore) {
+      left -= this.entries[evicted++].bytes + ENTRY_BYTES;
     }
-    if (this.heldBytes + bytes > this.limitBytes && this.size > 0) return false;
+    if (left + bytes > this.limitBytes && evicted < this.size) return false;
+    this.entries.splice(0, evicted);
     this.entries.splice(this.lowerBound(entry.sequence), 0, entry);
-    this.heldBytes += bytes;
+    this.heldBytes = left + bytes;
     return true;
   }
 
