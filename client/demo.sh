@@ -139,12 +139,12 @@ rm -rf "$output"
 echo
 echo "$drops, as closed surfaces:"
 "$build/bin/partiemc" replay "$drops" --server "$address" --surface --check \
-  --output-dir "$output/surfaces" --format ply
+  --output-dir "$output/surfaces" --format ply,svg
 
 echo
 echo "The results are in $PWD/$output:"
 echo "  report.html       the whole replay to look at: open it in a browser"
 echo "  statistics.csv    numbers of every frame"
 echo "  frames/           GeoJSON, SVG and OBJ of every frame"
-echo "  surfaces/         PLY of the drops, for ParaView, Blender or MeshLab"
+echo "  surfaces/         PLY of the drops, for ParaView, Blender or MeshLab, and pictures (SVG)"
 ! $browser || play

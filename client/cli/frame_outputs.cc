@@ -60,9 +60,6 @@ StatisticsOf StatisticsFor(const FrameOutputs::Places& places) {
 absl::Status CheckSurfaces(const FrameOutputs::Places& places,
                            std::span<const FrameFormat> formats) {
   if (!places.surface) return absl::OkStatus();
-  if (!places.color_by.empty()) {
-    return absl::InvalidArgumentError("--color-by: colours outlines, but the frames are surfaces");
-  }
   if (!places.gauges.empty()) {
     return absl::InvalidArgumentError("--gauge: measures outlines, but the frames are surfaces");
   }

@@ -18,17 +18,10 @@ absl::Status CheckCombinations(const CLI::App& app) {
   if (app.count("--format") > 0 && app.count("--output-dir") == 0) {
     return absl::InvalidArgumentError("--format: requires --output-dir");
   }
-  if (app.count("--surface") > 0) {
-    if (app.count("--gauge") > 0) {
-      return absl::InvalidArgumentError(
-          "--gauge: measures outlines, so it cannot be combined with --surface; --stats has the "
-          "areas and volumes of surfaces");
-    }
-    if (app.count("--color-by") > 0) {
-      return absl::InvalidArgumentError(
-          "--color-by: colours outlines, so it cannot be combined with --surface; --report and "
-          "--output-dir have surfaces with all attributes");
-    }
+  if (app.count("--surface") > 0 && app.count("--gauge") > 0) {
+    return absl::InvalidArgumentError(
+        "--gauge: measures outlines, so it cannot be combined with --surface; --stats has the "
+        "areas and volumes of surfaces");
   }
   if (app.count("--check") > 0 && app.count("--coordinates") > 0) {
     return absl::InvalidArgumentError("--check: requires --coordinates float64, the default");
@@ -322,8 +315,7 @@ void AddOutputFlags(CLI::App& app, ReplayFlags& flags) {
   AddCompressGlbFlag(app, flags.files.compress_glb)->group(kGroup);
   app.add_option("--color-by", flags.files.color_by,
                  "Attribute that colours the pictures of svg and report; a vector by its length. "
-                 "The values "
-                 "are taken at the vertices: --fill grid has the most")
+                 "The values are taken at the vertices: --fill grid has the most")
       ->type_name("NAME")
       ->group(kGroup);
   AddStatisticsFlags(app, flags.files, kGroup);

@@ -22,19 +22,28 @@ constexpr std::array<std::array<double, 3>, 9> kStops{{{0x3d, 0x00, 0x6f},
 
 }  // namespace
 
-std::string ColorOf(double share) {
+Rgb RgbOf(double share) {
   const double place = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
   const std::size_t below = std::min(static_cast<std::size_t>(place), kStops.size() - 2);
   const double part = place - static_cast<double>(below);
-  std::string text = "#";
+  Rgb color;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto byte = static_cast<unsigned>(
+    color[channel] = static_cast<std::uint8_t>(
         std::lround((1 - part) * kStops[below][channel] + part * kStops[below + 1][channel]));
+  }
+  return color;
+}
+
+std::string TextOf(const Rgb& color) {
+  std::string text = "#";
+  for (const std::uint8_t byte : color) {
     text += "0123456789abcdef"[byte >> 4];
     text += "0123456789abcdef"[byte & 15];
   }
   return text;
 }
+
+std::string ColorOf(double share) { return TextOf(RgbOf(share)); }
 
 const AttributeValues* FindAttribute(const Result& result, const std::string& name) {
   for (const AttributeValues& attribute : result.attributes) {

@@ -2,7 +2,9 @@
 // with lightness in equal steps.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,7 +16,14 @@ namespace partiemc::client {
 /// Number of different colours in a picture.
 inline constexpr std::size_t kColorBands = 32;
 
-/// Returns the colour "#rrggbb" at a position in the map. `share` is clamped to 0 to 1.
+/// Red, green and blue, sRGB.
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// Returns the colour at a position in the map. `share` is clamped to 0 to 1.
+Rgb RgbOf(double share);
+/// "#rrggbb".
+std::string TextOf(const Rgb& color);
+/// TextOf(RgbOf(share)).
 std::string ColorOf(double share);
 
 /// The attribute of this name. Null if there is none or `name` is empty.

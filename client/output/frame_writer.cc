@@ -112,8 +112,7 @@ absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view name
 }
 
 bool HoldsSurfaces(FrameFormat format) {
-  return format != FrameFormat::kGeoJson && format != FrameFormat::kSvg &&
-         format != FrameFormat::kCsv;
+  return format != FrameFormat::kGeoJson && format != FrameFormat::kCsv;
 }
 
 absl::Status CheckHoldsSurfaces(FrameFormat format) {
@@ -142,7 +141,7 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
     return absl::OutOfRangeError(Concat("frame ", frame.index, ": coordinates above 3.4e38; ",
                                         Name(format), " has 32-bit floats"));
   }
-  // GLB has its origin at the centre of the frame.
+  // Only STL is checked: coordinates in GLB are relative to the centre of the frame.
   const std::span<const double> vertices = frame.surface ? points : frame.result.mesh.points;
   if (format == FrameFormat::kStl &&
       !AreFineFloats(vertices, frame.surface ? 3 : 2, frame.result.statistics.spacing)) {
@@ -155,7 +154,7 @@ absl::StatusOr<std::string> EncodeFrame(FrameFormat format, const FrameRecord& f
     case FrameFormat::kGeoJson:
       return EncodeGeoJson(frame);
     case FrameFormat::kSvg:
-      return EncodeSvg(frame, options);
+      return frame.surface ? EncodeSurfaceSvg(frame, options) : EncodeSvg(frame, options);
     case FrameFormat::kObj:
       return EncodeObj(frame);
     case FrameFormat::kCsv:

@@ -17,7 +17,7 @@
 
 namespace partiemc::client {
 
-/// Each format holds outlines. Formats of meshes also hold surfaces in space: see HoldsSurfaces.
+/// Each format holds outlines. Most formats also hold surfaces in space: see HoldsSurfaces.
 enum class FrameFormat : std::uint8_t {
   /// RFC 7946 FeatureCollection with one Polygon per outer ring and its holes. In every case outer
   /// rings are counter-clockwise, holes are clockwise, and the first point is repeated at the end.
@@ -29,6 +29,8 @@ enum class FrameFormat : std::uint8_t {
   /// A picture of mesh edges, outline, isolines and particles. The y axis points up. The longer
   /// side has 1000 units, without the legend; coordinates are rounded to 0.001 units. Dots mark the
   /// points where the outline meets a wall.
+  /// A surface: its triangles that face the camera, lit, seen as the page shows them at first. The
+  /// z axis points up. A surface with more than 20,000 triangles is simplified.
   kSvg,
   /// Wavefront OBJ: vertices "v x y 0", and the groups "mesh" (faces) and "rings" (closed
   /// polylines). Indices begin at 1.
@@ -73,7 +75,7 @@ std::string_view Name(FrameFormat format);
 /// The names of formats, separated by commas.
 std::string Names(std::span<const FrameFormat> formats);
 
-/// Whether a format can hold surfaces in space: all except geojson, svg and csv. Bodies are
+/// Whether a format can hold surfaces in space: all except geojson and csv. Bodies are
 /// numbered from 0 in the order of their outer shells.
 bool HoldsSurfaces(FrameFormat format);
 
@@ -87,8 +89,8 @@ absl::StatusOr<std::vector<FrameFormat>> ParseFrameFormats(std::string_view name
 struct FrameWriterOptions {
   std::filesystem::path directory = {};  ///< Created, with its parents, if absent.
   std::vector<FrameFormat> formats = {};
-  /// Visible box of all pictures of a sequence, in world units. Parts outside are cut off. Absent:
-  /// each picture fits its frame.
+  /// Visible box of all pictures of outlines of a sequence, in world units. Parts outside are cut
+  /// off. Absent: each picture fits its frame.
   std::optional<Box> picture_box = {};
   bool picture_particles = true;  ///< Draw the particles where the record has them.
   /// Attribute that colours the pictures, with a legend. A vector is coloured by its length. If the

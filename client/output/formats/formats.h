@@ -13,6 +13,9 @@ std::string EncodeGeoJson(const FrameRecord& frame);
 std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& options);
 std::string EncodeCsv(const FrameRecord& frame);
 
+/// Requires: frame.surface.
+std::string EncodeSurfaceSvg(const FrameRecord& frame, const FrameWriterOptions& options);
+
 // These write outlines and surfaces.
 std::string EncodeObj(const FrameRecord& frame);
 std::string EncodePly(const FrameRecord& frame);

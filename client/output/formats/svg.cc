@@ -5,23 +5,17 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "client/output/color_map.h"
 #include "client/output/formats/formats.h"
 #include "client/output/formats/stretches.h"
-#include "client/output/html.h"
+#include "client/output/formats/svg_picture.h"
 #include "client/output/text.h"
 
 namespace partiemc::client {
 namespace {
 
-// Length of the picture's longer side, in SVG units. World coordinates are scaled to it, because
-// readers of SVG use single precision, which world coordinates can exceed.
-constexpr double kLongerSide = 1000;
-constexpr double kSteps = 1000;  // Rounding steps per unit.
-
-// Margin around the box, as a share of its longer side.
-constexpr double kMargin = 0.02;
+// Rounding steps of coordinates and widths per SVG unit.
+constexpr double kSteps = 1000;
 
 // Diameter of a particle's dot.
 constexpr double kDotSpacings = 0.4;  // In spacings.
@@ -29,8 +23,7 @@ constexpr double kDefaultDot = 1.5;   // In SVG units, if the spacing is unknown
 constexpr double kSmallestDot = 0.4;  // Lower limit, in SVG units.
 
 // Colours of the page's light theme (client/viewer/src/draw/colours.ts).
-constexpr std::string_view kStyle =
-    "<style>"
+constexpr const char* kStyle =
     "path{stroke-linecap:round;stroke-linejoin:round}"
     ".inside{fill:#dfecf7;fill-rule:evenodd}"
     ".mesh{fill:none;stroke:#5f93c0;stroke-width:.6}"
@@ -38,48 +31,7 @@ constexpr std::string_view kStyle =
     ".outline{fill:none;stroke:#0b4f86;stroke-width:2}"
     ".isoline{fill:none;stroke:#a3470f;stroke-width:1}"
     ".bands path{stroke-width:.7}"
-    ".lines path{fill:none;stroke-width:3}"
-    ".legend{font:22px sans-serif;fill:#333}"
-    "</style>\n";
-
-// The legend below a picture that is coloured by an attribute, in SVG units: height of the legend,
-// and length of its colour bar.
-constexpr double kLegendHeight = 70;
-constexpr double kLegendBar = 400;
-
-/// Maps world coordinates to SVG units: y points down, the upper left corner of the box with its
-/// margin is (0, 0).
-class Picture {
- public:
-  explicit Picture(Box box) {
-    if (box.Empty()) box.Include(0, 0);
-    double margin = kMargin * box.Side();
-    if (!(margin > 0)) margin = 0.5;
-    left_ = box.min_x - margin;
-    top_ = box.max_y + margin;
-    const double width = box.Width() + 2 * margin;
-    const double height = box.Height() + 2 * margin;
-    scale_ = kLongerSide / std::max(width, height);
-    width_ = width * scale_;
-    height_ = height * scale_;
-  }
-
-  double width() const { return Round(width_); }
-  double height() const { return Round(height_); }
-  double scale() const { return scale_; }
-
-  void AppendPoint(std::string& out, const double* point) const {
-    AppendNumber(out, Round((point[0] - left_) * scale_));
-    out += ' ';
-    AppendNumber(out, Round((top_ - point[1]) * scale_));
-  }
-
- private:
-  // Adding 0 converts -0 to 0.
-  static double Round(double value) { return std::round(value * kSteps) / kSteps + 0.0; }
-
-  double left_, top_, scale_, width_, height_;
-};
+    ".lines path{fill:none;stroke-width:3}";
 
 Box OwnBox(const FrameRecord& frame, bool with_particles) {
   Box box;
@@ -101,7 +53,7 @@ std::string RingPath(const Rings& rings, const Picture& picture) {
   return path;
 }
 
-/// Returns the path of the rings without their cuts.
+/// Returns the path of the rings without the segments on faces of a periodic box (Rings::cuts).
 std::string OutlinePath(const Rings& rings, const Picture& picture) {
   std::string path;
   ForEachStretch(rings, [&](std::size_t, std::span<const std::uint32_t> points, bool is_closed) {
@@ -165,8 +117,9 @@ struct Corner {
   double x, y, share;
 };
 
-/// Returns the part of a convex polygon whose shares are above `bound` (side 1) or below (side -1).
-/// Source: Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
+/// Returns the part of a convex polygon where Corner::share, interpolated linearly, is at least
+/// `bound` (side 1) or at most `bound` (side -1). Source: Sutherland and Hodgman, "Reentrant
+/// polygon clipping", 1974.
 std::vector<Corner> Clip(const std::vector<Corner>& polygon, double bound, double side) {
   std::vector<Corner> kept;
   for (std::size_t k = 0; k < polygon.size(); ++k) {
@@ -179,11 +132,6 @@ std::vector<Corner> Clip(const std::vector<Corner>& polygon, double bound, doubl
     kept.push_back({from.x + part * (to.x - from.x), from.y + part * (to.y - from.y), bound});
   }
   return kept;
-}
-
-std::size_t BandOf(double share) {
-  const double band = std::clamp(share, 0.0, 1.0) * kColorBands;
-  return std::min(static_cast<std::size_t>(band), kColorBands - 1);
 }
 
 /// One path for each colour of the map. The attribute is linear in each triangle, so the parts of a
@@ -246,7 +194,7 @@ void AppendBands(std::string& out, std::string_view kind, const BandPaths& paths
   AppendAll(out, "<g class=\"", kind, "\">\n");
   for (std::size_t band = 0; band < kColorBands; ++band) {
     if (paths[band].empty()) continue;
-    const std::string color = ColorOf((static_cast<double>(band) + .5) / kColorBands);
+    const std::string color = ColorOf(ShareOfBand(band));
     AppendAll(out, "<path stroke=\"", color, "\"");
     if (kind == "bands") AppendAll(out, " fill=\"", color, "\"");
     AppendAll(out, " d=\"", paths[band], "\"/>\n");
@@ -254,35 +202,14 @@ void AppendBands(std::string& out, std::string_view kind, const BandPaths& paths
   out += "</g>\n";
 }
 
-void AppendLegend(std::string& out, const std::string& name, const ValueRange& range, double top) {
-  constexpr double kLeft = 20, kBarHeight = 18;
-  AppendAll(out, "<g class=\"legend\" transform=\"translate(", kLeft, " ");
-  AppendNumber(out, top);
-  out += ")\">\n";
-  for (std::size_t band = 0; band < kColorBands; ++band) {
-    const double step = kLegendBar / kColorBands;
-    AppendAll(out, "<rect x=\"", step * static_cast<double>(band), "\" width=\"", step + .5,
-              "\" height=\"", kBarHeight, "\" fill=\"",
-              ColorOf((static_cast<double>(band) + .5) / kColorBands), "\"/>\n");
-  }
-  AppendAll(out, "<text y=\"46\">", absl::StrCat(range.low), "</text>\n<text x=\"", kLegendBar,
-            "\" y=\"46\" text-anchor=\"end\">", absl::StrCat(range.high), "</text>\n<text x=\"",
-            kLegendBar + 20, "\" y=\"17\">", EscapeHtml(name), "</text>\n</g>\n");
-}
-
 }  // namespace
 
 std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& options) {
   const bool dots = options.picture_particles && !frame.particles.empty();
-  const Picture picture(options.picture_box.value_or(OwnBox(frame, dots)));
-  std::string out = R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 )";
-  AppendNumber(out, picture.width());
-  out += ' ';
+  const Picture picture(options.picture_box.value_or(OwnBox(frame, dots)), kSteps);
   const AttributeValues* const attribute = FindAttribute(frame.result, options.color_by);
-  AppendNumber(out, picture.height() + (attribute != nullptr ? kLegendHeight : 0));
-  AppendAll(out, "\">\n<title>Frame ", frame.index, ", time ");
-  AppendNumber(out, frame.time);
-  AppendAll(out, "</title>\n", kStyle, "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n");
+  std::string out;
+  AppendHead(out, frame, picture, attribute != nullptr, kStyle);
   AppendAll(out, R"(<path class="inside" d=")", RingPath(frame.result.rings, picture), "\"/>\n");
   const Mesh& mesh = frame.result.mesh;
   const std::vector<double> values =
@@ -315,7 +242,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
     AppendAll(out, R"(<path class="isoline" d=")",
               OutlinePath(frame.result.sections[k].rings, picture), "\"/>\n");
   }
-  if (attribute != nullptr) AppendLegend(out, attribute->name, range, picture.height());
+  if (attribute != nullptr) AppendLegend(out, attribute->name, range, picture);
   out += "</svg>\n";
   return out;
 }

@@ -303,17 +303,17 @@ TEST(SurfaceFiles, AnEmptySurfaceIsAValidFile) {
 }
 
 TEST(SurfaceFiles, FormatsOfOutlinesRefuseSurfaces) {
-  for (const FrameFormat format : {FrameFormat::kGeoJson, FrameFormat::kSvg, FrameFormat::kCsv}) {
+  for (const FrameFormat format : {FrameFormat::kGeoJson, FrameFormat::kCsv}) {
     EXPECT_FALSE(HoldsSurfaces(format));
     const auto refused =
         EncodeFrame(format, {.result = kNoOutline, .surface = &Scene()}, {}).status();
     EXPECT_EQ(refused, CheckHoldsSurfaces(format));
     EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_THAT(std::string(refused.message()), HasSubstr("must be some of obj,"));
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("must be some of svg,obj,"));
     EXPECT_THAT(std::string(refused.message()), HasSubstr(",glb"));
   }
-  for (const FrameFormat format : {FrameFormat::kObj, FrameFormat::kVtp, FrameFormat::kPly,
-                                   FrameFormat::kStl, FrameFormat::kGlb}) {
+  for (const FrameFormat format : {FrameFormat::kSvg, FrameFormat::kObj, FrameFormat::kVtp,
+                                   FrameFormat::kPly, FrameFormat::kStl, FrameFormat::kGlb}) {
     EXPECT_TRUE(HoldsSurfaces(format)) << Name(format);
     EXPECT_TRUE(CheckHoldsSurfaces(format).ok());
   }

@@ -97,6 +97,8 @@ class Report {
       this.look.setAttributes([...colorRanges.keys()], null);
       this.look.setColour(colorRanges.has(color) ? color : 'plain');
       this.look.toggle('edges');
+    } else if (color) {
+      this.look.setColour(color);
     }
     this.curves.setKind(this.track.hasSurfaces ? 'space' : 'plane');
     for (const element of document.querySelectorAll<HTMLElement>('[data-of]')) {
@@ -145,8 +147,8 @@ class Report {
   }
 
   private toggleColour(): void {
-    const { color, colorRanges } = this.track;
-    if (colorRanges.has(color)) this.look.setColour(this.look.look.colour === color ? 'plain' : color);
+    const { color, colorRanges, hasSurfaces } = this.track;
+    if (color && (hasSurfaces || colorRanges.has(color))) this.look.setColour(this.look.look.colour === color ? 'plain' : color);
   }
 
   private lookChanged(): void {
