@@ -26,8 +26,8 @@ class CallChannel {
   /// Sends the status of the call to the client.
   virtual void Finish(const absl::Status& status) = 0;
 
-  /// Called after a failed read. Returns true if the client has disconnected, false if it has
-  /// half-closed.
+  /// Called after a failed read. Returns true if the call was cancelled: the client disconnected or
+  /// broke the protocol, or Cancel was called. Returns false if the client has half-closed.
   virtual bool IsCancelled() const = 0;
   /// Address of the client in gRPC's format: "ipv4:192.0.2.7:51234".
   virtual std::string peer() const = 0;

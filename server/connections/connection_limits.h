@@ -42,9 +42,9 @@ class ConnectionCounts {
 
   /// Called when a connection of `address`, admitted as `admission`, was cut because of a flood.
   /// For ten seconds, new connections of this address may only make health checks. If the cut
-  /// connection was kHealthOnly, new ones are refused for one second, because over TLS a flood is
-  /// detected only after an expensive handshake. No effect if bans() is false. Of the address's
-  /// open connections, ConnectionWatch cuts the suspects.
+  /// connection was kHealthOnly, all are refused for the first of these seconds, because over TLS a
+  /// flood is detected only after an expensive handshake. No effect if bans() is false. Of the
+  /// address's open connections, ConnectionWatch cuts the suspects.
   void OnFlood(const std::string& address, Admission admission, Clock::time_point now);
 
   /// Whether OnFlood has an effect: not if the rate of new connections is unlimited, because an

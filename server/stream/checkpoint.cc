@@ -32,8 +32,8 @@ static_assert(kHeaderBytes + kMaxStreamNameBytes + kChecksumBytes +
 constexpr char kAsSent[] = "must be as a server sent it; start the stream anew";
 
 std::uint64_t FingerprintOf(const ReconstructionParameters& parameters) {
-  // Lists each member by name. If a member is added, this statement does not compile until the
-  // author also hashes the new member.
+  // Lists each member by name, so a new member does not compile here until it is listed. The
+  // compiler does not check that it is also hashed: add that below.
   const auto& [output, placement, fill, spacing, spacing_rule, sizes, boundary, kernel_radius,
                cell_size, reference_radius, surface_offset, attribute_tolerance, normal_memory,
                clean, min_component_area, min_component_particles, plane, slice, isovalue, sections,

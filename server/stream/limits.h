@@ -24,7 +24,8 @@ struct ServerLimits {
   FrameLimits frame{.max_particles = 4'000'000, .max_tiles = 131'072};
 
   /// Maximum size of a serialised ParticleFrame. By default the command line sets
-  /// DefaultFrameBytes(frame.max_particles), but at most an eighth of the memory budget.
+  /// DefaultFrameBytes(frame.max_particles), but at most an eighth of the memory budget (4 MiB if
+  /// an eighth is less), and at most 1.7 GB, so that gRPC can receive a message a quarter larger.
   std::uint64_t max_frame_bytes = DefaultFrameBytes(4'000'000);
 
   /// Maximum size of a client's message. A larger message ends the stream. The limit exceeds the

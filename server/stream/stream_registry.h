@@ -170,7 +170,8 @@ class StreamRegistry : private CallRegistry<StreamStateMachine, StreamEntry> {
   using CallRegistry::WaitUntilEmpty;
 
  private:
-  // The former stream's data, which a take-over releases without the lock.
+  // What Open handles without the lock: the machine of the former stream, to call TakenOver, which
+  // may call Leave; and frames that the history does not take over, to free them.
   struct Replaced {
     std::shared_ptr<StreamStateMachine> machine;
     std::vector<Published> frames;

@@ -118,7 +118,7 @@ class LevelQueue final : public Dispatched {
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// `computed`: number of levels that were computed. `shared`: number of requests that needed no
-  /// computation of their own, because another request has the same level.
+  /// computation of their own, because the level is kept, being computed or already requested.
   std::uint64_t computed() const { return computed_; }
   std::uint64_t shared() const { return shared_; }
   /// Bytes of the levels that are kept.

@@ -27,7 +27,7 @@ struct PickleValue {
   std::vector<std::uint64_t> shape;
   const PickleValue* content = nullptr;  ///< Of an array: text, or a sequence of objects.
 
-  /// The value of a key of a dict, or null.
+  /// The value of a key of a dict. Null if there is none, or if this is no dict.
   const PickleValue* Find(std::string_view key) const;
 };
 

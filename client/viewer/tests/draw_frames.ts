@@ -30,7 +30,7 @@ export interface FrameOptions {
   width?: number;
   height?: number;
   cell?: number;
-  /** Merges whole cells of a row to rectangles. Otherwise each has two triangles. */
+  /** Merges the whole cells of a row to rectangles. Default true. False: each whole cell has two triangles. */
   merge?: boolean;
   sequence?: bigint;
   origin?: [number, number];

@@ -53,8 +53,9 @@ struct Rings {
   /// moved an end of this segment off the wall.
   std::vector<std::uint32_t> wetted;
   /// Indices of points, ascending, where the outline of a body meets a wall, or where a phase meets
-  /// two other phases, or one and the outside (core/PHASES.md). `contact_angles` has one angle per
-  /// contact, of the fluid or of the phase, in radians, in [0, 2 pi].
+  /// two other phases, or one and the outside (core/PHASES.md). Junctions of phases whose angle
+  /// cannot be measured are not listed. `contact_angles` has one angle per contact, of the fluid or
+  /// of the phase, in radians, in [0, 2 pi].
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

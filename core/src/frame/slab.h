@@ -29,8 +29,9 @@ class Slab {
   /// Requires: three components, and CheckFrame has passed the frame. Cost: linear.
   void Take(const Frame& frame, const SlicePlane& plane, double reach);
 
-  /// The slab as a frame in the plane: positions and velocities along the plane; volumes, ids and
-  /// attributes unchanged. The arrays are views of this slab.
+  /// The slab as a frame in the plane: positions and velocities along the plane; volumes, ids,
+  /// attributes and time unchanged. The arrays are views of this slab. The names of attributes are
+  /// views of the frame that Take has read.
   Frame AsFrame() const;
 
   /// By particle: its signed distance from the plane in world units.

@@ -12,7 +12,7 @@ namespace partiemc {
 /// Divides each tile along one axis into buckets of a power of two of cells.
 class GridAxis {
  public:
-  /// Buckets of `width` cells, rounded down to a power of two; at least one cell.
+  /// Buckets of `width` cells, rounded down to a power of two; at least one cell, at most a tile.
   explicit GridAxis(double width = 0) {
     while (shift_ < kTileShift && (2 << shift_) <= width) ++shift_;
   }

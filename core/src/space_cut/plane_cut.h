@@ -44,8 +44,9 @@ struct CutMesh {
   std::vector<std::uint32_t> shell_of;   ///< Per triangle: any number; its parts get the same.
   std::vector<std::uint8_t> is_clipped;  ///< Per triangle: 1 if it is a part of a cut triangle.
   std::vector<Cap> caps;                 ///< One for each plane, in the order of the calls.
-  /// Set by CapPlanes. Cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]). Triangles of
-  /// no cap come first.
+  /// Set by CapPlanes: cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]), after all
+  /// triangles of no cap. CutSurface then appends shells that are not cut, and drops dust. After
+  /// that, only cap_offsets[0] is valid.
   std::vector<std::uint32_t> cap_offsets;
 };
 

@@ -31,8 +31,9 @@ enum class Stop { kNowhere, kAtEdges };
 void SmoothNormals(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                    Stop stop, std::span<Vec3> smooth);
 
-/// Sets `bends` to the sum of the principal curvatures, from the turn of the normals. Positive
-/// where the surface is convex. Clamped to +-`limit` / s_i.
+/// Sets `bends` to the sum of the principal curvatures, from the turn of the normals within
+/// `reach` s_i; 0 where nothing is near. Positive where the surface is convex. Clamped to
+/// +-`limit` / s_i. s_i is SizeOf(i), a ratio. `reach` and 1 / `limit` are lengths in cells.
 void FindBends(const LoopSurface& surface, std::span<const Vec3> normals, double reach,
                double limit, std::span<double> bends);
 

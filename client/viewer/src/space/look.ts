@@ -11,7 +11,7 @@ export interface SpaceLook {
   clipHeld: Vector | null;
   /** Place of the plane along its normal, from 0 to 1 across the box around all frames so far. */
   clipAt: number;
-  /** Cuts away the side with the smaller coordinates instead of the larger. */
+  /** Cuts away the smaller coordinates instead of the larger ones; with `view`, the far side instead of the near. */
   isClipFlipped: boolean;
   /** Closes cut bodies in the clip plane. */
   hasCutFaces: boolean;

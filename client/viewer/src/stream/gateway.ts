@@ -89,7 +89,7 @@ export class Gateway {
     return new Channel(url, [PROTOCOL, ...bearer], events);
   }
 
-  /** Information on the server, requested once. Throws CallError. */
+  /** Information on the server. Keeps the answer; after an error, the next call asks again. Throws CallError. */
   info(): Promise<GetServerInfoResponse> {
     this.known ??= this.call('/v1/info', GetServerInfoRequestSchema, GetServerInfoResponseSchema, {})
       .then((info) => {
