@@ -26,8 +26,8 @@ after(async () => {
 });
 
 /** Opens the report for the duration of `work`. */
-async function inReport(options, work) {
-  const report = await Viewer.open(browser, pathToFileURL(file('balls.html')).href, options);
+async function inReport(options, work, name = 'balls.html') {
+  const report = await Viewer.open(browser, pathToFileURL(file(name)).href, options);
   try {
     await until('a surface is shown', () => report.value('surface-digest'));
     await work(report);
@@ -125,6 +125,20 @@ for (const colorScheme of ['light', 'dark']) {
     await shot('section');
   }));
 }
+
+test('--color-by is the first colour; C switches it', async () => {
+  await replay(ballsOf({ folder }), ...SURFACE, '--color-by', 'p', '--report', file('by_p.html'));
+  await inReport({ hash: '#frame=0' }, async (report) => {
+    const colour = report.page.getByLabel('Colour', { exact: true });
+    await still(report);
+    assert.equal(await colour.inputValue(), 'p');
+    assert.equal(await report.page.locator('#legend-name').textContent(), 'p');
+    await changes(report, 'C', () => report.page.keyboard.press('c'));
+    assert.equal(await colour.inputValue(), 'plain');
+    await report.page.keyboard.press('c');
+    await until('the first colour is back', async () => await colour.inputValue() === 'p');
+  }, 'by_p.html');
+});
 
 test('without WebGL the reason is shown, with all numbers', async () => {
   const bare = await launch(['--no-sandbox', '--disable-gpu', '--disable-3d-apis', '--disable-software-rasterizer']);
