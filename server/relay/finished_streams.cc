@@ -22,6 +22,7 @@ void FinishedStreams::Add(relay::v1::LiveStream stream, std::uint64_t last_seque
 
 std::optional<relay::v1::LiveStream> FinishedStreams::Find(std::string_view name,
                                                            std::string_view lineage) {
+  if (lineage.empty()) return std::nullopt;
   const MutexLock lock(mutex_);
   DropOld();
   for (auto one = streams_.rbegin(); one != streams_.rend(); ++one) {
