@@ -177,11 +177,13 @@ void RejoiningWatch::Account(WatchedFrame& frame) {
 // the server does not support it (no lineage), or a retry cannot succeed.
 bool RejoiningWatch::Lose(const absl::StatusOr<Received>& received) {
   end_ = call_->end();
-  end_.dropped += unreported_drops_;
-  if (retry_.lost() && stream_.held && last_ != 0) {
-    // No frame came since the watch was lost, so all later ones are missing.
-    const std::uint64_t newest = stream_.held->newest_sequence;
-    end_.dropped = std::max(end_.dropped, newest - std::min(newest, last_));
+  if (retry_.lost() && last_ != 0) {
+    // No frame came since the watch was lost, so all after `last_` are missing. The counts of both
+    // calls may contain the same frames.
+    const std::uint64_t newest = stream_.held ? stream_.held->newest_sequence : 0;
+    end_.dropped = std::max({end_.dropped, unreported_drops_, newest - std::min(newest, last_)});
+  } else {
+    end_.dropped += unreported_drops_;
   }
   if (options_.rejoin.give_up_after.count() <= 0 || lineage_.empty() || !call_->lost()) {
     return false;

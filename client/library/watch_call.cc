@@ -52,6 +52,11 @@ std::vector<std::size_t> AxesOf(const ReconstructionParameters& parameters,
   return {0, 1};
 }
 
+// Whether a stream that ended with this reason may go on, here or elsewhere.
+bool MayReturn(const std::string& reason) {
+  return reason == "TAKEN_OVER" || reason == "PRODUCER_LOST";
+}
+
 void TakeParticles(const Frame& echoed, const ReconstructionParameters& parameters,
                    WatchedFrame& frame) {
   const auto components = static_cast<std::size_t>(echoed.components);
@@ -224,7 +229,8 @@ WatchCall::Message WatchCall::TakeNext(std::optional<TimePoint> until,
 
 bool WatchCall::HasEnd() const {
   if (status_->ok()) return !end_.reason.empty();
-  return end_.reason == "FINISHED" && IsLostConnection(status_->error_code(), reason_);
+  return !end_.reason.empty() && !MayReturn(end_.reason) && end_.reason != "DRAINING" &&
+         IsLostConnection(status_->error_code(), reason_);
 }
 
 absl::Status WatchCall::Decode(v1::WatchStreamResponse& message, WatchedFrame& frame) {
@@ -285,7 +291,7 @@ bool WatchCall::lost() {
     // TOO_MANY_OPENING counts as a loss, because it is temporary: the server was short of memory.
     return IsLostConnection(status_->error_code(), reason_) || reason_ == "TOO_MANY_OPENING";
   }
-  return end_.reason.empty() || end_.reason == "TAKEN_OVER" || end_.reason == "PRODUCER_LOST";
+  return end_.reason.empty() || MayReturn(end_.reason);
 }
 
 std::string WatchCall::why() {

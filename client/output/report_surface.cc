@@ -38,7 +38,8 @@ Surface ShownSurface(const FrameRecord& frame, std::size_t max_triangles) {
   if (surface.TriangleCount() <= max_triangles) return surface;
   const double spacing = frame.result.statistics.spacing;
   if (!(spacing > 0) || max_triangles == 0 ||
-      !MakeLevel({.max_triangles = max_triangles}, spacing, SurfaceOrigin::kCore, nullptr, surface)
+      !MakeLevel({.max_triangles = max_triangles}, spacing, SurfaceOrigin::kUnknown, nullptr,
+                 surface)
            .ok() ||
       surface.TriangleCount() > max_triangles) {
     return {};

@@ -1,5 +1,6 @@
 #include "server/calls/reconstruct_call.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "partiemc/status.h"
@@ -105,7 +106,11 @@ void ReconstructCall::EndWatches(const StreamSummary& stream, const absl::Status
     relay::v1::LiveStream finished;
     EncodeSummary(stream, std::chrono::steady_clock::now(), *finished.mutable_summary());
     finished.set_lineage(stream.lineage);
-    context().finished.Add(std::move(finished), broadcaster.last_sequence());
+    // The results of a stream that was resumed may all be at the former server.
+    context().finished.Add(std::move(finished), std::max(broadcaster.last_sequence(),
+                                                         stream.description.next_sequence - 1));
+  } else {
+    context().finished.Forget(stream.lineage);
   }
   broadcaster.End(WatchEnd::OfStream(status));
 }

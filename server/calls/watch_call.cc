@@ -102,26 +102,21 @@ void WatchCall::StartOpen() {
   terms_ = *std::move(terms);
   const std::string name = parsed_.open().stream_name();
   const auto stream = context().streams.Find(name, caller());
-  if (absl::IsNotFound(stream.status())) {
-    if (auto finished = context().finished.Find(name, parsed_.open().lineage())) {
-      const absl::Status status = OpenFinished(*std::move(finished));
-      return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
-    }
-  }
   const bool is_elsewhere =
       context().relay != nullptr &&
       (stream.ok() ? context().relay->WasResumedElsewhere(stream->lineage, stream->opened)
                    : absl::IsNotFound(stream.status()));
   if (!is_elsewhere) {
-    const absl::Status status = stream.ok() ? OpenHere(*stream) : stream.status();
+    absl::Status status = stream.ok() ? OpenHere(*stream) : stream.status();
+    if (absl::IsNotFound(status)) status = OpenFinished(name, status);
     return machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
   }
   context().relay->Find(
       name, terms_.from_sequence, [this, name](const absl::StatusOr<Relay::Found>& found) {
         absl::Status status = found.ok() ? OpenRemote(*found) : found.status();
-        if (absl::IsNotFound(status)) {  // The stream may have moved here.
-          if (const auto here = context().streams.Find(name, caller()); here.ok())
-            status = OpenHere(*here);
+        if (absl::IsNotFound(status)) {  // The stream may have moved here, or finished.
+          const auto here = context().streams.Find(name, caller());
+          status = here.ok() ? OpenHere(*here) : OpenFinished(name, status);
         }
         machine_->Opened(status.ok() ? absl::StatusOr<WatchTerms>(terms_) : status);
       });
@@ -169,12 +164,15 @@ absl::Status WatchCall::OpenRemote(const Relay::Found& found) {
   return absl::OkStatus();
 }
 
-absl::Status WatchCall::OpenFinished(relay::v1::LiveStream stream) {
-  finished_sequence_ = stream.summary().last_sequence();
+// Opens the watch of a stream that has finished. Returns `not_found` if it has not.
+absl::Status WatchCall::OpenFinished(const std::string& name, const absl::Status& not_found) {
+  auto stream = context().finished.Find(name, parsed_.open().lineage());
+  if (!stream) return not_found;
+  finished_sequence_ = stream->summary().last_sequence();
   auto broadcaster =
       std::make_shared<ResultBroadcaster>(context().dispatcher, ResultBroadcaster::Limits{});
   broadcaster->End(WatchEnd::OfStream(absl::OkStatus()));
-  return OpenRemote({std::move(broadcaster), std::move(stream)});
+  return OpenRemote({std::move(broadcaster), *std::move(stream)});
 }
 
 absl::Status WatchCall::TakePlace(const std::string& stream_id, const std::string& stream_name) {

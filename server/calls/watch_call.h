@@ -47,7 +47,7 @@ class WatchCall final : public ByteCall, private WatchTransport, private LevelQu
   absl::Status JoinLevel(bool has_surfaces);
   absl::Status OpenHere(const StreamSummary& stream);
   absl::Status OpenRemote(const Relay::Found& found);
-  absl::Status OpenFinished(relay::v1::LiveStream stream);
+  absl::Status OpenFinished(const std::string& name, const absl::Status& not_found);
   absl::Status TakePlace(const std::string& stream_id, const std::string& stream_name);
   void Write(grpc::ByteBuffer response);
   void LogEnd(const absl::Status& status) const;

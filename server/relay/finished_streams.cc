@@ -20,6 +20,15 @@ void FinishedStreams::Add(relay::v1::LiveStream stream, std::uint64_t last_seque
   DropOld();
 }
 
+void FinishedStreams::Forget(std::string_view lineage) {
+  const MutexLock lock(mutex_);
+  std::erase_if(streams_, [&](const Finished& one) {
+    if (one.stream.lineage() != lineage) return false;
+    bytes_ -= one.bytes;
+    return true;
+  });
+}
+
 std::optional<relay::v1::LiveStream> FinishedStreams::Find(std::string_view name,
                                                            std::string_view lineage) {
   if (lineage.empty()) return std::nullopt;

@@ -208,8 +208,13 @@ void ImportedStream::FetchAgain(TimePoint now) {
 void ImportedStream::End(const WatchEnd& end) {
   if (ended_) return;
   ended_ = true;
-  if (end.reason == kReasonFinished && limits_.finished != nullptr) {
-    limits_.finished->Add(stream_.stream, broadcaster_->last_sequence());
+  if (limits_.finished != nullptr) {
+    if (end.reason == kReasonFinished) {
+      limits_.finished->Add(stream_.stream, std::max(stream_.stream.summary().last_sequence(),
+                                                     broadcaster_->last_sequence()));
+    } else {
+      limits_.finished->Forget(stream_.stream.lineage());
+    }
   }
   broadcaster_->End(end);
   AnswerWaiting(NoSuchStream(stream_.name()));

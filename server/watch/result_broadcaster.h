@@ -42,7 +42,7 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
                                       std::uint64_t next_sequence) ABSL_LOCKS_EXCLUDED(mutex_);
   void ShareRoom() override { dispatcher_.Wake(*this); }
   /// Keeps the history after the end of the stream, also without a watcher that reads it, until
-  /// ReleaseHistory. Calls nest.
+  /// ReleaseHistory. Calls nest. A stream that resumes this one takes the history nevertheless.
   void HoldHistory() ABSL_LOCKS_EXCLUDED(mutex_);
   void ReleaseHistory() ABSL_LOCKS_EXCLUDED(mutex_);
 

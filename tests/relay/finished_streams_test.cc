@@ -31,6 +31,9 @@ TEST(FinishedStreams, AreFoundByNameAndLineageForThirtySeconds) {
   finished.Add(Named("tank", ""), 9);
   EXPECT_FALSE(finished.Find("tank", "")) << "a first watch";
   EXPECT_FALSE(finished.Find("pond", "first"));
+  finished.Add(Named("tank", "third"), 9);
+  finished.Forget("third");
+  EXPECT_FALSE(finished.Find("tank", "third"));
   clock.Advance(std::chrono::seconds(11));
   EXPECT_FALSE(finished.Find("tank", "first"));
   EXPECT_TRUE(finished.Find("tank", "second"));

@@ -15,8 +15,8 @@
 namespace partiemc::client::input {
 namespace {
 
-// Sizes of the first read from a file and of the largest one. Each read is twice as large as the
-// one before it, so that small files need little memory.
+// Sizes of the first read from a file and of the largest one. Reads double from one to the other,
+// so that small files need little memory.
 constexpr std::size_t kFirstBlockBytes = std::size_t{64} << 10;
 constexpr std::size_t kBlockBytes = std::size_t{256} << 10;
 constexpr std::size_t kMaxLineBytes = std::size_t{1} << 20;

@@ -3,9 +3,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
-#include <numeric>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -25,8 +24,8 @@ using Vector = std::array<double, 3>;
 // Rounding steps of coordinates per SVG unit.
 constexpr double kStepsInSpace = 10;
 
-// A surface with more triangles is simplified, so that viewers open the file quickly. About half of
-// the triangles face the camera; each takes 50 bytes.
+// A surface with more triangles is simplified, by at most 0.35 spacings, so that viewers open the
+// file quickly. About half of the triangles face the camera; each takes 62 bytes.
 constexpr std::uint64_t kMostTriangles = 20'000;
 
 // The camera of the page (DEFAULT_VIEW in client/viewer/src/space/camera.ts), with parallel rays:
@@ -36,7 +35,7 @@ constexpr double kTurn = -1.05, kTilt = 0.42;
 // Light and colour of the page (SURFACE_FRAGMENT in client/viewer/src/space/shaders.ts). The
 // direction to the light has the axes right, up and to the camera.
 constexpr Vector kLight = {-0.35, 0.55, 1.0};
-constexpr double kAmbient = 0.42, kBrightest = 1.06, kCutFaceLight = 0.8;
+constexpr double kAmbient = 0.42, kBrightest = 1.06;
 constexpr Rgb kSurfaceColor = {0xbf, 0xd8, 0xee};
 
 // Number of different brightnesses in a picture.
@@ -45,7 +44,7 @@ constexpr std::size_t kShades = 64;
 double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// The points of a surface as the camera sees them: to the right, up, to the camera, from the
-/// centre of their box.
+/// centre of their box. The longest side of the box has length 2, so that no sum overflows.
 class Seen {
  public:
   explicit Seen(std::span<const double> points) {
@@ -59,11 +58,17 @@ class Seen {
       low[k % 3] = std::min(low[k % 3], points[k]);
       high[k % 3] = std::max(high[k % 3], points[k]);
     }
+    double half_side = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      half_side = std::max(half_side, high[axis] / 2 - low[axis] / 2);
+    }
+    if (!(half_side > 0)) half_side = 1;
     points_.resize(points.size() / 3);
     for (std::size_t k = 0; k < points_.size(); ++k) {
       Vector from_centre;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        from_centre[axis] = points[3 * k + axis] - (low[axis] / 2 + high[axis] / 2);
+        from_centre[axis] =
+            points[3 * k + axis] / half_side - (low[axis] / 2 + high[axis] / 2) / half_side;
       }
       points_[k] = Turned(from_centre);
     }
@@ -109,9 +114,22 @@ struct Facet {
   std::uint8_t shade = 0, band = 0;
 };
 
+/// By triangle: 1 if it belongs to a cavity, which its body hides.
+std::vector<std::uint8_t> TrianglesOfCavities(const Surface& surface) {
+  std::vector<std::uint8_t> is_hidden(surface.TriangleCount(), 0);
+  for (std::size_t shell = 0; shell < surface.ShellCount(); ++shell) {
+    if (surface.outer_of[shell] == kNoShell) continue;
+    std::fill(is_hidden.begin() + surface.triangle_offsets[shell],
+              is_hidden.begin() + surface.triangle_offsets[shell + 1], 1);
+  }
+  return is_hidden;
+}
+
 /// The triangles that face the camera, from back to front. `values`: one for each point, or empty.
+/// Triangles of cuts are flat; others have the mean of the normals at their points.
 std::vector<Facet> FacetsOf(const Surface& surface, const Seen& seen,
                             std::span<const double> values, const ValueRange& range) {
+  const std::vector<std::uint8_t> is_hidden = TrianglesOfCavities(surface);
   std::vector<Facet> facets;
   std::size_t next_cut = 0;
   for (std::size_t t = 0; t < surface.TriangleCount(); ++t) {
@@ -119,7 +137,7 @@ std::vector<Facet> FacetsOf(const Surface& surface, const Seen& seen,
     const bool is_cut = next_cut < surface.cuts.size() && surface.cuts[next_cut] == t;
     const std::uint32_t* const corners = &surface.triangles[3 * t];
     const Vector flat = NormalOf(seen[corners[0]], seen[corners[1]], seen[corners[2]]);
-    if (!(flat[2] > 0)) continue;
+    if (!(flat[2] > 0) || is_hidden[t] != 0) continue;
     Vector normal = {};
     double depth = 0, value = 0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -131,9 +149,8 @@ std::vector<Facet> FacetsOf(const Surface& surface, const Seen& seen,
         normal[axis] += static_cast<double>(surface.normals[3 * point + axis]);
       }
     }
-    normal = surface.normals.empty() ? flat : seen.Turned(normal);
     const double brightness =
-        is_cut ? kAmbient + (kBrightest - kAmbient) * kCutFaceLight : BrightnessOf(normal);
+        BrightnessOf(is_cut || surface.normals.empty() ? flat : seen.Turned(normal));
     facets.push_back(
         {.depth = depth,
          .triangle = static_cast<std::uint32_t>(t),
@@ -178,12 +195,13 @@ const AttributeValues* FindIn(const Surface& surface, const std::string& name) {
   return nullptr;
 }
 
-/// The surface with at most kMostTriangles triangles, or all if they cannot be that few.
+/// The surface, simplified if it has more than kMostTriangles triangles and its spacing is known.
 Surface DrawnSurface(const FrameRecord& frame) {
   Surface surface = *frame.surface;
   const double spacing = frame.result.statistics.spacing;
   if (surface.TriangleCount() <= kMostTriangles || !(spacing > 0)) return surface;
-  if (MakeLevel({.max_triangles = kMostTriangles}, spacing, SurfaceOrigin::kCore, nullptr, surface)
+  if (MakeLevel({.max_triangles = kMostTriangles}, spacing, SurfaceOrigin::kUnknown, nullptr,
+                surface)
           .ok()) {
     return surface;
   }

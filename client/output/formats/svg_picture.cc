@@ -42,7 +42,8 @@ void Picture::AppendPoint(std::string& out, const double* point) const {
 double Picture::Round(double value) const { return std::round(value * steps_) / steps_ + 0.0; }
 
 std::size_t BandOf(double share) {
-  const double band = std::clamp(share, 0.0, 1.0) * kColorBands;
+  if (!(share > 0)) return 0;
+  const double band = std::min(share, 1.0) * kColorBands;
   return std::min(static_cast<std::size_t>(band), kColorBands - 1);
 }
 

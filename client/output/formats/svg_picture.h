@@ -33,7 +33,8 @@ class Picture {
   double steps_, left_, top_, scale_, width_, height_;
 };
 
-/// The colour of the map for a position in the range, as a number from 0 to kColorBands - 1.
+/// The colour of the map for a position in the range, as a number from 0 to kColorBands - 1; 0 for
+/// NaN.
 std::size_t BandOf(double share);
 /// The position of a band's centre in the range.
 double ShareOfBand(std::size_t band);
