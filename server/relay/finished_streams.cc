@@ -23,6 +23,7 @@ void FinishedStreams::Add(relay::v1::LiveStream stream, std::uint64_t last_seque
 void FinishedStreams::Forget(std::string_view lineage) {
   const MutexLock lock(mutex_);
   std::erase_if(streams_, [&](const Finished& one) {
+    mutex_.AssertHeld();
     if (one.stream.lineage() != lineage) return false;
     bytes_ -= one.bytes;
     return true;
