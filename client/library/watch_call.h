@@ -79,8 +79,9 @@ class WatchCall {
   Message TakeNext(std::optional<TimePoint> until, absl::StatusOr<Received>& received)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void Run(v1::WatchStreamRequest open) ABSL_LOCKS_EXCLUDED(mutex_);
-  // Whether the call ended with the server's WatchEnded message and status OK. After the reason
-  // FINISHED a status that means a lost connection counts, too: some proxies lose the status.
+  // Whether the call ended with the server's WatchEnded message and status OK. A status that
+  // means a lost connection counts, too, because some proxies lose the status. It does not count
+  // after a reason for which the watch rejoins: TAKEN_OVER, PRODUCER_LOST, DRAINING.
   bool HasEnd() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Decode(v1::WatchStreamResponse& message, WatchedFrame& frame);
   absl::Status ExceededCredit() const;

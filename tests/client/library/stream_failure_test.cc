@@ -386,22 +386,24 @@ TEST(WatchFailure, FramesWithoutCreditBreakTheProtocol) {
 }
 
 // Some proxies reset a call instead of delivering its last message or its status.
-TEST(WatchFailure, AFinishedStreamEndsTheWatchEvenIfItsStatusIsLost) {
-  const FakeServer server(AnswerAll, [&](grpc::ServerContext&, FakeServer::WatchRpc& rpc) {
-    v1::WatchStreamResponse response;
-    response.mutable_opened()->set_lineage("of the tank");
-    rpc.Write(response);
-    response.mutable_ended()->set_reason("FINISHED");
-    rpc.Write(response);
-    return grpc::Status(grpc::StatusCode::CANCELLED, "Received RST_STREAM with error code 8");
-  });
-  const auto watcher = Watcher::Open(server.address(), "tank", {});
-  ASSERT_TRUE(watcher.ok()) << watcher.status();
-  WatchedFrame frame;
-  const auto received = (*watcher)->Receive(frame);
-  ASSERT_TRUE(received.ok()) << received.status();
-  EXPECT_EQ(*received, Received::kEnd);
-  EXPECT_EQ((*watcher)->end().reason, "FINISHED");
+TEST(WatchFailure, TheReasonEndsTheWatchEvenIfTheStatusIsLost) {
+  for (const char* reason : {"FINISHED", "IDLE"}) {
+    const FakeServer server(AnswerAll, [&](grpc::ServerContext&, FakeServer::WatchRpc& rpc) {
+      v1::WatchStreamResponse response;
+      response.mutable_opened()->set_lineage("of the tank");
+      rpc.Write(response);
+      response.mutable_ended()->set_reason(reason);
+      rpc.Write(response);
+      return grpc::Status(grpc::StatusCode::CANCELLED, "Received RST_STREAM with error code 8");
+    });
+    const auto watcher = Watcher::Open(server.address(), "tank", {});
+    ASSERT_TRUE(watcher.ok()) << watcher.status();
+    WatchedFrame frame;
+    const auto received = (*watcher)->Receive(frame);
+    ASSERT_TRUE(received.ok()) << received.status();
+    EXPECT_EQ(*received, Received::kEnd);
+    EXPECT_EQ((*watcher)->end().reason, reason);
+  }
 }
 
 TEST(WatchFailure, AWatchThatLostTheEndAsksForItAndCountsWhatItMissed) {
@@ -421,7 +423,9 @@ TEST(WatchFailure, AWatchThatLostTheEndAsksForItAndCountsWhatItMissed) {
     response.mutable_opened()->set_has_frames(true);
     response.mutable_opened()->set_newest_sequence(5);
     rpc.Write(response);
-    response.mutable_ended()->set_reason("FINISHED");
+    // The second call reports the same missed frames as the third one.
+    response.mutable_ended()->set_reason(calls == 2 ? "PRODUCER_LOST" : "FINISHED");
+    response.mutable_ended()->set_dropped(calls == 2 ? 3 : 0);
     rpc.Write(response);
     return grpc::Status::OK;
   });
