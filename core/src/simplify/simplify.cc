@@ -94,9 +94,9 @@ class Simplifier {
     if (limits_.work != nullptr) limits_.work->Take(work);
   }
 
-  /// Marks the cells near a fault of a shell, and has the next round simplify the shell again.
+  /// Marks the cells near a fault of a shell. The next round then simplifies the shell again.
   void Repeat(std::uint32_t shell, const Box& fault);
-  /// Has the next round copy the shell's certified triangles.
+  /// Marks a shell whose certified triangles the next round copies.
   void GiveUp(std::uint32_t shell) {
     attempts_[shell] = kMostAttempts;
     progress_[shell] = Progress::kToSimplify;
