@@ -32,9 +32,9 @@ ReadPermits::ReadPermits(MemoryBudget& budget, const ReadTerms& terms)
       terms_{.streams_beyond = std::max(terms.streams_beyond, 1u),
              .message_bytes = std::max<std::uint64_t>(terms.message_bytes, 1)} {}
 
-std::uint64_t ReadPermits::Expected(const Read& read) const {
-  if (read.expected_bytes == 0) return terms_.message_bytes;
-  return std::min(read.expected_bytes, terms_.message_bytes);
+std::uint64_t ReadPermits::PlannedBytes(std::uint64_t expected_bytes) const {
+  if (expected_bytes == 0) return terms_.message_bytes;
+  return std::min(expected_bytes, terms_.message_bytes);
 }
 
 ReadPermits::Permit& ReadPermits::Renew(const std::shared_ptr<Reader>& reader, Read read) {
@@ -56,11 +56,19 @@ bool ReadPermits::Begin(const std::shared_ptr<Reader>& reader, Read read) {
   return begins;
 }
 
+bool ReadPermits::MayReadAhead(const Reader& reader) {
+  const MutexLock lock(mutex_);
+  const auto found = permits_.find(&reader);
+  if (found == permits_.end()) return true;
+  FreeSlotIfFits(found->first, found->second);
+  return !found->second.has_slot;
+}
+
 void ReadPermits::BeginNow(const std::shared_ptr<Reader>& reader, Read read) {
   const MutexLock lock(mutex_);
   Permit& permit = Renew(reader, std::move(read));
   permit.state = State::kReading;
-  permit.planned = Expected(permit.read);
+  permit.planned = PlannedBytes(permit.read.expected_bytes);
   budget_.Plan(permit.planned, permit.read.caller);
   --waiting_;
   ++reading_;
@@ -118,7 +126,7 @@ void ReadPermits::Finish(Permits::value_type& item) {
 
 bool ReadPermits::TryPermit(Permits::value_type& item, bool may_open_slot) {
   Permit& permit = item.second;
-  const std::uint64_t expected = Expected(permit.read);
+  const std::uint64_t expected = PlannedBytes(permit.read.expected_bytes);
   if (!budget_.TryPlan(expected, permit.read.caller)) {
     Slot* const slot = FindSlot(item, may_open_slot);
     if (slot == nullptr) return false;
@@ -148,17 +156,20 @@ ReadPermits::Slot* ReadPermits::FindSlot(const Permits::value_type& item, bool m
   return &slots_[item.second.read.stream];
 }
 
-// Frees the slots whose bytes now fit into the budget and into the share of their caller.
-void ReadPermits::FreeSlots() {
-  for (auto& [reader, permit] : permits_) {
-    if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
-      LeaveSlot(reader, permit);
-    }
+// Frees the slot if its bytes now fit into the budget and into the share of their caller.
+void ReadPermits::FreeSlotIfFits(const Reader* reader, Permit& permit) {
+  if (permit.has_slot && budget_.FitsWithout(permit.beyond, permit.read.caller)) {
+    LeaveSlot(reader, permit);
   }
+}
+
+void ReadPermits::FreeSlots() {
+  for (auto& [reader, permit] : permits_) FreeSlotIfFits(reader, permit);
 }
 
 void ReadPermits::LeaveSlot(const Reader* reader, Permit& permit) {
   if (!std::exchange(permit.has_slot, false)) return;
+  changed_ = true;
   SetBeyond(permit, 0);
   const auto slot = slots_.find(permit.read.stream);
   if (permit.state == State::kReading) slot->second.reading = false;
@@ -257,7 +268,8 @@ void ReadPermits::LapseOrCover(Permits::value_type& item, Clock::time_point now)
     return;
   }
   if (permit.came <= permit.planned + kBeside || permit.planned >= terms_.message_bytes) return;
-  const std::uint64_t most = permit.has_lapsed ? Expected(permit.read) : terms_.message_bytes;
+  const std::uint64_t most =
+      permit.has_lapsed ? PlannedBytes(permit.read.expected_bytes) : terms_.message_bytes;
   const std::uint64_t more = most - std::min(most, permit.planned);
   if (more == 0 || !budget_.TryPlan(more, permit.read.caller)) return;
   permit.planned += more;

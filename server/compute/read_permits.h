@@ -37,7 +37,8 @@ struct ReadTerms {
 /// 2. If the planned bytes do not fit into the budget, the stream may get a slot, which permits one
 ///    frame beyond the budget. There are `streams_beyond` slots. If no slot is free, the read
 ///    waits. A stream keeps its slot until the response to the frame is sent or the bytes fit into
-///    the budget. Bytes in a slot take no memory of the budget from other streams.
+///    the budget. Until then, the connection reads no other frame. Bytes in a slot take no memory
+///    of the budget from other streams.
 /// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
 ///    other, each connection once, until they have received the size of the largest message.
 /// 4. Waiting reads get permits in this order: streams that have a slot, callers with the fewest
@@ -82,7 +83,13 @@ class ReadPermits {
   /// Requests a permit for a reader that has no frame in flight. Returns false if the read must
   /// wait; ReadPermitted is called later.
   bool Begin(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Like Begin, but always permits the read. Requires: MemoryBudget has just granted the bytes.
+  /// Whether a reader with a frame in flight may claim memory for its next frame: not while its
+  /// frame in flight needs the slot. Frees the slot if the bytes fit into the budget.
+  bool MayReadAhead(const Reader& reader) ABSL_LOCKS_EXCLUDED(mutex_);
+  /// Bytes that a permit plans for a read with this Read::expected_bytes.
+  std::uint64_t PlannedBytes(std::uint64_t expected_bytes) const;
+  /// Like Begin, but always permits the read. Requires: MayReadAhead, and MemoryBudget has just
+  /// granted PlannedBytes.
   void BeginNow(const std::shared_ptr<Reader>& reader, Read read) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Records that the read is complete: its bytes are no longer planned. Requires: the received
   /// `bytes` were taken from the budget (MemoryBudget::Take). Errors: RESOURCE_EXHAUSTED
@@ -145,7 +152,6 @@ class ReadPermits {
     std::set<const Reader*> open;  // Connections that use it still.
   };
 
-  std::uint64_t Expected(const Read& read) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Permit& Renew(const std::shared_ptr<Reader>& reader, Read read)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool TryPermit(Permits::value_type& item, bool may_open_slot)
@@ -155,6 +161,7 @@ class ReadPermits {
   void Unplan(Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void SetBeyond(Permit& permit, std::uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Finish(Permits::value_type& item) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void FreeSlotIfFits(const Reader* reader, Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void FreeSlots() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void LeaveSlot(const Reader* reader, Permit& permit) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::shared_ptr<Reader> PermitNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -331,8 +331,12 @@ void StreamStateMachine::DecideRead() {
   if (read_ == written_) {
     const bool permitted = budget_.reads().Begin(shared_from_this(), NextRead());
     permitted ? Read(Reading::kNext) : void(state_.reading = Reading::kPermit);
-  } else if (budget_.TakeOrWait(last_bytes_, shared_from_this(), caller_.get())) {
-    surplus_ += last_bytes_;
+    return;
+  }
+  if (!budget_.reads().MayReadAhead(*this)) return;
+  const std::uint64_t bytes = budget_.reads().PlannedBytes(ExpectedBytes());
+  if (budget_.TakeOrWait(bytes, shared_from_this(), caller_.get())) {
+    surplus_ += bytes;
     ReadAhead();
   } else {
     state_.reading = Reading::kMemory;
@@ -351,12 +355,13 @@ void StreamStateMachine::Read(Reading what) {
   Do([this, slot = read_ % window_] { transport_.StartRead(slot); });
 }
 
-// Returns the data of the next read. Expects the next frame to be at most an eighth larger than the
-// last one.
+// The next frame is expected to be at most an eighth larger than the last one.
+std::uint64_t StreamStateMachine::ExpectedBytes() const { return last_bytes_ + last_bytes_ / 8; }
+
 ReadPermits::Read StreamStateMachine::NextRead() const {
   const void* const assembly = handler_.Assembly();
   return {.stream = assembly != nullptr ? assembly : this,
-          .expected_bytes = last_bytes_ + last_bytes_ / 8,
+          .expected_bytes = ExpectedBytes(),
           .caller = caller_.get(),
           .peer = transport_.peer()};
 }

@@ -194,6 +194,7 @@ class StreamStateMachine final : public SerializedCall,
   void DecideCompute() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void DecideFinish() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool IsAllSaid() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::uint64_t ExpectedBytes() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   ReadPermits::Read NextRead() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Read(Reading what) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void ReadAhead() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -20,6 +20,7 @@
 #include "server/base/machine_limits.h"
 #include "server/memory_transport.h"
 #include "server/moving_blob.h"
+#include "server/scripted_transport.h"
 #include "support/temporary_folder.h"
 
 namespace partiemc::server {
@@ -280,6 +281,35 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
     pool.reset();  // Its threads may still notify streams of free memory.
     EXPECT_EQ(budget.held(), 0u) << "round " << round;
   }
+}
+
+// A stream with a frame beyond the budget gives up its slot before it claims memory for the next
+// frame. Otherwise, the frame would be counted neither in the budget nor in a slot.
+TEST(MemoryOfStreams, KeepsTheSlotOfAFrameUntilTheFrameFits) {
+  const std::uint64_t frame = FrameBytes();
+  SteppedPool pool;
+  MemoryBudget budget(2 * frame, {.reads = {.streams_beyond = 1, .message_bytes = frame}});
+  ScriptedTransport first(pool, budget, kWindow, BlobParameters(), kLimits);
+  ScriptedTransport second(pool, budget, kWindow, BlobParameters(), kLimits);
+  budget.Take(2 * frame);
+  for (ScriptedTransport* transport : {&first, &second}) {
+    transport->BringRequest({.kind = RequestKind::kOpen, .positions = {}});
+    transport->EndWrite(true);
+  }
+  ASSERT_TRUE(first.reading());
+  ASSERT_FALSE(second.reading()) << "the first stream has the only slot";
+  first.BringRequest({.kind = RequestKind::kFrame, .sequence = 1, .positions = MovingBlob(1, 0)});
+  EXPECT_FALSE(first.reading());
+  EXPECT_EQ(budget.planned(), 3 * frame);
+  budget.GiveBack(frame);
+  EXPECT_FALSE(first.reading()) << "there is no memory for its next frame";
+  EXPECT_TRUE(second.reading()) << "the slot is free";
+  EXPECT_EQ(budget.planned(), 3 * frame);
+  budget.GiveBack(frame);
+  EXPECT_LE(budget.planned(), 3 * frame);
+  for (ScriptedTransport* transport : {&first, &second}) transport->machine().Cancelled();
+  pool.Step();
+  EXPECT_EQ(budget.planned(), 0u);
 }
 
 class MachineLimits : public ::testing::Test {
