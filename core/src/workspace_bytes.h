@@ -10,7 +10,7 @@ struct FrameSize {
   std::uint64_t particles = 0;
   std::uint64_t tiles = 0;
   std::uint64_t segments = 0;          ///< Of the outline: one per active cell, two per saddle.
-  std::uint64_t cut_segments = 0;      ///< Segments if rings are cut at a periodic box, else 0.
+  std::uint64_t cut_segments = 0;      ///< `segments` if a periodic box can cut rings, else 0.
   std::uint64_t grid_cells = 0;        ///< Interior cells if the fill is `grid`, else 0.
   std::uint64_t block_cells = 0;       ///< Interior cells if the mesh has blocks, else 0.
   std::uint64_t block_tiles = 0;       ///< Tiles with such cells.

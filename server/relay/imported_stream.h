@@ -68,9 +68,13 @@ class ImportedStream {
   void End(const WatchEnd& end);
   /// Ends all pending joins with `status`.
   void Refuse(const absl::Status& status) { AnswerWaiting(status); }
-  /// Renews the request for results each second, and ends a fetch that gets no response for two
-  /// seconds. If the first fetch gets none, the import ends with an error. Called every 50 ms.
-  /// `connected`: whether the bus is connected.
+  /// Handles the timeouts. Called every 50 ms. `connected`: whether the bus is connected.
+  /// - Requests the owner's new results each second while the bus is connected. The owner publishes
+  ///   new results only while such requests arrive.
+  /// - Ends a fetch, which requests results already published, if no response arrives for two
+  ///   seconds. Before watchers can join (Ready), the import then ends with an error. Afterwards,
+  ///   the missing results count as dropped, and a fetch does not time out while the bus is
+  ///   disconnected.
   void Tick(TimePoint now, bool connected);
 
  private:

@@ -46,9 +46,9 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   void HoldHistory() ABSL_LOCKS_EXCLUDED(mutex_);
   void ReleaseHistory() ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Publishes the result of the frame `sequence`. Wait-free: takes the lock only if it is free.
-  /// Returns whether there are watchers; if so, the caller must call Announce. Requires: `sequence`
-  /// increases from call to call.
+  /// Publishes the result of the frame `sequence`. Wait-free: the result stays in the mailbox until
+  /// a thread that holds the lock collects it. Returns whether there are watchers. If so, the
+  /// caller must call Announce. Requires: `sequence` increases from call to call.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence)
       ABSL_LOCKS_EXCLUDED(mutex_);
   /// Publishes and announces a result of a stream that another server owns, under that server's

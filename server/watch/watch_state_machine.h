@@ -76,11 +76,11 @@ class WatchTransport {
   virtual void Finish(const absl::Status& status) = 0;
 };
 
-/// Totals of a watch, counted from the first frame that was offered to it.
+/// Totals of a watch, counted from the frame with which it starts (ResultBroadcaster::Join).
 struct WatchCounts {
-  std::uint64_t frames = 0;         ///< Passed to the transport.
+  std::uint64_t frames = 0;         ///< Passed to the transport, and not skipped or refused by it.
   std::uint64_t dropped = 0;        ///< Never sent.
-  std::size_t most_held_bytes = 0;  ///< Largest number of pending bytes.
+  std::size_t most_held_bytes = 0;  ///< Largest value of held_bytes().
 };
 
 /// The state machine of one watcher (phases: server/base/call_state.h). Ending owes the message
@@ -157,7 +157,7 @@ class WatchStateMachine final : public SerializedCall {
   void Cut();
 
   WatchCounts counts() const;
-  /// Bytes of pending frames.
+  /// Bytes of the pending frames and of the frame being written (Published::pending_bytes).
   std::size_t held_bytes() const;
   /// Whether this watch reads the history.
   bool goes_back() const;

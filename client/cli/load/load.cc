@@ -112,9 +112,10 @@ class LoadedStream {
   double CpuSeconds() { return CpuSecondsOf(sender_) + CpuSecondsOf(receiver_); }
 
   // Arrival time of the response to a frame that has been sent. Empty if the response has not
-  // arrived. Once kRemembered later frames have been sent, returns the time of a later frame, or
-  // empty.
+  // arrived. If more than kRemembered / 2 later frames have been sent, the time of a later frame.
   std::optional<Clock::time_point> AnsweredAt(std::uint64_t sequence) const {
+    const std::uint64_t sent = sent_;
+    if (sent > kRemembered / 2) sequence = std::max(sequence, sent - kRemembered / 2);
     const auto at = answered_at_[sequence % kRemembered].load();
     if (at == Clock::duration::rep{0}) return std::nullopt;
     return Clock::time_point(Clock::duration(at));
@@ -136,6 +137,7 @@ class LoadedStream {
         due = start_ + PeriodTimes(static_cast<double>(k));
         std::this_thread::sleep_until(due);
       }
+      sent_ = k + 1;
       due_[(k + 1) % kRemembered] = due.time_since_epoch().count();
       answered_at_[(k + 1) % kRemembered] = 0;  // Removes the time of an earlier frame.
       const std::vector<float>& frame = shared_.frames[k % shared_.frames.size()];
@@ -174,6 +176,7 @@ class LoadedStream {
   const std::string name_;
   std::unique_ptr<Stream> stream_;
   Clock::time_point start_;
+  std::atomic<std::uint64_t> sent_ = 0;  // Number of the frame that is being sent.
   Times due_{}, answered_at_{};
   std::thread sender_, receiver_;
 };
@@ -192,7 +195,8 @@ void WatchStream(Shared& shared, const LoadedStream& stream, const std::string& 
     if (*got == Received::kEnd) return;
     if (*got != Received::kEvent) continue;
     const auto now = Clock::now();
-    // If the watcher received the result before the producer, the delay counts as 0.
+    // If the watcher received the result before the producer, the delay counts as 0. The delay of a
+    // watcher that is far behind is a lower bound.
     const auto answered = stream.AnsweredAt(frame.sequence);
     shared.watches.Add(answered ? std::max(Milliseconds(now - *answered), 0.0) : 0.0);
   }

@@ -20,7 +20,9 @@ std::optional<double> ValueOf(std::string_view text, std::string_view name) {
   return ConsumeNumber<double>(text);
 }
 
-// Connects with a timeout of five seconds per step. Returns the descriptor, or -1.
+// Connects to the first address of `host` that accepts. Returns the descriptor, or -1. The timeout
+// is five seconds for each attempt to connect, and later for each send and receive. The name lookup
+// has no timeout.
 int Connect(const std::string& host, const std::string& port) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;

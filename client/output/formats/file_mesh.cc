@@ -47,6 +47,13 @@ std::span<const std::uint32_t> FileMesh::triangles() const {
   return surface_ ? surface_->triangles : outline_.mesh.triangles;
 }
 
+std::vector<bool> FileMesh::Cuts() const {
+  if (surface_ == nullptr || surface_->cuts.empty()) return {};
+  std::vector<bool> cuts(TriangleCount());
+  for (const std::uint32_t triangle : surface_->cuts) cuts[triangle] = true;
+  return cuts;
+}
+
 const Rings& FileMesh::rings() const {
   static const Rings kNone;
   return surface_ ? kNone : outline_.rings;

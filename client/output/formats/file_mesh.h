@@ -13,6 +13,9 @@
 
 namespace partiemc::client {
 
+/// The name of FileMesh::Cuts in files.
+inline constexpr const char* kCut = "cut";
+
 /// Whether the mesh starts with the points of the rings, bit for bit. Guarantee M3 of result.h
 /// states this for all placements except `farthest-particle`.
 bool MeshSharesRingPoints(const Result& result);
@@ -37,6 +40,8 @@ class FileMesh {
   /// Three vertex indices each.
   std::span<const std::uint32_t> triangles() const;
   std::size_t TriangleCount() const { return triangles().size() / 3; }
+  /// Whether each triangle lies on a wall or on a face of a periodic box. Empty if none does.
+  std::vector<bool> Cuts() const;
 
   /// Empty for a surface.
   const Rings& rings() const;

@@ -33,18 +33,19 @@ void AppendRings(std::string& out, const FileMesh& mesh) {
   }
 }
 
-/// The faces of one shell. The corners refer to the normals of their points, if there are any.
-void AppendShell(std::string& out, const Surface& surface, std::size_t shell) {
-  for (std::size_t k = std::size_t{3} * surface.triangle_offsets[shell];
-       k < std::size_t{3} * surface.triangle_offsets[shell + 1]; ++k) {
-    const std::size_t vertex = std::size_t{surface.triangles[k]} + 1;
-    AppendAll(out, k % 3 == 0 ? "f " : " ", vertex);
+/// The face of a triangle. The corners refer to the normals of their points, if there are any.
+void AppendFace(std::string& out, const Surface& surface, std::size_t triangle) {
+  out += 'f';
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const std::size_t vertex = std::size_t{surface.triangles[3 * triangle + corner]} + 1;
+    AppendAll(out, " ", vertex);
     if (!surface.normals.empty()) AppendAll(out, "//", vertex);
-    if (k % 3 == 2) out += '\n';
   }
+  out += '\n';
 }
 
-void AppendBodies(std::string& out, const Surface& surface) {
+/// A group for each body. Cut triangles also belong to the group `cut`.
+void AppendBodies(std::string& out, const Surface& surface, const std::vector<bool>& cuts) {
   const std::vector<std::uint32_t> bodies = BodyOfShells(surface);
   std::vector<std::vector<std::size_t>> shells;
   for (std::size_t shell = 0; shell < bodies.size(); ++shell) {
@@ -53,7 +54,17 @@ void AppendBodies(std::string& out, const Surface& surface) {
   }
   for (std::size_t body = 0; body < shells.size(); ++body) {
     AppendAll(out, "g body_", body, "\n");
-    for (const std::size_t shell : shells[body]) AppendShell(out, surface, shell);
+    bool in_cut = false;
+    for (const std::size_t shell : shells[body]) {
+      for (std::size_t k = surface.triangle_offsets[shell]; k < surface.triangle_offsets[shell + 1];
+           ++k) {
+        if (!cuts.empty() && cuts[k] != in_cut) {
+          in_cut = cuts[k];
+          AppendAll(out, "g body_", body, in_cut ? Concat(" ", kCut) : "", "\n");
+        }
+        AppendFace(out, surface, k);
+      }
+    }
   }
 }
 
@@ -65,7 +76,7 @@ std::string EncodeObj(const FrameRecord& frame) {
   AppendVectors(out, "v", mesh.points());
   if (mesh.surface()) {
     AppendVectors(out, "vn", mesh.normals());
-    AppendBodies(out, *mesh.surface());
+    AppendBodies(out, *mesh.surface(), mesh.Cuts());
     return out;
   }
   if (mesh.TriangleCount() > 0) {

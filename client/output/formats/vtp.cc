@@ -120,6 +120,15 @@ void AddWalls(const FileMesh& mesh, vtkPolyData* data) {
   data->GetPointData()->AddArray(angles);
 }
 
+void AddCuts(const FileMesh& mesh, vtkPolyData* data) {
+  const std::vector<bool> is_cut = mesh.Cuts();
+  if (is_cut.empty()) return;
+  vtkNew<vtkUnsignedCharArray> cuts;
+  cuts->SetName(kCut);
+  for (const bool cut : is_cut) cuts->InsertNextValue(cut ? 1 : 0);
+  data->GetCellData()->AddArray(cuts);
+}
+
 void AddShells(const Surface& surface, vtkPolyData* data) {
   vtkNew<vtkIntArray> shell_of, body_of;
   shell_of->SetName("shell");
@@ -146,6 +155,7 @@ absl::StatusOr<std::string> EncodeVtp(const FrameRecord& frame) {
   AddPolygons(mesh, data);
   if (mesh.surface()) {
     AddShells(*mesh.surface(), data);
+    AddCuts(mesh, data);
   } else {
     AddOutline(mesh, frame.result.mesh, data);
   }

@@ -77,10 +77,10 @@ absl::Status Check(const Gauge& gauge);
 /// Check; INVALID_ARGUMENT for a text of another form.
 absl::StatusOr<Gauge> ParseGauge(std::string_view text);
 
-/// The values of a gauge, in the order of GaugeTraits::values. A value is NaN if the outline has no
-/// such point. A value that requires discs is NaN if `discs` is empty or has unequal numbers of
-/// centres and areas. Only angles and contact points are fitted; all other values are exact for the
-/// polygons.
+/// The values of a gauge, in the order of GaugeTraits::values. A height, position, centroid or
+/// angle is NaN if the outline does not have it; a length, an area or a number of crossings is then
+/// 0. A value that requires discs is NaN if `discs` is empty or has unequal numbers of centres and
+/// areas. Only angles and contact points are fitted; all other values are exact for the polygons.
 /// Requires: Check(gauge).ok(). Cost: linear in the points of the rings. `height` and `wetted` also
 /// sort the crossings, `repose` visits the points 200 times, and `packing` visits every disc.
 std::vector<double> Measure(const Gauge& gauge, const Result& result, const Discs& discs = {});

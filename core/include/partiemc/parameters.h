@@ -80,14 +80,14 @@ struct SlicePlane {
   friend bool operator==(const SlicePlane&, const SlicePlane&) = default;
 };
 
-/// A further outline of the same particles. The members replace parameters of the stream; all other
-/// parameters are the same. At most one member is present, except that a slice and an isovalue may
-/// be combined.
+/// Another outline of the same particles, with the parameters of the stream except the members of
+/// this struct. At most one member is present, or a slice and an isovalue.
 struct Section {
-  /// Absent: the slice of the stream. Must be present for Output::kSurface; otherwise it may be
-  /// present only if the stream has a slice.
+  /// Absent: the slice of the stream. Required for Output::kSurface; otherwise allowed only if the
+  /// stream has a slice.
   std::optional<SlicePlane> slice = std::nullopt;
-  std::optional<double> isovalue = std::nullopt;  ///< Absent: the outline of the body.
+  /// Absent: the outline of the body, even if the stream has an isovalue.
+  std::optional<double> isovalue = std::nullopt;
   /// The outline of the particles with this value of `phase_attribute` (core/PHASES.md), at most
   /// 2^24 in magnitude. Sections with phases divide the outline of the stream: two phases share the
   /// points of their interface. All other particles are one more phase, without a result. No two
@@ -225,8 +225,10 @@ struct ReconstructionParameters {
   /// covered with blocks instead of rectangles, without T-junctions (core/METHOD.md, "Mesh").
   double attribute_tolerance = 0.01;
 
-  /// Orients the normal of a cell by its normal in the last frame (Eq. 11), not by the outline
-  /// alone. Used only by `farthest-particle` and `qef`, and only without `box`.
+  /// Takes, of the two directions of a cell's normal, the one closer to the cell's normal in the
+  /// last frame (Eq. 11), which also replaces a weak normal. If false, or in cells without a last
+  /// normal, the outline determines the direction. Used only by `farthest-particle` and `qef`, and
+  /// only without `box`.
   bool normal_memory = true;
 
   /// Closes holes below 2 squared spacings (grains: 0.5; surfaces: 2 cubed spacings), with

@@ -63,7 +63,7 @@ class PlaneFit {
   double xx_ = 0, xy_ = 0, yy_ = 0, xz_ = 0, yz_ = 0, zz_ = 0;
 };
 
-/// The sums for all components of the attributes of a frame.
+/// Sums over particles (Carried) for each component of the attributes of a frame; 0 at first.
 class CarriedSums {
  public:
   explicit CarriedSums(std::span<const Attribute> attributes) {

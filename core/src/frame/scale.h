@@ -35,9 +35,14 @@ struct Scale {
 /// The unit of ReconstructionParameters::cell_size, in spacings: 0.5 for grains, else 1.
 double CellUnit(const ReconstructionParameters& parameters);
 
-/// Arguments in world units. `lightest_volume`: the smallest area of a particle (h^2 without
-/// volumes); with parameters.slice, the smallest volume (h^3). Requires: resolved parameters; for
-/// Sizes::kOwn, `lightest_volume` is h^2 or h^3, because weights do not contain volumes.
+/// Makes the scale of a frame. Arguments are in world units, except `sizes`.
+///   spacing: h.
+///   lightest_volume: the smallest volume of a particle in the frame; an area unless
+///     parameters.slice is set. Surfaces set it, too. `lightest_volume` limits f_0, so that a lone
+///     particle of this volume has an outline. If particles have no volumes, it is h^2, or with
+///     parameters.slice h^3. Also for Sizes::kOwn, because weights then do not contain volumes.
+///   sizes: in spacings; both 1 except for Sizes::kOwn.
+/// Requires: resolved parameters.
 Scale MakeScale(const ReconstructionParameters& parameters, double spacing, double cell_size,
                 double lightest_volume, const SizeRange& sizes = {});
 

@@ -50,16 +50,20 @@ struct SampleInput {
   }
 };
 
-/// Selects the samples of each outer ring, and finds the samples of the last frame.
+/// Selects the samples of each outer ring. Also finds the particles that were samples in the last
+/// frame: RingSamples::found has their ring before, their ring now, and their displacement.
 ///
 /// The samples of a ring are its kMaxSamples particles with the smallest hashes of their ids: a
 /// bottom-k sketch (Cohen, Kaplan: Summarizing data using bottom-k sketches, 2007). They are a
 /// random choice, independent of the order of the particles, and mostly the same in the next frame.
 ///
-/// The limit of a ring is the hash below which 2 kMaxSamples of its particles are expected. A first
-/// pass over the ids skips each particle whose hash exceeds the limits of all rings near its tile,
-/// unless the particle is a sample of the last frame. If a ring gets too few samples, a second pass
-/// selects them from all particles of the tiles near it. The samples are therefore exact.
+/// The result is exact, but most particles are skipped early:
+/// 1. The limit of a ring is the hash below which 2 kMaxSamples of its particles are expected. The
+///    limit of a tile is the largest limit of the rings near it.
+/// 2. The first pass visits all ids. It skips a particle if its hash exceeds the limit of its tile,
+///    except samples of the last frame.
+/// 3. If a ring has too few samples after the first pass, the second pass selects them from all
+///    particles of the tiles near the ring.
 /// Cost: a hash and a comparison for each particle; log kMaxSamples for each particle that passes.
 void SampleRings(const SampleInput& input, std::span<const ParticleSample> previous,
                  RingSamples& samples);

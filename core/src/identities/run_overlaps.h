@@ -53,7 +53,7 @@ inline void SumByPair(std::vector<SharedNodes>& shared) {
   shared.resize(kept);
 }
 
-/// The order of runs: by row, then column.
+/// The order of runs: by row, then first column, then piece.
 template <typename Run>
 bool ComesBefore(const Run& a, const Run& b) {
   return std::tuple(RowOf(a), a.first, PieceOf(a)) < std::tuple(RowOf(b), b.first, PieceOf(b));

@@ -28,7 +28,7 @@ struct CellPlane {
   float gradient_x = 0, gradient_y = 0;  ///< Of F, or of phi if vertices are particles.
   float size = 1;                        ///< The local size at the point, in spacings.
   double normal_x = 0, normal_y = 0;     ///< Unit normal, oriented (Eq. 11).
-  /// `virtual-plane` only: F, its gradient and the local size at `entry`.
+  /// `virtual-plane` only: F, its gradient and the local particle size, in spacings, at `entry`.
   float entry_value = 0;
   float entry_gradient_x = 0, entry_gradient_y = 0;
   float entry_size = 1;

@@ -34,8 +34,8 @@ constexpr std::size_t kItemsPerCheck = 1 << 16;
 
 std::uint8_t AxisBit(std::size_t axis) { return static_cast<std::uint8_t>(1u << axis); }
 
-// The grid of cells. The diagonal of a cell is at most the range, so the particles of a cell are in
-// one cluster.
+// The grid of cells. The diagonal of a cell is at most the range (LiftInput::range), so the
+// particles of a cell are in one cluster.
 struct Grid {
   std::array<bool, 3> counts{};         // The coordinate counts.
   std::array<double, 3> origin{};       // Lower end of the box; 0 without a period.
@@ -166,8 +166,9 @@ bool AreNear(const Grid& grid, const LiftScratch& s, const LiftCell& a, const Li
   return false;
 }
 
-// Joins the cells that are within the range of each other, and marks the clusters that percolate.
-// Returns the axes along which any cluster percolates.
+// Joins cells into clusters. Two cells are joined if a particle of one is at most the range
+// (LiftInput::range) away from a particle of the other, or from its image (AreNear). Marks the
+// clusters that percolate. Returns the axes along which any cluster percolates.
 std::array<bool, 3> JoinCells(const Grid& grid, LiftScratch& s) {
   s.sets.Reset(s.cells.size());
   const auto visit = [&](std::uint32_t a, const GridCell& step) {

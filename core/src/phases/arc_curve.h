@@ -18,10 +18,11 @@ inline constexpr double kCurveNearest = 1.5;
 /// direction of the curve, points up to kCurvatureFarthest its curvature.
 inline constexpr double kCurveFarthest = 5, kCurvatureFarthest = 9;
 
-/// `noise` of ArcCurveFit::Fit for a curve that determines the place of a junction: a bend below
-/// ten standard errors, the square root of this number, becomes 0. The limit is that high for two
-/// reasons. Smoothing correlates the deviations of neighbouring points, so the standard error is
-/// too small. And the curve is extrapolated to the junction.
+/// `noise` of ArcCurveFit::Fit for a curve that determines the place of a junction. This is the
+/// square of a limit in standard errors: a bend of less than ten standard errors becomes 0. The
+/// limit is high for two reasons. Smoothing correlates the deviations of neighbouring points, so
+/// the computed standard error is too small. And the curve is extrapolated to the junction, which
+/// magnifies an error of the bend.
 inline constexpr double kPlaceNoise = 100;
 
 struct Line {

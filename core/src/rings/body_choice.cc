@@ -75,7 +75,8 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   for (std::uint32_t component = 0; component < components; ++component) {
     const std::uint32_t root = RootOf(c.set, component);
     const std::uint32_t outer = topology.outer_ring[component];
-    // Particles that have a component only by their copies are in `total` already.
+    // A given particle may lie in no component although its copy lies in one. `given_count` lacks
+    // such particles; JoinImages has counted them in `total`.
     c.total[root] += std::exchange(c.total[component], 0) + c.given_count[component];
     if (outer != kNoRing) {
       c.largest[root] = std::max(c.largest[root], AreaOfRing(topology, outer));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "base/predicates_in_space.h"
 #include "check/triangle_contact.h"
@@ -86,24 +87,28 @@ void FindManifoldFaults(std::span<const double> points, std::span<const std::uin
 }
 
 bool IsConnected(std::span<const std::uint32_t> triangles, std::size_t points) {
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   const auto [least, most] = std::minmax_element(triangles.begin(), triangles.end());
   const std::uint32_t first = *least;
-  std::vector<std::uint32_t> parent(*most - first + 1);
-  for (std::uint32_t k = 0; k < parent.size(); ++k) parent[k] = k;
-  const auto root_of = [&](std::uint32_t k) {
+  std::vector<std::uint32_t> parent(*most - first + 1, kUnused);
+  std::size_t used = 0, joined = 0;
+  const auto root_of = [&](std::uint32_t point) {
+    std::uint32_t k = point - first;
+    if (parent[k] == kUnused) {
+      parent[k] = k;
+      ++used;
+    }
     while (parent[k] != k) k = parent[k] = parent[parent[k]];
     return k;
   };
-  std::size_t joined = 1;
   for (std::size_t t = 0; t < triangles.size() / 3; ++t) {
     for (int k = 1; k < 3; ++k) {
-      const std::uint32_t a = root_of(triangles[3 * t] - first);
-      const std::uint32_t b = root_of(triangles[3 * t + k] - first);
+      const std::uint32_t a = root_of(triangles[3 * t]), b = root_of(triangles[3 * t + k]);
       joined += a != b ? 1 : 0;
       parent[std::max(a, b)] = std::min(a, b);
     }
   }
-  return joined == points;
+  return used == points && joined + 1 == used;
 }
 
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,

@@ -38,11 +38,12 @@ struct SpaceBins {
   BrickDirectory bricks;
   /// Classes with particles in this frame, largest sizes first; one class for equal sizes.
   std::vector<SizeClass> classes{SizeClass{}};
-  /// By brick and class: the first particle of each cell, then the end of the last cell.
+  /// By brick and class: the first particle of each cell. A class has (8 >> shift)^3 cells in a
+  /// brick. All further entries are the end of the last cell.
   std::vector<std::array<std::uint32_t, kBrickNodes + 1>> cells;
   /// kBinPadding values follow the last particle, so that vectors may read beyond it.
   std::vector<float> x, y, z;
-  std::vector<float> weight;          ///< Padded. Empty without volumes, and with own sizes.
+  std::vector<float> weight;          ///< Padded. Empty without volumes, and also with own sizes.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
   /// Images: particles of the frame from this index on, which are mirror images behind walls or

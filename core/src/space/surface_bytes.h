@@ -71,16 +71,18 @@ inline constexpr std::uint64_t kBytesPerSimplifiedPoint = 400;
 /// Lone particles at edges of walls require the most.
 inline constexpr std::uint64_t kBytesPerCutPoint = 1600, kBytesPerCutAxis = 900;
 
-/// Bytes of the cut at the faces of a box, per point: copies of all points and triangles, and the
-/// cuts along each axis. Bodies that percolate reach far beyond the faces, so few of their points
-/// are near a cut. Wrapped spray has more (space_allocation_test.cc).
+/// Bytes of the cut at the faces of a periodic box, per point of the surface before the cut: copies
+/// of all points and triangles, and the cuts along each axis. The cuts need little memory: before
+/// the cut, a body that percolates continues far beyond the faces, so few of its points are near a
+/// cut. Wrapped spray has more points near a cut. The bound holds for it, too
+/// (tests/core/space_memory_test.cc).
 inline constexpr std::uint64_t kBytesPerBoxPoint = 450, kBytesPerBoxAxis = 50;
 
-/// Bytes of any frame.
+/// Bytes added for every frame.
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
 /// Upper bound of the bytes of a new SurfaceWorkspace, Surface and SurfaceState after a frame of
-/// this size (tests/core/space_allocation_test.cc).
+/// this size (tests/core/space_memory_test.cc).
 inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
   const std::uint64_t per_loop = kBytesPerLoop + (size.has_windows ? kBytesPerWindow : 0);
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +

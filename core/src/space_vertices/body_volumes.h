@@ -65,8 +65,9 @@ void FindBodyOfVertices(const BrickDirectory& bricks, const SpaceField& field,
 void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings, double cell_size,
                    const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
 
-/// Sets `measures` from the triangles of the bodies. Positions, area and volume are in world units.
-/// Requires: FindBodyOfVertices. Linear in triangles.
+/// Sets BodyVolumes::measures from the triangles of the bodies. `positions`: by vertex, in world
+/// units. The areas and volumes of the measures are then in world units, too. Requires:
+/// FindBodyOfVertices. Cost: linear in the triangles.
 void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodies& bodies,
                       std::span<const Vec3> positions, std::span<const VertexTriangle> triangles,
                       BodyVolumes& volumes);

@@ -81,13 +81,16 @@ class ContactFitter {
     rings_.points[2 * point + 1] = at.y;
   }
   Point At() const { return lines_.At(p_.place[contact_]); }
-  // 1 if the wet side is ahead in the direction of the wall, else -1. A ring runs along its wall in
-  // the wall's direction.
+  // The direction from the contact to the wet part of the wall: 1 is the direction of the wall, -1
+  // the opposite one. A ring runs along its wall in the direction of the wall, so the wet part is
+  // ahead if it follows the contact on the ring.
   double WetSign() const { return is_wet_after_ ? 1 : -1; }
-  // The signed length along the wall from the contact's first place to the length `along`.
+  // The signed length from the contact's first place, before any move, to another place on the same
+  // wall. `along`: WallLines::Along of that place.
   double From(double along) const { return lines_.Between(loop_, start_, along); }
 
-  // Moves the contact to the foot of its curve. Returns false if the contact stops before the foot.
+  // Moves the contact to `foot`, the place where its fitted curve meets the wall. Returns false if
+  // the contact stops before it, at a sharp corner, another contact or another wall.
   bool MoveContact(const WallPlace& foot) {
     const double wanted = From(lines_.Along(foot));
     double move = wanted;

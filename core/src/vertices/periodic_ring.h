@@ -17,8 +17,9 @@ struct PeriodicRingSize {
   std::uint32_t count = 0, margin = 0;
 };
 
-/// Coordinates and arc lengths are integers in units of 2^-22 cells, modulo 2^32. Differences of
-/// less than 512 cells are therefore exact, wherever and however long the ring is.
+/// Coordinates and arc lengths are integers in units of 2^-22 cells, modulo 2^32 units, which are
+/// 1,024 cells. Differences of less than 512 cells are therefore exact (UnitsBetween). This holds
+/// for rings of any length, at any distance from the origin.
 inline constexpr double kRingUnitsPerCell = 1 << 22;
 
 /// Converts cells to units, rounded towards 0. Requires: |cells| < 2^41.
@@ -122,7 +123,8 @@ class ShortRing {
   float floats_[PeriodicRing::kFloatArrays][kCapacity];
 };
 
-/// The arrays of all long rings of a frame; warm buffers.
+/// The arrays of any number of rings of any size. Keeps its memory, so a later frame allocates only
+/// if its rings need more. ShortRing is faster for a ring that it holds.
 class PeriodicRings {
  public:
   using Size = PeriodicRingSize;

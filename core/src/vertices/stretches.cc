@@ -10,10 +10,11 @@
 namespace partiemc {
 namespace {
 
-// Distance between the points beyond a wall, in spacings.
+// Distance between consecutive points that AddBeyond adds beyond a wall, in spacings.
 constexpr double kStep = .5;
 
-// The vertices of a ring, counted along it from vertex `first`.
+// All vertices of one ring: [first, first + count). At(k) is the k-th vertex along the ring from
+// `first`; after the last vertex follows the first one.
 struct Vertices {
   std::size_t first, count;
   std::size_t At(std::size_t k) const { return first + k % count; }

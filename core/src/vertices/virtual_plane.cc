@@ -233,7 +233,8 @@ void SmoothNormals(const VertexInput& input, PeriodicRing& ring) {
   }
 }
 
-// Mean of values at the vertices of a run, weighted by length.
+// Mean of `values` at the vertices of a run, weighted by the arc length at each vertex
+// (PeriodicRing::weight). 0 if the run has no vertices.
 template <typename Run>
 double MeanOf(const Run& run, const PeriodicRing& ring, const float* values) {
   double sum = 0, weight = 0;

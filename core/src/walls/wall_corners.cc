@@ -71,7 +71,8 @@ class Ring {
   std::size_t count() const { return points_.size() / 2; }
   double perimeter() const { return perimeter_; }
   Point At(std::size_t k) const { return PointAt(points_, k % count()); }
-  // The length from one point to another, by the nearer way around.
+  // The length of the ring from one point to another, by the shorter way. Negative if this way runs
+  // against the ring.
   double Between(std::size_t from, std::size_t to) const {
     return std::remainder(lengths_[to] - lengths_[from], perimeter_);
   }

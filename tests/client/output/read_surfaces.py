@@ -125,7 +125,7 @@ class Surfaces(unittest.TestCase):
     def test_vtp_collections(self):
         series = json.loads((self.folder / "frames.vtp.series").read_text())["files"]
         self.assertEqual([(one["name"], one["time"]) for one in series],
-                         [(f"frame_00000{k}.vtp", 0.5 + 0.25 * k) for k in range(3)])
+                         [(f"frame_00000{k}.vtp", 0.5 + 0.25 * k) for k in range(4)])
         self.assertIn('timestep="1" part="0" file="frame_000002.vtp"', (self.folder / "frames.pvd").read_text())
 
     def test_stl(self):
@@ -155,6 +155,18 @@ class Surfaces(unittest.TestCase):
         numpy.testing.assert_allclose(points_of(data), self.ply.points, atol=2e-6)
         numpy.testing.assert_allclose(vtk_to_numpy(data.GetPointData().GetNormals())[:, 2],
                                       self.ply.point_data["nz"], atol=1e-6)
+
+    def test_cuts(self):
+        triangles = self.ply.cells[0].data
+        expected = (self.ply.points[triangles][:, :, 2] > 2).all(axis=1)
+        self.assertTrue(expected.any() and not expected.all())
+        data = self.read(vtk.vtkXMLPolyDataReader(), "vtp", 3).GetCellData()
+        numpy.testing.assert_array_equal(vtk_to_numpy(data.GetArray("cut")), expected)
+        self.assertIsNone(self.vtp.GetCellData().GetArray("cut"))
+        obj = meshio.read(self.path("obj", 3))
+        self.assert_is_the_surface(obj.points, numpy.concatenate([block.data for block in obj.cells]), 9)
+        shown = self.read(vtk.vtkOBJReader(), "obj", 3)
+        self.assert_is_the_surface(points_of(shown), polygons_of(shown))
 
     def test_empty_surface(self):
         self.assertEqual(len(meshio.read(self.path("ply", 2)).points), 0)

@@ -1,6 +1,8 @@
 // Writes surfaces as files for read_surfaces.py.
 //   surface_files DIR
-// Frames 0 and 1 are the scene, frame 2 is empty. DIR/packed has the GLB files of --compress-glb.
+// Frames 0 and 1 are the scene, frame 2 is empty, frame 3 is the scene with cuts. DIR/packed has
+// the GLB files of --compress-glb.
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -31,13 +33,14 @@ void WriteAll(const std::filesystem::path& directory) {
       {.directory = directory / "packed", .formats = {FrameFormat::kGlb}, .compress_glb = true}));
   StatisticsWriter statistics =
       Required(StatisticsWriter::Create(directory / "stats.json", {}, StatisticsOf::kSurfaces));
-  const Surface scene = HollowBallAndTorus(), empty;
+  const Surface scene = HollowBallAndTorus(), empty, cut = WithCuts(scene);
+  const std::array<const Surface*, 4> surfaces = {&scene, &scene, &empty, &cut};
   const Result no_outline;
-  for (std::uint64_t k = 0; k < 3; ++k) {
+  for (std::uint64_t k = 0; k < surfaces.size(); ++k) {
     const FrameRecord frame{.index = k,
                             .time = 0.5 + 0.25 * static_cast<double>(k),
                             .result = no_outline,
-                            .surface = k < 2 ? &scene : &empty};
+                            .surface = surfaces[k]};
     Require(files.Write(frame));
     Require(packed.Write(frame));
     Require(statistics.Add(frame));

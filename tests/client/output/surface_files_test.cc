@@ -23,6 +23,9 @@ using nlohmann::json;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Key;
+using ::testing::Not;
+using ::testing::UnorderedElementsAre;
 
 const Result kNoOutline;
 
@@ -240,6 +243,21 @@ TEST(SurfaceFiles, StlHasTheNormalsOfFacets) {
     }
   }
   ExpectTheSurface(mesh, surface, 1e-6);
+}
+
+TEST(SurfaceFiles, ObjHasAGroupOfTrianglesOnWalls) {
+  const Surface surface = WithCuts(Scene());
+  ASSERT_THAT(surface.cuts, Not(IsEmpty()));
+  std::map<std::vector<std::string>, std::size_t> faces;
+  std::vector<std::string> group;
+  for (const auto& words : ObjLines(Encode(FrameFormat::kObj, surface))) {
+    if (words[0] == "g") group.assign(words.begin() + 1, words.end());
+    if (words[0] == "f") ++faces[group];
+  }
+  EXPECT_THAT(faces,
+              UnorderedElementsAre(Key(ElementsAre("body_0")), Key(ElementsAre("body_0", "cut")),
+                                   Key(ElementsAre("body_1")), Key(ElementsAre("body_1", "cut"))));
+  EXPECT_EQ((faces[{"body_0", "cut"}] + faces[{"body_1", "cut"}]), surface.cuts.size());
 }
 
 // The array of an accessor.

@@ -1,8 +1,10 @@
 #include "client/output/surface_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <span>
 #include <vector>
 
 #include "partiemc/surface_reconstructor.h"
@@ -45,6 +47,18 @@ Surface HollowBallAndTorus(double shift) {
   if (!status.ok()) {
     std::cerr << status << "\n";
     std::abort();
+  }
+  return surface;
+}
+
+Surface WithCuts(Surface surface) {
+  for (std::uint32_t k = 0; k < surface.TriangleCount(); ++k) {
+    const auto corners = std::span(surface.triangles).subspan(std::size_t{3} * k, 3);
+    if (std::ranges::all_of(corners, [&](auto corner) {
+          return surface.points[std::size_t{3} * corner + 2] > 2;
+        })) {
+      surface.cuts.push_back(k);
+    }
   }
   return surface;
 }

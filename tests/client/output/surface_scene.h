@@ -9,4 +9,7 @@ namespace partiemc::client {
 /// Attributes: "height" (z) and "a,b" (x, y, z). `shift` moves all particles along x.
 Surface HollowBallAndTorus(double shift = 0);
 
+/// The surface with its triangles above z = 2 as cuts, as if a wall were there.
+Surface WithCuts(Surface surface);
+
 }  // namespace partiemc::client

@@ -319,6 +319,7 @@ TEST(Simplify, FindsPlantedFaults) {
   }
   EXPECT_EQ(faults(two), 0u);
   EXPECT_FALSE(simplify::IsConnected(two, 2 * count));
+  EXPECT_FALSE(simplify::IsConnected(two, 2 * count - 1)) << "one point less does not join them";
   EXPECT_EQ(faults(joined), 1u);
   open.resize(open.size() - 3);
   EXPECT_EQ(faults(open), 3u);

@@ -197,7 +197,10 @@ export class Scene {
       .filter((values) => values !== undefined);
   }
 
-  /** Adds the frame's numbers to the range, so that a colour keeps its meaning. `restart`: drops the range so far. */
+  /**
+   * Widens the range of the colours to the values of the frame. A frame never narrows the range, so
+   * colours change little from frame to frame. `restart`: first drops the earlier range.
+   */
   private widenRange(restart: boolean): void {
     if (restart) this.range = null;
     for (const values of this.attributes()) this.range = widened(this.range, values);

@@ -104,7 +104,11 @@ export function contactAngles({ largest, spacing }: MeasuredRings, origin: Point
   return [start.angle, end.angle, start.place, end.place];
 }
 
-/** Angles of the left and the right flank of the largest body, in degrees; NaN without a flank. */
+/**
+ * Angles of repose of the largest body: of its left and its right flank against the horizontal, in
+ * degrees. A flank is the upper surface on one side of the peak, between FLANK_FROM and FLANK_TO of
+ * the peak's height. NaN for a flank of fewer than two samples, and without a body.
+ */
 export function anglesOfRepose({ largest }: MeasuredRings): number[] {
   if (!largest) return [NaN, NaN];
   let [left, right, base] = [Infinity, -Infinity, Infinity];

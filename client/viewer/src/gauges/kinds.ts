@@ -8,7 +8,7 @@ interface Kind {
   drawn: number;
 }
 
-/** `packing` is missing: the page does not know the areas of the particles. */
+/** All kinds except `packing`: it requires areas of particles, which the page does not have. */
 export const KINDS = {
   height: { numbers: ['x'], values: ['highest', 'lowest', 'crossings'], drawn: 2 },
   front: { numbers: ['dx', 'dy'], values: ['position', 'x', 'y'], drawn: 1 },

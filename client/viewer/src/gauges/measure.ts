@@ -3,7 +3,10 @@ import { anglesOfRepose, contactAngles } from './angles';
 import type { Gauge } from './kinds';
 import { lineCrossings, type MeasuredRings, type Point } from './rings';
 
-/** The values of a gauge, in the order of its kind. NaN: the outline has no such point. */
+/**
+ * The values of a gauge, in the order of its kind. A height, position, centroid or angle is NaN if
+ * the outline does not have it. A length, an area or a number of crossings is 0 in this case.
+ */
 export function measure({ kind, numbers: n }: Gauge, outline: MeasuredRings): number[] {
   switch (kind) {
     case 'height': return heightAt(outline.rings, n[0]);

@@ -66,7 +66,7 @@ class Report {
   private readonly status = new StatusLine();
   private readonly pace = new TextPace();
   private ownAddress = '';
-  /** False until the address has been read, which must not be overwritten before. */
+  /** Whether the address has been read. Until then the report must not overwrite the address. */
   private isReady = false;
 
   constructor(spacePart: SpacePart | null) {

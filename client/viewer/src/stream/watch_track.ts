@@ -124,7 +124,11 @@ export class WatchTrack implements Track {
     if (this.retry !== null) clearTimeout(this.retry);
   }
 
-  /** Fetches frames from before the watch, after the first picture. Starts at the requested frame. */
+  /**
+   * Fetches the frames from before the watch that the server holds. Fetches a requested frame, and
+   * the frames after it, at once; a later call fetches the older frames. If no frame is requested,
+   * waits for the first picture.
+   */
   private fetchPast(): void {
     const first = this.history.first?.sequence;
     if (!this.isPastMissing || this.backfill || first === undefined) return;
