@@ -114,6 +114,15 @@ void AddLimitFlags(CLI::App& app, ServerLimits& limits, LimitFlags& flags) {
       ->type_name("N")
       ->envname("PARTIEMC_STREAMS_BEYOND_BUDGET")
       ->group(kGroup);
+  app.add_option(
+         "--caller-limits", flags.caller_limits,
+         "Limits of each caller, as in \"streams=4 watchers=16 calls=64 bytes=64MB\" (default: "
+         "none for streams, watchers and bytes). A caller is a token, whose line in --token-file "
+         "takes precedence, or without tokens an address. Behind a proxy all clients without a "
+         "token are one caller")
+      ->type_name("LIMITS")
+      ->envname("PARTIEMC_CALLER_LIMITS")
+      ->group(kGroup);
   app.add_option("--idle-timeout", flags.idle_seconds,
                  "End a stream that sends no frame for this time; 0: never")
       ->check(CLI::Range(0.0, 1e8))

@@ -10,6 +10,7 @@
 
 #include "server/base/machine_limits.h"
 #include "server/limit_flags.h"
+#include "server/security/caller_terms.h"
 #include "server/stream/memory_plan.h"
 
 namespace partiemc::server {
@@ -131,8 +132,8 @@ void AddSecurity(CLI::App& app, Raw& raw) {
          "--token-file", raw.token_file,
          "Require a bearer token of this file, except for health checks. A line is TOKEN [NAME] "
          "[may=produce,watch,list] [names=PATTERN,...] [calls=N] [streams=N] [watchers=N] "
-         "[bytes=64MB]. NAME identifies the client in the log; fields that are left out set "
-         "no limit. The last line must end with a newline")
+         "[bytes=64MB]. NAME identifies the client in the log; limits that are left out are "
+         "those of --caller-limits. The last line must end with a newline")
       ->type_name("FILE")
       ->envname("PARTIEMC_TOKEN_FILE")
       ->group(kGroup);
@@ -303,6 +304,11 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   ServerLimits& limits = raw.line.server.limits;
   limits.idle.streaming = Milliseconds(raw.limits.idle_seconds);
   limits.max_frame_bytes = FrameBytes(raw.limits, limits);
+  const auto caller_limits = ParseCallerQuota(raw.limits.caller_limits);
+  if (!caller_limits.ok()) {
+    return Wrong("--caller-limits: " + std::string(caller_limits.status().message()));
+  }
+  raw.line.server.caller_limits = *caller_limits;
   if (raw.print_memory_plan) {
     return EarlyExit{0, MemoryPlan(limits, raw.line.server.threads).ToString()};
   }

@@ -149,6 +149,11 @@ Relay::Limits RelayLimits(const ServerLimits& limits, HistoryRoom& history,
           .watches = limits.max_watchers};
 }
 
+CallerQuota WithCalls(CallerQuota quota, std::uint32_t calls) {
+  if (!quota.calls) quota.calls = calls;
+  return quota;
+}
+
 // Time for watchers to read the end of their watch when the server drains.
 constexpr std::chrono::milliseconds kWatchPatience(500);
 
@@ -157,7 +162,7 @@ constexpr std::chrono::milliseconds kWatchPatience(500);
 Server::Server(const ServerOptions& options, std::unique_ptr<MessageBus> bus)
     : options_(options),
       address_(options.address),
-      authentication_(CallerQuota{.calls = options.limits.CallsOfOneCaller()}),
+      authentication_(WithCalls(options.caller_limits, options.limits.CallsOfOneCaller())),
       tls_identity_(std::make_unique<CurrentTlsIdentity>()),
       opening_(options.limits.MaxOpeningCalls()),
       history_(options.limits.history_bytes, options.limits.AllHistoryBytes()),

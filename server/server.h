@@ -19,6 +19,7 @@
 #include "server/connections/connection_watch.h"
 #include "server/relay/finished_streams.h"
 #include "server/security/authentication.h"
+#include "server/security/caller_terms.h"
 #include "server/security/checkpoint_keys.h"
 #include "server/security/file_reloader.h"
 #include "server/security/tls_identity.h"
@@ -94,6 +95,9 @@ struct ServerOptions {
   /// Number of compute threads for all streams together, at least 1.
   unsigned threads = 1;
   ServerLimits limits;
+  /// Limits of each caller: of a token, for values that its line does not set, or without tokens of
+  /// an address (HostOfPeer). Without `calls`, ServerLimits::CallsOfOneCaller applies.
+  CallerQuota caller_limits;
   /// Limits of the connections of `address`.
   ConnectionLimits connections;
   /// Maximum number of bytes that a connection has received and that belong to no call and no

@@ -29,6 +29,9 @@ constexpr char kBytesRule[] =
 constexpr char kWordRule[] =
     "after the token and a name may stand may=, names=, calls=, streams=, watchers= and bytes=, "
     "each once and nothing else";
+constexpr char kQuotaRule[] =
+    "must be calls=, streams=, watchers= or bytes= and a number, each once, with blanks between "
+    "them";
 constexpr char kNameRule[] = "a name must be at most 64 characters of [A-Za-z0-9._-]";
 
 bool Consists(std::string_view text, std::string_view of) {
@@ -83,16 +86,22 @@ bool ReadBytes(std::string_view text, std::optional<std::uint64_t>& bytes) {
   return true;
 }
 
-// Stores the value of the word `key=value` in `terms`. Returns the rule that it breaks, or null.
-const char* Read(std::string_view key, std::string_view value, CallerTerms& terms) {
-  CallerQuota& quota = terms.quota;
-  if (key == "may") return ReadMay(value, terms) ? nullptr : kMayRule;
-  if (key == "names") return ReadNames(value, terms) ? nullptr : kNamesRule;
+// Stores the value of the word `key=value` in `quota`. Returns the rule that it breaks, or null.
+// `otherwise`: the rule for another key.
+const char* ReadQuota(std::string_view key, std::string_view value, const char* otherwise,
+                      CallerQuota& quota) {
   if (key == "calls") return ReadCount(value, quota.calls) ? nullptr : kCountRule;
   if (key == "streams") return ReadCount(value, quota.streams) ? nullptr : kCountRule;
   if (key == "watchers") return ReadCount(value, quota.watchers) ? nullptr : kCountRule;
   if (key == "bytes") return ReadBytes(value, quota.bytes) ? nullptr : kBytesRule;
-  return kWordRule;
+  return otherwise;
+}
+
+// Stores the value of the word `key=value` in `terms`. Returns the rule that it breaks, or null.
+const char* Read(std::string_view key, std::string_view value, CallerTerms& terms) {
+  if (key == "may") return ReadMay(value, terms) ? nullptr : kMayRule;
+  if (key == "names") return ReadNames(value, terms) ? nullptr : kNamesRule;
+  return ReadQuota(key, value, kWordRule, terms.quota);
 }
 
 }  // namespace
@@ -125,6 +134,22 @@ absl::StatusOr<CallerTerms> ParseCallerTerms(std::span<const std::string> words)
     }
   }
   return terms;
+}
+
+absl::StatusOr<CallerQuota> ParseCallerQuota(std::string_view text) {
+  CallerQuota quota;
+  std::set<std::string_view> seen;
+  for (const std::string_view word : Split(text, ' ')) {
+    if (word.empty()) continue;
+    const std::size_t equals = std::min(word.find('='), word.size());
+    const std::string_view key = word.substr(0, equals);
+    const std::string_view value = word.substr(std::min(equals + 1, word.size()));
+    const char* const broken =
+        seen.insert(key).second ? ReadQuota(key, value, kQuotaRule, quota) : kQuotaRule;
+    if (broken != nullptr)
+      return absl::InvalidArgumentError(absl::StrCat(std::string(word), ": ", broken));
+  }
+  return quota;
 }
 
 }  // namespace partiemc::server

@@ -45,4 +45,8 @@ struct CallerTerms {
 /// word, which may be a misplaced token.
 absl::StatusOr<CallerTerms> ParseCallerTerms(std::span<const std::string> words);
 
+/// Parses limits of a caller, with the words of ParseCallerTerms and blanks between them:
+/// "streams=4 watchers=16 bytes=64MB". Errors: INVALID_ARGUMENT with the word and the rule.
+absl::StatusOr<CallerQuota> ParseCallerQuota(std::string_view text);
+
 }  // namespace partiemc::server

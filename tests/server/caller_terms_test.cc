@@ -72,6 +72,21 @@ TEST(CallerTerms, CountBytesInUnitsOf1024) {
   EXPECT_EQ(bytes("16777215TB"), std::uint64_t{16777215} << 40);
 }
 
+TEST(CallerQuotas, AreTheLimitsOfALineInAnyOrder) {
+  EXPECT_EQ(*ParseCallerQuota(""), CallerQuota());
+  EXPECT_EQ(*ParseCallerQuota("  bytes=64MB streams=4  watchers=16 calls=9 "),
+            (CallerQuota{.calls = 9, .streams = 4, .watchers = 16, .bytes = 64u << 20}));
+  for (const char* wrong :
+       {"streams", "streams=", "streams=0", "streams=1.5", "=4", "streams=4,calls=9",
+        "streams=4 streams=4", "may=watch", "bytes=9XB", "calls=4294967296"}) {
+    const auto status = ParseCallerQuota(wrong).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << wrong;
+    EXPECT_THAT(std::string(status.message()), HasSubstr(": ")) << wrong;
+  }
+  EXPECT_THAT(std::string(ParseCallerQuota("calls=2 name=x").status().message()),
+              HasSubstr("name=x: must be calls=, streams=, watchers= or bytes="));
+}
+
 TEST(CallerTerms, ThatAreWrongAreToldByWordAndRuleWithoutShowingIt) {
   EXPECT_THAT(Refused("na/me"), HasSubstr("word 2: a name must be at most 64 characters"));
   EXPECT_THAT(Refused(std::string(65, 'n')), HasSubstr("word 2: a name"));

@@ -145,6 +145,16 @@ TEST(CommandLineOptions, AStreamMayBeIdleForAnHourUnlessToldOtherwise) {
   EXPECT_THAT(Refused({"--idle-timeout", "-1"}), HasSubstr("--idle-timeout"));
 }
 
+TEST(CommandLineOptions, LimitsOfCallersAreThoseOfATokenFile) {
+  EXPECT_EQ(Parsed({}).server.caller_limits, CallerQuota());
+  EXPECT_EQ(Parsed({"--caller-limits", "streams=4 bytes=1KB"}).server.caller_limits,
+            (CallerQuota{.streams = 4, .bytes = 1024}));
+  EXPECT_THAT(Refused({"--caller-limits", "streams=4,bytes=1KB"}),
+              HasSubstr("--caller-limits: streams=4,bytes=1KB: calls=, streams= and watchers="));
+  const Environment limits("PARTIEMC_CALLER_LIMITS", "watchers=3");
+  EXPECT_EQ(Parsed({}).server.caller_limits, (CallerQuota{.watchers = 3}));
+}
+
 TEST(CommandLineOptions, TheHealthCheckAsksTheAddressOfTheServerUnlessGivenAnother) {
   EXPECT_EQ(Parsed({"--health-check"}).health_check->ToString(), "127.0.0.1:50051");
   EXPECT_EQ(Parsed({"--health-check", "--address", "localhost:7"}).health_check->ToString(),

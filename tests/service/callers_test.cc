@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <memory>
@@ -227,6 +228,33 @@ TEST_F(Callers, EachHasWhatItsLineSaysAndIsToldWhatIsTooMuch) {
   EXPECT_EQ(other.EndReason(), "CALLER_WATCHERS");
   EXPECT_EQ(CallFrame(kMallory), "CALLER_BYTES");
   EXPECT_EQ(CallFrame(kAlice), "OK");
+}
+
+TEST_F(Callers, HaveTheLimitsOfAllCallersUnlessTheirLineSaysOtherwise) {
+  options_.caller_limits = {.streams = 1};
+  Serve("alice streams=2", "mallory");
+  for (const char* token : {kAlice, kMallory}) {
+    Stream first = BeginStream(token), second = BeginStream(token);
+    ASSERT_TRUE(first.Ask(OpenRequest()).has_opened());
+    const bool is_alice = token == kAlice;
+    EXPECT_EQ(second.Ask(OpenRequest()).has_opened(), is_alice);
+    EXPECT_EQ(second.EndReason(), is_alice ? "" : "CALLER_STREAMS");
+  }
+}
+
+TEST(CallersWithoutTokens, HaveTheLimitsOfAllCallers) {
+  ServerOptions options = TestOptions();
+  options.caller_limits = {.streams = 1};
+  const auto server = StartServer(options);
+  const auto stub = v1::ReconstructionService::NewStub(Connect(*server, Transport::kTcp));
+  std::array<Stream, 2> streams;
+  for (Stream& stream : streams) {
+    SetDeadline(*stream.context);
+    stream.rpc = stub->Reconstruct(stream.context.get());
+  }
+  ASSERT_TRUE(streams[0].Ask(OpenRequest()).has_opened());
+  EXPECT_FALSE(streams[1].Ask(OpenRequest()).has_opened());
+  EXPECT_EQ(streams[1].EndReason(), "CALLER_STREAMS");
 }
 
 TEST_F(Callers, HaveNoMoreCallsThanTheirLineSays) {
