@@ -93,6 +93,33 @@ INSTANTIATE_TEST_SUITE_P(Over, ResumeProtocol,
                          ::testing::Values(Transport::kInProcess, Transport::kTcp),
                          [](const auto& test) { return TransportName(test.param); });
 
+// The results of the stream are all at its former server.
+TEST_P(ResumeProtocol, AStreamThatFinishesElsewhereWithoutAFrameIsKnownThereAsFinished) {
+  Stream stream = Start();
+  WatchClient watcher(channel_, "tank", v1::WATCH_MODE_LATEST, 9);
+  const std::string lineage = watcher.Receive().opened().lineage();
+  stream.client->Cancel();
+  const auto elsewhere = StartServer(TestOptions());
+  const auto channel = Connect(*elsewhere, GetParam());
+  StreamClient resumed(channel);
+  const auto opened = resumed.SendAndReceive(Resume(stream.checkpoint, stream.token)).opened();
+  EXPECT_EQ(opened.next_sequence(), 2u);
+  resumed.HalfClose();
+  ASSERT_TRUE(resumed.Finish().ok());
+  WatchClient back(channel);
+  v1::WatchStreamRequest request;
+  request.mutable_open()->set_stream_name("tank");
+  request.mutable_open()->set_credits(1);
+  request.mutable_open()->set_lineage(lineage);
+  back.Send(request);
+  const auto found = back.Receive().opened();
+  EXPECT_EQ(found.lineage(), lineage);
+  EXPECT_TRUE(found.has_frames());
+  EXPECT_EQ(found.newest_sequence(), 1u);
+  EXPECT_EQ(back.Receive().ended().reason(), "FINISHED");
+  EXPECT_TRUE(back.Finish().ok());
+}
+
 TEST_P(ResumeProtocol, ACheckpointComesWithEveryKthFrameWhateverItsAnswer) {
   StreamClient client(channel_);
   ASSERT_TRUE(client.SendAndReceive(OpenWithCheckpoints(3)).has_opened());
