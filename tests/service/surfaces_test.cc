@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "partiemc/client/watcher.h"
 #include "partiemc/status.h"
 #include "server/merging_balls.h"
+#include "server/moving_blob.h"
 #include "service/service_testing.h"
 #include "wire/codec.h"
 
@@ -85,6 +87,36 @@ TEST_F(Surfaces, OfAStreamAreThoseOfThisProcess) {
   EXPECT_EQ(stream->info().parameters.output, Output::kSurface);
   EXPECT_EQ(stream->info().parameters.surface, SurfaceOptions{});
   for (std::uint64_t k = 0; k < kFrames; ++k) ExpectEqual(ResultOf(*stream, k), expected_[k]);
+}
+
+// Streams share the workers of the server, and each worker keeps its last result.
+TEST_F(Surfaces, WithAttributesChangeNoOutlineOfAnotherStream) {
+  auto options = Options();
+  options.outputs.attributes = {"height"};
+  const auto surfaces = Open(options);
+  const auto outlines =
+      Open({.name = "blob", .parameters = BlobParameters(), .outputs = {.mesh = true}});
+  ASSERT_TRUE(surfaces != nullptr && outlines != nullptr);
+  Event event;
+  for (std::uint64_t k = 0; k < 8; ++k) {
+    const SpaceParticles balls = MergingBalls(k);
+    const std::vector<float> heights(balls.ids.size(), 1);
+    const std::vector<Attribute> attributes = {{"height", 1, heights}};
+    Frame frame = balls.AsFrame(0);
+    frame.attributes = attributes;
+    ASSERT_TRUE(surfaces->Send(frame, 0).ok());
+    ASSERT_TRUE(surfaces->Receive(event).ok());
+    ASSERT_EQ(event.kind, Event::Kind::kResult) << event.message;
+    EXPECT_EQ(event.frame.result.surface.attributes.size(), 1u);
+    const std::vector<double> blob = MovingBlob(1, k);
+    ASSERT_TRUE(outlines->Send({.positions = std::span<const double>(blob)}, 0).ok());
+    ASSERT_TRUE(outlines->Receive(event).ok());
+    ASSERT_EQ(event.kind, Event::Kind::kResult) << event.message;
+    const Result& result = event.frame.result;
+    EXPECT_GT(result.rings.PointCount(), 0u) << k;
+    EXPECT_EQ(event.frame.rings_digest, DigestRings(result.rings));
+    EXPECT_EQ(event.frame.mesh_digest, DigestMesh(result.mesh));
+  }
 }
 
 TEST_F(Surfaces, OfASingleCallAreThoseOfAFirstFrame) {

@@ -196,12 +196,25 @@ class Receiver {
     for (const Result& section : event_.frame.result.sections) {
       valid.Update(Validate(section, fill));
     }
+    valid.Update(CheckDigests());
     if (valid.ok()) return;
     // A placement without guarantees breaks them in almost every frame, so only the first failure
     // is printed.
     const std::uint64_t told = KeepsGuarantees(*FindPlacement(flags_.placement)) ? 10 : 1;
     if (++failed_checks_ > told) return;
     progress_.Note(Concat("partiemc: ", source, ": --check: ", OneLine(valid)));
+  }
+
+  // Compares the received geometry with its digests, which the server has computed.
+  absl::Status CheckDigests() const {
+    const FrameResult& frame = event_.frame;
+    if (DigestRings(frame.result.rings) == frame.rings_digest &&
+        DigestMesh(frame.result.mesh) == frame.mesh_digest &&
+        DigestSurface(frame.result.surface) == frame.surface_digest &&
+        DigestSections(frame.result) == frame.section_digests) {
+      return absl::OkStatus();
+    }
+    return absl::InternalError("the geometry is not that of its digests: report this");
   }
 
   void Refuse(const std::string& source, const std::string& message) {
