@@ -27,6 +27,9 @@ constexpr std::chrono::seconds kHealthCheckTimeout{3};
 
 // Time that cancelled work gets to end, after the grace time has passed.
 constexpr std::chrono::milliseconds kTimeToEnd{500};
+// Signals that follow the first one within this time count as the same: `timeout` and terminals may
+// send a signal twice, to the process and to its group.
+constexpr std::chrono::milliseconds kSameSignal{300};
 constexpr int kCutOff = 1;  // Exit code if the work has not ended by then.
 
 int Fail(const absl::Status& status) {
@@ -78,7 +81,10 @@ std::atomic<bool> leaving = false;
 
 // After a second signal, or after `grace` and kTimeToEnd, ends the process unless it has drained.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
-  const int signal = WaitForSignal(signals, grace + kTimeToEnd);
+  const auto until = std::chrono::steady_clock::now() + grace + kTimeToEnd;
+  while (WaitForSignal(signals, kSameSignal) != 0) continue;
+  const int signal = WaitForSignal(signals, std::chrono::ceil<std::chrono::milliseconds>(
+                                                until - std::chrono::steady_clock::now()));
   if (leaving.exchange(true)) return;
   LogEvent(spdlog::level::warn, "cut off",
            {{"at", signal != 0 ? strsignal(signal) : "the end of the grace time"}});
@@ -97,7 +103,9 @@ int Serve(const CommandLine& line) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  sigset_t all_signals = signals;
+  sigaddset(&all_signals, SIGHUP);
+  pthread_sigmask(SIG_BLOCK, &all_signals, nullptr);
 
   signal(SIGPIPE, SIG_IGN);  // The reader of the log may exit.
 
@@ -126,7 +134,10 @@ int Serve(const CommandLine& line) {
             {"nats", line.server.nats ? "on" : "off"},
             {"metrics", metrics ? metrics->ToString() : "off"}});
   int signal = 0;
-  sigwait(&signals, &signal);
+  while (sigwait(&all_signals, &signal) == 0 && signal == SIGHUP) {
+    LogEvent(spdlog::level::info, "nothing to do after Hangup: changed files are reloaded anyway",
+             {});
+  }
   LogEvent(spdlog::level::info, std::string("draining after ") + strsignal(signal), {});
   std::thread(CutDrainShort, signals, line.drain_delay + line.grace).detach();
   if (line.drain_delay.count() > 0) (*server)->SendAway(line.drain_delay);

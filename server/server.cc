@@ -240,7 +240,13 @@ absl::Status Server::LoadFiles() {
     auto status = reloader_.Add("TLS certificate", options_.tls->All(), [this] {
       auto identity = ReadTlsIdentity(*options_.tls);
       if (!identity.ok()) return identity.status();
-      if (identity->not_after < std::chrono::system_clock::now()) {
+      const auto now = std::chrono::system_clock::now();
+      if (identity->not_after < now) {
+        const auto current = tls_identity_->Get().identity;
+        if (current != nullptr && current->not_after >= now) {
+          return absl::InvalidArgumentError(options_.tls->certificate +
+                                            ": has expired; the current one has not");
+        }
         LogEvent(spdlog::level::warn, "TLS certificate has expired, clients will refuse it",
                  {{"file", options_.tls->certificate}});
       }

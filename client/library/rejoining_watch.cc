@@ -35,8 +35,8 @@ class RejoiningWatch::Calls final : public Attempts {
       // These refusals can change: the producer may still be reconnecting, and the lost call may
       // still hold its slot.
       retryable = reason == "NO_SUCH_STREAM" || reason == "TOO_MANY_WATCHERS" ||
-                  reason == "TOO_MANY_OPENING" || reason == "CALLER_WATCHERS" ||
-                  reason == "CALLER_CALLS" || call.lost();
+                  reason == "TOO_MANY_OPENING" || reason == "TOO_MANY_CONNECTIONS" ||
+                  reason == "CALLER_WATCHERS" || reason == "CALLER_CALLS" || call.lost();
       return opened;
     }
     if (!*opened || call.lineage() == watch_.lineage_) return opened;
@@ -223,7 +223,7 @@ absl::StatusOr<Received> RejoiningWatch::Rejoin(std::optional<TimePoint> until) 
   if (lost.ok()) return *lost_;
   return absl::Status(lost.code(), absl::StrCat(lost.message(), "; not found again within ",
                                                 Seconds(options_.rejoin.give_up_after), ": ",
-                                                retry_.refusal().message()));
+                                                retry_.RefusalText()));
 }
 
 void RejoiningWatch::SetCall(std::shared_ptr<WatchCall> call) {

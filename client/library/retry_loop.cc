@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/library/channel.h"
+#include "partiemc/status.h"
 
 namespace partiemc::client {
 namespace {
@@ -40,6 +41,7 @@ void RetryLoop::Lose(std::string description) {
   backoff_.emplace(policy_, addresses_.size(), surroundings_.random->Next());
   lost_at_ = attempt_at_ = Now();
   loss_ = std::move(description);
+  refusal_ = answer_ = absl::OkStatus();
 }
 
 void RetryLoop::TryNext(absl::Status refusal) {
@@ -49,6 +51,7 @@ void RetryLoop::TryNext(absl::Status refusal) {
 
 void RetryLoop::TryAgain(absl::Status refusal) {
   refusal_ = std::move(refusal);
+  if (FindViolation(refusal_)) answer_ = refusal_;
   attempt_at_ = Now() + backoff_->NextPause();
 }
 
@@ -90,9 +93,15 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
   }
 }
 
+std::string RetryLoop::RefusalText() const {
+  std::string text(refusal_.message());
+  if (answer_.ok() || answer_ == refusal_) return text;
+  return absl::StrCat(text, "; before, a server answered: ", answer_.message());
+}
+
 Reconnecting RetryLoop::Progress() const {
   return {.loss = loss_,
-          .refusal = std::string(refusal_.message()),
+          .refusal = RefusalText(),
           .elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(Now() - lost_at_),
           .give_up_after = policy_.give_up_after};
 }

@@ -73,8 +73,9 @@ class RetryLoop {
   /// One line about the last loss: the description passed to Lose, the address where the call
   /// continues, and the time since the loss.
   std::string LossDescription() const;
-  /// Error of the last attempt.
-  const absl::Status& refusal() const { return refusal_; }
+  /// The error of the last attempt since Lose, and the last answer of a server if an earlier
+  /// attempt received it. Empty before the first attempt has failed.
+  std::string RefusalText() const;
 
  private:
   TimePoint Now() const { return surroundings_.clock->Now(); }
@@ -91,7 +92,8 @@ class RetryLoop {
   TimePoint lost_at_, attempt_at_;
   std::string loss_;
   std::optional<TimePoint> attempt_until_;  // Set while an attempt is in progress.
-  absl::Status refusal_;
+  // The last errors: of any attempt, and with a Violation, which only servers send.
+  absl::Status refusal_, answer_;
 };
 
 }  // namespace partiemc::client

@@ -14,13 +14,13 @@ constexpr std::string_view kDraining = "DRAINING";
 // Reasons of refusals (proto/PROTOCOL.md) after which another attempt may succeed: the stream's
 // former call may release its name, its slot or the memory of its state, and another server's
 // version or keys may accept the checkpoint.
-constexpr std::array<std::string_view, 9> kRetryableWhileResuming = {
-    "NAME_IN_USE",          "TOO_MANY_STREAMS", "TOO_MANY_OPENING",
-    "CALLER_STREAMS",       "CALLER_CALLS",     "CHECKPOINT_MISMATCH",
-    "CHECKPOINT_SIGNATURE", "MEMORY_BUDGET",    "CALLER_BYTES"};
+constexpr std::array<std::string_view, 10> kRetryableWhileResuming = {
+    "NAME_IN_USE",    "TOO_MANY_STREAMS", "TOO_MANY_OPENING",    "TOO_MANY_CONNECTIONS",
+    "CALLER_STREAMS", "CALLER_CALLS",     "CHECKPOINT_MISMATCH", "CHECKPOINT_SIGNATURE",
+    "MEMORY_BUDGET",  "CALLER_BYTES"};
 
-constexpr std::array<std::string_view, 4> kRetryableWhileJoining = {
-    "NO_SUCH_STREAM", "LEADER_GONE", "TOO_MANY_OPENING", "CALLER_CALLS"};
+constexpr std::array<std::string_view, 5> kRetryableWhileJoining = {
+    "NO_SUCH_STREAM", "LEADER_GONE", "TOO_MANY_OPENING", "TOO_MANY_CONNECTIONS", "CALLER_CALLS"};
 
 bool IsRetryable(std::string_view reason, CallPurpose purpose) {
   switch (purpose) {

@@ -204,7 +204,7 @@ absl::StatusOr<std::optional<StreamConnector::Opened>> StreamConnector::OpenAgai
   }
   return absl::UnavailableError(absl::StrCat("the stream could not continue within ",
                                              Seconds(options_.reconnect.give_up_after), ": ",
-                                             retry_.refusal().message()));
+                                             retry_.RefusalText()));
 }
 
 CallPurpose StreamConnector::Purpose() const {

@@ -3,6 +3,7 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -72,6 +73,11 @@ OwnedDiscs DiscsOf(const py::kwargs& given) {
   OwnedDiscs discs{.centres = {centres.data(), centres.data() + centres.size()}};
   for (py::ssize_t k = 0; k < sizes.shape(0); ++k) {
     const double size = sizes.at(k);
+    if (!(size >= 0) || !std::isfinite(size)) {
+      Raise(Invalid(kReasonOutOfRange,
+                    by_radius ? "gauge packing: radii" : "gauge packing: volumes",
+                    ShortestNumber(size), "must be finite and at least 0"));
+    }
     discs.areas.push_back(static_cast<float>(by_radius ? std::numbers::pi * size * size : size));
   }
   return discs;

@@ -125,6 +125,18 @@ void DefineResults(py::module_& module) {
   py::class_<PythonResult, std::shared_ptr<PythonResult>>(
       module, "Result", "The result of one frame. It can be pickled and copied.")
       .def(py::pickle(&StateOf, &ResultOf))
+      // Earlier protocols make an empty object, which pybind11 cannot.
+      .def("__reduce_ex__",
+           [](const py::object& self, int protocol) -> py::object {
+             if (protocol < 2) {
+               throw py::type_error(
+                   "pickle: a partiemc Result requires protocol 2 or later, "
+                   "as by default");
+             }
+             return py::module_::import("builtins")
+                 .attr("object")
+                 .attr("__reduce_ex__")(self, protocol);
+           })
       .def_property_readonly("rings", &RingsOf, "The outline: Rings.")
       .def_property_readonly("mesh", &MeshOf, "The inside: Mesh; empty with fill='none'.")
       .def_property_readonly("surface", &SurfaceOf,

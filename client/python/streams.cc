@@ -66,7 +66,7 @@ class ProducerStream {
   }
   ~ProducerStream() {
     const py::gil_scoped_release others_may_run;
-    if (finished_) Drain(std::chrono::steady_clock::now() + kDropWait);
+    if (finished_) Drain(std::chrono::steady_clock::now() + kDropWait).IgnoreError();
     if (finisher_.joinable()) {
       stream_->Cancel();  // Ends `finisher_` if frames are left. Does nothing after the end.
       finisher_.join();
@@ -112,6 +112,7 @@ class ProducerStream {
         return stream_->Receive(event, slice);
       });
       result->frame = std::move(event.frame);  // Returns unused buffers.
+      if (!received.ok()) has_raised_ = true;
       RaiseUnlessOk(received.status());
       if (*received == Received::kNothingYet) return nullptr;
       if (*received == Received::kEnd) RaiseEnd();
@@ -152,10 +153,11 @@ class ProducerStream {
   }
 
   // Finishes the stream. Receives and drops the results that are left, so that waiting frames are
-  // still sent. Ctrl-C cancels the stream.
+  // still sent. Ctrl-C cancels the stream. Raises the error that ended the stream, unless Receive
+  // has raised it: frames may be lost.
   void Close() {
-    std::packaged_task<void()> task([this] { FinishAndDrain(); });
-    std::future<void> closed = task.get_future();
+    std::packaged_task<absl::Status()> task([this] { return FinishAndDrain(); });
+    std::future<absl::Status> closed = task.get_future();
     std::thread closer(std::move(task));
     bool is_interrupted = false;
     for (bool is_closed = false; !is_closed && !is_interrupted;) {
@@ -171,6 +173,8 @@ class ProducerStream {
       closer.join();
     }
     if (is_interrupted) throw py::error_already_set();
+    const absl::Status end = closed.get();
+    if (!has_raised_ && !absl::IsCancelled(end)) RaiseUnlessOk(end);
   }
 
   void Cancel() {
@@ -212,29 +216,34 @@ class ProducerStream {
     ProducerStream& stream_;
   };
 
-  void FinishAndDrain() {
-    std::thread receiver([this] {
+  // Returns the error that ended the stream, or OK.
+  absl::Status FinishAndDrain() {
+    absl::Status sent, end;
+    std::thread receiver([this, &end] {
       const std::scoped_lock lock(receiving_);
-      Drain(std::nullopt);
+      end = Drain(std::nullopt);
     });
     {
       const MutexLock lock(sending_);
       if (!std::exchange(finished_, true)) {
-        const absl::Status status =
-            latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
-        if (!status.ok()) stream_->Cancel();
+        sent = latest_ != nullptr ? latest_->Finish() : stream_->FinishSending();
+        if (!sent.ok()) stream_->Cancel();
       }
     }
     receiver.join();
     if (finisher_.joinable()) finisher_.join();
+    return sent.ok() ? end : sent;
   }
 
-  // Receives and drops events until the stream has ended or `until` has passed.
-  void Drain(std::optional<std::chrono::steady_clock::time_point> until) {
+  // Receives and drops events until the stream has ended or `until` has passed. Returns the error
+  // that ended the stream, or OK.
+  absl::Status Drain(std::optional<std::chrono::steady_clock::time_point> until) {
     Event event;
-    for (auto got = stream_->Receive(event, kSlice); got.ok() && *got != Received::kEnd;
-         got = stream_->Receive(event, kSlice)) {
-      if (until && std::chrono::steady_clock::now() >= *until) return;
+    for (;;) {
+      const auto got = stream_->Receive(event, kSlice);
+      if (!got.ok()) return got.status();
+      if (*got == Received::kEnd) return absl::OkStatus();
+      if (until && std::chrono::steady_clock::now() >= *until) return absl::OkStatus();
     }
   }
 
@@ -279,6 +288,7 @@ class ProducerStream {
   std::thread finisher_;                                   // Runs LatestSender::Finish.
   Doubts warned_;                                          // Guarded by the GIL.
   std::atomic<std::uint64_t> offered_ = 0, answered_ = 0;  // Counts of frames; used with `latest`.
+  std::atomic<bool> has_raised_ = false;                   // Receive has raised the end.
   std::atomic<int> receives_ = 0;                          // Number of threads in Receive.
   std::atomic<std::thread::id> last_receiver_;             // Default: no thread has received.
   std::timed_mutex receiving_;                             // Held by the receiving thread.

@@ -99,7 +99,15 @@ void DefineSurface(py::module_& module) {
           "cuts", [](S s) { return View<std::uint32_t>(s.part.cuts, 1, s.owner); },
           "(K,) uint32, ascending: triangles on walls (wall_planes). `area` does not count them.")
       .def(
-          "check", [](S s) { RaiseUnlessOk(Validate(s.part)); },
+          "check",
+          [](S s) {
+            absl::Status valid;
+            {
+              const py::gil_scoped_release others_may_run;
+              valid = Validate(s.part);
+            }
+            RaiseUnlessOk(valid);
+          },
           "Checks with exact arithmetic that every shell is closed, manifold, oriented and free of "
           "intersections. Raises Error. Takes about as long as the reconstruction.");
 }

@@ -2,8 +2,18 @@
 
 #include <utility>
 
+#include "partiemc/status.h"
+
 namespace partiemc::server {
 namespace {
+
+absl::Status TooManyConnections() {
+  return ViolationError(
+      absl::StatusCode::kResourceExhausted,
+      {std::string(kReasonTooManyConnections), "caller.connections", "above a limit",
+       "may only make health checks: the server, or this address, has too many connections, or too "
+       "many new ones; use one connection for all calls, or try again later"});
+}
 
 absl::StatusOr<AdmittedCall> WithPlace(Caller caller, CallerAccount::Kind kind) {
   auto place = caller.account()->Take(kind);
@@ -14,9 +24,11 @@ absl::StatusOr<AdmittedCall> WithPlace(Caller caller, CallerAccount::Kind kind) 
 }  // namespace
 
 absl::StatusOr<AdmittedCall> Admit(const Authentication& authentication, const CallOrigin& origin,
-                                   Permission permission) {
+                                   Permission permission, std::string& client) {
+  if (origin.is_health_only) return TooManyConnections();
   auto caller = authentication.Authenticate(origin.authorization, origin.peer);
   if (!caller.ok()) return caller.status();
+  client = caller->name();
   if (permission != nullptr) {
     if (auto status = ((*caller).*permission)(); !status.ok()) return status;
   }

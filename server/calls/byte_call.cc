@@ -8,7 +8,8 @@ ByteCall::ByteCall(ArrivedCall call, const ServerContext& context)
     : channel_(call.channel),
       meters_(call.meters),
       context_(context),
-      admission_(call.admission.status()) {
+      admission_(call.admission.status()),
+      client_(std::move(call.client)) {
   if (call.admission.ok()) call_ = *std::move(call.admission);
   if (meters_ != nullptr) meters_->Started();
 }

@@ -26,6 +26,7 @@ struct ArrivedCall {
   CallChannel& channel;
   const MethodMeters* meters;  ///< Null: the call is not counted.
   absl::StatusOr<AdmittedCall> admission;
+  std::string client;  ///< Name of the caller for the log, also of a refused one; may be empty.
 };
 
 /// Connects a CallChannel to a state machine (StreamStateMachine, WatchStateMachine,
@@ -64,6 +65,8 @@ class ByteCall {
   const absl::Status& admission() const { return admission_; }
   /// The caller; an anonymous one if the caller was refused.
   const Caller& caller() const { return call_.caller; }
+  /// ArrivedCall::client.
+  const std::string& client() const { return client_; }
 
   /// Lets the server evict this call by `machine->GiveWay` until the first request has arrived
   /// (OpeningCalls). Called before the machine starts.
@@ -94,6 +97,7 @@ class ByteCall {
   const ServerContext& context_;
   const std::chrono::steady_clock::time_point came_ = std::chrono::steady_clock::now();
   const absl::Status admission_;
+  const std::string client_;
   AdmittedCall call_;
   OpeningCalls::Place opening_;  // Destroyed before the account.
   std::atomic<bool> ended_ = false;

@@ -94,7 +94,9 @@ Methods::Methods(const ServerContext& context, Metrics& metrics)
 
 ArrivedCall Methods::Arrive(Method method, CallChannel& channel, const CallOrigin& origin,
                             Permission permission) const {
-  return {channel, &meters_.Of(Name(method)), Admit(context_.authentication, origin, permission)};
+  std::string client;
+  auto admission = Admit(context_.authentication, origin, permission, client);
+  return {channel, &meters_.Of(Name(method)), std::move(admission), std::move(client)};
 }
 
 std::unique_ptr<ByteCall> Methods::Begin(Method method, CallChannel& channel,

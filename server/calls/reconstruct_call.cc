@@ -18,9 +18,9 @@ namespace partiemc::server {
 namespace {
 
 void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,
-            const absl::Status& status) {
+            const std::string& client, const absl::Status& status) {
   if (!stream) {
-    LogRefusal("stream refused", peer, status);
+    LogRefusal("stream refused", peer, status, client);
     return;
   }
   const auto violation = FindViolation(status);
@@ -94,7 +94,7 @@ void ReconstructCall::Finish(const absl::Status& status) {
   if (const JoinedPart* const part = frames_->joined()) {
     LogPartEnd(*part, status);
   } else {
-    LogEnd(stream, channel().peer(), status);
+    LogEnd(stream, channel().peer(), client(), status);
   }
   if (stream) EndWatches(*stream, status);
   End(status);

@@ -45,7 +45,7 @@ void UnaryCall::Finish(const absl::Status& status) {
   // Frees the slot before End, because a client that receives the end may call again at once.
   context().unary_calls.GiveBackPlace(*machine_);
   if (!status.ok() && !absl::IsCancelled(status))
-    LogRefusal("call refused", channel().peer(), status);
+    LogRefusal("call refused", channel().peer(), status, client());
   End(status);
 }
 

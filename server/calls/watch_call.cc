@@ -241,7 +241,7 @@ void WatchCall::Finish(const absl::Status& status) {
 
 void WatchCall::LogEnd(const absl::Status& status) const {
   if (stream_name_.empty()) {
-    LogRefusal("watch refused", channel().peer(), status);
+    LogRefusal("watch refused", channel().peer(), status, client());
     return;
   }
   const std::chrono::duration<double> open = std::chrono::steady_clock::now() - came_;

@@ -39,6 +39,10 @@ class CallTally {
   CallTally(const CallTally&) = delete;
   CallTally& operator=(const CallTally&) = delete;
 
+  /// Whether the connection may only make health checks.
+  bool is_health_only() const {
+    return connection_ != nullptr && connection_->admission == Admission::kHealthOnly;
+  }
   void OnReadBegun();
   /// The read has completed with a message of `bytes`. A failed read is not reported, and counts as
   /// pending until the call ends.

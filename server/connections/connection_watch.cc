@@ -40,6 +40,9 @@ constexpr milliseconds kPendingBetweenCounts(500);
 constexpr std::size_t kHealthOnlyOfAddress = 8;
 constexpr std::size_t kHealthOnly = 64;
 constexpr seconds kHealthOnlyTime(5);
+// A connection that may only make health checks ends after this time if it has made another call,
+// whose refusal arrives in the meantime.
+constexpr milliseconds kMisusedTime(100);
 // Limits of one connection that may only make health checks: unaccounted bytes, number of streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
@@ -115,6 +118,11 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   ++counters_.accepted;
   if (admission == Admission::kHealthOnly) {
     ++counters_.health_only;
+    if (log_limit_.Allow(now)) {
+      LogEvent(spdlog::level::warn, "connection may only make health checks",
+               {{"peer", connection.peer.name.empty() ? address : connection.peer.name},
+                {"reason", "too many connections, too many new ones, or a flood of this address"}});
+    }
     EvictHealthOnly(address);
     connection.waiting = std::move(socket);
     connection.hand_over = hand_over;
@@ -289,7 +297,9 @@ void ConnectionWatch::Examine(Connections::iterator connection, Clock::time_poin
 // Returns false if the connection must end. Passes it to gRPC after kHealthOnlyDelay.
 bool ConnectionWatch::ExamineHealthOnly(Connection& connection, Clock::time_point now) {
   const auto time = now - connection.came;
-  if (connection.tracked->misused || time > kHealthOnlyTime) return false;
+  if (connection.tracked->misused && !connection.misused) connection.misused = now;
+  if (connection.misused && now - *connection.misused >= kMisusedTime) return false;
+  if (time > kHealthOnlyTime) return false;
   if (connection.waiting.get() < 0) return true;
   if (connection.reading.bytes_received > kFirstBytes) return false;
   if (time >= kHealthOnlyDelay)

@@ -9,6 +9,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -95,6 +96,7 @@ class ConnectionWatch {
     // (kHealthOnlyDelay).
     Descriptor waiting;
     HandOver hand_over;
+    std::optional<Clock::time_point> misused;  // When the watch saw TrackedConnection::misused.
   };
   using Connections = std::list<Connection>;
 

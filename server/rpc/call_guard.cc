@@ -42,11 +42,13 @@ class Guard final : public Interceptor {
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
-      const CallOrigin origin = OriginOf(context_);
-      if (const auto status = TakePlaces(origin); status.ok()) {
+      CallOrigin origin = OriginOf(context_);
+      origin.is_health_only = tally_.is_health_only();
+      std::string client;
+      if (const auto status = TakePlaces(origin, client); status.ok()) {
         EndInTime();
       } else {
-        LogRefusal("call refused", origin.peer, status);
+        LogRefusal("call refused", origin.peer, status, client);
         End(context_.c_call(), status);
       }
     }
@@ -54,8 +56,8 @@ class Guard final : public Interceptor {
   }
 
  private:
-  absl::Status TakePlaces(const CallOrigin& origin) {
-    auto admitted = Admit(authentication_, origin);
+  absl::Status TakePlaces(const CallOrigin& origin, std::string& client) {
+    auto admitted = Admit(authentication_, origin, nullptr, client);
     if (!admitted.ok()) return admitted.status();
     auto place = admitted->caller.account()->Take(CallerAccount::Kind::kReflection);
     if (!place.ok()) return place.status();

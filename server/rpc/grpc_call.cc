@@ -8,9 +8,11 @@ namespace partiemc::server {
 
 GrpcCall::GrpcCall(grpc::CallbackServerContext& context, const ConnectionTable& connections,
                    CallKind kind, const Make& make)
-    : context_(context),
-      tally_(connections.BeginCall(context.peer(), kind)),
-      call_(make(*this, OriginOf(context))) {}
+    : context_(context), tally_(connections.BeginCall(context.peer(), kind)) {
+  CallOrigin origin = OriginOf(context);
+  origin.is_health_only = tally_.is_health_only();
+  call_ = make(*this, origin);
+}
 
 void GrpcCall::StartRead(grpc::ByteBuffer* message) {
   tally_.OnReadBegun();

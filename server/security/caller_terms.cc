@@ -25,7 +25,7 @@ constexpr char kNamesRule[] =
     "most 128 characters";
 constexpr char kCountRule[] = "calls=, streams= and watchers= must be whole numbers from 1 on";
 constexpr char kBytesRule[] =
-    "bytes= must be a whole number from 1 on, and a unit (B, KB, MB, GB, TB) or none";
+    "bytes= must be a whole number from 1 on, and a unit (B, KB or KiB, MB or MiB, GB, TB) or none";
 constexpr char kWordRule[] =
     "after the token and a name may stand may=, names=, calls=, streams=, watchers= and bytes=, "
     "each once and nothing else";
@@ -79,7 +79,7 @@ bool ReadBytes(std::string_view text, std::optional<std::uint64_t>& bytes) {
   const std::string unit = absl::AsciiStrToLower(std::string(text));
   if (unit.empty() || unit == "b") return true;
   const std::size_t power = kUnits.find(unit.front());
-  if (power == kUnits.npos || unit.substr(1) != "b") return false;
+  if (power == kUnits.npos || (unit.substr(1) != "b" && unit.substr(1) != "ib")) return false;
   const std::uint64_t factor = std::uint64_t{1} << (10 * (power + 1));
   if (*bytes > std::numeric_limits<std::uint64_t>::max() / factor) return false;
   *bytes *= factor;

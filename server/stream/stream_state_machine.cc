@@ -250,7 +250,12 @@ void StreamStateMachine::Computed() {
     ++computed_;
     if (!answered) return;
     SetSlotBytes(computed_ - 1, answered->bytes);
-    ++(answered->is_result ? counts_.frames : counts_.frame_errors);
+    // An abandoned frame has no error, although it has no result.
+    if (answered->is_result) {
+      ++counts_.frames;
+    } else if (state_.phase != Phase::kAbandoned) {
+      ++counts_.frame_errors;
+    }
     counts_.last_sequence = answered->last_sequence;
   }
   if (!answered->afterwards) return;

@@ -147,11 +147,13 @@ void LogEvent(spdlog::level::level_enum level, std::string_view event,
   logger->log(level, fmt::string_view("{}"), line);
 }
 
-void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status) {
+void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status,
+                const std::string& client) {
   if (!refusals.Allow(RateLimit::Clock::now())) return;
   const auto violation = FindViolation(status);
   LogEvent(spdlog::level::warn, event,
            {{"peer", peer},
+            {"client", client},
             {"status", absl::StatusCodeToString(status.code())},
             {"reason", violation ? violation->reason : std::string()},
             {"error", std::string(status.message())}});

@@ -55,9 +55,11 @@ struct LogField {
 void LogEvent(spdlog::level::level_enum level, std::string_view event,
               std::initializer_list<LogField> fields);
 
-/// Logs a refused caller or request with its reason. Writes at most twenty lines per second; then
+/// Logs a refused caller or request with its reason. `client`: the name of the caller; empty if it
+/// is unknown. Writes at most twenty lines per second; then
 /// writes one line with the number of refusals that were not logged.
-void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status);
+void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status,
+                const std::string& client = {});
 
 /// Logs the begin or the end of an admitted call. Writes at most 500 lines per second; then writes
 /// one line with the number of lines that were not written.

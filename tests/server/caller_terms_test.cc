@@ -68,6 +68,7 @@ TEST(CallerTerms, CountBytesInUnitsOf1024) {
   EXPECT_EQ(bytes("7"), 7u);
   EXPECT_EQ(bytes("7B"), 7u);
   EXPECT_EQ(bytes("7kb"), 7u << 10);
+  EXPECT_EQ(bytes("7MiB"), 7u << 20);
   EXPECT_EQ(bytes("7GB"), std::uint64_t{7} << 30);
   EXPECT_EQ(bytes("16777215TB"), std::uint64_t{16777215} << 40);
 }

@@ -278,6 +278,17 @@ TEST_F(CallRefused, TOO_MANY_OPENING) {
   EXPECT_EQ(gave_way, 1);
 }
 
+TEST_F(CallRefused, TOO_MANY_CONNECTIONS) {
+  options_.connections.of_address = 1;
+  Serve();
+  StreamClient first(channel_);
+  ASSERT_TRUE(first.SendAndReceive(OpenRequest()).has_opened());
+  StreamClient second(Connect(*server_, Transport::kTcp));
+  const auto status = second.Finish();
+  Expect(status, second.reason(), StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_CONNECTIONS");
+  EXPECT_TRUE(first.SendAndReceive(BlobRequest(1, 1, 0)).has_frame());
+}
+
 TEST_F(CallRefused, CALLER_CALLS) {
   ExpectOfTerms("calls=1", StatusCode::RESOURCE_EXHAUSTED, "CALLER_CALLS");
 }

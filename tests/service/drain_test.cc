@@ -287,6 +287,9 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
     while (server_->process().Output().find("draining") == std::string::npos) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
+    server_->process().Signal(SIGTERM);  // Counts as the first one.
+    std::this_thread::sleep_for(std::chrono::milliseconds(800));
+    EXPECT_THAT(server_->process().Output(), Not(HasSubstr("cut off")));
     server_->process().Signal(second);
     EXPECT_EQ(server_->process().WaitFor(kPatience), 128 + second);
     EXPECT_THAT(server_->process().Output(), HasSubstr("cut off"));

@@ -213,7 +213,10 @@ def _map(self, frames, times=None):
             raise TypeError(f"map: a frame with the keys {', '.join(map(repr, frame))}; must have "
                             f"'positions' and may have {', '.join(sorted(_SENT - {'positions'}))}")
         if times is not None:
-            frame = {"time": next(times), **frame}
+            time = next(times, None)
+            if time is None:
+                raise ValueError("map: times: has fewer elements than frames")
+            frame = {"time": time, **frame}
         self.send(**frame)
         while self.latest and (result := self.receive(wait=0)) is not None:
             yield result

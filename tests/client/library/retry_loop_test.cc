@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "partiemc/status.h"
 #include "support/manual_clock.h"
 
 namespace partiemc::client {
@@ -169,7 +170,23 @@ TEST_F(RetryLoopTest, GivesUpInTimeAndKeepsWhatTheLastAttemptSaid) {
   Scripted attempts(clock_, {kBusy, kBusy, {.opened = false}});  // The last one never responds.
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
-  EXPECT_EQ(loop.refusal(), absl::UnavailableError("busy"));
+  EXPECT_EQ(loop.RefusalText(), "busy");
+}
+
+TEST_F(RetryLoopTest, TellsWhatAServerAnsweredBeforeAnotherWasGone) {
+  RetryLoop loop = Loop(milliseconds(30));
+  const Scripted::Answer answered{
+      .opened = ViolationError(absl::StatusCode::kFailedPrecondition,
+                               {"CHECKPOINT_SIGNATURE", "checkpoint", "unknown", "must be known"}),
+      .retryable = true};
+  Scripted attempts(clock_, {answered, kBusy, {.opened = false}});
+  loop.Lose("lost a");
+  EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
+  EXPECT_EQ(loop.RefusalText(),
+            "busy; before, a server answered: checkpoint: unknown; must be known");
+  loop.Recovered();
+  loop.Lose("lost b");
+  EXPECT_EQ(loop.RefusalText(), "");
 }
 
 TEST_F(RetryLoopTest, AnAttemptThatTakesTooLongIsNotAccepted) {
@@ -177,7 +194,7 @@ TEST_F(RetryLoopTest, AnAttemptThatTakesTooLongIsNotAccepted) {
   Scripted attempts(clock_, {Scripted::Answer{.opened = false}});
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
-  EXPECT_THAT(std::string(loop.refusal().message()), HasSubstr("did not accept the stream"));
+  EXPECT_THAT(loop.RefusalText(), HasSubstr("did not accept the stream"));
   EXPECT_GE(attempts.started.size(), 2u);
 }
 

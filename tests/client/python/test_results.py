@@ -134,6 +134,9 @@ class Results(unittest.TestCase):
         sequence = partiemc.Reconstructor(spacing=1, sections=[{"isovalue": 0.3}])
         sequence.reconstruct(particles, 0.5)
         result = sequence.reconstruct(particles, 1.5, attributes={"p": x, "v": (y, x)})
+        for protocol in (0, 1):
+            with self.assertRaisesRegex(TypeError, "requires protocol 2"):
+                pickle.dumps(result, protocol)
         for fresh in (True, False):  # Sections as Python objects are made at the first access.
             again = pickle.loads(pickle.dumps(result))
             assert_equal(self, again, result)
@@ -227,7 +230,8 @@ class Results(unittest.TestCase):
             packing = rings.gauge("packing", positions=positions, **sizes, **box)
             self.assertAlmostEqual(packing["fraction"], numpy.pi / 4, 6)
         for wrong in ({}, {"positions": positions}, {"positions": positions, "radii": radii, "volumes": radii},
-                      {"positions": positions, "radii": radii[1:]}, {"positions": radii, "radii": radii}):
+                      {"positions": positions, "radii": radii[1:]}, {"positions": radii, "radii": radii},
+                      {"positions": positions, "radii": -radii}, {"positions": positions, "volumes": radii * numpy.nan}):
             with self.assertRaises(partiemc.Error):
                 rings.gauge("packing", **wrong, **box)
         with self.assertRaises(partiemc.Error):

@@ -72,6 +72,11 @@ class Streams(ServerTest):
                 with self.assertRaisesRegex(TypeError, "'positions'.*volumes"):
                     list(stream.map([wrong]))
 
+    def test_map_needs_a_time_for_each_frame(self):
+        with partiemc.connect(self.address, spacing=1) as stream:
+            with self.assertRaisesRegex(ValueError, "times: has fewer elements"):
+                list(stream.map([block(), block()], times=[1]))
+
     def test_a_full_window_that_nobody_empties_is_refused_within_a_second(self):
         with partiemc.connect(self.address, spacing=1) as stream:
             for received in (False, True):
@@ -339,6 +344,25 @@ class Streams(ServerTest):
                 start = time.monotonic()
                 del stream
                 self.assertLess(time.monotonic() - start, 15 if latest else 0.5)
+
+    def test_leaving_with_raises_the_loss_of_frames(self):
+        for received in (False, True):
+            with Server() as lost, self.assertRaisesRegex(partiemc.Error, "could not continue within 1 s"):
+                with partiemc.connect(lost.address, spacing=1, give_up_after=1) as stream:
+                    stream.send(block())
+                    lost.process.kill()
+                    lost.process.wait()
+                    stream.send(block())
+                    if received:  # Raises before the end of `with`.
+                        list(stream)
+                    self.assertFalse(received)
+        with Server() as lost, partiemc.connect(lost.address, spacing=1, give_up_after=1) as stream:
+            stream.send(block())
+            lost.process.kill()
+            lost.process.wait()
+            with self.assertRaises(partiemc.Error):  # Told once.
+                while True:
+                    stream.receive()
 
     def test_watchers_see_what_the_producer_gets(self):
         with partiemc.connect(self.address, spacing=1, name="watched", labels={"run": "7"},
