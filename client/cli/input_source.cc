@@ -16,6 +16,47 @@
 #include "partiemc/spacing.h"
 
 namespace partiemc::client {
+namespace {
+
+/// A recording whose volumes come from its attribute of diameters or radii
+/// (SequenceOptions::needs_sizes, needs_diameters). Volumes of a recording stay for frames without
+/// such an attribute, and with needs_sizes for all frames that have volumes.
+class SizedRecording final : public Sequence {
+ public:
+  SizedRecording(std::unique_ptr<Sequence> recording, bool needs_diameters)
+      : recording_(std::move(recording)), needs_diameters_(needs_diameters) {}
+
+  absl::StatusOr<bool> Next(RecordedFrame& frame) override {
+    const auto more = recording_->Next(frame);
+    if (!more.ok() || !*more || !(frame.volumes.empty() || needs_diameters_)) return more;
+    for (const ParticleAttribute& attribute : frame.attributes) {
+      const bool is_diameter = attribute.name == "diameter";
+      if (attribute.components != 1 || !(is_diameter || attribute.name == "radius")) continue;
+      frame.volumes.clear();
+      for (const float length : attribute.values) {
+        const double size = (is_diameter ? 1 : 2) * double{length};
+        const double square = size * size;
+        // A square of a negative length would be positive.
+        frame.volumes.push_back(static_cast<float>(!(size > 0)             ? size
+                                                   : frame.components == 3 ? square * size
+                                                                           : square));
+      }
+      break;
+    }
+    return true;
+  }
+  std::optional<std::size_t> FrameCount() override { return recording_->FrameCount(); }
+  std::string Description() const override { return recording_->Description(); }
+  const std::vector<std::string>& notices() const override { return recording_->notices(); }
+  std::vector<std::string> files() const override { return recording_->files(); }
+  std::vector<std::string> losses() const override { return recording_->losses(); }
+
+ private:
+  const std::unique_ptr<Sequence> recording_;
+  const bool needs_diameters_;
+};
+
+}  // namespace
 
 absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOptions& options) {
   if (!IsRecording(input)) {
@@ -38,6 +79,11 @@ absl::StatusOr<InputSource> OpenInput(const std::string& input, const SequenceOp
       RecordingReader::Open(input, options.frames, options.in_space, options.max_expansion);
   if (!reader.ok()) return reader.status();
   const auto spacing = (*reader)->header().spacing;
+  if (options.needs_sizes || options.needs_diameters) {
+    return InputSource{
+        .frames = std::make_unique<SizedRecording>(*std::move(reader), options.needs_diameters),
+        .spacing = spacing};
+  }
   return InputSource{.frames = *std::move(reader), .spacing = spacing};
 }
 

@@ -1,6 +1,7 @@
 #include "client/cli/replay_flags.h"
 
 #include <string>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "client/cli/console.h"
@@ -11,7 +12,7 @@
 namespace partiemc::client {
 namespace {
 
-absl::Status CheckCombinations(const CLI::App& app) {
+absl::Status CheckCombinations(const CLI::App& app, const ReplayFlags& flags) {
   if (app.count("--threads") > 0 && app.count("--local") == 0) {
     return absl::InvalidArgumentError("--threads: requires --local; a server has its own threads");
   }
@@ -22,6 +23,18 @@ absl::Status CheckCombinations(const CLI::App& app) {
     return absl::InvalidArgumentError(
         "--gauge: measures outlines, so it cannot be combined with --surface; --stats has the "
         "areas and volumes of surfaces");
+  }
+  if (app.count("--surface") > 0 && app.count("--slice") == 0) {
+    for (const auto& [flag, instead] :
+         {std::pair("--min-area", "; --min-volume drops small bodies"), std::pair("--fill", "")}) {
+      if (app.count(flag) == 0) continue;
+      return absl::InvalidArgumentError(
+          Concat(flag, ": is for outlines, so --surface requires --slice with it", instead));
+    }
+  }
+  if (flags.boundary == "grains" && app.count("--sizes") > 0 && flags.sizes != "own") {
+    return absl::InvalidArgumentError(
+        "--sizes: must be own, or absent, with --boundary grains: grains have own sizes");
   }
   if (app.count("--check") > 0 && app.count("--coordinates") > 0) {
     return absl::InvalidArgumentError("--check: requires --coordinates float64, the default");
@@ -345,8 +358,8 @@ CLI::App* AddReplay(CLI::App& app, ReplayFlags& flags) {
   AddPlaceFlags(*verb, flags);
   AddMethodFlags(*verb, flags);
   AddOutputFlags(*verb, flags);
-  verb->parse_complete_callback([verb] {
-    const absl::Status status = CheckCombinations(*verb);
+  verb->parse_complete_callback([verb, &flags] {
+    const absl::Status status = CheckCombinations(*verb, flags);
     if (!status.ok()) throw CLI::ValidationError(OneLine(status), CLI::ExitCodes::ValidationError);
   });
   verb->footer(

@@ -84,6 +84,12 @@ std::vector<std::string> Summary::Warnings() const {
   return warnings;
 }
 
+bool Summary::is_empty() const {
+  const auto is_zero = [](double count) { return count == 0; };
+  return !std::ranges::all_of(particles_, is_zero) && std::ranges::all_of(rings_, is_zero) &&
+         std::ranges::all_of(bodies_, is_zero);
+}
+
 double Summary::MeanReductionPercent() const { return Mean(reduction_); }
 
 std::vector<SummaryRow> Summary::SurfaceRows() const {

@@ -31,6 +31,9 @@ class Summary {
   std::uint64_t frame_count() const { return particles_.size(); }
   std::uint64_t refused_count() const { return refused_; }
 
+  /// Whether frames have particles, but no frame has a ring or a body.
+  bool is_empty() const;
+
   /// Mean of 1 - triangles / triangles_grid, in percent, over the frames with triangles_grid > 0. 0
   /// without such frames.
   double MeanReductionPercent() const;

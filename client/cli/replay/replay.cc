@@ -219,7 +219,10 @@ class Receiver {
 
   void Refuse(const std::string& source, const std::string& message) {
     outputs_.AddRefused();
-    progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message)));
+    // The core names arrays, but the user of --sizes own and --boundary grains gives columns.
+    const bool lacks_sizes = message.starts_with("volumes: 0 values");
+    progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message),
+                          lacks_sizes ? " (a column volume, diameter or radius)" : ""));
   }
 
   const ReplayFlags& flags_;
@@ -246,6 +249,13 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   const Summary& summary = outputs.summary();
   ExitCode code = kGood;
   for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
+  if (summary.is_empty()) {
+    const bool has_walls = !flags.walls.empty() || !flags.wall_planes.empty();
+    Complain(kGood, Concat("no frame has ", flags.surface ? "a body" : "an outline",
+                           has_walls ? "; are the particles behind a wall? The fluid is on the "
+                                       "left of --wall, and above --wall-plane without `below`"
+                                     : "; is --spacing right?"));
+  }
   if (summary.refused_count() > 0 && !flags.keep_going) {
     Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),
                             " refused, see above; --keep-going exits with 0 nevertheless"));

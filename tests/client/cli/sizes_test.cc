@@ -109,6 +109,25 @@ TEST(SizedReplay, GrainsComeFromDiametersRadiiOrAreasOfDiscs) {
       digest);
 }
 
+// A recording has no columns, but it may have an attribute of diameters or radii.
+TEST(SizedReplay, RecordingsGiveTheSameByTheirAttributes) {
+  const support::TemporaryFolder input;
+  WriteZones(input.Path("diameter.csv"), "diameter", 1, 1);
+  WriteZones(input.Path("radius.csv"), "radius", .5, 1);
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--local", "--sizes", "own", "--spacing", "1"},
+        std::vector<std::string>{"--local", "--boundary", "grains", "--spacing", "1"}}) {
+    const std::string digest = DigestOf(input.Path("diameter.csv"), flags);
+    for (const std::string column : {"diameter", "radius"}) {
+      const std::string recording = input.Path(column + flags[2] + ".pemc");
+      const Ran ran =
+          RunPartiemc({"convert", input.Path(column + ".csv"), recording, "--attributes", column});
+      ASSERT_EQ(ran.exit_code, 0) << ran.error;
+      EXPECT_EQ(DigestOf(recording, flags), digest) << column << flags[2];
+    }
+  }
+}
+
 // A square packing of touching grains fills pi / 4 of a box, whichever column has their sizes.
 TEST(SizedReplay, PackingOfGrainsCountsTheAreasOfDiscs) {
   const support::TemporaryFolder folder;
@@ -138,7 +157,7 @@ TEST(SizedReplay, WrongSizesAreRefused) {
     EXPECT_EQ(ran.exit_code, exit_code) << ran.error;
     return ran.error;
   };
-  EXPECT_THAT(refusal({"--sizes", "own"}, 3), HasSubstr("volumes"));
+  EXPECT_THAT(refusal({"--sizes", "own"}, 3), HasSubstr("a column volume, diameter or radius"));
   EXPECT_THAT(refusal({"--sizes", "large"}, 2), HasSubstr("equal or own"));
   EXPECT_THAT(refusal({"--boundary", "grains"}, 3), HasSubstr("volumes"));
   EXPECT_THAT(refusal({"--boundary", "smooth"}, 2), HasSubstr("bulk or grains"));

@@ -148,6 +148,19 @@ TEST(WallsReplay, BlockFillsItsTankInSpace) {
   EXPECT_THAT(outline.error, HasSubstr("--wall-plane: "));
 }
 
+TEST(WallsReplay, WallsThatLeaveNothingAreTold) {
+  const support::TemporaryFolder folder;
+  {
+    std::ofstream file(folder.Path("column.csv"));
+    file << "x,y\n";
+    for (int k = 0; k < 100; ++k) file << k % 10 + .5 << "," << k / 10 + .5 << "\n";
+  }
+  const Ran ran = RunPartiemc({"replay", folder.Path("column.csv"), "--local", "--spacing", "1",
+                               "--check", "--wall", "0,0,0,20,10,20,10,0"});  // Clockwise.
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.error, HasSubstr("no frame has an outline; are the particles behind a wall?"));
+}
+
 TEST(WallsReplay, WrongWallsAreRefused) {
   const support::TemporaryFolder folder;
   WriteColumn(folder.Path("column.csv"));
