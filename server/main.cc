@@ -82,7 +82,10 @@ std::atomic<bool> leaving = false;
 // After a second signal, or after `grace` and kTimeToEnd, ends the process unless it has drained.
 void CutDrainShort(const sigset_t& signals, std::chrono::milliseconds grace) {
   const auto until = std::chrono::steady_clock::now() + grace + kTimeToEnd;
-  while (WaitForSignal(signals, kSameSignal) != 0) continue;
+  const auto same_until = std::chrono::steady_clock::now() + kSameSignal;
+  while (WaitForSignal(signals, std::chrono::ceil<std::chrono::milliseconds>(
+                                    same_until - std::chrono::steady_clock::now())) != 0) {
+  }
   const int signal = WaitForSignal(signals, std::chrono::ceil<std::chrono::milliseconds>(
                                                 until - std::chrono::steady_clock::now()));
   if (leaving.exchange(true)) return;

@@ -96,7 +96,7 @@ absl::StatusOr<RetryLoop::Outcome> RetryLoop::Run(Attempts& attempts,
 std::string RetryLoop::RefusalText() const {
   std::string text(refusal_.message());
   if (answer_.ok() || answer_ == refusal_) return text;
-  return absl::StrCat(text, "; before, a server answered: ", answer_.message());
+  return absl::StrCat(text, "; before: ", answer_.message());
 }
 
 Reconnecting RetryLoop::Progress() const {

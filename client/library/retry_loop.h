@@ -73,8 +73,8 @@ class RetryLoop {
   /// One line about the last loss: the description passed to Lose, the address where the call
   /// continues, and the time since the loss.
   std::string LossDescription() const;
-  /// The error of the last attempt since Lose, and the last answer of a server if an earlier
-  /// attempt received it. Empty before the first attempt has failed.
+  /// The error of the last attempt since Lose. If it has no Violation, also the last error with
+  /// one, which is usually the answer of another server. Empty before the first attempt has failed.
   std::string RefusalText() const;
 
  private:
@@ -92,7 +92,7 @@ class RetryLoop {
   TimePoint lost_at_, attempt_at_;
   std::string loss_;
   std::optional<TimePoint> attempt_until_;  // Set while an attempt is in progress.
-  // The last errors: of any attempt, and with a Violation, which only servers send.
+  // The last errors: of any attempt, and with a Violation.
   absl::Status refusal_, answer_;
 };
 

@@ -95,6 +95,7 @@ class ProducerStream {
       }
       if (sent.ok()) ++frames_;
     }
+    if (absl::IsUnavailable(sent.status())) has_raised_ = true;
     RaiseUnlessOk(sent.status());
     return latest_ != nullptr ? std::nullopt : std::optional(*sent);
   }
@@ -153,8 +154,8 @@ class ProducerStream {
   }
 
   // Finishes the stream. Receives and drops the results that are left, so that waiting frames are
-  // still sent. Ctrl-C cancels the stream. Raises the error that ended the stream, unless Receive
-  // has raised it: frames may be lost.
+  // still sent. Ctrl-C cancels the stream. Raises the error that ended the stream, unless Send
+  // or Receive has raised it: frames may be lost.
   void Close() {
     std::packaged_task<absl::Status()> task([this] { return FinishAndDrain(); });
     std::future<absl::Status> closed = task.get_future();
@@ -288,7 +289,7 @@ class ProducerStream {
   std::thread finisher_;                                   // Runs LatestSender::Finish.
   Doubts warned_;                                          // Guarded by the GIL.
   std::atomic<std::uint64_t> offered_ = 0, answered_ = 0;  // Counts of frames; used with `latest`.
-  std::atomic<bool> has_raised_ = false;                   // Receive has raised the end.
+  std::atomic<bool> has_raised_ = false;                   // The loss has been raised.
   std::atomic<int> receives_ = 0;                          // Number of threads in Receive.
   std::atomic<std::thread::id> last_receiver_;             // Default: no thread has received.
   std::timed_mutex receiving_;                             // Held by the receiving thread.

@@ -19,15 +19,12 @@ bool WorkerMemory::Reserve(std::uint64_t bytes, std::size_t particles, std::uint
   if (bytes > kWorkerBytes + counted_) {
     const std::uint64_t more = bytes - kWorkerBytes - counted_;
     const bool is_usual = bytes <= kWorkerBytes + state_bytes + kWorkerBytesPerParticle * particles;
-    if (!is_usual) {
-      if (budget_->TryTake(more) != FairShare::Fit::kYes) return false;
-      counted_ += more;
-    } else {
-      const std::uint64_t taken = budget_->TakeForWorker(more, this);
-      is_beyond_ = budget_->IsBeyond(this);
-      counted_ += taken;
-      if (taken < more) return false;
+    if (budget_->TryTake(more) != FairShare::Fit::kYes &&
+        !(is_usual && budget_->TryTakeBeyond(more, this))) {
+      return false;
     }
+    is_beyond_ = budget_->IsBeyond(this);
+    counted_ += more;
   }
   used_ = std::max(used_, bytes);
   return true;

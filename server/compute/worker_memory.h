@@ -35,12 +35,10 @@ class WorkerMemory {
   /// MemoryBudget::TakeForWorker, which may take the memory beyond the budget.
   void BeginFrame(std::uint64_t message_bytes);
   /// Reserves memory so that all buffers together may grow to `bytes`, for a frame with this number
-  /// of particles. Returns false if the memory is refused. The buffers may always use kWorkerBytes
-  /// and the bytes reserved before. More is usual if `bytes` are at most kWorkerBytes plus
-  /// `state_bytes` plus kWorkerBytesPerParticle for each particle. Blocks for usual bytes like
-  /// MemoryBudget::TakeForWorker, which may take them beyond the budget, and refuses them only if
-  /// they exceed BeyondBudget::worker_bytes. For other bytes does not block, and refuses what
-  /// MemoryBudget::TryTake does.
+  /// of particles. Does not block; returns false if the memory is refused. The buffers may always
+  /// use kWorkerBytes and the bytes reserved before. More is granted if MemoryBudget::TryTake or
+  /// TryTakeBeyond grants it. TryTakeBeyond is tried only if `bytes` are at most kWorkerBytes plus
+  /// `state_bytes` plus kWorkerBytesPerParticle for each particle.
   /// `state_bytes`: the part of `bytes` for states of the stream. Earlier frames determine their
   /// size.
   bool Reserve(std::uint64_t bytes, std::size_t particles, std::uint64_t state_bytes = 0);

@@ -42,7 +42,7 @@ constexpr std::size_t kHealthOnly = 64;
 constexpr seconds kHealthOnlyTime(5);
 // A connection that may only make health checks ends after this time if it has made another call,
 // whose refusal arrives in the meantime.
-constexpr milliseconds kMisusedTime(100);
+constexpr milliseconds kMisusedTime(500);
 // Limits of one connection that may only make health checks: unaccounted bytes, number of streams.
 constexpr std::uint64_t kHealthOnlyBytes = 16 << 10;
 constexpr std::uint64_t kHealthOnlyStreams = 16;
@@ -73,7 +73,8 @@ ConnectionWatch::ConnectionWatch(const ConnectionLimits& limits, const Connectio
       events_(epoll_create1(EPOLL_CLOEXEC)),
       wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       counts_(limits),
-      log_limit_(kLinesPerSecond) {
+      log_limit_(kLinesPerSecond),
+      health_only_log_limit_(kLinesPerSecond) {
   epoll_event event{.events = EPOLLIN, .data = {.u64 = kWakeKey}};
   epoll_ctl(events_.get(), EPOLL_CTL_ADD, wake_.get(), &event);
 }
@@ -118,7 +119,7 @@ void ConnectionWatch::Add(Descriptor socket, const HandOver& hand_over) {
   ++counters_.accepted;
   if (admission == Admission::kHealthOnly) {
     ++counters_.health_only;
-    if (log_limit_.Allow(now)) {
+    if (health_only_log_limit_.Allow(now)) {
       LogEvent(spdlog::level::warn, "connection may only make health checks",
                {{"peer", connection.peer.name.empty() ? address : connection.peer.name},
                 {"reason", "too many connections, too many new ones, or a flood of this address"}});
@@ -300,6 +301,7 @@ bool ConnectionWatch::ExamineHealthOnly(Connection& connection, Clock::time_poin
   if (connection.tracked->misused && !connection.misused) connection.misused = now;
   if (connection.misused && now - *connection.misused >= kMisusedTime) return false;
   if (time > kHealthOnlyTime) return false;
+  if (connection.tracked->ledger.calls_begun() > kHealthOnlyStreams) return false;
   if (connection.waiting.get() < 0) return true;
   if (connection.reading.bytes_received > kFirstBytes) return false;
   if (time >= kHealthOnlyDelay)

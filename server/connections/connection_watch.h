@@ -143,7 +143,8 @@ class ConnectionWatch {
   Clock::time_point all_at_ ABSL_GUARDED_BY(mutex_){};
   Clock::time_point forget_at_ ABSL_GUARDED_BY(mutex_){};
   Clock::time_point end_all_at_ ABSL_GUARDED_BY(mutex_) = Clock::time_point::max();
-  RateLimit log_limit_ ABSL_GUARDED_BY(mutex_);
+  RateLimit log_limit_ ABSL_GUARDED_BY(mutex_);              // Of cut connections.
+  RateLimit health_only_log_limit_ ABSL_GUARDED_BY(mutex_);  // Of new health-only connections.
   std::thread thread_;
 };
 

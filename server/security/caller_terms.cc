@@ -25,7 +25,8 @@ constexpr char kNamesRule[] =
     "most 128 characters";
 constexpr char kCountRule[] = "calls=, streams= and watchers= must be whole numbers from 1 on";
 constexpr char kBytesRule[] =
-    "bytes= must be a whole number from 1 on, and a unit (B, KB or KiB, MB or MiB, GB, TB) or none";
+    "bytes= must be a whole number from 1 on, and a unit (B, KB, MB, GB, TB, also KiB and so on) "
+    "or none";
 constexpr char kWordRule[] =
     "after the token and a name may stand may=, names=, calls=, streams=, watchers= and bytes=, "
     "each once and nothing else";

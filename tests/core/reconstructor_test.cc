@@ -296,6 +296,20 @@ TEST(Reconstructor, AnOutlineAsFarOutAsTheKernelReachesStillKeepsEveryPromise) {
   }
 }
 
+TEST(Reconstructor, AnOutlineHasNoAttributesOfASurfaceBefore) {
+  Result result;
+  result.surface.attributes = {{"heat", 1, {}}};
+  const std::vector<double> positions = {0, 0, 1, 0, 0, 1, 1, 1};
+  State state;
+  Workspace workspace;
+  ASSERT_TRUE(
+      Reconstructor::Create({.spacing = 1})
+          ->Reconstruct({.positions = std::span<const double>(positions)}, state, workspace, result)
+          .ok());
+  EXPECT_GT(result.rings.PointCount(), 0u);
+  EXPECT_EQ(result.surface, Surface{});
+}
+
 TEST(Reconstructor, VolumesBeyondReasonAreRefusedByName) {
   Particles particles = support::Disc(4);
   particles.volumes.assign(particles.size(), 1.0f);

@@ -3,9 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cstdint>
-#include <future>
 #include <memory>
 
 namespace partiemc::server {
@@ -52,22 +50,6 @@ TEST(WorkerMemory, GrantsWhatParticlesNeedHoweverSmallTheBudgetIs) {
   EXPECT_EQ(budget.held(), most - kWorkerBytes) << "it counts all the same";
   EXPECT_TRUE(memory.Reserve(most + 1, kParticles)) << "the budget's byte is still free";
   EXPECT_FALSE(memory.Reserve(most + 2, kParticles));
-}
-
-// Otherwise a usual frame would be refused because of the frames of other streams.
-TEST(WorkerMemory, WaitsUntilAnotherWorkerNoLongerComputesBeyondTheBudget) {
-  MemoryBudget budget(1);
-  WorkerMemory first(&budget), second(&budget);
-  constexpr std::size_t kParticles = 1'000'000;
-  ASSERT_TRUE(first.Reserve(kWorkerBytes + 40 * kMib, kParticles));
-  ASSERT_TRUE(first.is_beyond());
-  auto waiting = std::async(std::launch::async,
-                            [&] { return second.Reserve(kWorkerBytes + 40 * kMib, kParticles); });
-  EXPECT_EQ(waiting.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
-  EXPECT_TRUE(first.Reserve(kWorkerBytes + 50 * kMib, kParticles)) << "it does not wait";
-  first.GiveBack();
-  EXPECT_TRUE(waiting.get());
-  EXPECT_TRUE(second.is_beyond());
 }
 
 TEST(WorkerMemory, StatesOfFormerFramesAreUsual) {

@@ -192,6 +192,9 @@ def read_pysph(path, *, array="fluid"):
 _SENT = {"positions", "time", "volumes", "ids", "velocities", "attributes", "box"}
 
 
+_ABSENT = object()
+
+
 def _map(self, frames, times=None):
     """Yields the results of `frames`, an iterable, in order.
 
@@ -213,8 +216,8 @@ def _map(self, frames, times=None):
             raise TypeError(f"map: a frame with the keys {', '.join(map(repr, frame))}; must have "
                             f"'positions' and may have {', '.join(sorted(_SENT - {'positions'}))}")
         if times is not None:
-            time = next(times, None)
-            if time is None:
+            time = next(times, _ABSENT)
+            if time is _ABSENT:
                 raise ValueError("map: times: has fewer elements than frames")
             frame = {"time": time, **frame}
         self.send(**frame)

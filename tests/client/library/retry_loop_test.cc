@@ -183,7 +183,7 @@ TEST_F(RetryLoopTest, TellsWhatAServerAnsweredBeforeAnotherWasGone) {
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
   EXPECT_EQ(loop.RefusalText(),
-            "busy; before, a server answered: checkpoint: unknown; must be known");
+            "busy; before: checkpoint: unknown; must be known");
   loop.Recovered();
   loop.Lose("lost b");
   EXPECT_EQ(loop.RefusalText(), "");
