@@ -294,6 +294,7 @@ Answered ReconstructCall::AnswerWhole(std::size_t slot, Worker& worker,
   messages->Shrink(request_bytes);
   worker.message_buffers = std::move(messages);
   return {.is_result = status.ok(),
+          .is_cancelled = absl::IsCancelled(status),
           .last_sequence = session_->next_sequence() - 1,
           .afterwards = Afterwards(has_watchers)};
 }

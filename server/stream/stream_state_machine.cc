@@ -250,10 +250,9 @@ void StreamStateMachine::Computed() {
     ++computed_;
     if (!answered) return;
     SetSlotBytes(computed_ - 1, answered->bytes);
-    // An abandoned frame has no error, although it has no result.
     if (answered->is_result) {
       ++counts_.frames;
-    } else if (state_.phase != Phase::kAbandoned) {
+    } else if (!answered->is_cancelled) {
       ++counts_.frame_errors;
     }
     counts_.last_sequence = answered->last_sequence;
@@ -339,7 +338,8 @@ void StreamStateMachine::DecideRead() {
     return;
   }
   if (!budget_.reads().MayReadAhead(*this)) return;
-  const std::uint64_t bytes = budget_.reads().PlannedBytes(ExpectedBytes());
+  // At least the last size, even if it exceeds ReadTerms::message_bytes.
+  const std::uint64_t bytes = std::max(last_bytes_, budget_.reads().PlannedBytes(ExpectedBytes()));
   if (budget_.TakeOrWait(bytes, shared_from_this(), caller_.get())) {
     surplus_ += bytes;
     ReadAhead();

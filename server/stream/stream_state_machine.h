@@ -30,7 +30,8 @@ enum class RequestKind { kMalformed, kEmpty, kOpen, kFrame };
 enum class Outgoing { kOpened, kAnswer, kDraining };
 
 struct Answered {
-  bool is_result = false;           ///< False: a frame error.
+  bool is_result = false;           ///< False: a frame error, or `is_cancelled`.
+  bool is_cancelled = false;        ///< The call was cancelled during the computation.
   std::uint64_t last_sequence = 0;  ///< The last sequence number that the stream has used.
   std::uint64_t bytes = 0;          ///< Size of the response.
   /// Function to run after the response's write has started or was queued behind another write. The

@@ -225,6 +225,9 @@ TEST_F(CallRefused, TAKEN_OVER) {
   open.mutable_open()->set_checkpoint_interval(1);
   StreamClient old_call(channel_);
   const auto opened = old_call.SendAndReceive(open);
+  // The server cuts a call that is taken over during a write. The write of `opened` ends soon after
+  // the client has received it.
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
   StreamClient new_call(channel_);
   ASSERT_TRUE(new_call.SendAndReceive(Resume("", opened.opened().stream_token())).has_opened());
   const auto status = old_call.Finish();
