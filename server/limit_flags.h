@@ -17,7 +17,7 @@ namespace partiemc::server {
 /// Values of flags from which limits are computed after all flags are known.
 struct LimitFlags {
   std::uint64_t max_frame_bytes = 0;  ///< 0: the default (FrameBytes).
-  std::string caller_limits;  ///< Text of ParseCallerQuota.
+  std::string caller_limits;          ///< Text of ParseCallerQuota.
   double idle_seconds = std::chrono::duration<double>(ServerLimits{}.idle.streaming).count();
 };
 

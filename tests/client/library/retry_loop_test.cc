@@ -182,8 +182,7 @@ TEST_F(RetryLoopTest, TellsWhatAServerAnsweredBeforeAnotherWasGone) {
   Scripted attempts(clock_, {answered, kBusy, {.opened = false}});
   loop.Lose("lost a");
   EXPECT_EQ(*loop.Run(attempts, {}), Outcome::kGaveUp);
-  EXPECT_EQ(loop.RefusalText(),
-            "busy; before: checkpoint: unknown; must be known");
+  EXPECT_EQ(loop.RefusalText(), "busy; before: checkpoint: unknown; must be known");
   loop.Recovered();
   loop.Lose("lost b");
   EXPECT_EQ(loop.RefusalText(), "");
