@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "partiemc/client/local_stream.h"
@@ -117,6 +118,43 @@ TEST_F(Surfaces, WithAttributesChangeNoOutlineOfAnotherStream) {
     EXPECT_EQ(event.frame.rings_digest, DigestRings(result.rings));
     EXPECT_EQ(event.frame.mesh_digest, DigestMesh(result.mesh));
   }
+}
+
+// A frame that has begun cannot wait for memory, so it would be refused because of other streams.
+TEST(SurfacesTogether, WaitForTheirMemoryInsteadOfBeingRefused) {
+  ServerOptions options = TestOptions();
+  options.threads = 2;
+  options.limits.memory_budget = std::uint64_t{24} << 20;
+  options.limits.frame.max_particles = 100'000;
+  options.limits.max_frame_bytes = 3'000'000;
+  const auto server = StartServer(options);
+  std::vector<double> ball;
+  constexpr int kRadius = 24;
+  for (int x = -kRadius; x <= kRadius; ++x) {
+    for (int y = -kRadius; y <= kRadius; ++y) {
+      for (int z = -kRadius; z <= kRadius; ++z) {
+        if (x * x + y * y + z * z > kRadius * kRadius) continue;
+        ball.insert(ball.end(), {1.0 * x, 1.0 * y, 1.0 * z});
+      }
+    }
+  }
+  std::vector<std::thread> clients;
+  for (int k = 0; k < 4; ++k) {
+    clients.emplace_back([&] {
+      const auto stream = client::Stream::Open(
+          server->address().ToString(), {.parameters = {.output = Output::kSurface, .spacing = 1}});
+      ASSERT_TRUE(stream.ok()) << stream.status();
+      Event event;
+      for (int frame = 0; frame < 3; ++frame) {
+        const auto sent =
+            (*stream)->Send({.positions = std::span<const double>(ball), .components = 3}, frame);
+        ASSERT_TRUE(sent.ok()) << sent.status();
+        ASSERT_TRUE((*stream)->Receive(event).ok());
+        EXPECT_EQ(event.kind, Event::Kind::kResult) << event.message;
+      }
+    });
+  }
+  for (std::thread& client : clients) client.join();
 }
 
 TEST_F(Surfaces, OfASingleCallAreThoseOfAFirstFrame) {
