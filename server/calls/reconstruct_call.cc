@@ -18,9 +18,8 @@ namespace partiemc::server {
 namespace {
 
 // A surface takes about this multiple of the memory that an outline takes for a message of the same
-// size: a ball of 100,000 particles takes 370 bytes per particle. The worker reserves so much
-// before it begins (WorkerMemory::BeginFrame), because a frame that has begun cannot wait for
-// memory.
+// size: a ball of 102,000 particles takes 37 MiB. The worker reserves the memory before the frame
+// begins (WorkerMemory::BeginFrame), because a frame that has begun cannot wait for memory.
 constexpr std::uint64_t kSurfaceFactor = 4;
 
 void LogEnd(const std::optional<StreamSummary>& stream, const std::string& peer,

@@ -37,8 +37,8 @@ struct ReadTerms {
 /// 2. If the planned bytes do not fit into the budget, the stream may get a slot, which permits one
 ///    frame beyond the budget. There are `streams_beyond` slots. If no slot is free, the read
 ///    waits. A stream keeps its slot until the response to the frame is sent or the bytes fit into
-///    the budget. Until its next event after that, the connection reads no other frame. Bytes in a
-///    slot take no memory of the budget from other streams.
+///    the budget. While it has a slot, the connection reads no other frame. Bytes in a slot take
+///    no memory of the budget from other streams.
 /// 3. If a stream's frames arrive in parts, its connections share one slot. They read one after the
 ///    other, each connection once, until they have received the size of the largest message.
 /// 4. Waiting reads get permits in this order: streams that have a slot, callers with the fewest

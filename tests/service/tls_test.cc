@@ -45,6 +45,17 @@ TEST_F(Security, AnExpiredServerIsNotTrustedUntilItsCertificateIsReplaced) {
   EXPECT_TRUE(Eventually([&] { return Ask(client).code == grpc::StatusCode::OK; }));
 }
 
+TEST_F(Security, AnExpiredCertificateReplacesNoValidOne) {
+  const CapturedLog log;
+  WriteIdentity(authority_.Issue("server"));
+  server_ = StartServer(Options(true, false, false));
+  const Client client{.authority = authority_.certificate()};
+  EXPECT_EQ(Ask(client).code, grpc::StatusCode::OK);
+  WriteIdentity(authority_.Issue("server", std::chrono::hours(-2)));
+  EXPECT_TRUE(Eventually([&] { return log.Count("has expired; the current one has not") > 0; }));
+  EXPECT_EQ(Ask(client).code, grpc::StatusCode::OK);
+}
+
 TEST_F(Security, AClientNeedsACertificateOfTheAuthorityWhereOneIsAskedFor) {
   WriteIdentity(stranger_.Issue("server"));
   Write("clients.pem", authority_.certificate());

@@ -81,7 +81,7 @@ struct SlicePlane {
 };
 
 /// Another outline of the same particles, with the parameters of the stream except the members of
-/// this struct. At most one member is present, or a slice and an isovalue.
+/// this struct. At most one member is present; a slice and an isovalue may be combined.
 struct Section {
   /// Absent: the slice of the stream. Required for Output::kSurface; otherwise allowed only if the
   /// stream has a slice.
