@@ -28,6 +28,18 @@ void KeepFixedVertices(SurfaceWorkspace::Buffers& b) {
   }
 }
 
+/// Vertices of settled bodies stay at their anchors.
+void FixSettledBodies(SurfaceWorkspace::Buffers& b) {
+  b.certificate.is_settled.clear();
+  if (b.drops.is_settled.empty()) return;
+  const std::vector<std::uint32_t>& body_of = b.virtual_plane.volumes.body_of;
+  b.certificate.is_settled.resize(body_of.size());
+  for (std::size_t v = 0; v < body_of.size(); ++v) {
+    if (b.drops.is_settled[body_of[v]] == 0) continue;
+    b.certificate.is_settled[v] = b.is_fixed[v] = 1;
+  }
+}
+
 /// A step of SearchVolumes with offsets of at most `limit` spacings. Positions are in world units.
 /// Returns whether any body moved.
 bool CorrectVolumes(const Scale& scale, double limit, SurfaceWorkspace::Buffers& b) {
@@ -60,6 +72,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   const space::BrickDirectory& bricks = b.bins.bricks;
   space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kAnchorMargin, b.anchors);
   space::MarkFixedVertices(b.crossings, b.is_fixed);
+  FixSettledBodies(b);
   if (placement == SurfacePlacement::kQef) {
     space::PlaceOnCrossings(bricks, b.field, b.crossings, space::kEdgeMargin, b.positions);
     space::PlaceByQef(b.bins, scale, b.crossings, b.positions, b.normals);
@@ -73,7 +86,7 @@ absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale
   for (Vec3& anchor : b.anchors) anchor = scale.cell_size * anchor;
   // Empty for qef and for equal sizes.
   const std::span<const float> sizes(b.virtual_plane.volumes.sizes);
-  space::BeginSearch(b.bodies, b.positions, b.virtual_plane.volumes);
+  space::BeginSearch(b.bodies, b.positions, b.drops.is_settled, b.virtual_plane.volumes);
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     const auto certify = round == 0 ? space::Certify : space::CertifyAgain;

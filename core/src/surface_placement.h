@@ -16,8 +16,9 @@ void PlaceByMarchingCubes(double cell_size, SurfaceWorkspace::Buffers& b);
 /// Places vertices away from their anchors and connects them by quads that the certificate accepts.
 /// Positions are in world units afterwards, because the certificate checks the final coordinates.
 /// Requires: as PlaceByMarchingCubes, with the bodies and the steps of the crossings; a placement
-/// other than kMarchingCubes. Errors: INTERNAL if the certificate refuses a face whose vertices are
-/// at their anchors.
+/// other than kMarchingCubes. For kVirtualPlane also the body of each vertex. Vertices of settled
+/// bodies (space_vertices/drops.h) stay at their anchors. Errors: INTERNAL if the certificate
+/// refuses a face whose vertices are at their anchors.
 absl::Status PlaceMovedVertices(const SurfaceParameters& parameters, const Scale& scale,
                                 SurfaceWorkspace::Buffers& b);
 

@@ -408,17 +408,27 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       PlaceByMarchingCubes(cell_size, b);
       return absl::OkStatus();
     }
-    absl::Status placed = PlaceMovedVertices(parameters_, scale, b);
-    if (!placed.ok() || placement == SurfacePlacement::kQef) return placed;
-    space::NormalsFromTriangles(space::NormalWeights::kSphere, b.positions, b.mesh.triangles,
-                                b.normals);
-    space::ReplaceDrops({frame, b.bins, scale, b.bodies, b.certificate.nodes,
-                         b.virtual_plane.volumes.body_of, wraps},
-                        {.most_particles = parameters_.max_drop_particles,
-                         .least_particles = parameters_.min_component_particles,
-                         .least_volume = parameters_.min_component_volume * h * h * h},
-                        b.drops, b.positions, b.normals, b.mesh.triangles);
-    return absl::OkStatus();
+    b.drops.is_settled.clear();
+    if (placement == SurfacePlacement::kQef) return PlaceMovedVertices(parameters_, scale, b);
+    std::vector<std::uint32_t>& body_of = b.virtual_plane.volumes.body_of;
+    space::FindBodyOfVertices(bricks, b.field, b.crossings, b.bodies, b.virtual_plane.volumes);
+    const space::DropsInput drops{
+        frame, b.bins, scale, b.bodies, b.crossings, b.certificate.nodes, body_of, wraps};
+    const space::DropLimits limits{.most_particles = parameters_.max_drop_particles,
+                                   .least_particles = parameters_.min_component_particles,
+                                   .least_volume = parameters_.min_component_volume * h * h * h};
+    space::SettleDrops(drops, limits, b.drops);
+    for (;;) {
+      absl::Status placed = PlaceMovedVertices(parameters_, scale, b);
+      if (!placed.ok()) return placed;
+      space::NormalsFromTriangles(space::NormalWeights::kSphere, b.positions, b.mesh.triangles,
+                                  b.normals);
+      const bool are_replaced =
+          space::ReplaceDrops(drops, limits, b.drops, b.positions, b.normals, b.mesh.triangles);
+      if (are_replaced) return placed;
+      // A settled body has no ellipsoid, and its surface has not been placed: none is settled now.
+      b.drops.is_settled.clear();
+    }
   });
   if (!status.ok()) return status;
   in_stage(Stage::kMesh, [&] {

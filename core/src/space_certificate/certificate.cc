@@ -251,7 +251,7 @@ bool Certify(const BrickDirectory& bricks, const SpaceCrossings& crossings, doub
              Certificate& certificate) {
   const auto count = static_cast<std::uint32_t>(bricks.size());
   MovedNodes& nodes = certificate.nodes;
-  FindMovedNodes(bricks, crossings, nodes);
+  FindMovedNodes(bricks, crossings, certificate.is_settled, nodes);
   certificate.modes.assign(crossings.cells.size(), {});
   certificate.returned = 0;
   certificate.setbacks.assign(positions.size(), 0);

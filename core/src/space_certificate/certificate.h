@@ -31,6 +31,9 @@ namespace partiemc::space {
 enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 
 struct Certificate {
+  /// By vertex: whether it stays at its anchor with all vertices of its body. Empty: none does. Set
+  /// before Certify. Faces at which nothing can move are not tested.
+  std::vector<std::uint8_t> is_settled;
   /// By active cell: the mode of the quad on its upper face along each axis.
   std::vector<std::array<QuadMode, 3>> modes;
   /// Number of vertices that were set back since Certify. A vertex counts again after

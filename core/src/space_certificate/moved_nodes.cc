@@ -33,7 +33,7 @@ std::uint64_t CornersOf(const BrickLayers& cells, int k) {
 }
 
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                    MovedNodes& nodes) {
+                    std::span<const std::uint8_t> is_settled, MovedNodes& nodes) {
   const auto count = static_cast<std::uint32_t>(bricks.size());
   nodes.bricks.resize(count);
   nodes.active.resize(count);
@@ -43,8 +43,10 @@ void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossing
     nodes.active[brick] = crossings.bricks[brick].active;
   }
   for (const ActiveCell& cell : crossings.cells) {
-    if (HasOneLoop(cell)) continue;
-    nodes.fixed[cell.brick][cell.k] |= std::uint64_t{1} << (cell.j * kBrickSize + cell.i);
+    const bool rests = !is_settled.empty() && is_settled[cell.first_loop] != 0;
+    const std::uint64_t bit = std::uint64_t{1} << (cell.j * kBrickSize + cell.i);
+    if (!HasOneLoop(cell) || rests) nodes.fixed[cell.brick][cell.k] |= bit;
+    if (HasOneLoop(cell) && rests) nodes.active[cell.brick][cell.k] &= ~bit;
   }
   ParallelFor(count, [&](std::uint32_t brick) {
     const BrickLayers active(bricks, nodes.active, brick), fixed(bricks, nodes.fixed, brick);

@@ -9,6 +9,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/vec3.h"
@@ -51,9 +52,12 @@ inline constexpr int kSmoothings = 4;
 inline constexpr int kMostSetbacks = 12;
 inline constexpr double kKeptOfMove = .7;
 
-/// Finds the nodes that may move, and sets their moves and setbacks to 0. Parallel over bricks.
+/// Finds the nodes that may move, and sets their moves and setbacks to 0. `is_settled`: by vertex,
+/// whether it stays at its anchor with all vertices of its body; empty if none does. Nodes of cells
+/// with settled vertices stay, and these cells are near only for other reasons. Parallel over
+/// bricks.
 void FindMovedNodes(const BrickDirectory& bricks, const SpaceCrossings& crossings,
-                    MovedNodes& nodes);
+                    std::span<const std::uint8_t> is_settled, MovedNodes& nodes);
 
 /// The nodes of a layer that are corners of cells among `cells`.
 std::uint64_t CornersOf(const BrickLayers& cells, int k);

@@ -169,8 +169,12 @@ void MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vecto
   });
 }
 
-void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes) {
+void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions,
+                 std::span<const std::uint8_t> is_settled, BodyVolumes& volumes) {
   volumes.best.assign(bodies.bodies.size(), {});
+  for (std::size_t body = 0; body < is_settled.size(); ++body) {
+    volumes.best[body].is_final = is_settled[body] != 0;
+  }
   volumes.best_positions.resize(positions.size());
 }
 

@@ -48,7 +48,8 @@ struct BodyVolumes {
   /// The smallest relative error of the volume of a body since BeginSearch.
   struct Best {
     double error = std::numeric_limits<double>::infinity();
-    bool is_final = false;  ///< The body has returned, and SearchVolumes does not move it again.
+    bool is_final =
+        false;  ///< SearchVolumes does not move the body: it has returned or is settled.
   };
   std::vector<Best> best;            ///< By body.
   std::vector<BodyStep> steps;       ///< By body: the result of the last SearchVolumes.
@@ -86,8 +87,9 @@ struct VolumeStep {
 void MatchVolumes(const Bodies& bodies, const VolumeStep& step, const std::vector<Vec3>& normals,
                   BodyVolumes& volumes, std::vector<Vec3>& positions);
 
-/// Starts a search: clears `best`.
-void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions, BodyVolumes& volumes);
+/// Starts a search: clears `best`. `is_settled`: by body, whether it stays; empty if none does.
+void BeginSearch(const Bodies& bodies, const std::vector<Vec3>& positions,
+                 std::span<const std::uint8_t> is_settled, BodyVolumes& volumes);
 
 /// MatchVolumes as a step of a search. A body whose error has grown returns to its best positions
 /// and stays there. Errors can grow because the certificate sets vertices back, in sheets of one

@@ -158,12 +158,13 @@ bool MakeEllipsoid(const Scale& scale, const Drops::Drop& drop, Drops& drops) {
   return true;
 }
 
-/// Extends the box of the drop by its ellipsoid. The box of a body is set. Returns false if there
-/// is no ellipsoid.
-bool IncludeEllipsoid(const Scale& scale, Drops::Drop& drop, Drops& drops) {
+/// Sets the boxes of a drop. `node`: as for Drop::box. Returns false if there is no ellipsoid.
+bool SetBoxes(const Scale& scale, const Vec3& node, Drops::Drop& drop, Drops& drops) {
   if (!MakeEllipsoid(scale, drop, drops)) return false;
-  if (drop.body != kNoIndex) drop.box = {drops.points[0], drops.points[0]};
-  for (const Vec3& point : drops.points) Include(point, drop.box);
+  drop.ellipsoid = Drops::Box::Empty();
+  for (const Vec3& point : drops.points) Include(point, drop.ellipsoid);
+  drop.box = drop.ellipsoid;
+  Include(node, drop.box);
   return true;
 }
 
@@ -187,9 +188,13 @@ bool ForEachBrickOf(const Drops::Box& box, double cell_size, const Visit& visit)
   return true;
 }
 
-/// Finds the drops and their moments, and the boxes of lone particles. Leaves out lone particles
-/// that cannot become ellipsoids, unless they matter for other drops.
-void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) {
+/// Whether nodes have moved from their places in the lattice.
+enum class NodesAre { kAtRest, kMoved };
+
+/// Finds the drops, their moments and their boxes. Takes all that have an ellipsoid. Leaves out
+/// lone particles that cannot become ellipsoids, unless they matter for other drops.
+void FindDrops(const DropsInput& input, const DropLimits& limits, NodesAre nodes_are,
+               Drops& drops) {
   const Bodies& bodies = input.bodies;
   const double cell = input.scale.cell_size;
   const double unit = 1 / (cell * cell * cell);
@@ -228,16 +233,16 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       }
       const std::array<int, 3> node{static_cast<int>(within.x), static_cast<int>(within.y),
                                     static_cast<int>(within.z)};
-      const bool is_free = input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
+      const bool is_free = nodes_are == NodesAre::kAtRest ||
+                           input.nodes.IndexOf({brick, node[0], node[1], node[2]}) == kNoIndex;
       if (!takes_lone || volume < unit * limits.least_volume || !is_free) continue;
       Drops::Drop drop;
       drop.particle = p;
       AddParticle(at, volume, drop);
       drop.particles = 1;
       // This node is outside and has not moved, so it is still outside of all bodies.
-      const Vec3 corner = NodeAt(input.bins.bricks, input.nodes, cell, brick, node);
-      drop.box = {corner, corner};
-      drop.is_taken = IncludeEllipsoid(input.scale, drop, drops);
+      const Vec3 corner = cell * (origin + Vec3{1.0 * node[0], 1.0 * node[1], 1.0 * node[2]});
+      drop.is_taken = SetBoxes(input.scale, corner, drop, drops);
       if (!drop.is_taken) continue;
       std::uint32_t reached = 0, is_at_home = 0;
       ForEachBrickOf(drop.box, cell, [&](const BrickCoordinate& place) {
@@ -250,6 +255,16 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) 
       at_home += is_at_home;
       drops.drops.push_back(drop);
     }
+  }
+  for (Drops::Drop& drop : drops.drops) {
+    if (drop.body == kNoIndex) continue;
+    const BrickPlace& lowest = bodies.bodies[drop.body].lowest;
+    const std::array<int, 3> node{lowest.i, lowest.j, lowest.k};
+    const Vec3 at = nodes_are == NodesAre::kAtRest
+                        ? cell * (OriginOf(input.bins.bricks[lowest.brick]) +
+                                  Vec3{1.0 * node[0], 1.0 * node[1], 1.0 * node[2]})
+                        : NodeAt(input.bins.bricks, input.nodes, cell, lowest.brick, node);
+    drop.is_taken = SetBoxes(input.scale, at, drop, drops);
   }
 }
 
@@ -271,8 +286,8 @@ void ListDrops(double cell_size, Drops& drops) {
   for (std::size_t k = 1; k < drops.first.size(); ++k) drops.first[k] += drops.first[k - 1];
 }
 
-/// Drops whose boxes touch each other keep their surfaces, as do all drops that reach a brick with
-/// more than kMostDropsOfBrick of them.
+/// Drops whose ellipsoids have boxes that touch each other keep their surfaces, as do all drops
+/// that reach a brick with more than kMostDropsOfBrick of them.
 void CompareDrops(Drops& drops) {
   for (std::size_t brick = 0; brick + 1 < drops.first.size(); ++brick) {
     ThrowIfCancelled();
@@ -285,39 +300,96 @@ void CompareDrops(Drops& drops) {
       }
       for (std::uint32_t m = first; m < k; ++m) {
         Drops::Drop& other = drops.drops[drops.reaches[m].drop];
-        if (Touch(drop.box, other.box)) drop.is_taken = other.is_taken = false;
+        if (Touch(drop.ellipsoid, other.ellipsoid)) drop.is_taken = other.is_taken = false;
       }
     }
   }
 }
 
-/// Drops whose boxes touch the box of a triangle of another body keep their surfaces.
-void CompareTriangles(const DropsInput& input, std::span<const Vec3> positions,
-                      std::span<const VertexTriangle> triangles, Drops& drops) {
+/// Drops whose boxes touch `box`, which has a part of the surface of `body`, keep their surfaces,
+/// unless they are drops of this body. Lists them in `refused`.
+void CompareBox(const Drops::Box& box, std::uint32_t body, double cell_size, Drops& drops) {
+  const auto compare = [&](std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t k = first; k < last; ++k) {
+      const std::uint32_t index = drops.reaches[k].drop;
+      Drops::Drop& drop = drops.drops[index];
+      if (drop.body == body || !drop.is_taken || !Touch(drop.box, box)) continue;
+      drop.is_taken = false;
+      drops.refused.push_back(index);
+    }
+  };
+  const bool is_small = ForEachBrickOf(box, cell_size, [&](const BrickCoordinate& at) {
+    const std::uint32_t brick = drops.bricks.Find(at);
+    if (brick == kNoIndex) return;
+    const std::uint32_t first = drops.first[brick], last = drops.first[brick + 1];
+    if (last - first <= kMostDropsOfBrick) compare(first, last);  // Else none is taken.
+  });
+  if (!is_small) compare(0, static_cast<std::uint32_t>(drops.reaches.size()));
+}
+
+/// Decides which drops are taken: the ellipsoid of each is apart from the others, and its box
+/// touches no surface of a body that remains. `for_each_part` calls its argument with (body, box)
+/// for boxes that hold all surfaces.
+template <typename ForEachPart>
+void ChooseDrops(double cell_size, const ForEachPart& for_each_part, Drops& drops) {
+  ListDrops(cell_size, drops);
+  CompareDrops(drops);
+  drops.surfaces.assign(drops.drops.size(), Drops::Box::Empty());
+  for_each_part([&](std::uint32_t body, const Drops::Box& box) {
+    const std::uint32_t index = drops.drop_of[body];
+    if (index == kNoIndex) {
+      CompareBox(box, body, cell_size, drops);
+    } else {
+      Include(box.low, drops.surfaces[index]);
+      Include(box.high, drops.surfaces[index]);
+    }
+  });
+  // A refused drop keeps its surface, so that further drops are refused.
+  drops.refused.clear();
+  for (std::uint32_t index = 0; index < drops.drops.size(); ++index) {
+    if (!drops.drops[index].is_taken) drops.refused.push_back(index);
+  }
+  for (std::size_t n = 0; n < drops.refused.size(); ++n) {
+    if (n % kTrianglesPerCheck == 0) ThrowIfCancelled();
+    const Drops::Drop& drop = drops.drops[drops.refused[n]];
+    const Drops::Box surface = drops.surfaces[drops.refused[n]];
+    if (surface.low.x <= surface.high.x) CompareBox(surface, drop.body, cell_size, drops);
+  }
+}
+
+/// Calls visit(body, box) for the active cells of each body.
+template <typename Visit>
+void ForEachCellOf(const DropsInput& input, const Visit& visit) {
+  const double cell_size = input.scale.cell_size;
+  std::uint32_t until_check = 0;
+  for (const ActiveCell& cell : input.crossings.cells) {
+    if (until_check-- == 0) {
+      ThrowIfCancelled();
+      until_check = kTrianglesPerCheck;
+    }
+    const Vec3 low =
+        OriginOf(input.bins.bricks[cell.brick]) + Vec3{1.0 * cell.i, 1.0 * cell.j, 1.0 * cell.k};
+    const Drops::Box box{cell_size * low, cell_size * (low + Vec3{1, 1, 1})};
+    for (int loop = 0; loop < LoopsOf(cell.corners).loops; ++loop) {
+      visit(input.body_of[cell.first_loop + loop], box);
+    }
+  }
+}
+
+/// Calls visit(body, box) for each triangle.
+template <typename Visit>
+void ForEachTriangleOf(const DropsInput& input, std::span<const Vec3> positions,
+                       std::span<const VertexTriangle> triangles, const Visit& visit) {
   std::uint32_t until_check = 0;
   for (const VertexTriangle& triangle : triangles) {
     if (until_check-- == 0) {
       ThrowIfCancelled();
       until_check = kTrianglesPerCheck;
     }
-    const std::uint32_t body = input.body_of[triangle[0]];
     Drops::Box box{positions[triangle[0]], positions[triangle[0]]};
     Include(positions[triangle[1]], box);
     Include(positions[triangle[2]], box);
-    const auto compare = [&](std::uint32_t first, std::uint32_t last) {
-      for (std::uint32_t k = first; k < last; ++k) {
-        Drops::Drop& drop = drops.drops[drops.reaches[k].drop];
-        if (drop.body != body && Touch(drop.box, box)) drop.is_taken = false;
-      }
-    };
-    const bool is_small =
-        ForEachBrickOf(box, input.scale.cell_size, [&](const BrickCoordinate& at) {
-          const std::uint32_t brick = drops.bricks.Find(at);
-          if (brick == kNoIndex) return;
-          const std::uint32_t first = drops.first[brick], last = drops.first[brick + 1];
-          if (last - first <= kMostDropsOfBrick) compare(first, last);  // Else none is taken.
-        });
-    if (!is_small) compare(0, static_cast<std::uint32_t>(drops.reaches.size()));
+    visit(input.body_of[triangle[0]], box);
   }
 }
 
@@ -348,26 +420,39 @@ void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positio
 
 }  // namespace
 
-void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
+void SettleDrops(const DropsInput& input, const DropLimits& limits, Drops& drops) {
+  drops.is_settled.clear();
+  if (limits.most_particles == 0) return;
+  FindDrops(input, limits, NodesAre::kAtRest, drops);
+  if (drops.drops.empty()) return;
+  ChooseDrops(
+      input.scale.cell_size, [&](const auto& visit) { ForEachCellOf(input, visit); }, drops);
+  drops.is_settled.assign(input.bodies.bodies.size(), 0);
+  for (const Drops::Drop& drop : drops.drops) {
+    // The images of a body that is cut move alike, and not all of them may be drops.
+    if (drop.body == kNoIndex || input.bodies.IsCut(drop.body)) continue;
+    drops.is_settled[drop.body] = drop.is_taken;
+  }
+}
+
+bool ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
                   std::vector<Vec3>& positions, std::vector<Vec3>& normals,
                   std::vector<VertexTriangle>& triangles) {
   drops.drops.clear();
-  if (limits.most_particles == 0) return;
-  FindDrops(input, limits, drops);
-  if (drops.drops.empty()) return;
-  for (Drops::Drop& drop : drops.drops) {
-    if (drop.body != kNoIndex) drop.is_taken = IncludeEllipsoid(input.scale, drop, drops);
-  }
-  for (const VertexTriangle& triangle : triangles) {
-    const std::uint32_t index = drops.drop_of[input.body_of[triangle[0]]];
-    if (index == kNoIndex) continue;
-    for (const std::uint32_t v : triangle) Include(positions[v], drops.drops[index].box);
-  }
+  if (limits.most_particles == 0) return true;
+  FindDrops(input, limits, NodesAre::kMoved, drops);
+  if (drops.drops.empty()) return true;
   ThrowIfCancelled();
-  ListDrops(input.scale.cell_size, drops);
-  CompareDrops(drops);
-  CompareTriangles(input, positions, triangles, drops);
+  const auto for_each_triangle = [&](const auto& visit) {
+    ForEachTriangleOf(input, positions, triangles, visit);
+  };
+  ChooseDrops(input.scale.cell_size, for_each_triangle, drops);
+  const bool is_refused = std::ranges::any_of(drops.drops, [&](const Drops::Drop& drop) {
+    return !drop.is_taken && drop.body != kNoIndex && drops.IsSettled(drop.body);
+  });
+  if (is_refused) return false;
   TakeDrops(input, drops, positions, normals, triangles);
+  return true;
 }
 
 }  // namespace partiemc::space

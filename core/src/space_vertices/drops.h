@@ -3,11 +3,16 @@
 // The level set of a few particles encloses few nodes or none. The surface of such a drop depends
 // on its place in the lattice, so its volume is wrong and it trembles as it moves. An ellipsoid
 // with the moments of the particles avoids both. A drop keeps its surface if the box of the
-// ellipsoid and of the former surface touches another triangle or drop (core/SURFACES.md, "Drops").
+// ellipsoid and of a node of the drop touches another surface (core/SURFACES.md, "Drops").
+//
+// Bodies that will surely become ellipsoids are found before vertices are placed (SettleDrops).
+// They are settled: their vertices stay at their anchors, so that placement, certificate and volume
+// steps leave them out.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -16,6 +21,7 @@
 #include "partiemc/frame.h"
 #include "space/bins.h"
 #include "space/bodies.h"
+#include "space/crossings.h"
 #include "space/lattice.h"
 #include "space/mesh.h"
 #include "space_certificate/moved_nodes.h"
@@ -35,6 +41,7 @@ struct DropsInput {
   const SpaceBins& bins;
   const Scale& scale;
   const Bodies& bodies;
+  const SpaceCrossings& crossings;
   const MovedNodes& nodes;
   std::span<const std::uint32_t> body_of;  ///< By vertex of SpaceCrossings.
   bool takes_copies = false;  ///< Copies without a body become drops, too. For boxes that wrap.
@@ -43,6 +50,11 @@ struct DropsInput {
 struct Drops {
   struct Box {
     Vec3 low, high;
+
+    static Box Empty() {
+      constexpr double kFar = std::numeric_limits<double>::infinity();
+      return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+    }
   };
   struct Drop {
     std::uint32_t body = kNoIndex;      ///< kNoIndex: a particle without a body.
@@ -52,14 +64,18 @@ struct Drops {
     Vec3 origin, first;  ///< In cells: a place in the drop; the first moment about `origin`.
     /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls. In cells.
     std::array<double, 6> second{};
-    /// Box around the ellipsoid and, for a body, its former surface. For a particle without a body:
-    /// around the ellipsoid and the lowest node of the particle's cell, an outside node that has
-    /// not moved. World units.
+    Box ellipsoid;  ///< Box around the ellipsoid. World units.
+    /// Box around the ellipsoid and a lattice node, which shows in which part of space the drop is.
+    /// For a body: its lowest node. For a particle without a body: the lowest node of its cell, an
+    /// outside node that has not moved. World units.
     Box box;
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
     std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
   std::vector<Drop> drops;
+  std::vector<std::uint8_t> is_settled;  ///< By body. Empty: none is.
+
+  bool IsSettled(std::uint32_t body) const { return !is_settled.empty() && is_settled[body] != 0; }
 
   std::vector<std::uint32_t> drop_of;  ///< Scratch: by body, or kNoIndex.
   std::vector<Vec3> points, normals;   ///< Scratch: of one ellipsoid, world units.
@@ -67,16 +83,23 @@ struct Drops {
     std::uint32_t brick, drop;
     friend auto operator<=>(const Reach&, const Reach&) = default;
   };
-  BrickDirectory bricks;             ///< Scratch: the bricks that boxes of drops reach.
-  std::vector<Reach> reaches;        ///< Scratch: sorted by brick.
-  std::vector<std::uint32_t> first;  ///< Scratch: by brick, its first index in `reaches`.
+  BrickDirectory bricks;               ///< Scratch: the bricks that boxes of drops reach.
+  std::vector<Reach> reaches;          ///< Scratch: sorted by brick.
+  std::vector<std::uint32_t> first;    ///< Scratch: by brick, its first index in `reaches`.
+  std::vector<Box> surfaces;           ///< Scratch: by drop, around the surface of its body.
+  std::vector<std::uint32_t> refused;  ///< Scratch: drops that are not taken.
 };
 
+/// Sets `is_settled`: bodies with an ellipsoid that ReplaceDrops will accept, unless a vertex of
+/// another body leaves its cell and comes too near, which is rare. Does not use `input.nodes`.
+/// Cost: linear in particles and active cells.
+void SettleDrops(const DropsInput& input, const DropLimits& limits, Drops& drops);
+
 /// Removes the triangles of the drops that ellipsoids replace (Drop::is_taken), and appends these
-/// ellipsoids to positions, normals and triangles. World units. Cost: linear in particles and
-/// triangles.
-void ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
-                  std::vector<Vec3>& positions, std::vector<Vec3>& normals,
-                  std::vector<VertexTriangle>& triangles);
+/// ellipsoids to positions, normals and triangles. World units. Returns false, and changes nothing
+/// but `drops`, if it must refuse a settled body. Cost: linear in particles and triangles.
+[[nodiscard]] bool ReplaceDrops(const DropsInput& input, const DropLimits& limits, Drops& drops,
+                                std::vector<Vec3>& positions, std::vector<Vec3>& normals,
+                                std::vector<VertexTriangle>& triangles);
 
 }  // namespace partiemc::space

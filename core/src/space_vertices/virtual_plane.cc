@@ -51,7 +51,6 @@ void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& con
   const double h = input.scale.spacing, cell_size = input.scale.cell_size;
   std::vector<float>& sizes = scratch.volumes.sizes;
   sizes.assign(input.scale.has_own_sizes ? anchors.size() : 0, 1);
-  FindBodyOfVertices(bricks, input.field, crossings, input.bodies, scratch.volumes);
   MeasureBodies(bricks, crossings, cell_size, input.bodies, anchors, scratch.volumes);
 
   positions = anchors;

@@ -42,7 +42,7 @@ struct VirtualPlaneScratch {
 };
 
 /// Places the vertices on smoothed planes, sets their normals and matches the volumes of bodies.
-/// Lengths are in cells.
+/// Lengths are in cells. Requires: FindBodyOfVertices.
 void PlaceOnPlanes(const PlacementInput& input, const VirtualPlaneConstants& constants,
                    const std::vector<Vec3>& anchors, VirtualPlaneScratch& scratch,
                    std::vector<Vec3>& positions, std::vector<Vec3>& normals);

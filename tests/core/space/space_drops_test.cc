@@ -10,6 +10,7 @@
 #include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 #include "support/tries.h"
+#include "surface_workspace.h"
 
 namespace partiemc {
 namespace {
@@ -136,6 +137,65 @@ TEST(SpaceDrops, KeepTheirSurfaceInABrickWithTooManyDrops) {
     Surface surface;
     ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
     EXPECT_EQ(surface.ShellCount(), count < 256 ? 2u : 1u);
+  }
+}
+
+/// Particles so far apart that nothing else can be near an ellipsoid: no vertex is placed for them.
+TEST(SpaceDrops, AreSettledBeforeVerticesArePlaced) {
+  Random random(4);
+  SpaceParticles particles;
+  for (int k = 0; k < 30; ++k) {
+    const Vec3 at = Vec3{9.0 * (k % 6), 9.0 * (k / 6), 0} + 2 * AnyPlace(random);
+    for (int n = k % 3; n >= 0; --n) particles.Add(at + .5 * AnyPlace(random));
+  }
+  const auto reconstructor =
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
+  EXPECT_EQ(surface.ShellCount(), 30u);
+  const SurfaceWorkspace::Buffers& b = workspace.buffers();
+  EXPECT_EQ(std::ranges::count(b.drops.is_settled, 1), std::ssize(b.bodies.bodies));
+  EXPECT_EQ(b.certificate.nodes.count, 0u);
+  for (const ShellMeasures& measures : surface.measures) {
+    EXPECT_NEAR(measures.volume, static_cast<double>(measures.particles), 1e-9);
+  }
+}
+
+/// Over a rough slab with drops. In about one of a thousand such frames, the slab comes too near to
+/// a settled drop.
+SpaceParticles DropsOverSlab(std::uint64_t seed) {
+  Random random(seed);
+  SpaceParticles particles;
+  const double jitter = .05 + .4 * random.Unit(), density = .002 + .05 * random.Unit();
+  for (int k = 0; k < 18 * 18 * 4; ++k) {
+    const Vec3 at{1.0 * (k % 18), 1.0 * (k / 18 % 18), 1.0 * (k / 324)};
+    particles.Add(at + jitter * AnyPlace(random) + Vec3{0, 0, .5 * std::sin(.5 * at.x)});
+  }
+  for (double drop = 6480 * density; drop > 0; --drop) {
+    const Vec3 at = 18 * AnyPlace(random) + Vec3{0, 0, 3.5};
+    const std::uint64_t count = random.Chance(.7) ? 1 : 1 + random.Below(8);
+    const double side = 1.1 * std::cbrt(static_cast<double>(count));
+    for (std::uint64_t n = 0; n < count; ++n) {
+      particles.Add(count == 1 ? at : at + side * AnyPlace(random));
+    }
+  }
+  return particles;
+}
+
+TEST(SpaceDrops, ArePlacedAgainIfASettledOneIsRefused) {
+  const auto reconstructor =
+      SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane});
+  SurfaceWorkspace workspace;
+  Surface surface;
+  for (const std::uint64_t seed : {2780, 2781}) {
+    SCOPED_TRACE(seed);
+    const SpaceParticles particles = DropsOverSlab(seed);
+    ASSERT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
+    EXPECT_EQ(workspace.buffers().drops.is_settled.empty(), seed == 2781);
+    EXPECT_TRUE(
+        std::ranges::any_of(workspace.buffers().drops.drops, &space::Drops::Drop::is_taken));
+    EXPECT_TRUE(Validate(surface).ok());
   }
 }
 

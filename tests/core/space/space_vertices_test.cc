@@ -358,7 +358,7 @@ TEST(VolumeSearch, ABodyWhoseErrorHasGrownReturnsForGood) {
   volumes.body_of = {0, 1};
   const std::vector<Vec3> normals(2, Vec3{0, 0, 1});
   std::vector<Vec3> positions(2);
-  BeginSearch(bodies, positions, volumes);
+  BeginSearch(bodies, positions, {}, volumes);
   const auto search = [&](double first, double second, double limit = 1) {
     volumes.measures = {{.area = 2, .volume = first}, {.area = 2, .volume = second}};
     return SearchVolumes(bodies, {.limit = limit, .tolerance = .01}, normals, volumes, positions);
