@@ -41,14 +41,16 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Moves the lanes of a mask to the front, for vectors of up to sixteen 32-bit lanes. The class
-// works in registers, because some processors are slow when they compress into memory.
-class Compressor {
+// Moves the lanes of a mask to the front, for vectors of up to kMostLanes 32-bit lanes. The class
+// works in registers, because some processors are slow when they compress into memory. Below
+// AVX-512, hn::Compress reads a table that GCC copies in each call.
+template <std::size_t kMostLanes>
+class CompressorOf {
  public:
-  using Bits = hn::CappedTag<std::int32_t, 16>;
+  using Bits = hn::CappedTag<std::int32_t, kMostLanes>;
 
 #if HWY_TARGET <= HWY_AVX3
-  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) : mask_(mask) {}
+  HWY_INLINE explicit CompressorOf(hn::Mask<Bits> mask) : mask_(mask) {}
 
   template <class D>
   HWY_INLINE hn::Vec<D> operator()(D d, hn::Vec<D> values) const {
@@ -59,7 +61,7 @@ class Compressor {
   hn::Mask<Bits> mask_;
 #else
   // The lane indices are looked up once per mask, so that several vectors can use them.
-  HWY_INLINE explicit Compressor(hn::Mask<Bits> mask) {
+  HWY_INLINE explicit CompressorOf(hn::Mask<Bits> mask) {
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(Bits(), mask, bits);
     const hn::Rebind<std::uint8_t, Bits> d_byte;
@@ -75,6 +77,8 @@ class Compressor {
   hn::Vec<Bits> lanes_;
 #endif
 };
+
+using Compressor = CompressorOf<16>;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace partiemc

@@ -11,6 +11,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "base/compressor-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace partiemc::space {
 namespace HWY_NAMESPACE {
@@ -286,8 +288,10 @@ HWY_INLINE bool SelectReachingOf(const Region& region, const NearBox& box, float
     if (chosen == 0) continue;
     // Stores write whole vectors. The padding of `found` has room for values beyond the count.
     if (found.count + chosen > Found::kCapacity) return false;
+    const partiemc::HWY_NAMESPACE::CompressorOf<NearBlock::kLanes> compress(
+        hn::RebindMask(hn::RebindToSigned<Lanes>(), is_in));
     const auto store = [&](auto& to, Vector values) HWY_ATTR {
-      hn::StoreU(hn::Compress(values, is_in), d, to.data() + found.count);
+      hn::StoreU(compress(d, values), d, to.data() + found.count);
     };
     store(found.x, x);
     store(found.y, y);
