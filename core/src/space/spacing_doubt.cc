@@ -13,8 +13,10 @@
 namespace partiemc::space {
 namespace {
 
-// The check ends when it has visited more particles and bricks than this.
-constexpr std::size_t kMostLooks = std::size_t{1} << 20;
+// Visited particles and sixteenths of bricks after which the check ends: kLeastLooks, or so many
+// that kFullSearches searches for a neighbour can visit all of them.
+constexpr std::size_t kLeastLooks = std::size_t{1} << 20;
+constexpr std::size_t kFullSearches = 32, kBricksOfLook = 16;
 
 // Limits of the distance of the sixth nearest position, in spacings. It is 1 on the cubic
 // lattice, 1.2 in disorder, up to 1.4 at a free surface.
@@ -73,7 +75,11 @@ class NearShell {
 class Probe {
  public:
   Probe(const SpaceBins& bins, const Scale& scale)
-      : bins_(bins), spacing_(scale.spacing), largest_(scale.sizes.largest) {}
+      : bins_(bins),
+        spacing_(scale.spacing),
+        largest_(scale.sizes.largest),
+        most_looks_(std::max(kLeastLooks, kFullSearches * (bins.source.size() +
+                                                           bins.bricks.size() / kBricksOfLook))) {}
 
   // Whether the distances around a particle contradict the spacing.
   bool Contradicts(std::size_t sampled) {
@@ -89,9 +95,11 @@ class Probe {
     }
     const double widest = WidestPair(at);
     if (widest * widest * near.reach_square() > kBrickSize * kBrickSize) {
-      looks_ += bins_.bricks.size();
+      looks_ += bins_.bricks.size() / kBricksOfLook;
       for (std::uint32_t other = 0; other < bins_.bricks.size() && !IsExhausted(); ++other) {
-        if (std::ranges::count(neighbours, other) == 0) Gather(other, at, near);
+        // Around lone particles, most bricks are empty.
+        const bool is_empty = bins_.FirstOf(other) == bins_.EndOf(other);
+        if (!is_empty && std::ranges::count(neighbours, other) == 0) Gather(other, at, near);
       }
     }
     if (!near.IsAround()) return false;
@@ -99,7 +107,7 @@ class Probe {
     return distance > kMaxDistance || distance < kMinDistance;
   }
 
-  bool IsExhausted() const { return looks_ > kMostLooks; }
+  bool IsExhausted() const { return looks_ > most_looks_; }
 
  private:
   // A sampled particle. `place` is in cells from its brick, `size` in spacings.
@@ -146,7 +154,7 @@ class Probe {
 
   const SpaceBins& bins_;
   double spacing_, largest_;
-  std::size_t looks_ = 0;
+  std::size_t most_looks_, looks_ = 0;
 };
 
 }  // namespace

@@ -131,6 +131,14 @@ TEST(SpacingDoubt, AFactorOfTwoOrMoreIsReportedInBodies) {
   }
 }
 
+/// All particles are alone then, and most bricks are empty.
+TEST(SpacingDoubt, ASpacingAHundredTimesTooSmallIsReported) {
+  Random random(10);
+  const SpaceParticles body = testing::Box({-9, -9, -9}, {9, 9, 9}, .2, random);
+  ASSERT_GT(body.size(), 5000u);
+  EXPECT_TRUE(Contradicts(body, .01));
+}
+
 TEST(SpacingDoubt, SprayDropsThreadsAndFilmsGiveNone) {
   Random random(7);
   SpaceParticles spray, drops, threads;
