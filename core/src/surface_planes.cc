@@ -65,7 +65,13 @@ std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& paramete
                         {box.high[0], box.high[1], box.high[2]}};
 }
 
-bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface) {
+double InnerStep(const SurfaceParameters& parameters, const Frame& frame) {
+  const bool has_inner = !frame.attributes.empty() && !(parameters.simplify > 0);
+  return has_inner ? 2 * parameters.cell_size * parameters.spacing : 0;
+}
+
+bool CutAtWalls(const SurfaceParameters& parameters, double inner_step, PlaneCuts& scratch,
+                Surface& surface) {
   // More than CutSurface moves a plane, so that no other shell reaches a moved plane.
   constexpr double kReach = 1e-4;
   scratch.planes.clear();
@@ -101,12 +107,13 @@ bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface
   return space::CutSurface({.planes = scratch.planes,
                             .is_cut = scratch.is_cut,
                             .spacing = parameters.spacing,
+                            .inner_step = inner_step,
                             .are_walls = true},
                            scratch.cut, scratch.pieces, surface);
 }
 
-bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
-              PlaneCuts& scratch, Surface& surface) {
+bool CutAtBox(double spacing, double inner_step, const CopiedBox& box,
+              const space::CutShells& shells, PlaneCuts& scratch, Surface& surface) {
   if (!shells.any) return true;
   const std::array<double, 3> low{box.faces.low.x, box.faces.low.y, box.faces.low.z};
   const std::array<double, 3> high{box.faces.high.x, box.faces.high.y, box.faces.high.z};
@@ -120,7 +127,8 @@ bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shel
   return space::CutSurface({.planes = scratch.planes,
                             .is_cut = shells.is_cut,
                             .body_of = shells.outer_of,
-                            .spacing = spacing},
+                            .spacing = spacing,
+                            .inner_step = inner_step},
                            scratch.cut, scratch.pieces, surface);
 }
 

@@ -56,11 +56,17 @@ absl::Status CheckWallsOf(const SurfaceParameters& parameters);
 /// The space before the walls, in world units; absent without walls.
 std::optional<space::ClipBox> SpaceBeforeWalls(const SurfaceParameters& parameters);
 
+/// The step of the inner points of flat faces (SurfaceCutInput::inner_step): two cells if the frame
+/// has attributes, because they have values at points only. 0 for a simplified surface, which has
+/// few points elsewhere, too.
+double InnerStep(const SurfaceParameters& parameters, const Frame& frame);
+
 /// Cuts the bodies that reach a wall. Returns false if CutSurface does.
-bool CutAtWalls(const SurfaceParameters& parameters, PlaneCuts& scratch, Surface& surface);
+bool CutAtWalls(const SurfaceParameters& parameters, double inner_step, PlaneCuts& scratch,
+                Surface& surface);
 
 /// Cuts the bodies of `shells` at the faces of the box. Returns false if CutSurface does.
-bool CutAtBox(double spacing, const CopiedBox& box, const space::CutShells& shells,
-              PlaneCuts& scratch, Surface& surface);
+bool CutAtBox(double spacing, double inner_step, const CopiedBox& box,
+              const space::CutShells& shells, PlaneCuts& scratch, Surface& surface);
 
 }  // namespace partiemc

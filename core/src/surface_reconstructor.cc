@@ -462,14 +462,16 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       simplify::Simplify({.error = parameters_.simplify * h, .spacing = h}, surface);
     });
   }
+  const double inner_step = InnerStep(parameters_, frame);
   if (!parameters_.wall_planes.empty()) {
-    const bool is_cut =
-        in_stage(Stage::kMesh, [&] { return CutAtWalls(parameters_, b.plane_cuts, surface); });
+    const bool is_cut = in_stage(
+        Stage::kMesh, [&] { return CutAtWalls(parameters_, inner_step, b.plane_cuts, surface); });
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its walls");
   }
   if (copied.any) {
-    const bool is_cut = in_stage(
-        Stage::kMesh, [&] { return CutAtBox(h, copied, b.cut_shells, b.plane_cuts, surface); });
+    const bool is_cut = in_stage(Stage::kMesh, [&] {
+      return CutAtBox(h, inner_step, copied, b.cut_shells, b.plane_cuts, surface);
+    });
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its box");
   }
   if (!frame.attributes.empty()) {

@@ -60,7 +60,8 @@ struct Surface {
   std::vector<std::uint64_t> parents;
   std::vector<std::uint32_t> parent_offsets = {0};  ///< {0} without identities.
   /// Indices of triangles, ascending, on walls (SurfaceParameters::wall_planes) or on faces of the
-  /// periodic box, where a body was cut. They close the surface; areas do not count them.
+  /// periodic box, where a body was cut. They close the surface; areas do not count them. They have
+  /// inner points if the frame has attributes and the surface is not simplified.
   std::vector<std::uint32_t> cuts;
   /// The attributes of the frame at the points, in the order of Frame::attributes: `components`
   /// values per point.

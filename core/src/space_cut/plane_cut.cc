@@ -21,13 +21,6 @@ double Coordinate(const CutMesh& mesh, std::uint32_t point, int axis) {
 
 Edge EdgeOf(std::uint32_t a, std::uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-/// The two axes in a plane, in the order for which a cap lies on the left of its edges.
-std::array<int, 2> FrameOf(const AxisPlane& plane) {
-  const int next = (plane.axis + 1) % 3, last = (plane.axis + 2) % 3;
-  // The outside is below the plane if the points above it are kept.
-  return plane.keeps_above ? std::array{last, next} : std::array{next, last};
-}
-
 /// Finds the side of each point. Returns false if a used point is too close to the plane.
 bool FindSides(const AxisPlane& plane, double clearance, const CutMesh& mesh, PlaneCutScratch& s) {
   const std::size_t count = mesh.points.size() / 3;
@@ -199,7 +192,7 @@ bool ClipCap(const AxisPlane& plane, const CrossingPoints& points, CutMesh& mesh
   }
   if (s.crossings.size() % 2 != 0) return false;
   // As in line_cut.cc, in the frame of the cap.
-  const bool begins_with_entry = (FrameOf(cap.plane)[0] == plane.axis) == plane.keeps_above;
+  const bool begins_with_entry = (PlaneFrame(cap.plane)[0] == plane.axis) == plane.keeps_above;
   for (std::size_t k = 0; k < s.crossings.size(); k += 2) {
     const auto &low = s.crossings[k], &high = s.crossings[k + 1];
     if (low.is_entry != begins_with_entry || high.is_entry == begins_with_entry) return false;
@@ -212,12 +205,13 @@ bool ClipCap(const AxisPlane& plane, const CrossingPoints& points, CutMesh& mesh
   return true;
 }
 
-/// Joins the edges of a cap to closed loops of its points. Returns false if that is impossible, or
+/// Joins edges on a plane to closed loops of its points. Returns false if that is impossible, or
 /// if two points have the same position.
-bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s) {
-  const std::array<int, 2> frame = FrameOf(cap.plane);
+bool FindLoops(const CutMesh& mesh, const AxisPlane& plane, std::span<const CapEdge> edges,
+               PlaneCutScratch& s) {
+  const std::array<int, 2> frame = PlaneFrame(plane);
   s.point_of.clear();
-  for (const CapEdge& edge : cap.edges) s.point_of.push_back(edge.from);
+  for (const CapEdge& edge : edges) s.point_of.push_back(edge.from);
   std::sort(s.point_of.begin(), s.point_of.end());
   if (std::adjacent_find(s.point_of.begin(), s.point_of.end()) != s.point_of.end()) return false;
   s.flat_points.clear();
@@ -237,7 +231,7 @@ bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s)
   };
   s.next.assign(s.point_of.size(), kNoIndex);
   s.shell_of.resize(s.point_of.size());
-  for (const CapEdge& edge : cap.edges) {
+  for (const CapEdge& edge : edges) {
     const std::uint32_t to = index_of(edge.to);
     if (to == kNoIndex) return false;
     const std::uint32_t from = index_of(edge.from);
@@ -257,6 +251,23 @@ bool FindLoops(const CutMesh& mesh, const CutMesh::Cap& cap, PlaneCutScratch& s)
     }
     if (point != start) return false;
     s.loop_offsets.push_back(static_cast<std::uint32_t>(s.loop_points.size()));
+  }
+  return true;
+}
+
+/// Triangulates the region to the left of edges on a plane. Returns false, with the mesh unchanged,
+/// if they do not form simple loops.
+bool TriangulateCap(const AxisPlane& plane, std::span<const CapEdge> edges, CutMesh& mesh,
+                    PlaneCutScratch& s) {
+  if (!FindLoops(mesh, plane, edges, s)) return false;
+  s.flat_triangles.clear();
+  if (!s.triangulator.Triangulate(s.flat_points, s.loop_points, s.loop_offsets, s.flat_triangles)) {
+    return false;
+  }
+  for (std::size_t k = 0; k < s.flat_triangles.size(); ++k) {
+    const std::uint32_t corner = s.flat_triangles[k];
+    mesh.triangles.push_back(s.point_of[corner]);
+    if (k % 3 == 0) mesh.shell_of.push_back(s.shell_of[corner]);
   }
   return true;
 }
@@ -339,20 +350,19 @@ bool CutAtPlane(const AxisPlane& plane, double clearance, PlaneCutScratch& s, Cu
   return true;
 }
 
-bool CapPlanes(PlaneCutScratch& s, CutMesh& mesh) {
+bool CapPlanes(double step, PlaneCutScratch& s, CutMesh& mesh) {
   if (ClippedTouch(mesh, s)) return false;
   mesh.cap_offsets.assign(1, static_cast<std::uint32_t>(mesh.triangles.size() / 3));
   for (const CutMesh::Cap& cap : mesh.caps) {
-    if (!FindLoops(mesh, cap, s)) return false;
-    s.flat_triangles.clear();
-    if (!s.triangulator.Triangulate(s.flat_points, s.loop_points, s.loop_offsets,
-                                    s.flat_triangles)) {
+    if (step > 0) s.squares.Find(mesh, cap, step);
+    const bool has_squares = step > 0 && !s.squares.empty();
+    s.cap_edges.assign(cap.edges.begin(), cap.edges.end());
+    if (has_squares) s.squares.AddPoints(cap, mesh, s.cap_edges);
+    const bool are_squares_apart = has_squares && TriangulateCap(cap.plane, s.cap_edges, mesh, s);
+    if (are_squares_apart) {
+      s.squares.AddTriangles(mesh);
+    } else if (!TriangulateCap(cap.plane, cap.edges, mesh, s)) {
       return false;
-    }
-    for (std::size_t k = 0; k < s.flat_triangles.size(); ++k) {
-      const std::uint32_t corner = s.flat_triangles[k];
-      mesh.triangles.push_back(s.point_of[corner]);
-      if (k % 3 == 0) mesh.shell_of.push_back(s.shell_of[corner]);
     }
     mesh.cap_offsets.push_back(static_cast<std::uint32_t>(mesh.triangles.size() / 3));
   }

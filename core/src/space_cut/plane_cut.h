@@ -12,43 +12,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/vec3.h"
 #include "mesh/triangulate.h"
 #include "simplify/mesh_faults.h"
+#include "space_cut/cap_squares.h"
+#include "space_cut/cut_mesh.h"
 
 namespace partiemc::space {
-
-/// A plane parallel to two axes, and the side on which points are kept.
-struct AxisPlane {
-  int axis = 0;  ///< The coordinate that is constant on the plane: 0, 1, 2 for x, y, z.
-  double at = 0;
-  bool keeps_above =
-      true;  ///< Whether points with a larger coordinate are kept, else smaller ones.
-};
-
-/// A closed surface: triangles, counter-clockwise as seen from outside, and caps on the planes that
-/// have cut it.
-struct CutMesh {
-  /// An edge of a cap. The cap is on its left, seen from outside of the body.
-  struct CapEdge {
-    std::uint32_t from, to;
-    std::uint32_t shell;  ///< A number as in CutMesh::shell_of.
-  };
-  struct Cap {
-    AxisPlane plane;
-    std::vector<CapEdge> edges;
-  };
-  std::vector<double> points;            ///< x0, y0, z0, x1, ...; may hold unused points.
-  std::vector<float> normals;            ///< Per point, interleaved.
-  std::vector<std::uint32_t> triangles;  ///< Three point indices each.
-  std::vector<std::uint32_t> shell_of;   ///< Per triangle: any number; its parts get the same.
-  std::vector<std::uint8_t> is_clipped;  ///< Per triangle: 1 if it is a part of a cut triangle.
-  std::vector<Cap> caps;                 ///< One for each plane, in the order of the calls.
-  /// Set by CapPlanes: cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]), after all
-  /// triangles of no cap. CutSurface then appends shells that are not cut, and drops dust. After
-  /// that, only cap_offsets[0] is valid.
-  std::vector<std::uint32_t> cap_offsets;
-};
 
 /// Warm buffers.
 struct PlaneCutScratch {
@@ -82,6 +51,7 @@ struct PlaneCutScratch {
   std::vector<std::array<double, 2>> places;
   std::vector<double> flat_points;
   Triangulator triangulator;
+  CapSquares squares;
 };
 
 /// Removes the caps, but keeps their memory.
@@ -102,7 +72,7 @@ void RemoveCaps(PlaneCutScratch& scratch, CutMesh& mesh);
 [[nodiscard]] bool CutAtPlane(const AxisPlane& plane, double clearance, PlaneCutScratch& scratch,
                               CutMesh& mesh);
 
-/// Triangulates the caps, without new points, and checks that no clipped triangle is degenerate or
+/// Triangulates the caps and checks that no clipped triangle is degenerate or
 /// intersects another triangle. All of this is exact. If the mesh had the guarantees S1 to S3 of
 /// partiemc/surface.h before the cuts, it has them afterwards:
 ///   - one edge arrives at each point of a cap, and one leaves, so caps are flat and simple, and
@@ -110,8 +80,9 @@ void RemoveCaps(PlaneCutScratch& scratch, CutMesh& mesh);
 ///   - all other points are strictly on the kept side, so other triangles touch a plane only with
 ///     edges and points of the cap;
 ///   - clipped triangles are compared with all triangles near them.
+/// Caps get inner points on a lattice with this `step` (cap_squares.h), or none if it is 0.
 /// Returns false, with `mesh` in any state, if a check fails. Cost: n log n in clipped triangles,
 /// triangles near the planes, and points of the caps.
-[[nodiscard]] bool CapPlanes(PlaneCutScratch& scratch, CutMesh& mesh);
+[[nodiscard]] bool CapPlanes(double step, PlaneCutScratch& scratch, CutMesh& mesh);
 
 }  // namespace partiemc::space

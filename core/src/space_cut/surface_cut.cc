@@ -97,7 +97,7 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
-  return CapPlanes(s.plane, s.mesh);
+  return CapPlanes(input.inner_step, s.plane, s.mesh);
 }
 
 /// Moves the points of caps to the given planes.

@@ -22,6 +22,8 @@ struct SurfaceCutInput {
   /// each outer shell is a body.
   std::span<const std::uint32_t> body_of;
   double spacing = 1;  ///< World units.
+  /// Step of the inner points of the faces on the planes, world units; 0 for no inner points.
+  double inner_step = 0;
   /// The planes are walls: if they must move (see CutSurface), they move to the side that is kept.
   /// The points on a moved plane then return to the wall, if Validate accepts this surface. If
   /// Validate rejects the surface for every move, these points stay on the moved plane.

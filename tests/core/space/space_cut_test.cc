@@ -24,6 +24,33 @@ using space::AxisPlane;
 using support::Random;
 using testing::SpaceParticles;
 
+double VolumeOf(const Surface& surface) {
+  double volume = 0;
+  for (const ShellMeasures& measures : surface.measures) volume += measures.volume;
+  return volume;
+}
+double AreaOf(const Surface& surface) {
+  double area = 0;
+  for (const ShellMeasures& measures : surface.measures) area += measures.area;
+  return area;
+}
+
+// Inner points of flat faces change nothing else.
+void ExpectSameWithInnerPoints(const Surface& surface, const std::vector<AxisPlane>& planes,
+                               const Surface& part) {
+  Surface inner = surface;
+  space::SurfaceCutScratch scratch;
+  space::SurfacePieces pieces;
+  ASSERT_TRUE(space::CutSurface({.planes = planes, .inner_step = .7}, scratch, pieces, inner));
+  const absl::Status status = Validate(inner);
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(inner.ShellCount(), part.ShellCount());
+  EXPECT_GE(inner.PointCount(), part.PointCount());
+  EXPECT_EQ(inner.TriangleCount() - inner.cuts.size(), part.TriangleCount() - part.cuts.size());
+  EXPECT_NEAR(VolumeOf(inner), VolumeOf(part), 1e-9 * (1 + std::abs(VolumeOf(part))));
+  EXPECT_NEAR(AreaOf(inner), AreaOf(part), 1e-9 * (1 + AreaOf(part)));
+}
+
 // The part of a surface on the kept side of planes.
 Surface Part(const Surface& surface, std::vector<AxisPlane> planes,
              space::SurfacePieces* sources = nullptr) {
@@ -35,18 +62,8 @@ Surface Part(const Surface& surface, std::vector<AxisPlane> planes,
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(pieces.sources.size(), part.ShellCount());
   if (sources != nullptr) *sources = pieces;
+  ExpectSameWithInnerPoints(surface, planes, part);
   return part;
-}
-
-double VolumeOf(const Surface& surface) {
-  double volume = 0;
-  for (const ShellMeasures& measures : surface.measures) volume += measures.volume;
-  return volume;
-}
-double AreaOf(const Surface& surface) {
-  double area = 0;
-  for (const ShellMeasures& measures : surface.measures) area += measures.area;
-  return area;
 }
 
 std::array<double, 2> RangeOf(const Surface& surface, int axis) {
@@ -131,6 +148,28 @@ TEST(SurfaceCut, BoxInsideBodyIsTheBox) {
   EXPECT_EQ(part.cuts.size(), 12u);
   EXPECT_NEAR(part.measures[0].volume, 3 * 4 * 5, 1e-9);
   EXPECT_EQ(part.measures[0].area, 0);
+}
+
+TEST(SurfaceCut, FlatFacesHaveInnerPointsOnRequest) {
+  Surface box;
+  testing::AddShell(testing::BoxShell({0, 0, 0}, {20, 12, 8}), kNoShell, box);
+  testing::AddShell(testing::InsideOut(testing::BoxShell({6, 4, 2}, {10, 8, 6})), 0, box);
+  const std::vector<AxisPlane> planes = {{2, 4.5, true}};
+  space::SurfaceCutScratch scratch;
+  space::SurfacePieces pieces;
+  ASSERT_TRUE(space::CutSurface({.planes = planes, .inner_step = 1}, scratch, pieces, box));
+  EXPECT_TRUE(Validate(box).ok()) << Validate(box);
+  // Nodes of the lattice at least one step from the rim, which has the hole as its inner part.
+  std::size_t found = 0;
+  for (std::size_t p = 0; p < box.PointCount(); ++p) {
+    const Vec3 at = Vec3At(box.points, p);
+    const bool is_in_hole = at.x > 5 && at.x < 11 && at.y > 3 && at.y < 9;
+    const bool is_inner = at.z == 4.5 && at.x >= 1 && at.x <= 19 && at.y >= 1 && at.y <= 11;
+    if (!is_inner || is_in_hole || at.x != std::floor(at.x) || at.y != std::floor(at.y)) continue;
+    EXPECT_EQ(box.normals[3 * p + 2], -1);
+    ++found;
+  }
+  EXPECT_EQ(found, 19u * 11 - 5 * 5);
 }
 
 TEST(SurfaceCut, CavitiesOpenOrStayInTheirPiece) {

@@ -184,6 +184,47 @@ DropErrors ErrorsOfDrop(double degrees, double shake, Random& random) {
   return errors;
 }
 
+/// Attributes have values at points only, so wetted faces have inner points then.
+TEST(SurfaceWalls, AttributesVaryOverTheFloor) {
+  Random random(4);
+  const SpaceParticles particles = OnFloor(
+      -3, 9, .1, random, [](const Vec3& at) { return at.z < 6 && std::hypot(at.x, at.y) < 9; });
+  const auto value_at = [](double x, double y) { return 1 + .05 * x * y; };
+  std::vector<float> values;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    values.push_back(static_cast<float>(value_at(particles.At(k).x, particles.At(k).y)));
+  }
+  const std::vector<Attribute> attributes = {{"value", 1, values}};
+  Frame frame = particles.AsFrame();
+  frame.attributes = attributes;
+  for (const double simplify : {0.0, .05}) {
+    SCOPED_TRACE(simplify);
+    const auto reconstructor =
+        SurfaceReconstructor::Create({.placement = SurfacePlacement::kVirtualPlane,
+                                      .simplify = simplify,
+                                      .wall_planes = {{2, -3, true}}});
+    SurfaceWorkspace workspace;
+    Surface surface;
+    ASSERT_TRUE(reconstructor->Reconstruct(frame, workspace, surface).ok());
+    EXPECT_TRUE(Validate(surface).ok()) << Validate(surface);
+    double largest = 0;
+    int inner = 0;
+    for (std::size_t t : surface.cuts) {
+      std::array<Vec3, 3> at;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t point = surface.triangles[3 * t + k];
+        at[k] = Vec3At(surface.points, point);
+        if (std::hypot(at[k].x, at[k].y) > 7) continue;
+        ++inner;
+        EXPECT_NEAR(surface.attributes[0].values[point], value_at(at[k].x, at[k].y), .15);
+      }
+      largest = std::max(largest, Length(Cross(at[1] - at[0], at[2] - at[0])) / 2);
+    }
+    EXPECT_EQ(inner > 0, simplify == 0);
+    EXPECT_EQ(largest < 8, simplify == 0) << largest;
+  }
+}
+
 TEST(SurfaceWalls, DropsKeepTheirShapeAtAWall) {
   const auto tries = testing::Frames(3);
   for (const double degrees : {60., 90., 120.}) {
