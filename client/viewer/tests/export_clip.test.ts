@@ -42,10 +42,10 @@ afterEach(() => {
   for (const name of Object.keys(browser)) delete (globalThis as Record<string, unknown>)[name];
 });
 
-function scene(hasWebgl = true): Drawn {
+function scene(isOnCanvas = true): Drawn {
   return {
-    drawn: null, draw: () => {}, size: { width: 400, height: 300 },
-    canvas: { width: 400, height: 300, getContext: () => hasWebgl || null } as unknown as HTMLCanvasElement,
+    isOnCanvas, drawn: null, draw: () => {}, size: { width: 400, height: 300 },
+    canvas: { width: 400, height: 300 } as unknown as HTMLCanvasElement,
   };
 }
 

@@ -68,7 +68,8 @@ export class Scene {
     this.resize();
   }
 
-  get hasWebgl(): boolean { return !(this.drawing instanceof SvgDrawing); }
+  /** Whether the canvas has the picture. Without WebGL, it is SVG beside the canvas. */
+  get isOnCanvas(): boolean { return !(this.drawing instanceof SvgDrawing); }
 
   /** The selected rings of the frame: several after a split. */
   get selectedRings(): readonly number[] {

@@ -1,7 +1,7 @@
 import { svg } from '../export/svg';
 import type { Drawing, Picture } from './webgl/renderer';
 
-export const NO_WEBGL = 'This browser has no WebGL2, so pictures are drawn slowly as SVG.';
+export const NO_WEBGL = 'This browser has no WebGL2, so pictures are drawn slowly.';
 
 /** Draws by SVG, for browsers without WebGL2. Slower, with the same colours. */
 export class SvgDrawing implements Drawing {

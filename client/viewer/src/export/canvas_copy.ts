@@ -2,17 +2,17 @@ import type { Scene } from '../draw/scene';
 import { drawMarks, type Mark } from './marks';
 
 /** The members of a scene that exports use. */
-export type Drawn = Pick<Scene, 'draw' | 'drawn' | 'canvas' | 'size'>;
+export type Drawn = Pick<Scene, 'draw' | 'drawn' | 'canvas' | 'size' | 'isOnCanvas'>;
 
 /** The last drawing of a scene with its marks, on a canvas of its own. */
 export class CanvasCopy {
   readonly canvas = document.createElement('canvas');
   private readonly context: CanvasRenderingContext2D;
 
-  /** Throws without WebGL, because the scene then draws SVG instead of its canvas. */
+  /** Throws if the scene draws SVG instead of its canvas. */
   constructor(private readonly scene: Drawn, private readonly marks: () => readonly Mark[]) {
     const context = this.canvas.getContext('2d');
-    if (!context || !scene.canvas.getContext('webgl2')) {
+    if (!context || !scene.isOnCanvas) {
       throw new Error('This browser draws without WebGL. Save the picture as SVG.');
     }
     this.context = context;

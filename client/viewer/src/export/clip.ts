@@ -16,7 +16,7 @@ export interface Clip {
   stop(): Promise<Blob>;
 }
 
-/** `marks`: returns the marks of the current picture; called for every picture. Throws without WebGL. */
+/** `marks`: returns the marks of the current picture; called for every picture. Throws if the scene draws SVG. */
 export function clip(scene: Drawn, marks: () => readonly Mark[]): Clip {
   const copy = new CanvasCopy(scene, marks);
   const { canvas } = copy;

@@ -196,7 +196,7 @@ class Report {
     this.time.refresh(this.pace);
     this.curves.refresh(this.track, null, this.pane.summary, this.pane.isStreamed, this.pace);
     if (this.track.hasSurfaces) this.look.setAttributes(this.pane.channels, this.track);
-    this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.hasWebgl, this.pane.isSpace);
+    this.look.offer(this.pane.frame, this.track.kind, this.pane.scene.isOnCanvas, this.pane.isSpace);
     this.space.offer(this.pane.isSpace, this.pane.outlines.length > 1);
     this.look.setOutlines(this.track.outlines);
     this.look.setLegend(this.pane.legend);

@@ -23,6 +23,8 @@ export const DEFAULT_VIEW: Readonly<SpaceView> = { target: [0, 0, 0], turn: -1.0
 
 /** Vertical angle of a perspective picture, in degrees. */
 export const FIELD_OF_VIEW = 35;
+/** Smallest depth that a perspective camera shows, as a share of its distance from the target. */
+export const NEAREST = 1e-3;
 const HALF_ANGLE = Math.tan(FIELD_OF_VIEW / 2 * Math.PI / 180);
 const MARGIN = 0.1;
 /** A drag over the height of the picture turns by this angle. */
@@ -41,6 +43,11 @@ export const plus = (a: Vector, b: Vector, share = 1): Vector =>
   [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
 export const minus = (a: Vector, b: Vector): Vector => plus(a, b, -1);
 export const dot = (a: Vector, b: Vector): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/** Vector k of an array. */
+export function vectorAt(numbers: Float32Array, k: number): Vector {
+  return [numbers[3 * k], numbers[3 * k + 1], numbers[3 * k + 2]];
+}
 
 /** Unit vectors of the picture: to the right, up, and to the camera. */
 export function axesOf({ turn, tilt }: SpaceView): { right: Vector; up: Vector; back: Vector } {
@@ -123,6 +130,34 @@ export function project(camera: Camera, point: Vector): { x: number; y: number; 
   if (isPerspective && nearer >= distance) return null;
   const scale = (isPerspective ? distance / (distance - nearer) : 1) / unitsPerPixel(camera);
   return { x: size.width / 2 + dot(apart, right) * scale, y: size.height / 2 - dot(apart, up) * scale, nearer };
+}
+
+/** Points in CSS pixels. Larger numbers of `near` are nearer; planes and lines have linear numbers. NaN: behind the camera. */
+export interface Projected { x: Float32Array; y: Float32Array; near: Float32Array }
+
+/** The numbers of `Projected.near` at a distance from the target's plane towards the camera. */
+export function nearOf({ view, isPerspective }: Camera, nearer: number): number {
+  if (!isPerspective) return nearer;
+  const distance = distanceOf(view);
+  return distance - nearer > NEAREST * distance ? 1 / (distance - nearer) : NaN;
+}
+
+/** Projects all points, which are relative to `origin`. */
+export function projectAll(camera: Camera, positions: Float32Array, origin: Vector): Projected {
+  const { view, isPerspective, size } = camera;
+  const { right, up, back } = axesOf(view);
+  const [tx, ty, tz] = minus(view.target, origin);
+  const [unit, distance, count] = [unitsPerPixel(camera), distanceOf(view), positions.length / 3];
+  const at = { x: new Float32Array(count), y: new Float32Array(count), near: new Float32Array(count) };
+  for (let k = 0, i = 0; k < count; ++k, i += 3) {
+    const [px, py, pz] = [positions[i] - tx, positions[i + 1] - ty, positions[i + 2] - tz];
+    const near = nearOf(camera, px * back[0] + py * back[1] + pz * back[2]);
+    const scale = (isPerspective ? distance * near : 1) / unit;
+    at.x[k] = size.width / 2 + scale * (px * right[0] + py * right[1] + pz * right[2]);
+    at.y[k] = size.height / 2 - scale * (px * up[0] + py * up[1] + pz * up[2]);
+    at.near[k] = near;
+  }
+  return at;
 }
 
 /** The ray through a CSS position, from the camera or (parallel view) from the target's plane. `along`: any length. */

@@ -1,5 +1,5 @@
 import {
-  axesOf, type Box, type Camera, cornersOf, distanceOf, dot, minus, plus, type SpaceView, type Vector,
+  axesOf, type Box, type Camera, cornersOf, distanceOf, dot, minus, plus, type SpaceView, unitsPerPixel, type Vector, vectorAt,
 } from './camera';
 import type { SpaceLook } from './look';
 
@@ -42,4 +42,23 @@ export function cutFaceOf(clip: Clip | null, look: SpaceLook, { view, isPerspect
   const middle = plus(minus(box.low, origin), minus(box.high, box.low), 0.5);
   const halfWidth = (0.5 + ROUNDING) * Math.hypot(...minus(box.high, box.low));
   return { middle: plus(middle, clip.normal, clip.at - dot(middle, clip.normal)), halfWidth };
+}
+
+/** Heights of points above a clip plane; null without a plane. */
+export function heightsOf(positions: Float32Array, clip: Clip | null): Float32Array | null {
+  return clip && Float32Array.from({ length: positions.length / 3 }, (_, k) => dot(vectorAt(positions, k), clip.normal) - clip.at);
+}
+
+/** `Projected.near` of the clip plane at a place in the picture. The camera looks at the plane. */
+export function nearOfClip(camera: Camera, { normal, at }: Clip, origin: Vector): (x: number, y: number) => number {
+  const { view, isPerspective, size } = camera;
+  const { right, up, back } = axesOf(view);
+  const unit = unitsPerPixel(camera);
+  const [alongRight, alongUp, alongBack] = [dot(right, normal), dot(up, normal), dot(back, normal)];
+  const distance = distanceOf(view);
+  const below = at - dot(minus(view.target, origin), normal);
+  return (x, y) => {
+    const across = ((x - size.width / 2) * alongRight + (size.height / 2 - y) * alongUp) * unit;
+    return isPerspective ? (across / distance - alongBack) / (below - distance * alongBack) : (below - across) / alongBack;
+  };
 }

@@ -10,6 +10,14 @@ export interface SectionLines { positions: Float32Array; colour: Rgb; isBorder: 
 /** Alpha of a point's tint: the sum of `shell` if its shell is selected, and `body` if its body is (for cut faces). */
 export const SELECTED = { shell: 170, body: 85 } as const;
 
+/** Opacities of a translucent surface, of its edges, and of lines that something hides. */
+export const TRANSLUCENT = 0.4;
+export const TRANSLUCENT_EDGES = 0.35;
+export const HIDDEN_LINES = 0.35;
+/** Smallest diameter of a particle, and width of a plane's border, in CSS pixels. */
+export const SMALLEST_DOT = 1.5;
+export const BORDER_WIDTH = 1;
+
 export interface SpaceTheme {
   background: Rgb;
   edge: Rgb;

@@ -1,4 +1,4 @@
-// Draws surfaces by three.js. Bundled as space.js, which the page loads when it shows a surface.
+// Draws surfaces by three.js, or without WebGL 2 by `CanvasDrawing`. Bundled as space.js, which the page loads when it shows a surface.
 import {
   AlwaysDepth, BackSide, BufferAttribute, BufferGeometry, Color, ColorManagement, DataTexture, DoubleSide, EqualStencilFunc,
   FrontSide, LinearSRGBColorSpace, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Points,
@@ -9,24 +9,22 @@ import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
 import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
 import type { Rgb } from '../draw/colours';
-import { dotDiameter } from '../draw/style';
+import { dotDiameter, EDGE_ALPHA } from '../draw/style';
 import type { Size } from '../draw/view';
 import type { Surface } from '../protocol/surface';
+import { CanvasDrawing } from './canvas_drawing';
 import { axesOf, distanceOf, FIELD_OF_VIEW, minus, plus, unitsPerPixel } from './camera';
-import type { SectionLines, SpaceDrawing, SpaceState } from './drawing';
+import {
+  BORDER_WIDTH, HIDDEN_LINES, type SectionLines, SMALLEST_DOT, type SpaceDrawing, type SpaceState, TRANSLUCENT, TRANSLUCENT_EDGES,
+} from './drawing';
 import {
   COLOUR_MODE, CUT_FACE_FRAGMENT, CUT_FACE_VERTEX, EDGE_FRAGMENT, EDGE_VERTEX, POINT_FRAGMENT, POINT_VERTEX,
   SURFACE_FRAGMENT, SURFACE_VERTEX,
 } from './shaders';
 
-const TRANSLUCENT = 0.4;
-const TRANSLUCENT_EDGES = 0.35;
-const HIDDEN_LINES = 0.35;
 const MAP_COLOURS = 256;
 /** Cuts nothing: no point is above an infinite height. */
 const NO_CLIP = 1e30;
-const SMALLEST_DOT = 1.5;
-const BORDER_WIDTH = 1;
 /** Largest depth over which the border of a cut is smoothed, in pixels. At silhouettes the depth changes without limit. */
 const DEEPEST_BORDER = 8;
 
@@ -247,7 +245,7 @@ class Drawing implements SpaceDrawing {
     pointUniforms.smallest.value = ratio * SMALLEST_DOT;
     pointUniforms.distance.value = camera.isPerspective ? distanceOf(camera.view) : 0;
     setColour(edgeUniforms.colour, theme.edge);
-    edgeUniforms.opacity.value = look.isTranslucent ? TRANSLUCENT_EDGES : 0.8;
+    edgeUniforms.opacity.value = look.isTranslucent ? TRANSLUCENT_EDGES : EDGE_ALPHA;
   }
 
   private setValues({ values }: SpaceState): void {
@@ -324,10 +322,8 @@ class Drawing implements SpaceDrawing {
   }
 }
 
-/** Throws an Error with a sentence if the browser cannot draw. */
+/** Draws by WebGL 2, or without it by the processor. Throws an Error with a sentence if the browser cannot draw. */
 export function createDrawing(canvas: HTMLCanvasElement): SpaceDrawing {
-  if (!canvas.getContext('webgl2', { antialias: true, alpha: false, stencil: true })) {
-    throw new Error('This browser cannot draw surfaces, because WebGL 2 is missing.');
-  }
-  return new Drawing(canvas);
+  const hasWebgl = canvas.getContext('webgl2', { antialias: true, alpha: false, stencil: true }) !== null;
+  return hasWebgl ? new Drawing(canvas) : new CanvasDrawing(canvas);
 }

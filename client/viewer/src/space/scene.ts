@@ -10,7 +10,7 @@ import type { Frame } from '../protocol/frame';
 import type { Outline } from '../protocol/sections';
 import type { Surface } from '../protocol/surface';
 import {
-  axesOf, type Box, type Camera, cornersOf, DEFAULT_VIEW, distanceOf, dot, fitBox, minus, plus, rayAt, type SpaceView,
+  axesOf, type Box, type Camera, cornersOf, DEFAULT_VIEW, distanceOf, dot, fitBox, minus, NEAREST, plus, rayAt, type SpaceView,
   unionOf, type Vector,
 } from './camera';
 import { type Clip, clipOf, type CutFace, cutFaceOf } from './clip';
@@ -27,8 +27,6 @@ export interface SpaceFrame { frame: Frame; surface: Surface; channels: Channels
 export interface PickedShell { shell: number; point: Vector }
 
 const MAP_COLOURS = 256;
-/** Smallest depth that a perspective camera shows, as a share of its distance from the target. */
-const NEAREST = 1e-3;
 
 /** A frame with a surface, ready to draw. Throws an Error with a sentence if its sections contradict themselves. */
 export function spaceFrameOf(frame: Frame, surface: Surface): SpaceFrame {
@@ -59,6 +57,8 @@ function themeOf(dark: boolean): SpaceTheme {
 /** A canvas that shows one surface after another. Only `draw` draws. */
 export class SpaceScene {
   view: SpaceView = { ...DEFAULT_VIEW };
+  /** As of a plane scene: the canvas always has the picture. */
+  readonly isOnCanvas = true;
   /** The canvas in CSS pixels at the last `resize`. Reading it from the page in each drawing would cost a layout. */
   size: Size = { width: 0, height: 0 };
   /** Called after each drawing, in the same task. */

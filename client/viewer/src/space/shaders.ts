@@ -3,8 +3,23 @@
 /** `tint`: the colour of the tint, or one colour for particles; `values`: the colour map. */
 export const COLOUR_MODE = { tint: 0, values: 1 } as const;
 
-/** Light on a cut face. It does not depend on the direction, so that the face does not look like a shadow. */
-const CUT_FACE_LIGHT = '0.8';
+/** Light on surfaces. `canvas_drawing.ts` and `facet.ts` have the same formulas. */
+export const LIGHT = {
+  /** Direction to the light along the axes right, up and to the camera. */
+  direction: [-0.35, 0.55, 1],
+  brightest: 1.06,
+  /** Of the highlight: its strength, and the exponent of the cosine. */
+  shine: 0.16,
+  sharpness: 40,
+  /** On the inside of a body, which a clip plane shows, as a share. */
+  inside: 0.62,
+  /** On a cut face. It does not depend on the direction, so that the face does not look like a shadow. */
+  cutFace: 0.8,
+} as const;
+/** Share of the accent in the colour of a selected shell. */
+export const ACCENT_SHARE = 0.62;
+
+const float = (number: number) => number.toFixed(2);
 
 const VALUE_COLOUR = `
 uniform sampler2D ramp;
@@ -80,16 +95,15 @@ void main() {
   vec3 base = mode == ${COLOUR_MODE.values} ? (isCut ? missing : colourOf(valueHere)) : tintHere.rgb;
   float ofShell = step(0.5, tintHere.a);
   float ofBody = step(0.16, tintHere.a - ofShell * 2.0 / 3.0);
-  base = mix(base, accent, 0.62 * (isCut ? ofBody : ofShell));
-  // The inside of a body, which a clip plane shows.
-  if (isInside && !isCut) base *= 0.62;
-  vec3 light = normalize(vec3(-0.35, 0.55, 1.0));
+  base = mix(base, accent, ${float(ACCENT_SHARE)} * (isCut ? ofBody : ofShell));
+  if (isInside && !isCut) base *= ${float(LIGHT.inside)};
+  vec3 light = normalize(vec3(${LIGHT.direction.map(float)}));
   vec3 eye = isParallel ? vec3(0.0, 0.0, 1.0) : normalize(-seen);
   // Falls off smoothly, so that shadows keep their shape.
   float wrapped = 0.5 * dot(normal, light) + 0.5;
-  float diffuse = isCut ? ${CUT_FACE_LIGHT} : wrapped * wrapped;
-  float shine = !isInside ? 0.16 * pow(max(dot(normal, normalize(light + eye)), 0.0), 40.0) : 0.0;
-  gl_FragColor = vec4(base * (ambient + (1.06 - ambient) * diffuse) + shine, opacity * stays);
+  float diffuse = isCut ? ${float(LIGHT.cutFace)} : wrapped * wrapped;
+  float shine = !isInside ? ${float(LIGHT.shine)} * pow(max(dot(normal, normalize(light + eye)), 0.0), ${float(LIGHT.sharpness)}) : 0.0;
+  gl_FragColor = vec4(base * (ambient + (${float(LIGHT.brightest)} - ambient) * diffuse) + shine, opacity * stays);
 }`;
 
 export const POINT_VERTEX = `

@@ -407,8 +407,8 @@ export class App {
     const isVariant = (pane?.variantStream ?? null) !== null;
     const isSpace = pane?.isSpace ?? false;
     this.look.setAttributes(pane?.channels ?? [], this.track);
-    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.hasWebgl ?? true, isSpace);
-    this.exports.offer(pane?.scene.hasWebgl ?? true, isSpace);
+    this.look.offer(pane?.frame ?? null, isVariant ? 'file' : this.track?.kind ?? 'watch', pane?.scene.isOnCanvas ?? true, isSpace);
+    this.exports.offer(pane?.drawn.isOnCanvas ?? true, isSpace);
     this.space.offer(isSpace, (pane?.outlines.length ?? 0) > 1);
     this.settings.offer(pane?.hasSurfaces ?? false);
     this.gaugesPanel.offer(pane?.hasSurfaces ?? false);

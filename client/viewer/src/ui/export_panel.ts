@@ -11,13 +11,13 @@ const OF_OUTLINES = 'A surface has no outline to save, so choose a section under
 const PNG_TITLE = 'Saves the picture with legend, scale and time in pixels.';
 
 /** State of the button that records. A running recording can always be stopped. */
-export function clipButton(isRecording: boolean, hasWebgl: boolean): { text: string; title: string; isDisabled: boolean } {
+export function clipButton(isRecording: boolean, isOnCanvas: boolean): { text: string; title: string; isDisabled: boolean } {
   if (isRecording) {
     return { text: 'Stop and save', title: 'Ends the recording and saves the video.', isDisabled: false };
   }
   return {
-    text: 'Record clip', isDisabled: !hasWebgl,
-    title: hasWebgl ? 'Records the picture as a video until the next click.' : `${NO_WEBGL} Save the picture as SVG.`,
+    text: 'Record clip', isDisabled: !isOnCanvas,
+    title: isOnCanvas ? 'Records the picture as a video until the next click.' : `${NO_WEBGL} Save the picture as SVG.`,
   };
 }
 
@@ -56,12 +56,12 @@ export class ExportPanel {
   }
 
   /** Enables the exports that the browser and the kind of picture allow. */
-  offer(hasWebgl: boolean, isSpace: boolean): void {
+  offer(isOnCanvas: boolean, isSpace: boolean): void {
     for (const id of ['export-svg', 'export-geojson']) block(button(id), isSpace ? OF_OUTLINES : '');
     const png = button('export-png');
-    png.disabled = !hasWebgl;
-    png.title = hasWebgl ? PNG_TITLE : `${NO_WEBGL} Save the picture as SVG.`;
-    const { text, title, isDisabled } = clipButton(this.recording !== null, hasWebgl);
+    png.disabled = !isOnCanvas;
+    png.title = isOnCanvas ? PNG_TITLE : `${NO_WEBGL} Save the picture as SVG.`;
+    const { text, title, isDisabled } = clipButton(this.recording !== null, isOnCanvas);
     const clipOf = button('export-clip');
     clipOf.disabled = isDisabled;
     clipOf.title = title;

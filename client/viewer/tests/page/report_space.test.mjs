@@ -27,7 +27,7 @@ after(async () => {
 
 /** Opens the report for the duration of `work`. */
 async function inReport(options, work, name = 'balls.html') {
-  const report = await Viewer.open(browser, pathToFileURL(file(name)).href, options);
+  const report = await Viewer.open(options.browser ?? browser, pathToFileURL(file(name)).href, options);
   try {
     await until('a surface is shown', () => report.value('surface-digest'));
     await work(report);
@@ -140,16 +140,66 @@ test('--color-by is the first colour; C switches it', async () => {
   }, 'by_p.html');
 });
 
-test('without WebGL the reason is shown, with all numbers', async () => {
-  const bare = await launch(['--no-sandbox', '--disable-gpu', '--disable-3d-apis', '--disable-software-rasterizer']);
-  try {
-    const report = await Viewer.open(bare, pathToFileURL(file('balls.html')).href, { width: 390, hash: '#frame=2' });
-    await until('the reason is shown', async () => /WebGL 2 is missing/.test(await report.status()));
-    await shows(report, 2);
-    assert.equal(await report.value('surface-digest'), truth[2].surface_digest);
-    assert.equal(await report.page.evaluate(() => document.documentElement.scrollWidth), 390);
-    await report.close();
-  } finally {
-    await bare.close();
-  }
-});
+/** Share of the pixels of two PNGs that differ clearly. */
+async function difference(...pictures) {
+  const page = await browser.newPage();
+  const share = await page.evaluate(async (all) => {
+    const [one, other] = await Promise.all(all.map(async (base64) => {
+      const picture = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+      const { width, height } = picture;
+      const pen = new OffscreenCanvas(width, height).getContext('2d');
+      pen.drawImage(picture, 0, 0);
+      return pen.getImageData(0, 0, width, height).data;
+    }));
+    if (one.length !== other.length) return 1;
+    return one.filter((part, k) => Math.abs(part - other[k]) > 40).length / one.length;
+  }, pictures);
+  await page.close();
+  return share;
+}
+
+/** The picture without WebGL, once it is fine. */
+async function fine(report) {
+  await until('the picture is fine', () => report.page.locator('.space canvas').evaluate(
+    ({ width, clientWidth }) => width === 2 * clientWidth));
+  return still(report);
+}
+
+for (const [colorScheme, width] of [['light', 390], ['dark', 1600]]) {
+  test(`without WebGL the report shows the same pictures (${colorScheme})`, async () => {
+    const bare = await launch(['--no-sandbox', '--disable-gpu', '--disable-3d-apis', '--disable-software-rasterizer']);
+    try {
+      const options = { width, colorScheme, hash: '#frame=0' };
+      await inReport(options, (report) => inReport({ ...options, browser: bare }, async (plain) => {
+        for (let frame = 0; frame < FRAMES; ++frame) {
+          await Promise.all([report, plain].map((one) => shows(one, frame)));
+          assert.equal(await plain.value('surface-digest'), truth[frame].surface_digest);
+          const share = await difference(await still(report), await fine(plain));
+          assert.ok(share < 0.01, `frame ${frame}: ${share}`);
+          await Promise.all([report, plain].map(({ page }) => page.keyboard.press('ArrowRight')));
+        }
+        await plain.page.keyboard.press('Home');
+        await plain.page.getByText('This browser has no WebGL2').waitFor();
+        assert.deepEqual(await violations(plain.page), []);
+        assert.equal(await plain.page.evaluate(() => document.documentElement.scrollWidth), width);
+        const { x, y, width: side, height } = await plain.page.locator('.space canvas').boundingBox();
+        const former = await fine(plain);
+        await plain.page.mouse.move(x + side / 2, y + height / 2);
+        await plain.page.mouse.down();
+        await plain.page.mouse.move(x + side / 2 + 60, y + height / 2 + 20, { steps: 4 });
+        await plain.page.mouse.up();
+        assert.ok(await difference(former, await fine(plain)) > 0.01, 'a drag turns the balls');
+        await plain.page.screenshot({ path: path.join(screenshots, `report_space_no_webgl_${colorScheme}.png`), fullPage: true });
+        await plain.page.keyboard.press('m');
+        await plain.page.keyboard.press('p');
+        await plain.page.keyboard.press('i');
+        await plain.page.getByLabel('Clip plane', { exact: true }).selectOption('y');
+        await plain.page.getByLabel('Other side').click();
+        await fine(plain);
+        await plain.page.screenshot({ path: path.join(screenshots, `report_space_no_webgl_parts_${colorScheme}.png`), fullPage: true });
+      }));
+    } finally {
+      await bare.close();
+    }
+  });
+}
