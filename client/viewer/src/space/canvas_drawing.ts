@@ -19,8 +19,8 @@ const FINE_PIXELS = 2;
 /** Lines are hidden or not in pieces of this length, in pixels, and in at most so many pieces. */
 const LINE_PIECE = 8;
 const MOST_PIECES = 500;
-/** Lines in a surface are this much nearer, in pixels, so that it does not hide them. */
-const LINE_LIFT = 3;
+/** Lines in a surface are this much nearer, and cut faces farther, in CSS pixels. So they do not hide what lies in them. */
+const LIFT = 3;
 
 const unitOf = (v: Vector): Vector => {
   const length = Math.hypot(...v);
@@ -130,7 +130,10 @@ export class CanvasDrawing implements SpaceDrawing {
     // Translucent triangles do not hide particles, so the particles come first.
     if (hasParticles && look.isTranslucent) this.drawParticles(state, camera, scale);
     this.drawSurface(state, camera, scale);
-    if (clip && cutFace) this.raster.closeCuts(nearOfClip(camera, clip, origin));
+    if (clip && cutFace) {
+      const lowered = { ...clip, at: clip.at - LIFT * scale * unitsPerPixel(camera) };
+      this.raster.closeCuts(nearOfClip(camera, lowered, origin));
+    }
     if (hasParticles && !look.isTranslucent) this.drawParticles(state, camera, scale);
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
@@ -193,7 +196,7 @@ export class CanvasDrawing implements SpaceDrawing {
       for (let piece = 0; piece < pieces; ++piece) {
         const middle = (piece + 0.5) / pieces;
         if (heights && along(heights, middle) > 0) continue;
-        const near = liftedNear(camera, along(at.near, middle), LINE_LIFT * scale * unit);
+        const near = liftedNear(camera, along(at.near, middle), LIFT * scale * unit);
         const isVisible = raster.shows(along(at.x, middle), along(at.y, middle), near);
         for (const path of isVisible ? [all, visible] : [all]) {
           path.moveTo(along(at.x, piece / pieces), along(at.y, piece / pieces));
