@@ -148,10 +148,13 @@ class GlbBuffer {
   std::size_t count_ = 0;
 };
 
-// A dull blue, lit from the outside only.
-constexpr std::string_view kMaterials =
-    R"("materials":[{"name":"surface","pbrMetallicRoughness":{"baseColorFactor":[0.1,0.35,0.7,1],)"
-    R"("metallicFactor":0,"roughnessFactor":0.5},"doubleSided":false}])";
+// A material of this name: a dull blue, lit from the outside only.
+std::string JsonMaterial(std::string_view name) {
+  return Concat(
+      R"({"name":")", name,
+      R"(","pbrMetallicRoughness":{"baseColorFactor":[0.1,0.35,0.7,1],"metallicFactor":0,)"
+      R"("roughnessFactor":0.5},"doubleSided":false})");
+}
 
 using Vector = std::array<double, 3>;
 
@@ -190,18 +193,54 @@ std::size_t AddPositions(std::span<const double> points, const Vector& centre, G
                             Concat(R"(,"min":)", JsonVector(low), R"(,"max":)", JsonVector(high)));
 }
 
-// Adds the arrays of the vertices and returns the JSON members that list them.
-std::string AddVertexArrays(const FileMesh& mesh, const Vector& centre, GlbBuffer& buffer) {
-  std::string members = Concat(R"("POSITION":)", AddPositions(mesh.points(), centre, buffer));
+// JSON members that list the arrays of the vertices.
+struct VertexMembers {
+  std::string position, normal, attributes;
+};
+
+VertexMembers AddVertexArrays(const FileMesh& mesh, const Vector& centre, GlbBuffer& buffer) {
+  VertexMembers members;
+  members.position = Concat(R"("POSITION":)", AddPositions(mesh.points(), centre, buffer));
   if (!mesh.normals().empty()) {
-    AppendAll(members, R"(,"NORMAL":)", buffer.AddVertices(mesh.normals(), 3));
+    members.normal = Concat(R"(,"NORMAL":)", buffer.AddVertices(mesh.normals(), 3));
   }
   for (const AttributeValues& one : mesh.attributes()) {
     const std::size_t index =
         buffer.AddVertices(one.values, static_cast<std::size_t>(one.components));
-    AppendAll(members, ",", JsonText(Concat("_", one.name)), ":", index);
+    AppendAll(members.attributes, ",", JsonText(Concat("_", one.name)), ":", index);
   }
   return members;
+}
+
+// The triangles k with cuts[k] == is_cut. An empty `cuts` cuts none.
+std::vector<std::uint32_t> TrianglesWhere(std::span<const std::uint32_t> triangles,
+                                          const std::vector<bool>& cuts, bool is_cut) {
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t corner = 0; corner < triangles.size(); ++corner) {
+    if ((!cuts.empty() && cuts[corner / 3]) == is_cut) chosen.push_back(triangles[corner]);
+  }
+  return chosen;
+}
+
+// Adds the primitives of a frame and returns their JSON. Triangles on walls and on faces of a
+// periodic box have their own primitive and material. They lack normals, so that viewers draw them
+// flat: a vertex at their rim has the normal of the free surface.
+std::string AddPrimitives(const FileMesh& mesh, const Vector& centre, GlbBuffer& buffer) {
+  const VertexMembers members = AddVertexArrays(mesh, centre, buffer);
+  std::string primitives;
+  const auto add = [&](std::span<const std::uint32_t> indices, int mode, bool is_cut) {
+    if (indices.empty()) return;
+    AppendAll(primitives, primitives.empty() ? "" : ",", R"({"attributes":{)", members.position,
+              is_cut ? "" : members.normal, members.attributes, R"(},"indices":)",
+              buffer.AddIndices(indices, mode), R"(,"mode":)", mode);
+    if (mesh.surface()) AppendAll(primitives, R"(,"material":)", is_cut ? 1 : 0);
+    primitives += '}';
+  };
+  const std::vector<bool> cuts = mesh.Cuts();
+  add(TrianglesWhere(mesh.triangles(), cuts, false), kTriangles, false);
+  add(TrianglesWhere(mesh.triangles(), cuts, true), kTriangles, true);
+  add(mesh.Sides(), kLines, false);
+  return primitives;
 }
 
 }  // namespace
@@ -215,22 +254,13 @@ absl::StatusOr<std::string> EncodeGlb(const FrameRecord& frame, bool compress) {
     return buffer.File(scene + R"(},"scene":0,"scenes":[{"name":"empty"}])");
   }
   const Vector centre = CentreOf(mesh.points());
-  const std::string members = AddVertexArrays(mesh, centre, buffer);
-  const auto primitive = [&](std::span<const std::uint32_t> indices, int mode) {
-    return Concat(R"({"attributes":{)", members, R"(},"indices":)",
-                  buffer.AddIndices(indices, mode), R"(,"mode":)", mode,
-                  mesh.surface() ? R"(,"material":0})" : "}");
-  };
-  std::string primitives;
-  if (mesh.TriangleCount() > 0) primitives = primitive(mesh.triangles(), kTriangles);
-  const std::vector<std::uint32_t> sides = mesh.Sides();
-  if (!sides.empty()) {
-    AppendAll(primitives, primitives.empty() ? "" : ",", primitive(sides, kLines));
-  }
   AppendAll(scene, R"(},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":)",
             JsonVector(centre), R"(}],"meshes":[{"name":"frame )", frame.index,
-            R"(","primitives":[)", primitives, "]}]");
-  if (mesh.surface()) AppendAll(scene, ",", kMaterials);
+            R"(","primitives":[)", AddPrimitives(mesh, centre, buffer), "]}]");
+  if (mesh.surface()) {
+    AppendAll(scene, R"(,"materials":[)", JsonMaterial("surface"),
+              mesh.Cuts().empty() ? "" : "," + JsonMaterial(kCut), "]");
+  }
   return buffer.File(scene);
 }
 

@@ -145,12 +145,16 @@ class Surfaces(unittest.TestCase):
         numpy.testing.assert_array_equal(vtk_to_numpy(shown.GetPointData().GetNormals()),
                                          numpy.column_stack([data["nx"], data["ny"], data["nz"]]))
 
+    def primitives_of_glb(self, frame):
+        iterator = self.read(vtk.vtkGLTFReader(), "glb", frame).NewIterator()
+        primitives = []
+        while not iterator.IsDoneWithTraversal():
+            primitives.append(iterator.GetCurrentDataObject())
+            iterator.GoToNextItem()
+        return primitives
+
     def test_glb(self):
-        blocks = self.read(vtk.vtkGLTFReader(), "glb")
-        iterator = blocks.NewIterator()
-        data = iterator.GetCurrentDataObject()
-        iterator.GoToNextItem()
-        self.assertTrue(iterator.IsDoneWithTraversal())
+        data, = self.primitives_of_glb(1)
         self.assert_is_the_surface(points_of(data), polygons_of(data))
         numpy.testing.assert_allclose(points_of(data), self.ply.points, atol=2e-6)
         numpy.testing.assert_allclose(vtk_to_numpy(data.GetPointData().GetNormals())[:, 2],
@@ -167,6 +171,11 @@ class Surfaces(unittest.TestCase):
         self.assert_is_the_surface(obj.points, numpy.concatenate([block.data for block in obj.cells]), 9)
         shown = self.read(vtk.vtkOBJReader(), "obj", 3)
         self.assert_is_the_surface(points_of(shown), polygons_of(shown))
+        primitives = self.primitives_of_glb(3)
+        self.assertEqual(len(primitives), 2)
+        for data, part in zip(primitives, (triangles[~expected], triangles[expected])):
+            numpy.testing.assert_array_equal(polygons_of(data), part)
+            numpy.testing.assert_allclose(points_of(data), self.ply.points, atol=2e-6)
 
     def test_empty_surface(self):
         self.assertEqual(len(meshio.read(self.path("ply", 2)).points), 0)

@@ -297,8 +297,38 @@ TEST(SurfaceFiles, GlbHasNormalsAttributesAndAMaterial) {
     EXPECT_EQ(ArrayOf<float>(glb, file, attributes.at("_height")), surface.attributes[0].values);
     EXPECT_EQ(ArrayOf<float>(glb, file, attributes.at("_a,b")), surface.attributes[1].values);
     const json& material = file.at("materials")[primitive.at("material").get<std::size_t>()];
+    EXPECT_EQ(file["materials"].size(), 1u);
     EXPECT_EQ(material.at("doubleSided"), false);
     EXPECT_EQ(material.at("pbrMetallicRoughness").at("metallicFactor"), 0);
+  }
+}
+
+TEST(SurfaceFiles, GlbHasAPrimitiveOfTrianglesOnWalls) {
+  const Surface surface = WithCuts(Scene());
+  for (const bool compress : {false, true}) {
+    const std::string glb = Encode(FrameFormat::kGlb, surface, {.compress_glb = compress});
+    const json file = JsonOf(glb);
+    const json& primitives = file.at("meshes")[0].at("primitives");
+    ASSERT_EQ(primitives.size(), 2u);
+    std::vector<std::vector<std::uint32_t>> triangles;
+    for (const json& primitive : primitives) {
+      const json& indices = file["accessors"][primitive.at("indices").get<std::size_t>()];
+      triangles.push_back(Rotated(
+          ViewOf(glb, file, file["bufferViews"][indices.at("bufferView").get<std::size_t>()])));
+    }
+    std::vector<std::vector<std::uint32_t>> expected(2);
+    for (std::uint32_t k = 0; k < surface.TriangleCount(); ++k) {
+      const auto corners = std::span(surface.triangles).subspan(std::size_t{3} * k, 3);
+      auto& chosen = expected[std::ranges::binary_search(surface.cuts, k) ? 1 : 0];
+      chosen.insert(chosen.end(), corners.begin(), corners.end());
+      std::rotate(chosen.end() - 3, std::min_element(chosen.end() - 3, chosen.end()), chosen.end());
+    }
+    EXPECT_EQ(triangles, expected);
+    json attributes = primitives[0].at("attributes");
+    attributes.erase("NORMAL");
+    EXPECT_EQ(primitives[1].at("attributes"), attributes) << "the same vertices, without normals";
+    EXPECT_EQ(primitives[1].at("material"), 1);
+    EXPECT_EQ(file.at("materials")[1].at("name"), "cut");
   }
 }
 
