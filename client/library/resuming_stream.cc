@@ -439,6 +439,7 @@ std::uint64_t ResumingStream::FirstToSend(const StreamConnector::Opened& opened)
 
 // Resends unanswered frames through the opened call and makes it the stream's call.
 void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
+  id_ = opened.message.stream_id();
   token_ = opened.message.stream_token();
   frame_boxes_ = opened.message.frame_boxes();
   next_of_call_ = FirstToSend(opened);
@@ -460,6 +461,11 @@ void ResumingStream::Adopt(StreamConnector::Opened opened, std::size_t window) {
 std::optional<Reconnecting> ResumingStream::reconnecting() const {
   const MutexLock lock(monitor_.mutex);
   return call_ == nullptr ? connector_.Progress() : std::nullopt;
+}
+
+std::string ResumingStream::CurrentId() const {
+  const MutexLock lock(monitor_.mutex);
+  return id_;
 }
 
 std::size_t ResumingStream::InFlight() const {

@@ -38,6 +38,7 @@ class ResumingStream final : public Stream {
       const TimeAndChance& surroundings = {});
 
   const StreamInfo& info() const override { return info_; }
+  std::string CurrentId() const override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
   absl::StatusOr<std::uint64_t> Send(const Frame& frame, double time) override;
   absl::StatusOr<std::uint64_t> SendArrays(const ParticleArrays& particles, double time) override;
   absl::Status FinishSending() override ABSL_LOCKS_EXCLUDED(monitor_.mutex);
@@ -106,6 +107,7 @@ class ResumingStream final : public Stream {
   // Null while reconnecting.
   std::unique_ptr<StreamCall> call_ ABSL_GUARDED_BY(monitor_.mutex);
   ResendBuffer resend_ ABSL_GUARDED_BY(monitor_.mutex){1};
+  std::string id_ ABSL_GUARDED_BY(monitor_.mutex);  // Of the last call.
   std::string token_ ABSL_GUARDED_BY(monitor_.mutex);
   std::string checkpoint_ ABSL_GUARDED_BY(monitor_.mutex);
   // The first frame after the checkpoint.

@@ -192,7 +192,7 @@ class ProducerStream {
   }
   bool IsLatest() const { return latest_ != nullptr; }
   std::size_t Window() const { return stream_->info().frames_in_flight; }
-  std::string Id() const { return stream_->info().stream_id; }
+  std::string Id() const { return stream_->CurrentId(); }
   py::dict Parameters() const { return ToDict(stream_->info().parameters); }
   py::dict Counts() const {
     const auto counts = latest_ != nullptr ? latest_->counts() : client::OfferCounts{};
@@ -385,7 +385,8 @@ void DefineStreams(py::module_& module) {
       .def_property_readonly("latest", &ProducerStream::IsLatest,
                              "Whether only the newest frame is kept while the stream is busy.")
       .def_property_readonly("window", &ProducerStream::Window, "Limit of in_flight.")
-      .def_property_readonly("id", &ProducerStream::Id, "The id in the server's log.")
+      .def_property_readonly("id", &ProducerStream::Id, "The current id in the server's log and in partiemc.streams. Each "
+                             "reconnection, which `receive` makes, gives the stream a new id.")
       .def_property_readonly("parameters", &ProducerStream::Parameters,
                              "Resolved parameters by name.")
       .def_property_readonly("counts", &ProducerStream::Counts,

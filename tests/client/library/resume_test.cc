@@ -82,14 +82,16 @@ INSTANTIATE_TEST_SUITE_P(Status, WorthRetrying,
 
 TEST_P(WorthRetrying, GoesOnElsewhereFromTheCheckpointAndDeliversEachAnswerOnce) {
   FakeServer first([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
-    EXPECT_EQ(AcceptResumable(rpc, 1).checkpoint_interval(), 2u);
+    const auto set_id = [](v1::StreamOpened& opened) { opened.set_stream_id("first"); };
+    EXPECT_EQ(AcceptResumable(rpc, 1, set_id).checkpoint_interval(), 2u);
     AnswerSome(rpc, 3, 2);
     return Lost(GetParam());
   });
   v1::OpenStream resumed;
   std::vector<std::uint64_t> sent_again;
   FakeServer second([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {
-    resumed = AcceptResumable(rpc, 3);
+    const auto set_id = [](v1::StreamOpened& opened) { opened.set_stream_id("second"); };
+    resumed = AcceptResumable(rpc, 3, set_id);
     v1::ParticleFrame frame;
     while (ReadFrame(rpc, frame)) {
       sent_again.push_back(frame.sequence());
@@ -99,7 +101,10 @@ TEST_P(WorthRetrying, GoesOnElsewhereFromTheCheckpointAndDeliversEachAnswerOnce)
   });
   const auto stream = Stream::Open(first.address(), Options(&second));
   ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_EQ((*stream)->CurrentId(), "first");
   EXPECT_THAT(Exchange(**stream, 6), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_EQ((*stream)->CurrentId(), "second");
+  EXPECT_EQ((*stream)->info().stream_id, "first");
   ASSERT_TRUE((*stream)->FinishSending().ok());
   Event event;
   EXPECT_EQ(*(*stream)->Receive(event), Received::kEnd);

@@ -73,6 +73,9 @@ class Server:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
         self.address = f"unix:{self.folder.name}/server.sock"
+        return self.start()
+
+    def start(self):
         program = os.environ["PARTIEMC_SERVER_PROGRAM"]
         self.process = subprocess.Popen([program, "--address", self.address],
                                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -85,9 +88,12 @@ class Server:
         self.__exit__()
         raise RuntimeError("the server does not come up")
 
-    def __exit__(self, *_):
+    def stop(self):
         self.process.kill()
         self.process.wait()
+
+    def __exit__(self, *_):
+        self.stop()
         self.folder.cleanup()
 
 

@@ -71,7 +71,7 @@ struct StreamLimits {
 
 /// Settings of an open stream.
 struct StreamInfo {
-  std::string stream_id;                ///< The id in the server's log; empty in process.
+  std::string stream_id;                ///< The first FrameStream::CurrentId().
   ReconstructionParameters parameters;  ///< Resolved; `spacing` is absent if it is estimated.
   std::size_t frames_in_flight = 1;  ///< Capacity of the window: frames sent and not yet answered.
   StreamLimits limits;
@@ -98,6 +98,11 @@ class FrameStream {
   virtual ~FrameStream() = default;
 
   virtual const StreamInfo& info() const = 0;
+
+  /// The id of the stream in the log of its server and in ListStreams; empty in process. Each
+  /// reconnection gives the stream a new id. Until Receive has reconnected, it is the id before the
+  /// loss. Any thread.
+  virtual std::string CurrentId() const { return info().stream_id; }
 
   /// Sends one frame and returns its number. `frame` is copied or serialised before the call
   /// returns. `time` replaces Frame::time. Waits while the window is full.
