@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/python/arguments.h"
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parts.h"
@@ -27,7 +28,8 @@ namespace py = pybind11;
 using RingsView = PartOf<Rings>;
 using MeshView = PartOf<Mesh>;
 
-py::array RingPoints(const RingsView& rings, py::ssize_t index) {
+py::array RingPoints(const RingsView& rings, const py::object& ring) {
+  auto index = As<py::ssize_t>(ring, "ring");
   const auto count = static_cast<py::ssize_t>(rings.part.RingCount());
   if (index < 0) index += count;
   if (index < 0 || index >= count) throw py::index_error("there are fewer rings");
@@ -109,13 +111,13 @@ Gauge GaugeOf(const std::string& kind, const py::kwargs& numbers) {
     if (!numbers.contains(key)) {
       Raise(Invalid(kReasonCount, "gauge " + kind, "no " + std::string(name), rule));
     }
-    gauge.numbers.push_back(numbers[key].cast<double>());
+    gauge.numbers.push_back(As<double>(numbers[key], std::string(name)));
   }
   return gauge;
 }
 
-py::dict Measured(const RingsView& rings, const std::string& kind, const py::kwargs& numbers) {
-  const Gauge gauge = GaugeOf(kind, numbers);
+py::dict Measured(const RingsView& rings, const py::object& kind, const py::kwargs& numbers) {
+  const Gauge gauge = GaugeOf(As<std::string>(kind, "kind"), numbers);
   RaiseUnlessOk(Check(gauge));
   const OwnedDiscs discs = gauge.kind == GaugeKind::kPacking ? DiscsOf(numbers) : OwnedDiscs();
   const std::vector<double> values = Measure(
@@ -127,8 +129,8 @@ py::dict Measured(const RingsView& rings, const std::string& kind, const py::kwa
   return named;
 }
 
-py::array Heights(const RingsView& rings, double x) {
-  const std::vector<double> heights = HeightsAt(rings.part, x);
+py::array Heights(const RingsView& rings, const py::object& x) {
+  const std::vector<double> heights = HeightsAt(rings.part, As<double>(x, "x"));
   // With a count instead of a shape, pybind11 before 2.12 gives wrong strides to NumPy 2.
   return py::array_t<double>(std::vector{static_cast<py::ssize_t>(heights.size())}, heights.data());
 }

@@ -1,7 +1,6 @@
 #include "client/python/parameters.h"
 
 #include <pybind11/numpy.h>
-#include <pybind11/stl.h>
 
 #include <array>
 #include <chrono>
@@ -21,41 +20,17 @@ namespace {
 
 namespace py = pybind11;
 
-// Removes `name` from the arguments and returns its value. Empty if the argument is absent or None.
-template <typename T>
-std::optional<T> Take(py::dict& arguments, const char* name) {
-  if (!arguments.contains(name)) return std::nullopt;
-  const py::object value = arguments.attr("pop")(name);
-  if (value.is_none()) return std::nullopt;
-  try {
-    return value.cast<T>();
-  } catch (const py::cast_error&) {
-    throw py::type_error(std::string(name) + ": " + py::repr(value).cast<std::string>() +
-                         " is of the wrong type");
-  }
-}
-
-template <typename T>
-void TakeInto(py::dict& arguments, const char* name, T& value) {
-  if (auto given = Take<T>(arguments, name)) value = *std::move(given);
-}
-
-template <typename T>
-void TakeInto(py::dict& arguments, const char* name, std::optional<T>& value) {
-  if (auto given = Take<T>(arguments, name)) value = *std::move(given);
-}
-
 template <typename Value>
-void TakeNamed(py::dict& arguments, const char* field, Value& value) {
-  if (const auto name = Take<std::string>(arguments, field)) {
+void TakeNamed(Arguments& arguments, const char* field, Value& value) {
+  if (const auto name = arguments.Take<std::string>(field)) {
     RaiseUnlessOk(client::SetByName(*name, value));
   }
 }
 
 // Reads a time in seconds. `time` may be a std::optional.
 template <typename Time>
-void TakeTime(py::dict& arguments, const char* name, Time& time) {
-  const auto seconds = Take<double>(arguments, name);
+void TakeTime(Arguments& arguments, const char* name, Time& time) {
+  const auto seconds = arguments.Take<double>(name);
   if (!seconds) return;
   if (!(*seconds >= 0)) {
     Raise(Invalid(kReasonOutOfRange, name, ShortestNumber(*seconds), "must be 0 or more seconds"));
@@ -72,8 +47,8 @@ std::optional<std::size_t> AxisOf(std::string_view name) {
 
 // Removes the argument `slice`: an axis and a coordinate such as ("z", 0.5), or a point and a
 // normal.
-void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
-  const auto given = Take<py::object>(arguments, "slice");
+void TakeSlice(Arguments& arguments, std::optional<SlicePlane>& slice) {
+  const auto given = arguments.Take<py::object>("slice");
   if (!given) return;
   const auto refuse = [&] {
     Raise(Invalid("UNSUPPORTED", "slice", py::repr(*given).cast<std::string>(),
@@ -101,9 +76,9 @@ void TakeSlice(py::dict arguments, std::optional<SlicePlane>& slice) {
 
 // Removes the arguments `box`, a dict of axes with their lower and upper bounds, such as
 // {"x": (0, 10), "y": (0, 10)}, and `wrap`.
-void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
-  const auto given = Take<py::dict>(arguments, "box");
-  const bool wraps = Take<bool>(arguments, "wrap").value_or(false);
+void TakeBox(Arguments& arguments, std::optional<PeriodicBox>& box) {
+  const auto given = arguments.Take<py::dict>("box");
+  const bool wraps = arguments.Take<bool>("wrap").value_or(false);
   if (!given) {
     if (wraps) Raise(Invalid("UNSUPPORTED", "wrap", "True", "requires a periodic box (box=)"));
     return;
@@ -113,15 +88,16 @@ void TakeBox(py::dict& arguments, std::optional<PeriodicBox>& box) {
 }
 
 // Reads each section: a dict of the values that differ from the parameters of the stream.
-void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
-  const auto given = Take<std::vector<py::dict>>(arguments, "sections");
+void TakeSections(Arguments& arguments, std::vector<Section>& sections) {
+  const auto given = arguments.Take<std::vector<py::dict>>("sections");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
-    py::dict left((*given)[k].attr("copy")());  // Leaves the caller's dict unchanged.
+    // A copy leaves the caller's dict unchanged.
+    Arguments left((*given)[k].attr("copy")(), "sections[" + std::to_string(k) + "].");
     Section& section = sections.emplace_back();
     TakeSlice(left, section.slice);
-    TakeInto(left, "isovalue", section.isovalue);
-    TakeInto(left, "phase", section.phase);
+    left.TakeInto("isovalue", section.isovalue);
+    left.TakeInto("phase", section.phase);
     if (left.empty()) continue;
     Raise(Invalid("UNSUPPORTED", "sections[" + std::to_string(k) + "]",
                   py::repr((*given)[k]).cast<std::string>(),
@@ -130,9 +106,9 @@ void TakeSections(py::dict& arguments, std::vector<Section>& sections) {
 }
 
 // Reads the points of each wall: x0, y0, x1, y1, ..., or an (n, 2) array.
-void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
+void TakeWalls(Arguments& arguments, std::vector<Wall>& walls) {
   using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
-  const auto given = Take<std::vector<py::object>>(arguments, "walls");
+  const auto given = arguments.Take<std::vector<py::object>>("walls");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
     const Numbers points = Numbers::ensure((*given)[k]);  // Null unless it is an array of numbers.
@@ -147,8 +123,8 @@ void TakeWalls(py::dict& arguments, std::vector<Wall>& walls) {
 }
 
 // Reads the walls of a surface: {"axis": "z", "position": 0, "side": "above"}.
-void TakeWallPlanes(py::dict& arguments, std::vector<WallPlane>& planes) {
-  const auto given = Take<std::vector<py::object>>(arguments, "wall_planes");
+void TakeWallPlanes(Arguments& arguments, std::vector<WallPlane>& planes) {
+  const auto given = arguments.Take<std::vector<py::object>>("wall_planes");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
     const std::string field = "wall_planes[" + std::to_string(k) + "]";
@@ -158,11 +134,11 @@ void TakeWallPlanes(py::dict& arguments, std::vector<WallPlane>& planes) {
                     "('above' or 'below')"));
     };
     if (!py::isinstance<py::dict>((*given)[k])) refuse();
-    py::dict dict = (*given)[k].cast<py::dict>().attr("copy")();
-    const auto axis = AxisOf(Take<std::string>(dict, "axis").value_or(""));
-    const auto position = Take<double>(dict, "position");
-    const std::string side = Take<std::string>(dict, "side").value_or("above");
-    if (!axis || !position || (side != "above" && side != "below") || !dict.empty()) refuse();
+    Arguments left((*given)[k].attr("copy")(), field + ".");
+    const auto axis = AxisOf(left.Take<std::string>("axis").value_or(""));
+    const auto position = left.Take<double>("position");
+    const std::string side = left.Take<std::string>("side").value_or("above");
+    if (!axis || !position || (side != "above" && side != "below") || !left.empty()) refuse();
     planes.push_back({static_cast<int>(*axis), *position, side == "above"});
   }
 }
@@ -208,7 +184,7 @@ py::object ToPython(const std::optional<PeriodicBox>& box) {
   return dict;
 }
 
-ReconstructionParameters TakeParameters(py::dict arguments) {
+ReconstructionParameters TakeParameters(Arguments& arguments) {
   ReconstructionParameters parameters;
   TakeNamed(arguments, "output", parameters.output);
   TakeNamed(arguments, "placement", parameters.placement);
@@ -217,29 +193,29 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   TakeNamed(arguments, "spacing_rule", parameters.spacing_rule);
   TakeNamed(arguments, "sizes", parameters.sizes);
   TakeNamed(arguments, "boundary", parameters.boundary);
-  TakeInto(arguments, "spacing", parameters.spacing);
-  TakeInto(arguments, "kernel_radius", parameters.kernel_radius);
-  TakeInto(arguments, "cell_size", parameters.cell_size);
-  TakeInto(arguments, "reference_radius", parameters.reference_radius);
-  TakeInto(arguments, "surface_offset", parameters.surface_offset);
-  TakeInto(arguments, "attribute_tolerance", parameters.attribute_tolerance);
-  TakeInto(arguments, "normal_memory", parameters.normal_memory);
-  TakeInto(arguments, "clean", parameters.clean);
-  TakeInto(arguments, "min_component_area", parameters.min_component_area);
-  TakeInto(arguments, "min_component_particles", parameters.min_component_particles);
+  arguments.TakeInto("spacing", parameters.spacing);
+  arguments.TakeInto("kernel_radius", parameters.kernel_radius);
+  arguments.TakeInto("cell_size", parameters.cell_size);
+  arguments.TakeInto("reference_radius", parameters.reference_radius);
+  arguments.TakeInto("surface_offset", parameters.surface_offset);
+  arguments.TakeInto("attribute_tolerance", parameters.attribute_tolerance);
+  arguments.TakeInto("normal_memory", parameters.normal_memory);
+  arguments.TakeInto("clean", parameters.clean);
+  arguments.TakeInto("min_component_area", parameters.min_component_area);
+  arguments.TakeInto("min_component_particles", parameters.min_component_particles);
   TakeSlice(arguments, parameters.slice);
-  TakeInto(arguments, "isovalue", parameters.isovalue);
+  arguments.TakeInto("isovalue", parameters.isovalue);
   TakeSections(arguments, parameters.sections);
-  TakeInto(arguments, "phase_attribute", parameters.phase_attribute);
+  arguments.TakeInto("phase_attribute", parameters.phase_attribute);
   TakeBox(arguments, parameters.box);
-  TakeInto(arguments, "noise_filter", parameters.noise_filter);
+  arguments.TakeInto("noise_filter", parameters.noise_filter);
   TakeWalls(arguments, parameters.walls);
   TakeWallPlanes(arguments, parameters.wall_planes);
-  TakeInto(arguments, "wall_phases", parameters.wall_phases);
-  TakeInto(arguments, "thinning_distance", parameters.surface.thinning_distance);
-  TakeInto(arguments, "max_drop_particles", parameters.surface.max_drop_particles);
-  TakeInto(arguments, "simplify", parameters.surface.simplify);
-  TakeInto(arguments, "min_component_volume", parameters.surface.min_component_volume);
+  arguments.TakeInto("wall_phases", parameters.wall_phases);
+  arguments.TakeInto("thinning_distance", parameters.surface.thinning_distance);
+  arguments.TakeInto("max_drop_particles", parameters.surface.max_drop_particles);
+  arguments.TakeInto("simplify", parameters.surface.simplify);
+  arguments.TakeInto("min_component_volume", parameters.surface.min_component_volume);
   // The core has the same rule. This error also names the function that estimates a spacing.
   if (!parameters.spacing && (parameters.output == Output::kSurface || parameters.slice)) {
     Raise(Invalid(kReasonOutOfRange, "parameters.spacing", "absent",
@@ -249,78 +225,71 @@ ReconstructionParameters TakeParameters(py::dict arguments) {
   return parameters;
 }
 
-client::Credentials TakeCredentials(py::dict arguments) {
+client::Credentials TakeCredentials(Arguments& arguments) {
   client::Credentials credentials = client::CredentialsFromEnvironment();
-  TakeInto(arguments, "ca_file", credentials.ca_file);
-  TakeInto(arguments, "cert_file", credentials.cert_file);
-  TakeInto(arguments, "key_file", credentials.key_file);
-  if (auto file = Take<std::string>(arguments, "token_file")) {
+  arguments.TakeInto("ca_file", credentials.ca_file);
+  arguments.TakeInto("cert_file", credentials.cert_file);
+  arguments.TakeInto("key_file", credentials.key_file);
+  if (auto file = arguments.Take<std::string>("token_file")) {
     credentials.token_file = *std::move(file);
     credentials.token.clear();  // Replaces the token of the environment.
   }
-  TakeInto(arguments, "token", credentials.token);
+  arguments.TakeInto("token", credentials.token);
   credentials.tls |= !credentials.ca_file.empty() || !credentials.cert_file.empty();
-  TakeInto(arguments, "tls", credentials.tls);
+  arguments.TakeInto("tls", credentials.tls);
   return credentials;
 }
 
-client::StreamOptions TakeStreamOptions(py::dict arguments, bool latest) {
+client::StreamOptions TakeStreamOptions(Arguments& arguments, bool latest) {
   client::StreamOptions options;
   if (latest) options.reconnect.give_up_after = client::kShortPatience;
   options.parameters = TakeParameters(arguments);
   options.credentials = TakeCredentials(arguments);
   options.outputs.mesh = options.parameters.fill != Fill::kNone;
-  TakeInto(arguments, "normals", options.outputs.normals);
+  arguments.TakeInto("normals", options.outputs.normals);
   TakeNamed(arguments, "coordinates", options.outputs.coordinates);
-  TakeInto(arguments, "echo_particles", options.outputs.echo_particles);
-  TakeInto(arguments, "attributes", options.outputs.attributes);
-  TakeInto(arguments, "name", options.name);
-  TakeInto(arguments, "labels", options.labels);
-  TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
-  TakeInto(arguments, "checkpoint_interval", options.checkpoint_interval);
-  TakeInto(arguments, "max_held_bytes", options.max_held_bytes);
+  arguments.TakeInto("echo_particles", options.outputs.echo_particles);
+  arguments.TakeInto("attributes", options.outputs.attributes);
+  arguments.TakeInto("name", options.name);
+  arguments.TakeInto("labels", options.labels);
+  arguments.TakeInto("fallback_addresses", options.fallback_addresses);
+  arguments.TakeInto("checkpoint_interval", options.checkpoint_interval);
+  arguments.TakeInto("max_held_bytes", options.max_held_bytes);
   TakeTime(arguments, "connect_timeout", options.connect_timeout);
   TakeTime(arguments, "deadline", options.deadline);
   TakeTime(arguments, "give_up_after", options.reconnect.give_up_after);
   TakeTime(arguments, "send_timeout", options.send_timeout);
-  TakeInto(arguments, "part", options.parts.part);
-  TakeInto(arguments, "parts", options.parts.parts);
-  TakeInto(arguments, "parts_token", options.parts.token);
+  arguments.TakeInto("part", options.parts.part);
+  arguments.TakeInto("parts", options.parts.parts);
+  arguments.TakeInto("parts_token", options.parts.token);
   TakeTime(arguments, "part_timeout", options.parts.timeout);
   return options;
 }
 
-client::WatcherOptions TakeWatcherOptions(py::dict arguments) {
+client::WatcherOptions TakeWatcherOptions(Arguments& arguments) {
   client::WatcherOptions options;
   options.credentials = TakeCredentials(arguments);
-  if (const auto mode = Take<std::string>(arguments, "mode")) {
+  if (const auto mode = arguments.Take<std::string>("mode")) {
     if (*mode == "every") {
       options.mode = client::WatchMode::kEvery;
     } else if (*mode != "latest") {
       Raise(Invalid("UNSUPPORTED", "mode", *mode, "must be latest, every"));
     }
   }
-  TakeInto(arguments, "credits", options.credits);
-  TakeInto(arguments, "from_sequence", options.from_sequence);
+  arguments.TakeInto("credits", options.credits);
+  arguments.TakeInto("from_sequence", options.from_sequence);
   LevelOfDetail level;
-  TakeInto(arguments, "max_error", level.max_error);
-  TakeInto(arguments, "max_triangles", level.max_triangles);
+  arguments.TakeInto("max_error", level.max_error);
+  arguments.TakeInto("max_triangles", level.max_triangles);
   if (level.max_error || level.max_triangles) {
     RaiseUnlessOk(Validate(level));
     options.level_of_detail = level;
   }
-  TakeInto(arguments, "fallback_addresses", options.fallback_addresses);
+  arguments.TakeInto("fallback_addresses", options.fallback_addresses);
   TakeTime(arguments, "connect_timeout", options.connect_timeout);
   TakeTime(arguments, "deadline", options.deadline);
   TakeTime(arguments, "give_up_after", options.rejoin.give_up_after);
   return options;
-}
-
-void ExpectNothingElse(const py::dict& arguments, const char* function) {
-  for (const auto& [name, value] : arguments) {
-    throw py::type_error(std::string(function) + "() got an unexpected keyword argument '" +
-                         py::str(name).cast<std::string>() + "'");
-  }
 }
 
 py::dict ToDict(const ReconstructionParameters& parameters) {

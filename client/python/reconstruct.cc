@@ -9,6 +9,7 @@
 
 #include "client/library/gather.h"
 #include "client/library/owned_frame.h"
+#include "client/python/arguments.h"
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
@@ -25,25 +26,38 @@ namespace {
 
 namespace py = pybind11;
 
+// The keyword arguments of a Reconstructor.
+struct SequenceOptions {
+  unsigned threads = 0;  // 0: one per processor.
+  VirtualPlaneVariant variant;
+  ReconstructionParameters parameters;
+};
+
+SequenceOptions TakeSequenceOptions(Arguments& arguments) {
+  SequenceOptions options;
+  arguments.TakeInto("threads", options.threads);
+  options.variant = TakeResearch(arguments);
+  options.parameters = TakeParameters(arguments);
+  return options;
+}
+
 // Implements partiemc.Reconstructor. Any thread may call it; calls run one after another.
 class Sequence {
  public:
-  explicit Sequence(py::dict arguments) {
-    if (arguments.contains("threads")) {
-      const auto threads = arguments.attr("pop")("threads").cast<std::optional<unsigned>>();
-      if (threads.value_or(0) > 0) arena_ = std::make_unique<Arena>(*threads);
-    }
-    const VirtualPlaneVariant variant = TakeResearch(arguments);
-    auto reconstructor = CreateVariant(TakeParameters(arguments), variant);
-    ExpectNothingElse(arguments, "reconstruct");
+  explicit Sequence(Arguments arguments) {
+    const SequenceOptions options = TakeSequenceOptions(arguments);
+    auto reconstructor = CreateVariant(options.parameters, options.variant);
+    arguments.ExpectNothingElse("reconstruct");
     RaiseUnlessOk(reconstructor.status());
     reconstructor_ = *std::move(reconstructor);
+    if (options.threads > 0) arena_ = std::make_unique<Arena>(options.threads);
   }
 
-  std::shared_ptr<PythonResult> Reconstruct(const py::object& positions, std::optional<double> time,
-                                            const py::object& volumes, const py::object& ids,
-                                            const py::object& velocities,
+  std::shared_ptr<PythonResult> Reconstruct(const py::object& positions,
+                                            const py::object& given_time, const py::object& volumes,
+                                            const py::object& ids, const py::object& velocities,
                                             const py::object& attributes, const py::object& box) {
+    const auto time = AsOptional<double>(given_time, "time");
     const PythonParticles particles(positions, volumes, ids, velocities, attributes, box);
     const auto result = results_->Take();
     absl::Status status;
@@ -128,11 +142,14 @@ void DefineReconstructor(py::module_& module) {
              "The spacing of particles, world units: from the density inside of bodies, within "
              "3 percent; in thin sheets the median distance to the nearest neighbour. Positions "
              "(N, 3) fill space. None if no two particles differ.");
+  module.attr("reconstructor_options") =
+      NamesTakenBy([](Arguments& none) { TakeSequenceOptions(none); });
   py::class_<Sequence>(module, "Reconstructor",
                        "Reconstructs the frames of one simulation in this process. Outlines are "
                        "steady and rings are tracked, as in a stream.")
-      .def(py::init(
-               [](const py::kwargs& arguments) { return std::make_unique<Sequence>(arguments); }),
+      .def(py::init([](const py::kwargs& arguments) {
+             return std::make_unique<Sequence>(Arguments(arguments));
+           }),
            "Reconstructor(*, spacing=None, threads=None, placement='virtual-plane', "
            "fill='greedy', ...): see partiemc.reconstruct.")
       .def("reconstruct", &Sequence::Reconstruct, "positions"_a, "time"_a = py::none(),

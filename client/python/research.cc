@@ -48,10 +48,11 @@ py::dict Defaults() {
 
 }  // namespace
 
-VirtualPlaneVariant TakeResearch(py::dict& arguments) {
+VirtualPlaneVariant TakeResearch(Arguments& arguments) {
   VirtualPlaneVariant variant;
-  if (!arguments.contains("_research")) return variant;
-  py::dict research(arguments.attr("pop")("_research").attr("copy")());
+  const auto given = arguments.Take<py::dict>("_research");
+  if (!given) return variant;
+  py::dict research(given->attr("copy")());
   TakeAll<bool>(research, "steps", AllSteps(), variant.steps);
   TakeAll<double>(research, "constants", AllConstants(), variant.constants);
   if (!research.empty()) throw py::key_error("_research: must be a dict of steps, constants");

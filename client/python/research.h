@@ -4,6 +4,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include "client/python/arguments.h"
 #include "core/internal/research.h"
 
 namespace partiemc::python {
@@ -11,7 +12,7 @@ namespace partiemc::python {
 /// Removes `_research` from `arguments`: a dict {"steps": {name: bool}, "constants": {name: float}}
 /// of the values that differ from the default. Raises KeyError for an unknown name, TypeError for a
 /// value of the wrong type.
-VirtualPlaneVariant TakeResearch(pybind11::dict& arguments);
+VirtualPlaneVariant TakeResearch(Arguments& arguments);
 
 /// Adds `_research()`, which returns the steps and constants with their default values in the same
 /// form, and `_count_t_junctions(result)`.

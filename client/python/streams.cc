@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/python/arguments.h"
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
@@ -49,9 +50,13 @@ constexpr std::chrono::seconds kDropWait(10);
 
 class ProducerStream {
  public:
-  ProducerStream(const std::optional<std::string>& address, bool latest, py::dict arguments) {
+  ProducerStream(const py::object& given_address, const py::object& is_latest,
+                 const py::dict& given) {
+    const auto address = AsOptional<std::string>(given_address, "address");
+    const bool latest = As<bool>(is_latest, "latest");
+    Arguments arguments(given);
     const client::StreamOptions options = TakeStreamOptions(arguments, latest);
-    ExpectNothingElse(arguments, "connect");
+    arguments.ExpectNothingElse("connect");
     if (latest && options.parts.parts > 0) {
       throw py::value_error("latest: True; must be False where frames come in parts");
     }
@@ -75,10 +80,11 @@ class ProducerStream {
     stream_.reset();
   }
 
-  std::optional<std::uint64_t> Send(const py::object& positions, std::optional<double> time,
+  std::optional<std::uint64_t> Send(const py::object& positions, const py::object& given_time,
                                     const py::object& volumes, const py::object& ids,
                                     const py::object& velocities, const py::object& attributes,
                                     const py::object& box) {
+    const auto time = AsOptional<double>(given_time, "time");
     const PythonParticles particles(positions, volumes, ids, velocities, attributes, box);
     absl::StatusOr<std::uint64_t> sent = 0;
     {
@@ -101,7 +107,8 @@ class ProducerStream {
   }
 
   // Returns null (None) if no event arrives in time, or if the event is the acceptance of a part.
-  std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
+  std::shared_ptr<PythonResult> Receive(const py::object& given_wait) {
+    const auto wait = AsOptional<double>(given_wait, "wait");
     const auto result = results_->Take();
     const ReceiveMark mark(*this);
     for (;;) {
@@ -133,7 +140,7 @@ class ProducerStream {
   }
 
   std::shared_ptr<PythonResult> Next() {
-    return NextBy([this] { return Receive(std::nullopt); });
+    return NextBy([this] { return Receive(py::none()); });
   }
 
   void Finish() {
@@ -298,9 +305,11 @@ class ProducerStream {
   bool finished_ ABSL_GUARDED_BY(sending_) = false;
 };
 
-py::list Streams(const std::optional<std::string>& address, const py::kwargs& arguments) {
+py::list Streams(const py::object& given_address, const py::kwargs& given) {
+  const auto address = AsOptional<std::string>(given_address, "address");
+  Arguments arguments(given);
   const client::Credentials credentials = TakeCredentials(arguments);
-  ExpectNothingElse(arguments, "streams");
+  arguments.ExpectNothingElse("streams");
   absl::StatusOr<std::vector<client::StreamSummary>> streams;
   {
     const py::gil_scoped_release others_may_run;
@@ -319,9 +328,11 @@ py::list Streams(const std::optional<std::string>& address, const py::kwargs& ar
   return list;
 }
 
-py::dict Server(const std::optional<std::string>& address, const py::kwargs& arguments) {
+py::dict Server(const py::object& given_address, const py::kwargs& given) {
+  const auto address = AsOptional<std::string>(given_address, "address");
+  Arguments arguments(given);
   const client::Credentials credentials = TakeCredentials(arguments);
-  ExpectNothingElse(arguments, "server");
+  arguments.ExpectNothingElse("server");
   absl::StatusOr<client::ServerInfo> info;
   {
     const py::gil_scoped_release others_may_run;
@@ -342,11 +353,14 @@ py::dict Server(const std::optional<std::string>& address, const py::kwargs& arg
 
 void DefineStreams(py::module_& module) {
   using namespace py::literals;
+  module.attr("stream_options") =
+      NamesTakenBy([](Arguments& none) { TakeStreamOptions(none, false); });
+  module.attr("credentials") = NamesTakenBy(&TakeCredentials);
   py::class_<ProducerStream>(
       module, "Stream",
       "A stream to a server, opened by partiemc.connect. One thread may send while another "
       "receives. It survives lost connections; each frame is answered once.")
-      .def(py::init<const std::optional<std::string>&, bool, py::dict>())
+      .def(py::init<const py::object&, const py::object&, const py::dict&>())
       .def("send", &ProducerStream::Send, "positions"_a, "time"_a = py::none(), py::kw_only(),
            "volumes"_a = py::none(), "ids"_a = py::none(), "velocities"_a = py::none(),
            "attributes"_a = py::none(), "box"_a = py::none(),
@@ -385,7 +399,8 @@ void DefineStreams(py::module_& module) {
       .def_property_readonly("latest", &ProducerStream::IsLatest,
                              "Whether only the newest frame is kept while the stream is busy.")
       .def_property_readonly("window", &ProducerStream::Window, "Limit of in_flight.")
-      .def_property_readonly("id", &ProducerStream::Id, "The current id in the server's log and in partiemc.streams. Each "
+      .def_property_readonly("id", &ProducerStream::Id,
+                             "The current id in the server's log and in partiemc.streams. Each "
                              "reconnection, which `receive` makes, gives the stream a new id.")
       .def_property_readonly("parameters", &ProducerStream::Parameters,
                              "Resolved parameters by name.")

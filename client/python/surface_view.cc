@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "client/python/arguments.h"
 #include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "client/python/parts.h"
@@ -23,7 +24,8 @@ static_assert(offsetof(ShellMeasures, centroid_z) ==
               offsetof(ShellMeasures, centroid_x) + 2 * sizeof(double));
 
 // The triangles of one shell.
-py::array ShellTriangles(const SurfaceView& view, py::ssize_t index) {
+py::array ShellTriangles(const SurfaceView& view, const py::object& number) {
+  auto index = As<py::ssize_t>(number, "shell");
   const Surface& surface = view.part;
   const auto count = static_cast<py::ssize_t>(surface.ShellCount());
   if (index < 0) index += count;

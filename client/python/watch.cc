@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "client/python/arguments.h"
 #include "client/python/errors.h"
 #include "client/python/parameters.h"
 #include "client/python/results.h"
@@ -24,9 +25,12 @@ using std::chrono::milliseconds;
 
 class Watch {
  public:
-  Watch(const std::optional<std::string>& address, const std::string& name, py::dict arguments) {
+  Watch(const py::object& given_address, const py::object& given_name, const py::dict& given) {
+    const auto address = AsOptional<std::string>(given_address, "address");
+    const auto name = As<std::string>(given_name, "name");
+    Arguments arguments(given);
     const client::WatcherOptions options = TakeWatcherOptions(arguments);
-    ExpectNothingElse(arguments, "watch");
+    arguments.ExpectNothingElse("watch");
     absl::StatusOr<std::unique_ptr<client::Watcher>> watcher = nullptr;
     {
       const py::gil_scoped_release others_may_run;
@@ -41,7 +45,8 @@ class Watch {
   }
 
   // Returns null (None) if no frame arrives in time. Raises EOFError at the end of the watch.
-  std::shared_ptr<PythonResult> Receive(std::optional<double> wait) {
+  std::shared_ptr<PythonResult> Receive(const py::object& given_wait) {
+    const auto wait = AsOptional<double>(given_wait, "wait");
     const auto result = results_->Take();
     client::WatchedFrame frame;
     frame.frame = std::move(result->frame);
@@ -73,7 +78,7 @@ class Watch {
   }
 
   std::shared_ptr<PythonResult> Next() {
-    return NextBy([this] { return Receive(std::nullopt); });
+    return NextBy([this] { return Receive(py::none()); });
   }
 
   void Cancel() {
@@ -94,10 +99,11 @@ class Watch {
 
 void DefineWatch(py::module_& module) {
   using namespace py::literals;
+  module.attr("watch_options") = NamesTakenBy(&TakeWatcherOptions);
   py::class_<Watch>(
       module, "Watch",
       "An iterator over the results of another producer's stream, opened by partiemc.watch.")
-      .def(py::init<const std::optional<std::string>&, const std::string&, py::dict>())
+      .def(py::init<const py::object&, const py::object&, const py::dict&>())
       .def(
           "receive", &Watch::Receive, "wait"_a = py::none(),
           "The next Result; None if no frame arrives within `wait` seconds. Raises EOFError at the "

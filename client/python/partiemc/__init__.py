@@ -17,7 +17,7 @@ Any strides are allowed; a stream copies each number once, into the message. Arr
 read-only views that keep the memory of their result alive.
 """
 
-from . import _convert
+from . import _calls, _convert, _native
 from ._errors import Error, PartiemcWarning
 from ._native import (Mesh, Reconstructor, Result, Rings, Stream, Surface, Watch, estimate_spacing,
                       server, streams, version as __version__)
@@ -147,6 +147,7 @@ def connect(address=None, *, latest=False, **options):
 def watch(address, name, **options):
     """Returns a Watch, an iterator over the results of another producer's stream `name`.
 
+    address: see connect.
     mode: "latest" receives the newest frame when a credit is free; "every" receives every frame, and
         a slow watcher is disconnected.
     credits: number of frames that may be on the way or waiting to be received; 2.
@@ -236,3 +237,25 @@ Mesh.to_triangulation = _convert.to_triangulation
 Mesh.to_meshio = _convert.to_meshio
 Result.to_svg = _convert.to_svg
 Surface.to_meshio = _convert.surface_to_meshio
+
+
+def _check_calls():
+    """Makes each public function, also of classes, name a wrong argument."""
+    reconstruction = _native.reconstructor_options
+    options = {"reconstruct": reconstruction, "connect": _native.stream_options,
+               "watch": _native.watch_options, "streams": _native.credentials,
+               "server": _native.credentials}
+    for name in __all__:
+        value = globals()[name]
+        if not isinstance(value, type):
+            globals()[name] = _calls.checked(value, name, options.get(name))
+        elif not issubclass(value, Exception):
+            for method in [each for each in vars(value) if not each.startswith("_")]:
+                function = getattr(value, method)
+                if callable(function):
+                    setattr(value, method, _calls.checked(function, f"{name}.{method}"))
+    Reconstructor.__init__ = _calls.checked(Reconstructor.__init__, "Reconstructor.__init__",
+                                            reconstruction)
+
+
+_check_calls()

@@ -28,7 +28,7 @@ class Wheel(unittest.TestCase):
                 listed = {line.split(",")[0] for line in wheel.read(record).decode().splitlines()}
                 wheel.extractall(f"{folder}/site")
             self.assertEqual(listed, names)
-            for name in ("__init__.py", "__init__.pyi", "py.typed", "_errors.py", "_convert.py"):
+            for name in ("__init__.py", "__init__.pyi", "py.typed", "_errors.py", "_calls.py", "_convert.py"):
                 self.assertIn(f"partiemc/{name}", names)
             script = ("import partiemc; r = partiemc.reconstruct([[0, 0], [1, 0], [0, 1], [1, 1]],"
                       " spacing=1); print(partiemc.__file__, len(r.rings))")
