@@ -23,18 +23,23 @@ std::string ShapeOf(const py::array& array) {
   return shape + ")";
 }
 
-[[noreturn]] void RaiseCount(const char* field, std::string value, std::string rule) {
+[[noreturn]] void RaiseCount(const std::string& field, std::string value, std::string rule) {
   Raise(Invalid(kReasonCount, field, std::move(value), std::move(rule)));
 }
 
-[[noreturn]] void RaiseNoNumbers(const char* field, const py::object& type) {
+[[noreturn]] void RaiseNoNumbers(const std::string& field, const py::object& type) {
   Raise(Invalid("UNSUPPORTED", field, py::str(type), "must be an array of numbers"));
 }
 
-py::array AsArray(const py::object& given, const char* field) {
-  py::array array = py::array::ensure(given);
-  if (!array) RaiseNoNumbers(field, py::object(py::type::of(given).attr("__name__")));
-  return array;
+// Raises ValueError if `given` is a masked array (numpy.ma) with masked entries.
+void ExpectNoMask(py::handle given, const std::string& field) {
+  if (!py::isinstance<py::array>(given) || !py::hasattr(given, "compressed")) return;
+  const auto masked =
+      py::module_::import("numpy").attr("ma").attr("count_masked")(given).cast<std::size_t>();
+  if (masked == 0) return;
+  throw py::value_error(absl::StrCat(
+      "argument '", field, "' has ", masked, " masked entries: select the entries without a mask ",
+      "first, for the same particles in all arrays of a frame (numpy.ma.getmaskarray)"));
 }
 
 // True if `type` is T in this machine's byte order, under any of NumPy's names. Reads the attribute
@@ -61,6 +66,20 @@ bool IsTuple(const py::object& given) {
 }
 
 }  // namespace
+
+py::array AsArray(const py::object& given, const std::string& field) {
+  ExpectNoMask(given, field);
+  if (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given)) {
+    for (const py::handle one : given) ExpectNoMask(one, field);
+  }
+  py::array array = py::array::ensure(given);
+  if (!array) RaiseNoNumbers(field, py::object(py::type::of(given).attr("__name__")));
+  if (array.dtype().kind() == 'c') {
+    throw py::type_error("argument '" + field + "' has complex numbers: pass real numbers, such " +
+                         "as their real parts (array.real)");
+  }
+  return array;
+}
 
 PythonParticles::PythonParticles(const py::object& positions, const py::object& volumes,
                                  const py::object& ids, const py::object& velocities,
@@ -104,9 +123,9 @@ void PythonParticles::TakeAttributes(const py::dict& given) {
       Raise(Invalid("UNSUPPORTED", "attributes", py::str(key), "must have names that are strings"));
     }
     client::AttributeArrays attribute{.name = names_.emplace_back(py::str(key)), .x = {}};
-    const bool is_scalar = !IsTuple(values) && AsArray(values, "attributes").ndim() == 1;
-    const auto columns =
-        is_scalar ? std::vector{Numbers(values, "attributes")} : Columns(values, "attributes");
+    const std::string field = "attributes['" + names_.back() + "']";
+    const bool is_scalar = !IsTuple(values) && AsArray(values, field).ndim() == 1;
+    const auto columns = is_scalar ? std::vector{Numbers(values, field)} : Columns(values, field);
     attribute.x = columns[0];
     if (columns.size() > 1) attribute.y = columns[1];
     if (columns.size() > 2) attribute.z = columns[2];
@@ -117,7 +136,7 @@ void PythonParticles::TakeAttributes(const py::dict& given) {
 
 // Converts `given` to float or double in this machine's byte order, unless it already has one of
 // these types.
-py::array PythonParticles::Real(const py::array& given, const char* field) {
+py::array PythonParticles::Real(const py::array& given, const std::string& field) {
   py::array array = given;
   if (!Is<float>(array.dtype()) && !Is<double>(array.dtype())) {
     array = py::array_t<double, py::array::forcecast>::ensure(given);
@@ -127,13 +146,14 @@ py::array PythonParticles::Real(const py::array& given, const char* field) {
   return array;
 }
 
-void PythonParticles::ExpectCount(const py::array& array, const char* field) const {
+void PythonParticles::ExpectCount(const py::array& array, const std::string& field) const {
   if (counted_ && static_cast<std::size_t>(array.shape(0)) != arrays_.count) {
     RaiseCount(field, ShapeOf(array), absl::StrCat("must have ", arrays_.count, " rows"));
   }
 }
 
-std::vector<client::Reals> PythonParticles::Columns(const py::object& given, const char* field) {
+std::vector<client::Reals> PythonParticles::Columns(const py::object& given,
+                                                    const std::string& field) {
   std::vector<client::Reals> columns;
   if (IsTuple(given)) {
     for (const py::handle one : given) {
@@ -159,7 +179,7 @@ std::vector<client::Reals> PythonParticles::Columns(const py::object& given, con
   return columns;
 }
 
-client::Reals PythonParticles::Numbers(const py::object& given, const char* field) {
+client::Reals PythonParticles::Numbers(const py::object& given, const std::string& field) {
   const py::array any = AsArray(given, field);
   if (any.ndim() != 1) RaiseCount(field, ShapeOf(any), "must have one dimension");
   ExpectCount(any, field);

@@ -13,6 +13,15 @@
 
 namespace partiemc::python {
 
+/// Converts `given` to an array. Raises partiemc.Error (UNSUPPORTED) if this is impossible,
+/// TypeError for complex numbers and ValueError for masked entries, because a conversion to numbers
+/// would drop imaginary parts and masks. `field` names the argument.
+pybind11::array AsArray(const pybind11::object& given, const std::string& field);
+
+/// The numbers of an array as float64 in C order.
+using ContiguousNumbers =
+    pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
 /// The arrays of a frame, and a view of them. NumPy arrays are used in place with any strides.
 /// Lists, and arrays of other number types or byte orders, are converted to float64, which copies
 /// them. Requires the GIL, except arrays().
@@ -21,7 +30,7 @@ class PythonParticles {
   /// `positions`: (N, 2), (N, 3), or a tuple of two or three arrays of N coordinates. `volumes`: N.
   /// `ids`: N integers of 32 or 64 bits; others are refused. `velocities`: like positions.
   /// `attributes`: a dict from names to (N,), (N, 2), (N, 3), or tuples. `box`: see BoxOf. None:
-  /// absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED).
+  /// absent. Raises partiemc.Error (reasons COUNT, UNSUPPORTED) and the errors of AsArray.
   PythonParticles(const pybind11::object& positions, const pybind11::object& volumes,
                   const pybind11::object& ids, const pybind11::object& velocities,
                   const pybind11::object& attributes,
@@ -33,12 +42,12 @@ class PythonParticles {
 
  private:
   // The columns of `given`: two or three views of the same length.
-  std::vector<client::Reals> Columns(const pybind11::object& given, const char* field);
+  std::vector<client::Reals> Columns(const pybind11::object& given, const std::string& field);
   void TakeAttributes(const pybind11::dict& given);
-  client::Reals Numbers(const pybind11::object& given, const char* field);
+  client::Reals Numbers(const pybind11::object& given, const std::string& field);
   client::Ids WholeNumbers(const pybind11::object& given);
-  pybind11::array Real(const pybind11::array& given, const char* field);
-  void ExpectCount(const pybind11::array& array, const char* field) const;
+  pybind11::array Real(const pybind11::array& given, const std::string& field);
+  void ExpectCount(const pybind11::array& array, const std::string& field) const;
 
   std::vector<pybind11::array> kept_;  // Keeps the memory of the views.
   std::vector<std::string> names_;     // Of attributes_.

@@ -56,8 +56,13 @@ bool IsDiscArgument(std::string_view name) {
   return name == "positions" || name == "radii" || name == "volumes";
 }
 
-template <typename T>
-using Numbers = py::array_t<T, py::array::c_style | py::array::forcecast>;
+// The array of numbers `name`.
+ContiguousNumbers NumbersOf(const py::kwargs& given, const char* name) {
+  const py::array array = AsArray(given[name], name);
+  const auto numbers = ContiguousNumbers::ensure(array);
+  if (!numbers) RaiseType(name, "an array of numbers", array);
+  return numbers;
+}
 
 OwnedDiscs DiscsOf(const py::kwargs& given) {
   const bool by_radius = given.contains("radii");
@@ -65,8 +70,8 @@ OwnedDiscs DiscsOf(const py::kwargs& given) {
     Raise(Invalid(kReasonCount, "gauge packing", "wrong arguments",
                   "takes positions, and either radii or volumes"));
   }
-  const auto centres = given["positions"].cast<Numbers<double>>();
-  const auto sizes = given[by_radius ? "radii" : "volumes"].cast<Numbers<double>>();
+  const ContiguousNumbers centres = NumbersOf(given, "positions");
+  const ContiguousNumbers sizes = NumbersOf(given, by_radius ? "radii" : "volumes");
   if (centres.ndim() != 2 || centres.shape(1) != 2 || sizes.ndim() != 1 ||
       sizes.shape(0) != centres.shape(0)) {
     Raise(Invalid(kReasonCount, "gauge packing", "arrays of other shapes",

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/library/adapters/seconds.h"
+#include "client/python/arrays.h"
 #include "client/python/errors.h"
 #include "partiemc/client/parameter_names.h"
 
@@ -107,15 +108,15 @@ void TakeSections(Arguments& arguments, std::vector<Section>& sections) {
 
 // Reads the points of each wall: x0, y0, x1, y1, ..., or an (n, 2) array.
 void TakeWalls(Arguments& arguments, std::vector<Wall>& walls) {
-  using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
   const auto given = arguments.Take<std::vector<py::object>>("walls");
   if (!given) return;
   for (std::size_t k = 0; k < given->size(); ++k) {
-    const Numbers points = Numbers::ensure((*given)[k]);  // Null unless it is an array of numbers.
+    const std::string field = "walls[" + std::to_string(k) + "]";
+    const auto points =
+        ContiguousNumbers::ensure(AsArray((*given)[k], field));  // Null: no numbers.
     const bool is_flat = points && points.ndim() == 1;
     if (!is_flat && !(points && points.ndim() == 2 && points.shape(1) == 2)) {
-      Raise(Invalid("UNSUPPORTED", "walls[" + std::to_string(k) + "]",
-                    py::repr((*given)[k]).cast<std::string>(),
+      Raise(Invalid("UNSUPPORTED", field, py::repr((*given)[k]).cast<std::string>(),
                     "must be the points of a wall: [x0, y0, x1, y1, ...] or an (n, 2) array"));
     }
     walls.push_back({.points = {points.data(), points.data() + points.size()}});

@@ -200,5 +200,53 @@ class Signatures(unittest.TestCase):
                 sequence.reconstruct(frame)
 
 
+class Arrays(Calls):
+    def test_masked_entries_are_refused(self):
+        masked = numpy.ma.masked_greater(block(), 20)
+        count = numpy.ma.count_masked(masked)
+        x, y = masked.T
+        values = numpy.ma.masked_array(numpy.ones(len(masked)), [True] + [False] * (len(masked) - 1))
+        rest = ("masked entries: select the entries without a mask first, for the same particles in all "
+                "arrays of a frame (numpy.ma.getmaskarray)")
+        for positions in (masked, masked.astype("f4"), masked.astype(int)):
+            self.assert_raises(f"argument 'positions' has {count} {rest}", partiemc.reconstruct, positions,
+                               spacing=1, error=ValueError)
+            self.assert_raises(f"argument 'positions' has {count} {rest}", partiemc.estimate_spacing, positions,
+                               error=ValueError)
+        for positions in ((x, y), [x, y], list(masked)):
+            with self.assertRaisesRegex(ValueError, "'positions' has .* masked entries"):
+                partiemc.reconstruct(positions, spacing=1)
+        for name in ("volumes", "ids", "attributes", "velocities"):
+            given = {"volumes": values, "ids": values.astype(int), "attributes": {"p": values},
+                     "velocities": numpy.ma.masked_array(block(), values.mask.repeat(2))}[name]
+            with self.assertRaisesRegex(ValueError, f"'{name}.* has .* masked entries"):
+                partiemc.reconstruct(block(), spacing=1, **{name: given})
+        with self.assertRaisesRegex(ValueError, r"'walls\[0\]' has 1 masked"):
+            partiemc.Reconstructor(walls=[numpy.ma.masked_array([0, 0, 1, 0], [0, 0, 0, 1])])
+        rings = partiemc.reconstruct(block(), spacing=1).rings
+        with self.assertRaisesRegex(ValueError, "'radii' has 1 masked"):
+            rings.gauge("packing", min_x=0, min_y=0, max_x=9, max_y=9, positions=block(), radii=values)
+
+    def test_masked_arrays_without_masked_entries_count(self):
+        expected = partiemc.reconstruct(block(), spacing=1)
+        for mask in (numpy.ma.nomask, numpy.zeros(block().shape, bool)):
+            result = partiemc.reconstruct(numpy.ma.masked_array(block(), mask), spacing=1)
+            self.assertEqual(result.rings_digest, expected.rings_digest)
+
+    def test_complex_numbers_are_refused(self):
+        ones = numpy.ones(len(block()), "c8")
+        rest = "has complex numbers: pass real numbers, such as their real parts (array.real)"
+        for positions in (block().astype(complex), (ones, ones), [[1j, 0], [0, 1]]):
+            self.assert_raises(f"argument 'positions' {rest}", partiemc.reconstruct, positions)
+            self.assert_raises(f"argument 'positions' {rest}", partiemc.estimate_spacing, positions)
+        for name, given in (("volumes", ones), ("ids", ones), ("velocities", (ones, ones))):
+            self.assert_raises(f"argument '{name}' {rest}", partiemc.reconstruct, block(), **{name: given})
+        self.assert_raises(f"argument 'attributes['p']' {rest}", partiemc.reconstruct, block(),
+                           attributes={"p": ones})
+        self.assert_raises(f"argument 'walls[0]' {rest}", partiemc.Reconstructor, walls=[[0, 0, 1j, 0]])
+        self.assert_raises("argument 'time' must be a number, not 1j", partiemc.Reconstructor().reconstruct,
+                           block(), 1j)
+
+
 if __name__ == "__main__":
     unittest.main()
