@@ -115,6 +115,10 @@ int Serve(const CommandLine& line) {
   SetUpLogging(line.log_level, line.log_format);
   FlushLogOnAbort();
   RefuseTraces();
+  for (const std::string& name : line.ignored_variables) {
+    LogEvent(spdlog::level::warn, "variable ignored",
+             {{"name", name}, {"error", "the server has no option of this name"}});
+  }
   LimitReadsOfGrpc();
   auto server = Server::Start(line.server);
   if (!server.ok()) return Fail(server.status());
@@ -167,6 +171,10 @@ int main(int argc, char** argv) {
   if (!line.health_check) return Serve(line);
   SetUpLogging("off", LogFormat::kText);  // gRPC would print every attempt to standard error.
   RefuseTraces();
+  for (const std::string& name : line.ignored_variables) {
+    LogEvent(spdlog::level::warn, "variable ignored",
+             {{"name", name}, {"error", "the server has no option of this name"}});
+  }
   const auto status =
       CheckHealth(*line.health_check, kHealthCheckTimeout, line.health_check_security);
   return status.ok() ? 0 : Fail(status);

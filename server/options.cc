@@ -1,15 +1,19 @@
 #include "server/options.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <thread>
 #include <utility>
 
 #include "server/base/machine_limits.h"
 #include "server/limit_flags.h"
+#include "server/option_sources.h"
 #include "server/security/caller_terms.h"
 #include "server/stream/memory_plan.h"
 
@@ -34,9 +38,10 @@ constexpr char kDescription[] =
 constexpr char kFooter[] =
     "\nEvery option can also be set in the file of --config (TOML or INI, `max-streams = 8`) or "
     "by\n"
-    "its environment variable. The command line takes precedence, then the file. GRPC_TRACE is\n"
-    "ignored, because gRPC's traces print tokens. Clients that are silent for 25 s are\n"
-    "disconnected.\n"
+    "its environment variable. The command line takes precedence, then the file. The server does\n"
+    "not start with an unknown option in the file, or with a misspelt variable PARTIEMC_*. Other\n"
+    "unknown variables are logged, except service links of Kubernetes. GRPC_TRACE is ignored,\n"
+    "because gRPC's traces print tokens. Clients that are silent for 25 s are disconnected.\n"
     "Exit codes: 0 success, 1 failed or cut off after --grace-seconds, 2 invalid command line,\n"
     "128 + N ended by a second signal N.";
 
@@ -254,23 +259,26 @@ std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(std::ceil(seconds * 1000)));
 }
 
-std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
+std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app, const ConfigFile& file) {
+  const auto wrong = [&](const std::string& flag, const absl::Status& status) {
+    return Wrong(file.WithLine(flag + ": " + std::string(status.message())));
+  };
   const auto address = ParseAddress(raw.address);
-  if (!address.ok()) return Wrong(std::string(address.status().message()));
+  if (!address.ok()) return wrong("--address", address.status());
   raw.line.server.address = *address;
   if (app.count("--health-check") > 0) {
     const auto asked = raw.health_check.empty() ? address : ParseAddress(raw.health_check);
-    if (!asked.ok()) return Wrong(std::string(asked.status().message()));
+    if (!asked.ok()) return wrong("--health-check", asked.status());
     raw.line.health_check = *asked;
   }
   if (!raw.metrics.empty()) {
     const auto metrics = ParseAddress(raw.metrics);
-    if (!metrics.ok()) return Wrong("--metrics: " + std::string(metrics.status().message()));
+    if (!metrics.ok()) return wrong("--metrics", metrics.status());
     raw.line.server.metrics = *metrics;
   }
   if (!raw.web.empty()) {
     const auto web = ParseAddress(raw.web);
-    if (!web.ok()) return Wrong("--web: " + std::string(web.status().message()));
+    if (!web.ok()) return wrong("--web", web.status());
     raw.web_options.address = *web;
     raw.line.server.web = raw.web_options;
     if (!raw.web_port_file.empty()) raw.line.web_port_file = raw.web_port_file;
@@ -278,13 +286,14 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   if (!raw.nats.empty()) raw.line.server.nats = raw.nats;
   if (!raw.advertise.empty()) {
     const auto advertised = ParseAddress(raw.advertise);
-    if (!advertised.ok())
-      return Wrong("--advertise: " + std::string(advertised.status().message()));
+    if (!advertised.ok()) return wrong("--advertise", advertised.status());
     if (!advertised->unix_path.empty() || advertised->port == 0) {
-      return Wrong("--advertise must be HOST:PORT, with the port that clients connect to");
+      return Wrong(
+          file.WithLine("--advertise must be HOST:PORT, with the port that clients connect to"));
     }
-    if (raw.nats.empty())
-      return Wrong("--advertise needs --nats, which sends the address to replicas");
+    if (raw.nats.empty()) {
+      return Wrong(file.WithLine("--advertise needs --nats, which sends the address to replicas"));
+    }
     raw.line.server.advertised_address = raw.advertise;
   }
   if (!raw.tls.certificate.empty()) raw.line.server.tls = raw.tls;
@@ -305,9 +314,7 @@ std::variant<CommandLine, EarlyExit> Check(Raw raw, const CLI::App& app) {
   limits.idle.streaming = Milliseconds(raw.limits.idle_seconds);
   limits.max_frame_bytes = FrameBytes(raw.limits, limits);
   const auto caller_limits = ParseCallerQuota(raw.limits.caller_limits);
-  if (!caller_limits.ok()) {
-    return Wrong("--caller-limits: " + std::string(caller_limits.status().message()));
-  }
+  if (!caller_limits.ok()) return wrong("--caller-limits", caller_limits.status());
   raw.line.server.caller_limits = *caller_limits;
   if (raw.print_memory_plan) {
     return EarlyExit{0, MemoryPlan(limits, raw.line.server.threads).ToString()};
@@ -346,9 +353,10 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   app.set_config("--config", config != nullptr ? config : "",
                  "Read options from this file (environment: PARTIEMC_CONFIG)",
                  /*config_required=*/config != nullptr);
-  // Without this mode, CLI11 would ignore a misspelt option in the file.
-  app.allow_config_extras(CLI::config_extras_mode::error);
+  const auto file = std::make_shared<ConfigFile>(app);
+  app.config_formatter(file);
   app.set_version_flag("--version", "partiemc-server " PARTIEMC_VERSION);
+  UnknownVariables unknown = FindUnknownVariables(app, environ);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -356,9 +364,12 @@ std::variant<CommandLine, EarlyExit> ParseCommandLine(int argc, const char* cons
   } catch (const CLI::CallForVersion&) {
     return EarlyExit{0, "partiemc-server " PARTIEMC_VERSION "\n"};
   } catch (const CLI::ParseError& error) {
-    return Wrong(error.what());
+    // A misspelt variable can be the cause of the other error.
+    return Wrong(unknown.error ? *unknown.error : file->WithLine(error.what()));
   }
-  return Check(std::move(raw), app);
+  if (unknown.error) return Wrong(*unknown.error);
+  raw.line.ignored_variables = std::move(unknown.ignored);
+  return Check(std::move(raw), app, *file);
 }
 
 }  // namespace partiemc::server

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "server/rpc/health_check.h"
 #include "server/server.h"
@@ -28,6 +29,8 @@ struct CommandLine {
   HealthCheckSecurity health_check_security;
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
+  /// Environment variables PARTIEMC_* that set no option, for a warning (FindUnknownVariables).
+  std::vector<std::string> ignored_variables;
 };
 
 /// Returned if the process must print `text` and exit with `code`.

@@ -236,7 +236,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         "",
         {"base", "telemetry", "security", "connections", "compute", "watch", "stream", "relay",
          "calls", "web", "rpc"},
-        {"limit_flags", "main", "options", "server", "server_metrics"}},
+        {"limit_flags", "main", "option_sources", "options", "server", "server_metrics"}},
        {"client/",
         "",
         {std::string(kPublicHeaders), "library", "c", "python", "output", "input", "recording",

@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/machine_limits.h"
@@ -16,7 +18,11 @@
 namespace partiemc::server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 std::variant<CommandLine, EarlyExit> Parse(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "partiemc-server");
@@ -203,10 +209,100 @@ TEST(CommandLineOptions, WhatIsWrongIsToldInOneLine) {
   EXPECT_THAT(Refused({"--config", "/no/such/file"}), HasSubstr("/no/such/file"));
 }
 
-TEST(CommandLineOptions, AMisspeltOptionInTheFileIsRefused) {
+// The error for a config file with this text, after "partiemc-server: FILE".
+std::string RefusedFile(const std::string& text, std::vector<const char*> flags = {}) {
   const support::TemporaryFolder folder;
-  const std::string path = folder.Write("options.toml", "max-stream = 8\n");
-  EXPECT_THAT(Refused({"--config", path.c_str()}), HasSubstr("max-stream"));
+  const std::string path = folder.Write("options.toml", text);
+  flags.insert(flags.end(), {"--config", path.c_str()});
+  const std::string error = Refused(flags);
+  const std::string begin = "partiemc-server: " + path;
+  EXPECT_THAT(error, StartsWith(begin));
+  return error.substr(std::min(begin.size(), error.size()));
+}
+
+TEST(ConfigFile, NamesLineAndNearestOptionOfAnUnknownOne) {
+  const std::string error = RefusedFile("threads = 1\n\nmax-stream = 8\n");
+  EXPECT_THAT(error, StartsWith(":3: "));
+  EXPECT_THAT(error, HasSubstr("`max-stream`"));
+  EXPECT_THAT(error, HasSubstr("`max-streams`"));
+  EXPECT_THAT(RefusedFile("max-streams 8\n"), StartsWith(":1: "));
+  EXPECT_THAT(RefusedFile("\n\"quoted\",\n"),
+              StartsWith(":2: there is no option `\"quoted\",`; see"));
+  EXPECT_THAT(RefusedFile("threads = 1\n[server]\nmax-streams = 8\n"), StartsWith(":2: [server]"));
+  EXPECT_THAT(RefusedFile("'max-streams' = 0\n"), StartsWith(":1: "));
+  EXPECT_THAT(RefusedFile("\na.b = 1\n"), StartsWith(":2: [a]"));
+  EXPECT_THAT(RefusedFile("threads = 1\nhealth-check = \"a:1\"\n"), StartsWith(":2: "));
+}
+
+TEST(ConfigFile, NamesLineOfAWrongValue) {
+  EXPECT_THAT(RefusedFile("# threads\nmax-streams = 0\nthreads = 1\n"),
+              StartsWith(":2: --max-streams"));
+  EXPECT_THAT(RefusedFile("web-host = \"a\"\nweb = \"b:1\"\nmax-streams = \"x\"\n"),
+              StartsWith(":3: "));
+  EXPECT_THAT(RefusedFile("log-level = \"info\"\ninsecure = maybe\n"), StartsWith(":2: "));
+  EXPECT_THAT(RefusedFile("threads = 1\naddress = \"nowhere\"\n"), StartsWith(":2: --address: "));
+  EXPECT_THAT(RefusedFile("\nadvertise = \"a.example:1\"\n"), StartsWith(":2: --advertise"));
+  EXPECT_THAT(RefusedFile("caller-limits = \"streams=x\"\n"), StartsWith(":1: --caller-limits"));
+  EXPECT_THAT(RefusedFile("threads = 1\ntls-cert = \"a.pem\"\n"), StartsWith(":2: --tls-cert"));
+}
+
+TEST(ConfigFile, IsNotBlamedForAValueOfTheCommandLine) {
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "max-streams = 8\nthreads = 1\n");
+  EXPECT_THAT(Refused({"--config", path.c_str(), "--max-streams", "0"}),
+              StartsWith("partiemc-server: --max-streams"));
+}
+
+TEST(ConfigFile, IsNamedByTheEnvironmentInErrors) {
+  const support::TemporaryFolder folder;
+  const std::string path = folder.Write("options.toml", "max-streams = 0\n");
+  const Environment config("PARTIEMC_CONFIG", path.c_str());
+  EXPECT_THAT(Refused({}), StartsWith("partiemc-server: " + path + ":1: --max-streams"));
+}
+
+TEST(EnvironmentVariables, AMisspeltOneIsRefusedWithTheNearestOption) {
+  for (const auto& [misspelt, nearest] :
+       {std::pair("PARTIEMC_MEMORY_BUGDET", "PARTIEMC_MEMORY_BUDGET (--memory-budget)"),
+        std::pair("PARTIEMC_TOKEN_FIEL", "PARTIEMC_TOKEN_FILE (--token-file)"),
+        std::pair("PARTIEMC_TOKENS_FILE", "PARTIEMC_TOKEN_FILE (--token-file)"),
+        std::pair("PARTIEMC_CONFIGS", "PARTIEMC_CONFIG (--config)"),
+        std::pair("PARTIEMC_MAXSTREAMS", "PARTIEMC_MAX_STREAMS (--max-streams)")}) {
+    const Environment variable(misspelt, "secret");
+    const std::string error = Refused({});
+    EXPECT_THAT(error, HasSubstr(misspelt));
+    EXPECT_THAT(error, HasSubstr(nearest));
+    EXPECT_THAT(error, Not(HasSubstr("secret")));
+    EXPECT_EQ(std::get<EarlyExit>(Parse({"--help"})).code, 0);
+  }
+  const Environment empty("PARTIEMC_TOKEN_FIEL", "");
+  EXPECT_THAT(Parsed({}).ignored_variables, IsEmpty());
+}
+
+TEST(EnvironmentVariables, OthersAreReported) {
+  EXPECT_THAT(Parsed({}).ignored_variables, IsEmpty());
+  // Variables of the client, of the proxy, of an image.
+  const std::vector<const char*> names = {"PARTIEMC_SERVER", "PARTIEMC_TOKEN",  "PARTIEMC_TLS",
+                                          "PARTIEMC_TLS_CA", "PARTIEMC_PROXY",  "PARTIEMC_PORT",
+                                          "PARTIEMC_BIN",    "PARTIEMC_VERSION"};
+  for (const char* name : names) {
+    const Environment variable(name, "1");
+    EXPECT_THAT(Parsed({}).ignored_variables, ElementsAre(name));
+  }
+}
+
+TEST(EnvironmentVariables, ServiceLinksOfKubernetesAreNoErrors) {
+  for (const std::string service : {"PARTIEMC", "PARTIEMC_WEB", "PARTIEMC_MAX_STREAMS"}) {
+    for (const auto& [name, value] :
+         {std::pair("_SERVICE_HOST", "10.0.0.11"), std::pair("_SERVICE_PORT", "50051"),
+          std::pair("_SERVICE_PORT_GRPC", "50051"), std::pair("_PORT", "tcp://10.0.0.11:50051"),
+          std::pair("_PORT_50051_TCP", "tcp://10.0.0.11:50051"),
+          std::pair("_PORT_50051_TCP_PROTO", "tcp"), std::pair("_PORT_50051_TCP_PORT", "50051"),
+          std::pair("_PORT_50051_TCP_ADDR", "10.0.0.11")}) {
+      const std::string variable = service + name;
+      const Environment link(variable.c_str(), value);
+      EXPECT_THAT(Parsed({}).ignored_variables, IsEmpty()) << variable;
+    }
+  }
 }
 
 TEST(CommandLineOptions, HelpAndVersionArePrintedAndAreNoError) {

@@ -74,6 +74,16 @@ TEST(Log, HasNoTokenAlthoughEveryTraceOfGrpcIsAskedFor) {
   }
 }
 
+TEST(Log, NamesVariablesThatSetNoOption) {
+  ServingProcess server(
+      {}, {.environment = {"PARTIEMC_VERSION=value-of-it", "PARTIEMC_SERVICE_HOST=10.0.0.11"}});
+  server.process().Signal(SIGTERM);
+  ASSERT_EQ(server.process().WaitFor(kPatience), 0);
+  EXPECT_THAT(server.process().Output(),
+              AllOf(HasSubstr("variable ignored name=PARTIEMC_VERSION"),
+                    Not(HasSubstr("value-of-it")), Not(HasSubstr("PARTIEMC_SERVICE_HOST"))));
+}
+
 class LogPipe : public ::testing::Test {
  protected:
   LogPipe() {
