@@ -64,12 +64,13 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   void OnHeader(error_code error) {
     namespace http = boost::beast::http;
     if (error == http::error::header_limit || error == http::error::buffer_overflow) {
-      return Refuse(
-          {WebRefusal::kTooLarge, 431, "the request must have a header of at most 16 KiB"});
+      return Refuse({WebRefusal::kTooLarge, 431, "header", "longer",
+                     "the request must have a header of at most 16 KiB"});
     }
     if (error.category() == make_error_code(http::error::bad_method).category() &&
         error != http::error::end_of_stream && error != http::error::partial_message) {
-      return Refuse({WebRefusal::kMalformed, 400, "the request must be HTTP/1.1"});
+      return Refuse({WebRefusal::kMalformed, 400, "request", error.message(),
+                     "the request must be HTTP/1.1"});
     }
     if (error) return connection_->Close();
     WebAnswer answer = Understand(ViewOf(*parser_), connection_->context.rules);
@@ -82,7 +83,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
   }
 
   static WebRefused FullServer() {
-    return {WebRefusal::kFull, 503,
+    return {WebRefusal::kFull, 503, "connection", "reserved for health checks",
             "the client must try again later: all connections of the server, or of this address, "
             "have calls"};
   }
@@ -95,8 +96,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   void Do(const WebRefused& refused) {
     closes_ = closes_ || refused.http_status == 400;  // The request's end is unknown.
-    connection_->context.Refuse(refused.refusal, connection_->peer,
-                                absl::InvalidArgumentError(refused.rule));
+    connection_->context.Refuse(refused.refusal, connection_->peer, ToStatus(refused));
     Send(ResponseTo(refused));
   }
   void Do(const WebHealth& health) { Send(ResponseTo(health, connection_->context.draining())); }
@@ -132,8 +132,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
 
   void BeginSocket(Methods::Method method, CallOrigin origin, bool from_page) {
     if (connection_->buffer.size() > 0) {
-      return Refuse(
-          {WebRefusal::kMalformed, 400, "the client must wait for the answer to its handshake"});
+      return Refuse({WebRefusal::kMalformed, 400, "handshake", "followed by other bytes",
+                     "the client must wait for the answer to its handshake"});
     }
     std::make_shared<SocketCall<Stream>>(connection_, std::move(parser_), from_page)
         ->Begin(method, std::move(origin));

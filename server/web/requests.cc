@@ -10,7 +10,9 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "common/address.h"
+#include "common/printable.h"
 #include "common/text.h"
+#include "partiemc/status.h"
 
 namespace partiemc::server {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 constexpr char kMessageType[] = "application/x-protobuf";
 constexpr std::string_view kCalls = "/v1/";
 constexpr std::size_t kMostPathBytes = 1024;
+constexpr std::size_t kMostValueBytes = 100;  // Of a refused value in the log.
 constexpr char kMustBeGet[] = "the request must be a GET";
 
 struct Route {
@@ -35,8 +38,35 @@ constexpr std::string_view kSpace = " \t";
 
 std::string Lower(std::string_view text) { return absl::AsciiStrToLower(std::string(text)); }
 
-WebAnswer RefusedAs(WebRefusal refusal, unsigned status, std::string rule, std::string allow = {}) {
-  return {.what = WebRefused{refusal, status, std::move(rule), std::move(allow)}};
+// A part of a request with its name, for the log.
+struct NamedValue {
+  std::string field, value;
+};
+
+// Makes a value of the request printable and short. A name and a password before '@' and a query
+// are left out, because they may be secrets.
+NamedValue PrintableValue(std::string field, std::string_view value) {
+  value = value.substr(0, value.find('?'));
+  if (const auto at = value.rfind('@'); at != std::string_view::npos) value.remove_prefix(at + 1);
+  std::string shown = Printable(value.substr(0, kMostValueBytes));
+  if (value.size() > kMostValueBytes) shown += "...";
+  return {std::move(field), shown.empty() ? "empty" : std::move(shown)};
+}
+
+NamedValue HeaderCount(std::string field, std::size_t headers) {
+  return {std::move(field), absl::StrCat(headers, headers == 1 ? " header" : " headers")};
+}
+
+WebAnswer RefusedAs(WebRefusal refusal, unsigned status, NamedValue part, std::string rule,
+                    std::string allow = {}) {
+  return {.what = WebRefused{refusal, status, std::move(part.field), std::move(part.value),
+                             std::move(rule), std::move(allow)}};
+}
+
+// A request whose HTTP method is not one of `allow`.
+WebAnswer RefusedMethod(const WebRequest& request, std::string rule, std::string allow) {
+  return RefusedAs(WebRefusal::kMalformed, 405, PrintableValue("method", request.method),
+                   std::move(rule), std::move(allow));
 }
 
 // Returns the value of a header that occurs exactly once, otherwise nothing. Programs differ in
@@ -126,15 +156,19 @@ bool IsLocalHost(std::string_view host) {
 
 WebAnswer SocketCallOf(const WebRequest& request, WebMethod method, bool from_page) {
   if (request.method != "GET") {
-    return RefusedAs(WebRefusal::kMalformed, 405,
-                     "the method must be called by GET, as a WebSocket", "GET");
+    return RefusedMethod(request, "the method must be called by GET, as a WebSocket", "GET");
   }
   if (!request.is_upgrade || request.has_body) {
-    return RefusedAs(WebRefusal::kMalformed, 426, "the method must be called as a WebSocket");
+    return RefusedAs(WebRefusal::kMalformed, 426,
+                     {"Upgrade", request.is_upgrade ? "a request with a body" : "none"},
+                     "the method must be called as a WebSocket");
   }
   OfferedProtocols offered = ParseProtocols(request.protocols);
   if (!offered.ours || offered.is_malformed) {
+    // The value may contain a token.
     return RefusedAs(WebRefusal::kMalformed, 400,
+                     {"Sec-WebSocket-Protocol",
+                      offered.ours ? "a wrong token, or several" : "without partiemc.v1"},
                      "the request must offer the subprotocol partiemc.v1, and at most one "
                      "bearer.TOKEN beside it, TOKEN in base64url without padding");
   }
@@ -149,12 +183,13 @@ WebAnswer SocketCallOf(const WebRequest& request, WebMethod method, bool from_pa
 WebAnswer PostCallOf(const WebRequest& request, WebMethod method, bool from_page) {
   if (request.method == "OPTIONS" && from_page) return {.what = WebPreflight{}};
   if (request.method != "POST") {
-    return RefusedAs(WebRefusal::kMalformed, 405, "the method must be called by POST", "POST");
+    return RefusedMethod(request, "the method must be called by POST", "POST");
   }
   const std::string_view type =
       request.content_type.substr(0, request.content_type.find_first_of("; \t"));
   if (Lower(type) != kMessageType) {
     return RefusedAs(WebRefusal::kMalformed, 415,
+                     PrintableValue("Content-Type", request.content_type),
                      "the request must have Content-Type application/x-protobuf");
   }
   return {.what = WebCall{.method = method,
@@ -168,6 +203,12 @@ std::string_view Name(WebRefusal refusal) {
   static constexpr std::array<std::string_view, kWebRefusals> kNames = {
       "full", "timeout", "malformed", "origin", "host", "call", "too_large", "bad_message"};
   return kNames[static_cast<std::size_t>(refusal)];
+}
+
+absl::Status ToStatus(const WebRefused& refused) {
+  return ViolationError(
+      absl::StatusCode::kInvalidArgument,
+      {std::string(Name(refused.refusal)), refused.field, refused.value, refused.rule});
 }
 
 bool IsHostAllowed(std::string_view host, const WebRules& rules) {
@@ -187,44 +228,53 @@ WebAnswer Understand(const WebRequest& request, const WebRules& rules) {
   const bool head_only = request.method == "HEAD";
   const bool is_get = request.method == "GET" || head_only;
   if (request.hosts.size() != 1) {
-    return RefusedAs(WebRefusal::kMalformed, 400, "the request must have one header Host");
+    return RefusedAs(WebRefusal::kMalformed, 400, HeaderCount("Host", request.hosts.size()),
+                     "the request must have one header Host");
   }
   const auto& encodings = request.transfer_encodings;
   if (encodings.size() > 1 || (encodings.size() == 1 && encodings.front() != "chunked")) {
     return RefusedAs(WebRefusal::kMalformed, 400,
+                     encodings.size() > 1 ? HeaderCount("Transfer-Encoding", encodings.size())
+                                          : PrintableValue("Transfer-Encoding", encodings.front()),
                      "the request must have no Transfer-Encoding, or once and exactly `chunked`");
   }
   // HTTP/1.0 has no Transfer-Encoding, so a proxy could find another end of the request.
   if (!encodings.empty() && request.is_before_1_1) {
-    return RefusedAs(WebRefusal::kMalformed, 400,
+    return RefusedAs(WebRefusal::kMalformed, 400, {"version", "HTTP/1.0"},
                      "a request with a Transfer-Encoding must be HTTP/1.1");
   }
   if (path == "/v1/healthz") {
-    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
+    if (!is_get) return RefusedMethod(request, kMustBeGet, "GET, HEAD");
     return {.what = WebHealth{.head_only = head_only}};
   }
   if (!IsHostAllowed(request.hosts.front(), rules)) {
     return RefusedAs(
-        WebRefusal::kHost, 421,
+        WebRefusal::kHost, 421, PrintableValue("Host", request.hosts.front()),
         "the request must name localhost, an address of this server, or one of its --web-host");
   }
   if (!path.starts_with(kCalls)) {
-    if (!is_get) return RefusedAs(WebRefusal::kMalformed, 405, kMustBeGet, "GET, HEAD");
+    if (!is_get) return RefusedMethod(request, kMustBeGet, "GET, HEAD");
     auto file = FilePathOf(request.target);
-    if (!file) return RefusedAs(WebRefusal::kMalformed, 404, "there is no such page");
+    if (!file) {
+      return RefusedAs(WebRefusal::kMalformed, 404, PrintableValue("path", path),
+                       "there is no such page");
+    }
     return {.what = WebFile{.path = *std::move(file),
                             .head_only = head_only,
                             .takes_gzip = AcceptsGzip(request.accept_encoding)}};
   }
   const auto route = std::ranges::find(kRoutes, path, &Route::path);
   if (route == kRoutes.end()) {
-    return RefusedAs(WebRefusal::kMalformed, 404, "there is no such method");
+    return RefusedAs(WebRefusal::kMalformed, 404, PrintableValue("path", path),
+                     "there is no such method");
   }
   const bool from_page = !request.origins.empty();
   if (from_page && (request.origins.size() > 1 ||
                     !IsOriginAllowed(request.origins.front(), request.hosts.front(), rules))) {
     return RefusedAs(
         WebRefusal::kOrigin, 403,
+        request.origins.size() > 1 ? HeaderCount("Origin", request.origins.size())
+                                   : PrintableValue("Origin", request.origins.front()),
         "the method must be called by a page of this server, or of an origin of its --web-origin");
   }
   WebAnswer answer = route->is_socket ? SocketCallOf(request, route->method, from_page)

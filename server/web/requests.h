@@ -81,9 +81,14 @@ struct WebPreflight {};
 struct WebRefused {
   WebRefusal refusal = WebRefusal::kMalformed;
   unsigned http_status = 400;
+  std::string field;       ///< Name of a header, or "method", "path", "request" and the like.
+  std::string value;       ///< Printable, at most 100 bytes of the request, without secrets.
   std::string rule;        ///< The broken rule, a sentence of one line.
   std::string allow = {};  ///< Allowed methods; set for 405.
 };
+
+/// The refusal for the log. Its reason is the name in the metrics.
+absl::Status ToStatus(const WebRefused& refused);
 
 struct WebAnswer {
   std::variant<WebRefused, WebHealth, WebFile, WebPreflight, WebCall> what;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/printable.h"
 #include "fuzz/choices.h"
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
@@ -34,6 +35,9 @@ void RequireSound(const server::WebRequest& request, const server::WebAnswer& an
     Require(!refused->rule.empty() && refused->rule.size() < 200 &&
                 refused->rule.find('\n') == std::string::npos,
             "a refusal says what was asked for in a line");
+    Require(!refused->field.empty() && !refused->value.empty() && IsPrintable(refused->value) &&
+                refused->value.size() < 1000,
+            "the log shows a refused value in a line");
     Require(!Name(refused->refusal).empty(), "a refusal is counted");
   }
   if (const auto* const file = std::get_if<server::WebFile>(&answer.what)) {

@@ -1,13 +1,18 @@
 // Interpreting requests to the gateway, including forbidden ones.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
+#include "partiemc/status.h"
 #include "server/web/requests.h"
 
 namespace partiemc::server {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(FilePathOf, NamesAFileBelowTheFolderOrNothing) {
   EXPECT_EQ(FilePathOf("/"), "index.html");
@@ -179,6 +184,62 @@ TEST(Understand, KnowsWhatIsAskedFor) {
   EXPECT_EQ(refused(), 421u);
   request.hosts = {"localhost", "localhost"};
   EXPECT_EQ(refused(), 400u);
+}
+
+// The field and value of a refusal, as they are in the log.
+std::string Shown(const WebRequest& request) {
+  const auto refused = std::get<WebRefused>(Understand(request, {}).what);
+  return std::string(
+      ToStatus(refused).message().substr(0, refused.field.size() + 2 + refused.value.size() + 2));
+}
+
+TEST(WebRefused, NamesFieldAndValue) {
+  const WebRequest good{.method = "GET", .target = "/v1/watch", .hosts = {"localhost"}};
+  const auto shown = [&](auto change) {
+    WebRequest request = good;
+    change(request);
+    return Shown(request);
+  };
+  EXPECT_EQ(shown([](auto& r) { r.hosts = {"evil.example:1"}; }), "Host: evil.example:1; ");
+  EXPECT_EQ(shown([](auto& r) { r.hosts = {}; }), "Host: 0 headers; ");
+  EXPECT_EQ(shown([](auto& r) { r.origins = {"http://evil.example"}; }),
+            "Origin: http://evil.example; ");
+  EXPECT_EQ(shown([](auto& r) { r.target = "/v1/nothing"; }), "path: /v1/nothing; ");
+  EXPECT_EQ(shown([](auto& r) { r.target = "/.git/config"; }), "path: /.git/config; ");
+  EXPECT_EQ(shown([](auto& r) { r.method = "PUT"; }), "method: PUT; ");
+  EXPECT_EQ(shown([](auto&) {}), "Upgrade: none; ");
+  EXPECT_EQ(shown([](auto& r) { r.transfer_encodings = {"gzip"}; }), "Transfer-Encoding: gzip; ");
+  EXPECT_EQ(shown([](auto& r) { r.method = "POST", r.target = "/v1/info"; }),
+            "Content-Type: empty; ");
+  EXPECT_EQ(FindViolation(ToStatus(std::get<WebRefused>(Understand(good, {}).what)))->reason,
+            "malformed");
+}
+
+TEST(WebRefused, ValueIsShortAndPrintable) {
+  const std::string name(100, 'a');
+  EXPECT_EQ(Shown({.method = "GET", .target = "/", .hosts = {name + "b"}}),
+            "Host: " + name + "...; ");
+  EXPECT_EQ(Shown({.method = "GET", .target = "/", .hosts = {"a\x1b[2J\xff"}}),
+            "Host: a\\u001b[2J\\xff; ");
+}
+
+TEST(WebRefused, ValueHasNoSecret) {
+  for (const char* target :
+       {"/v1/x?token=secret", "/.x?token=secret", "http://user:secret@host/"}) {
+    EXPECT_THAT(Shown({.method = "GET", .target = target, .hosts = {"localhost"}}),
+                Not(HasSubstr("secret")));
+  }
+  WebRequest request{.method = "GET",
+                     .target = "/v1/watch",
+                     .hosts = {"localhost"},
+                     .authorizations = {"Bearer secret"},
+                     .protocols = {"bearer.secret, bearer.secret, partiemc.v1"},
+                     .is_upgrade = true};
+  EXPECT_EQ(Shown(request), "Sec-WebSocket-Protocol: a wrong token, or several; ");
+  request.protocols = {"bearer.c2VjcmV0"};
+  EXPECT_EQ(Shown(request), "Sec-WebSocket-Protocol: without partiemc.v1; ");
+  request.origins = {"https://user:secret@evil.example"};
+  EXPECT_THAT(Shown(request), Not(HasSubstr("secret")));
 }
 
 }  // namespace

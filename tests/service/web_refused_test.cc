@@ -10,12 +10,14 @@
 #include <utility>
 #include <vector>
 
+#include "service/captured_log.h"
 #include "service/web_testing.h"
 
 namespace partiemc::server {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // The head of a client frame that announces `bytes` without sending them.
 std::string Announcement(std::uint64_t bytes) {
@@ -105,6 +107,34 @@ TEST_F(WebGatewayTest, ABodyThatIsAnnouncedOrBecomesTooLargeIsRefused) {
   chunked.Send("1\r\nx\r\n");
   EXPECT_THAT(chunked.ReceiveUntil("}\n"), HasSubstr("413 Payload Too Large"));
   EXPECT_EQ(Refusals("too_large"), 2);
+}
+
+TEST_F(WebGatewayTest, RefusedValuesAreLoggedWithoutSecrets) {
+  const CapturedLog log;
+  Serve();
+  // Repeats the request, because the log holds back refusals above its rate.
+  const auto is_logged = [&](const std::string& head, const std::string& part) {
+    return Eventually([&] {
+      WebPipe pipe(web());
+      pipe.Send(head + "\r\n\r\n");
+      pipe.ReceiveUntil("\r\n");
+      return log.Count(part) > 0;
+    });
+  };
+  EXPECT_TRUE(is_logged("GET / HTTP/1.1\r\nHost: evil.example",
+                        "reason=host error=\"Host: evil.example; the request must name"));
+  EXPECT_TRUE(is_logged("GET /v1/watch HTTP/1.1\r\nHost: localhost\r\nOrigin: http://evil.example",
+                        "reason=origin error=\"Origin: http://evil.example; the method"));
+  EXPECT_TRUE(is_logged(
+      "GET /v1/none?token=secret HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer secret",
+      "reason=malformed error=\"path: /v1/none; there is"));
+  EXPECT_TRUE(is_logged(
+      "GET /v1/watch HTTP/1.1\r\nHost: localhost\r\nConnection: upgrade\r\nUpgrade: websocket\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+      "Sec-WebSocket-Protocol: partiemc.v1, bearer.secret, bearer.secret",
+      "error=\"Sec-WebSocket-Protocol: a wrong token, or several; the request"));
+  EXPECT_TRUE(is_logged("hello", "error=\"request: "));
+  EXPECT_THAT(log.Text(), Not(HasSubstr("secret")));
 }
 
 TEST_F(WebGatewayTest, WhatIsNoRequestOfOursIsRefusedAndCounted) {
