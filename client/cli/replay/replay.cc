@@ -11,6 +11,7 @@
 #include "client/cli/input_source.h"
 #include "client/cli/replay/frame_feeder.h"
 #include "client/cli/replay/looped_input.h"
+#include "client/cli/replay/missing_phases.h"
 #include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
 #include "client/library/adapters/seconds.h"
@@ -86,7 +87,8 @@ class Receiver {
         feeder_(feeder),
         outputs_(outputs),
         progress_(progress),
-        sections_in_plane_(SectionsInPlane(stream.info().parameters)) {}
+        sections_in_plane_(SectionsInPlane(stream.info().parameters)),
+        missing_phases_(stream.info().parameters) {}
 
   /// kGood at the end of the stream, when every frame has a response.
   ReplayEnd Run() {
@@ -106,6 +108,7 @@ class Receiver {
 
   std::uint64_t answered() const { return answered_; }
   std::uint64_t failed_checks() const { return failed_checks_; }
+  const MissingPhases& missing_phases() const { return missing_phases_; }
 
  private:
   absl::Status Take() {
@@ -118,6 +121,7 @@ class Receiver {
       return absl::OkStatus();
     }
     std::unique_ptr<RecordedFrame> frame = feeder_.TakeAnswered();
+    missing_phases_.Remove(*frame);
     absl::Status status;
     if (event_.kind == Event::Kind::kRefusal) {
       Refuse(frame->source, event_.message);
@@ -231,6 +235,7 @@ class Receiver {
   ReplayOutputs& outputs_;
   Progress& progress_;
   const std::vector<std::size_t> sections_in_plane_;
+  MissingPhases missing_phases_;
   Event event_;
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
@@ -245,10 +250,12 @@ std::string WhyEarly(ExitCode ended, const absl::Status& input_status) {
 
 // Prints warnings and failures of a complete replay. Returns the exit code.
 ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& parameters,
-                  const ReplayOutputs& outputs, std::uint64_t failed_checks) {
+                  const ReplayOutputs& outputs, const Receiver& receiver) {
+  const std::uint64_t failed_checks = receiver.failed_checks();
   const Summary& summary = outputs.summary();
   ExitCode code = kGood;
   for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
+  for (const std::string& warning : receiver.missing_phases().Warnings()) Complain(kGood, warning);
   if (summary.is_empty()) {
     const bool has_walls = !flags.walls.empty() || !flags.wall_planes.empty();
     Complain(kGood, Concat("no frame has ", flags.surface ? "a body" : "an outline",
@@ -382,7 +389,7 @@ int Replay(const ReplayFlags& given) {
   if (ended.code != kGood) return Complain(ended.code, ended.error);
   if (!input_status.ok()) return Complain(kInput, input_status);
   if (!finished.ok()) return kFailed;
-  return Conclude(flags, *parameters, *outputs, receiver.failed_checks());
+  return Conclude(flags, *parameters, *outputs, receiver);
 }
 
 }  // namespace partiemc::client

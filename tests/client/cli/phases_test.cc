@@ -45,6 +45,16 @@ TEST(PhasesReplay, EachPhaseIsASectionWithItsArea) {
   EXPECT_EQ(digests[0], digests[1]);
 }
 
+TEST(PhasesReplay, PhasesOfNoParticleAreReported) {
+  const support::TemporaryFolder folder;
+  WritePhases(folder.Path("frame.csv"));
+  ServerProgram server;
+  const Ran ran = RunPartiemc({"replay", folder.Path("frame.csv"), "--spacing", "1", "--phases",
+                               "type=1,5", "--server", server.address()});
+  EXPECT_EQ(ran.exit_code, 0) << ran.error;
+  EXPECT_THAT(ran.error, HasSubstr("partiemc: --phases type=5: no particle has this value\n"));
+}
+
 TEST(PhasesReplay, WrongPhasesAreRefused) {
   const support::TemporaryFolder folder;
   WritePhases(folder.Path("frame.csv"));

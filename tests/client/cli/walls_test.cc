@@ -161,6 +161,30 @@ TEST(WallsReplay, WallsThatLeaveNothingAreTold) {
   EXPECT_THAT(ran.error, HasSubstr("no frame has an outline; are the particles behind a wall?"));
 }
 
+TEST(WallsReplay, WallsOfNoParticleAreReported) {
+  const support::TemporaryFolder folder;
+  for (const int frame : {0, 1}) {
+    std::ofstream file(folder.Path("column_" + std::to_string(frame) + ".csv"));
+    file << "x,y,type\n";
+    // In frame 0 the lowest row is of type 1, in frame 1 of type 2.
+    for (int k = 0; k < 100; ++k) {
+      file << k % 10 + .5 << "," << k / 10 + .5 << "," << (k < 10 ? 1 + frame : 3) << "\n";
+    }
+  }
+  const auto errors = [&](std::vector<std::string> walls) {
+    std::vector<std::string> all = {
+        "replay", folder.Path("column_*.csv"), "--local", "--spacing", "1", "--quiet"};
+    all.insert(all.end(), walls.begin(), walls.end());
+    const Ran ran = RunPartiemc(all);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return ran.error;
+  };
+  EXPECT_EQ(errors({"--wall", "type=1,2"}), "");
+  EXPECT_EQ(errors({"--wall", "type=7"}), "partiemc: --wall type=7: no particle has this value\n");
+  EXPECT_EQ(errors({"--wall", "type=1,8", "--wall", "type=9"}),
+            "partiemc: --wall type=8,9: no particle has one of these values\n");
+}
+
 TEST(WallsReplay, WrongWallsAreRefused) {
   const support::TemporaryFolder folder;
   WriteColumn(folder.Path("column.csv"));
