@@ -1,9 +1,11 @@
 #include "client/cli/watch.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <random>
 #include <span>
 #include <string_view>
 #include <thread>
@@ -14,6 +16,7 @@
 #include "client/cli/console.h"
 #include "client/cli/stream_recorder.h"
 #include "client/library/adapters/seconds.h"
+#include "client/library/backoff.h"
 #include "client/output/progress.h"
 #include "client/output/text.h"
 #include "common/text.h"
@@ -27,8 +30,9 @@ using Clock = std::chrono::steady_clock;
 // Poll interval for Ctrl-C while waiting for a frame.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-// Pause between two searches for a stream that has not started, in poll intervals.
-constexpr int kSearchPause = 2;
+// Pauses between two searches for a stream that has not started. They double up to the longest. A
+// stream that ends within a pause is missed, and its history with it.
+constexpr std::chrono::milliseconds kFirstSearchPause(200), kLongestSearchPause(1000);
 
 FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
                      std::span<const float> particle_areas,
@@ -169,11 +173,23 @@ Progress::Options ProgressOptions(const WatchFlags& flags) {
   return options;
 }
 
+// Waits for `pause`. Returns false after Ctrl-C.
+bool Sleep(std::chrono::milliseconds pause) {
+  for (const auto end = Clock::now() + pause; !Interrupted();) {
+    const auto left = end - Clock::now();
+    if (left <= Clock::duration::zero()) return true;
+    std::this_thread::sleep_for(std::min<Clock::duration>(left, kPollInterval));
+  }
+  return false;
+}
+
 // Opens the watch. With --wait it retries until the stream exists, even if the server becomes
 // unreachable in between, for example to restart. Shows `progress` from the first retry on. Errors:
 // as Watcher::Open; CANCELLED after Ctrl-C.
 absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
                                                     std::optional<Progress>& progress) {
+  Backoff backoff({.first_pause = kFirstSearchPause, .longest_pause = kLongestSearchPause},
+                  /*address_count=*/1, std::random_device()());
   for (bool waited = false;; waited = true) {
     auto watcher = OpenWatcher(flags);
     const bool absent =
@@ -181,10 +197,7 @@ absl::StatusOr<std::unique_ptr<Watcher>> OpenOrWait(const WatchFlags& flags,
     if (!flags.wait || !absent) return watcher;
     if (!progress) progress.emplace(ProgressOptions(flags));
     progress->Wait(Concat("waiting for the stream to start: ", OneLine(watcher.status())));
-    for (int k = 0; k < kSearchPause; ++k) {
-      if (Interrupted()) return absl::CancelledError("interrupted");
-      std::this_thread::sleep_for(kPollInterval);
-    }
+    if (!Sleep(backoff.NextPause())) return absl::CancelledError("interrupted");
   }
 }
 

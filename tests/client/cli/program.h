@@ -54,6 +54,7 @@ class ServerProgram {
   ~ServerProgram();
   const std::string& address() const { return address_; }
   void Signal(int signal) const { program_.Signal(signal); }
+  std::string Log() const { return program_.Error(); }
 
  private:
   support::TemporaryFolder directory_;

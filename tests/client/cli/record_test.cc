@@ -247,6 +247,21 @@ TEST_F(Record, WaitEndsByCtrlC) {
   EXPECT_EQ(LastLine(watch.Error()), "partiemc: interrupted");
 }
 
+TEST_F(Record, WaitSearchesLessAndLessOften) {
+  Program watch(PARTIEMC_PROGRAM, {"watch", "block", "--server", server_.address(), "--wait"});
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  watch.Signal(SIGINT);
+  EXPECT_EQ(watch.Wait(), 130);
+  const std::string log = server_.Log();
+  std::size_t searches = 0;
+  for (auto at = log.find("watch refused"); at != log.npos;
+       at = log.find("watch refused", at + 1)) {
+    ++searches;
+  }
+  EXPECT_GE(searches, 3u);
+  EXPECT_LE(searches, 11u);  // Twenty with a constant pause of 200 ms.
+}
+
 TEST_F(Record, WaitNeedsAServer) {
   EXPECT_EQ(RunPartiemc({"watch", "block", "--server", "unix:/nowhere.sock", "--wait"}).exit_code,
             4);
