@@ -7,6 +7,7 @@ import { clipButton } from '../src/ui/export_panel';
 
 let formats: string[];
 let copies: number;
+let copied: { width: number; height: number };
 
 class Recorder {
   static isTypeSupported(format: string): boolean { return formats.includes(format); }
@@ -29,7 +30,11 @@ const context = new Proxy({}, { get: () => () => {}, set: () => true });
 const browser = {
   MediaRecorder: Recorder,
   document: {
-    createElement: () => ({ width: 0, height: 0, getContext: () => context, captureStream: () => ({}) }),
+    createElement: () => {
+      const canvas = { width: 0, height: 0, getContext: () => context, captureStream: () => ({}) };
+      copied = canvas;
+      return canvas;
+    },
   },
 };
 
@@ -64,6 +69,24 @@ test('a clip has a picture for every drawing, in the best format', async () => {
   assert.equal(video.type, 'video/webm');
   assert.match(await video.text(), /vp8/);
   assert.equal(drawn.drawn, null);
+});
+
+test('coarse pictures do not change the pixels of a clip, another size of the page does', async () => {
+  const drawn = scene();
+  const resize = (canvas: HTMLCanvasElement | Drawn['size'], width: number, height: number) =>
+    Object.assign(canvas, { width, height });
+  resize(drawn.canvas, 800, 600);
+  const recording = clip(drawn, () => []);
+  recording.start();
+  assert.deepEqual([copied.width, copied.height], [800, 600]);
+  resize(drawn.canvas, 400, 300);
+  drawn.drawn?.();
+  assert.deepEqual([copied.width, copied.height], [800, 600]);
+  resize(drawn.size, 200, 100);
+  resize(drawn.canvas, 200, 100);
+  drawn.drawn?.();
+  assert.deepEqual([copied.width, copied.height], [200, 100]);
+  await recording.stop();
 });
 
 test('a clip is recorded once at a time', async () => {

@@ -88,17 +88,23 @@ export class CanvasDrawing implements SpaceDrawing {
 
   show(surface: Surface | null): void {
     this.surface = surface;
-    this.drawn = '';
+    this.forget();
   }
 
   setTints(tints: Uint8Array): void {
     this.tints = tints;
-    this.drawn = '';
+    this.forget();
   }
 
   setSections(lines: readonly SectionLines[]): void {
     this.sections = lines;
+    this.forget();
+  }
+
+  /** The next `draw` paints. No still picture of the former state follows. */
+  private forget(): void {
     this.drawn = '';
+    clearTimeout(this.timer);
   }
 
   /** Does nothing if the picture stays the same. */
