@@ -51,7 +51,8 @@ struct Frame {
   /// Quantities to interpolate to the vertices (Result::attributes, Surface::attributes), and the
   /// phase of each particle (ReconstructionParameters::phase_attribute). Interpolated quantities do
   /// not change the geometry, except the mesh of Fill::kGreedy
-  /// (ReconstructionParameters::attribute_tolerance).
+  /// (ReconstructionParameters::attribute_tolerance) and the faces of a surface at walls and at a
+  /// periodic box, which get inner points (Surface::cuts).
   std::span<const Attribute> attributes = {};
 
   /// Simulation time. Velocities are used only if the time increases from frame to frame.

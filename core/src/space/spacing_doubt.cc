@@ -13,9 +13,9 @@
 namespace partiemc::space {
 namespace {
 
-// Visited particles and sixteenths of bricks after which the check ends: kLeastLooks, or so many
-// that kFullSearches searches for a neighbour can visit all of them.
-constexpr std::size_t kLeastLooks = std::size_t{1} << 20;
+// Visited particles and sixteenths of bricks after which the check ends: so many that kFullSearches
+// searches for a neighbour can visit all of them, within these limits.
+constexpr std::size_t kLeastLooks = std::size_t{1} << 20, kMostLooks = std::size_t{1} << 25;
 constexpr std::size_t kFullSearches = 32, kBricksOfLook = 16;
 
 // Limits of the distance of the sixth nearest position, in spacings. It is 1 on the cubic
@@ -78,8 +78,9 @@ class Probe {
       : bins_(bins),
         spacing_(scale.spacing),
         largest_(scale.sizes.largest),
-        most_looks_(std::max(kLeastLooks, kFullSearches * (bins.source.size() +
-                                                           bins.bricks.size() / kBricksOfLook))) {}
+        most_looks_(
+            std::clamp(kFullSearches * (bins.source.size() + bins.bricks.size() / kBricksOfLook),
+                       kLeastLooks, kMostLooks)) {}
 
   // Whether the distances around a particle contradict the spacing.
   bool Contradicts(std::size_t sampled) {

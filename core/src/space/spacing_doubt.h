@@ -10,7 +10,7 @@ namespace partiemc::space {
 /// "Doubts"). A particle contradicts it if other positions lie all around, and the sixth nearest is
 /// farther than 1.7 or closer than .7 spacings. With own sizes, a distance is divided by the mean
 /// size of the two particles. Requires: SortParticles. Cost: some ten thousand distances if the
-/// spacing is right; at most about a million, or if this is more, 32 times the number of particles.
+/// spacing is right; at most 32 times the number of particles, between one and 34 million.
 bool ContradictsSpacing(const SpaceBins& bins, const Scale& scale);
 
 }  // namespace partiemc::space

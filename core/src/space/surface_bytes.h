@@ -61,7 +61,7 @@ inline constexpr std::uint32_t kMostDropsOfBrick = 256;
 
 /// Bytes of the drop of a lone particle, and of a point of its ellipsoid. A small drop reaches at
 /// most 8 bricks, a large one 64.
-inline constexpr std::uint64_t kBytesPerSmallDrop = 500, kBytesPerLargeDrop = 1500;
+inline constexpr std::uint64_t kBytesPerSmallDrop = 600, kBytesPerLargeDrop = 1600;
 inline constexpr std::uint64_t kBytesPerLonePoint = 300;
 
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.

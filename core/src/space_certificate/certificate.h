@@ -32,7 +32,8 @@ enum class QuadMode : std::uint8_t { kAlongFace, kAcrossCells };
 
 struct Certificate {
   /// By vertex: whether it stays at its anchor with all vertices of its body. Empty: none does. Set
-  /// before Certify. Faces at which nothing can move are not tested.
+  /// before Certify. Faces at which nothing can move are not tested, and their `modes` mean
+  /// nothing.
   std::vector<std::uint8_t> is_settled;
   /// By active cell: the mode of the quad on its upper face along each axis.
   std::vector<std::array<QuadMode, 3>> modes;

@@ -158,14 +158,20 @@ bool MakeEllipsoid(const Scale& scale, const Drops::Drop& drop, Drops& drops) {
   return true;
 }
 
-/// Sets the boxes of a drop. `node`: as for Drop::box. Returns false if there is no ellipsoid.
-bool SetBoxes(const Scale& scale, const Vec3& node, Drops::Drop& drop, Drops& drops) {
+/// Sets the node and the box of a drop. Returns false if there is no ellipsoid.
+bool SetBox(const Scale& scale, const Vec3& node, Drops::Drop& drop, Drops& drops) {
   if (!MakeEllipsoid(scale, drop, drops)) return false;
+  drop.node = node;
   drop.ellipsoid = Drops::Box::Empty();
   for (const Vec3& point : drops.points) Include(point, drop.ellipsoid);
-  drop.box = drop.ellipsoid;
-  Include(node, drop.box);
   return true;
+}
+
+/// The box around the ellipsoid and the node of a drop, which no other surface may touch.
+Drops::Box BoxOf(const Drops::Drop& drop) {
+  Drops::Box box = drop.ellipsoid;
+  Include(drop.node, box);
+  return box;
 }
 
 /// Calls visit(coordinate) for the bricks that a box reaches. Visits none and returns false if they
@@ -242,10 +248,10 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, NodesAre nodes
       drop.particles = 1;
       // This node is outside and has not moved, so it is still outside of all bodies.
       const Vec3 corner = cell * (origin + Vec3{1.0 * node[0], 1.0 * node[1], 1.0 * node[2]});
-      drop.is_taken = SetBoxes(input.scale, corner, drop, drops);
+      drop.is_taken = SetBox(input.scale, corner, drop, drops);
       if (!drop.is_taken) continue;
       std::uint32_t reached = 0, is_at_home = 0;
-      ForEachBrickOf(drop.box, cell, [&](const BrickCoordinate& place) {
+      ForEachBrickOf(BoxOf(drop), cell, [&](const BrickCoordinate& place) {
         ++reached;
         if (place == input.bins.bricks[brick]) is_at_home = 1;
       });
@@ -264,7 +270,7 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, NodesAre nodes
                         ? cell * (OriginOf(input.bins.bricks[lowest.brick]) +
                                   Vec3{1.0 * node[0], 1.0 * node[1], 1.0 * node[2]})
                         : NodeAt(input.bins.bricks, input.nodes, cell, lowest.brick, node);
-    drop.is_taken = SetBoxes(input.scale, at, drop, drops);
+    drop.is_taken = SetBox(input.scale, at, drop, drops);
   }
 }
 
@@ -276,7 +282,7 @@ void ListDrops(double cell_size, Drops& drops) {
     if (index % kItemsPerCheck == 0) ThrowIfCancelled();
     Drops::Drop& drop = drops.drops[index];
     if (!drop.is_taken) continue;
-    drop.is_taken = ForEachBrickOf(drop.box, cell_size, [&](const BrickCoordinate& at) {
+    drop.is_taken = ForEachBrickOf(BoxOf(drop), cell_size, [&](const BrickCoordinate& at) {
       drops.reaches.push_back({drops.bricks.Insert(at), index});
     });
   }
@@ -307,15 +313,15 @@ void CompareDrops(Drops& drops) {
 }
 
 /// Drops whose boxes touch `box`, which has a part of the surface of `body`, keep their surfaces,
-/// unless they are drops of this body. Lists them in `refused`.
+/// unless they are drops of this body. Lists drops of bodies in `refused`.
 void CompareBox(const Drops::Box& box, std::uint32_t body, double cell_size, Drops& drops) {
   const auto compare = [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t k = first; k < last; ++k) {
       const std::uint32_t index = drops.reaches[k].drop;
       Drops::Drop& drop = drops.drops[index];
-      if (drop.body == body || !drop.is_taken || !Touch(drop.box, box)) continue;
+      if (drop.body == body || !drop.is_taken || !Touch(BoxOf(drop), box)) continue;
       drop.is_taken = false;
-      drops.refused.push_back(index);
+      if (drop.body != kNoIndex) drops.refused.push_back(index);
     }
   };
   const bool is_small = ForEachBrickOf(box, cell_size, [&](const BrickCoordinate& at) {
@@ -334,7 +340,9 @@ template <typename ForEachPart>
 void ChooseDrops(double cell_size, const ForEachPart& for_each_part, Drops& drops) {
   ListDrops(cell_size, drops);
   CompareDrops(drops);
-  drops.surfaces.assign(drops.drops.size(), Drops::Box::Empty());
+  const auto of_bodies = static_cast<std::uint32_t>(
+      std::ranges::count_if(drops.drop_of, [](std::uint32_t drop) { return drop != kNoIndex; }));
+  drops.surfaces.assign(of_bodies, Drops::Box::Empty());
   for_each_part([&](std::uint32_t body, const Drops::Box& box) {
     const std::uint32_t index = drops.drop_of[body];
     if (index == kNoIndex) {
@@ -346,7 +354,7 @@ void ChooseDrops(double cell_size, const ForEachPart& for_each_part, Drops& drop
   });
   // A refused drop keeps its surface, so that further drops are refused.
   drops.refused.clear();
-  for (std::uint32_t index = 0; index < drops.drops.size(); ++index) {
+  for (std::uint32_t index = 0; index < of_bodies; ++index) {
     if (!drops.drops[index].is_taken) drops.refused.push_back(index);
   }
   for (std::size_t n = 0; n < drops.refused.size(); ++n) {

@@ -6,8 +6,8 @@
 // ellipsoid and of a node of the drop touches another surface (core/SURFACES.md, "Drops").
 //
 // Bodies that will surely become ellipsoids are found before vertices are placed (SettleDrops).
-// They are settled: their vertices stay at their anchors, so that placement, certificate and volume
-// steps leave them out.
+// They are settled: their vertices stay at their anchors, and certificate and volume steps leave
+// them out. Their triangles need not be valid; ReplaceDrops removes them.
 #pragma once
 
 #include <array>
@@ -65,14 +65,14 @@ struct Drops {
     /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls. In cells.
     std::array<double, 6> second{};
     Box ellipsoid;  ///< Box around the ellipsoid. World units.
-    /// Box around the ellipsoid and a lattice node, which shows in which part of space the drop is.
-    /// For a body: its lowest node. For a particle without a body: the lowest node of its cell, an
-    /// outside node that has not moved. World units.
-    Box box;
+    /// A lattice node, which shows in which part of space the drop is. For a body: its lowest node.
+    /// For a particle without a body: the lowest node of its cell, an outside node that has not
+    /// moved. World units.
+    Vec3 node;
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
     std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
-  std::vector<Drop> drops;
+  std::vector<Drop> drops;               ///< Those of bodies, then those of particles without one.
   std::vector<std::uint8_t> is_settled;  ///< By body. Empty: none is.
 
   bool IsSettled(std::uint32_t body) const { return !is_settled.empty() && is_settled[body] != 0; }
@@ -87,7 +87,7 @@ struct Drops {
   std::vector<Reach> reaches;          ///< Scratch: sorted by brick.
   std::vector<std::uint32_t> first;    ///< Scratch: by brick, its first index in `reaches`.
   std::vector<Box> surfaces;           ///< Scratch: by drop, around the surface of its body.
-  std::vector<std::uint32_t> refused;  ///< Scratch: drops that are not taken.
+  std::vector<std::uint32_t> refused;  ///< Scratch: drops of bodies that are not taken.
 };
 
 /// Sets `is_settled`: bodies with an ellipsoid that ReplaceDrops will accept, unless a vertex of
