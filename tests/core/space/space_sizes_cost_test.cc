@@ -111,8 +111,8 @@ std::vector<double> Measure(SurfacePlacement placement, const std::vector<CostCa
   return least;
 }
 
-// PARTIEMC_SPACE_PARTICLES sets the number of particles. Only then times are compared, because other
-// work on the machine disturbs short frames.
+// PARTIEMC_SPACE_PARTICLES sets the number of particles. Only then times are compared, because
+// other work on the machine disturbs short frames.
 TEST(SpaceSizesCost, PerParticleIsAtMostTwiceThatOfEqualSizes) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
   const char* const wanted = std::getenv("PARTIEMC_SPACE_PARTICLES");
