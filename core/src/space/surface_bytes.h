@@ -51,6 +51,9 @@ inline constexpr std::uint64_t kBytesPerSample = 200;
 /// Bytes of one value of an attribute at a point. An ellipsoid has up to 42 points.
 inline constexpr std::uint64_t kBytesPerValue = 8;
 inline constexpr std::uint64_t kMostPointsOfDrop = 42;
+/// Vertices of the smallest body, which has one node: six on edges, eight in cells. An ellipsoid
+/// replaces at least so many.
+inline constexpr std::uint64_t kLeastPointsOfBody = 14;
 /// Ellipsoids of at most kSmallDropVolume, in cubed spacings, have kPointsOfSmallDrop points.
 inline constexpr std::uint64_t kPointsOfSmallDrop = 12;
 inline constexpr double kSmallDropVolume = 1.7;
@@ -61,7 +64,7 @@ inline constexpr std::uint32_t kMostDropsOfBrick = 256;
 
 /// Bytes of the drop of a lone particle, and of a point of its ellipsoid. A small drop reaches at
 /// most 8 bricks, a large one 64.
-inline constexpr std::uint64_t kBytesPerSmallDrop = 600, kBytesPerLargeDrop = 1600;
+inline constexpr std::uint64_t kBytesPerSmallDrop = 640, kBytesPerLargeDrop = 1600;
 inline constexpr std::uint64_t kBytesPerLonePoint = 300;
 
 /// Bytes of the simplification of a point: about 240 of meshoptimizer, or the check for contacts.
@@ -102,7 +105,9 @@ inline std::uint64_t SurfaceBytes(const SurfaceSize& size) {
     bytes +=
         kBytesPerLonePoint * most * (size.has_large_lone ? kMostPointsOfDrop : kPointsOfSmallDrop);
   }
-  const std::uint64_t drop_points = size.has_windows ? kMostPointsOfDrop * size.bodies : 0;
+  const std::uint64_t replaced = kLeastPointsOfBody * (size.bodies - size.lone);
+  const std::uint64_t drop_points =
+      size.has_windows ? kMostPointsOfDrop * size.bodies - replaced : 0;
   const std::uint64_t points = size.edges + size.loops + drop_points;
   bytes += kBytesPerValue * size.attribute_values * points;
   if (size.is_simplified) bytes += kBytesPerSimplifiedPoint * points;
