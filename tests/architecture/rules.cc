@@ -139,11 +139,11 @@ Violations CoreIsPlain(const SourceTree& tree) {
       "(fstream|iostream|cstdio|stdio\\.h|filesystem|chrono|ctime|time\\.h|cstdlib|thread|random)");
   static const std::regex kForbiddenName(
       R"(\b(getenv|fopen|f?printf|system_clock|steady_clock|random_device)\b)");
+  const IncludeGraph graph(tree);
   Violations violations;
   for (const auto& [path, text] : tree) {
     if (Room(path) != "core" || !IsCxx(path)) continue;
-    for (const std::string& include : Includes(text)) {
-      const std::string target = ResolveInclude(tree, path, include);
+    for (const auto& [include, target] : graph.Of(path)) {
       if (std::regex_match(include, kForbiddenHeader) ||
           (!target.empty() && Room(target) != "core")) {
         violations.push_back(path + ": includes " + include + "; the core is plain C++");
@@ -246,6 +246,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         "",
         {"base", "formats"},
         {"collection", "file_list", "frame_range", "plane", "sequence", "times"}}}};
+  const IncludeGraph graph(tree);
   Violations violations;
   for (const House& house : kHouses) {
     const auto room_of = [&](const std::string& path) {
@@ -261,8 +262,7 @@ Violations FilesKeepTheirRooms(const SourceTree& tree) {
         violations.push_back(path + ": lies in no room");
         continue;
       }
-      for (const std::string& include : Includes(text)) {
-        const std::string target = ResolveInclude(tree, path, include);
+      for (const auto& [include, target] : graph.Of(path)) {
         if (!target.starts_with(house.folder)) continue;
         // Public headers are included by their public names.
         const bool is_public = room_of(target) == kPublicHeaders;
@@ -341,10 +341,11 @@ Violations StagesKeepTheirOrder(const SourceTree& tree) {
   }
   if (!violations.empty()) return violations;
 
+  const IncludeGraph graph(tree);
   for (std::size_t k = 0; k < kStageCount; ++k) {
     for (const char* extension : {".h", ".cc"}) {
       const std::string file = StageFile(static_cast<Stage>(k), extension);
-      const Reached reached = Reach(tree, file);
+      const auto reached = graph.Reach(file);
       for (std::size_t later = k + 1; later < kStageCount; ++later) {
         if (reached.ours.contains(headers[later])) {
           violations.push_back(file + ": reaches the later stage " + headers[later]);
@@ -355,7 +356,7 @@ Violations StagesKeepTheirOrder(const SourceTree& tree) {
   for (const auto& [path, text] : tree) {
     // The last stage may include the others without knowing their order.
     if (Room(path) != "core" || !path.ends_with(".cc") || path == kLastStage) continue;
-    const Reached reached = Reach(tree, path);
+    const auto reached = graph.Reach(path);
     const bool all =
         std::ranges::all_of(headers, [&](const auto& h) { return reached.ours.contains(h); });
     if (all != (path == kStages || path == kReconstructor)) {
@@ -372,6 +373,7 @@ Violations SessionsAreFreeOfGrpc(const SourceTree& tree) {
   const auto cmake = tree.find("server/CMakeLists.txt");
   const auto lists =
       cmake == tree.end() ? std::vector<std::string>{} : Matches(cmake->second, kLibrary);
+  const IncludeGraph graph(tree);
   if (lists.size() != 1) return {"server/CMakeLists.txt: has not one partiemc_server_session"};
   std::istringstream words(lists.front());
   for (std::string word; words >> word;) {
@@ -379,7 +381,7 @@ Violations SessionsAreFreeOfGrpc(const SourceTree& tree) {
     RequireFile(tree, stem + ".cc", violations);
     for (const std::string& path : {stem + ".h", stem + ".cc"}) {
       if (!tree.contains(path)) continue;
-      for (const std::string& include : Reach(tree, path).foreign) {
+      for (const std::string& include : graph.Reach(path).foreign) {
         if (IsMessaging(include)) violations.push_back(path + ": reaches " + include);
       }
     }
@@ -391,12 +393,13 @@ Violations ServerAndClientAreStrangers(const SourceTree& tree) {
   static const std::array<std::pair<std::string_view, std::string>, 2> kStrangers = {
       {{"server", "client"}, {"client", "server"}}};
   static const std::regex kLinked(R"(\bpartiemc(?:::|_)(server|client)\w*)");
+  const IncludeGraph graph(tree);
   Violations violations;
   for (const auto& [path, text] : tree) {
     for (const auto& [room, stranger] : kStrangers) {
       if (Room(path) != room) continue;
       if (IsCxx(path)) {
-        for (const std::string& file : Reach(tree, path).ours) {
+        for (const std::string& file : graph.Reach(path).ours) {
           if (Room(file) == stranger) violations.push_back(path + ": reaches " + file);
         }
       } else if (path.ends_with("CMakeLists.txt")) {

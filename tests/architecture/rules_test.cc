@@ -55,10 +55,17 @@ TEST(SourceTree, AnIncludeInACommentIsNone) {
 }
 
 TEST(SourceTree, AnIncludeMeansTheNearestFile) {
-  const SourceTree tree = {{"core/src/a.h", ""}, {"server/a.h", ""}, {"server/x/b.cc", ""}};
-  EXPECT_EQ(ResolveInclude(tree, "server/x/b.cc", "a.h"), "server/a.h");
-  EXPECT_EQ(ResolveInclude(tree, "client/b.cc", "src/a.h"), "core/src/a.h");
-  EXPECT_EQ(ResolveInclude(tree, "client/b.cc", "vector"), "");
+  const SourceTree tree = {
+      {"core/src/a.h", ""},
+      {"server/a.h", ""},
+      {"server/x/b.cc", "#include \"a.h\"\n"},
+      {"client/b.cc", "#include \"src/a.h\"\n#include <vector>\n"},
+  };
+  const IncludeGraph graph(tree);
+  EXPECT_EQ(graph.Of("server/x/b.cc").at(0).file, "server/a.h");
+  EXPECT_EQ(graph.Of("client/b.cc").at(0).file, "core/src/a.h");
+  EXPECT_EQ(graph.Of("client/b.cc").at(1).file, "");
+  EXPECT_THAT(graph.Reach("client/b.cc").foreign, testing::ElementsAre("vector"));
 }
 
 TEST(Architecture, TheCoreIsPlain) { EXPECT_THAT(CoreIsPlain(Project()), IsEmpty()); }

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <regex>
+#include <sstream>
 
 namespace partiemc::architecture {
 namespace {
@@ -16,6 +17,8 @@ std::string_view DirectoryOf(std::string_view path) {
   const auto slash = path.rfind('/');
   return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash + 1);
 }
+
+std::string_view NameOf(std::string_view path) { return path.substr(path.rfind('/') + 1); }
 
 }  // namespace
 
@@ -82,40 +85,56 @@ std::string WithoutComments(std::string_view text, Literals literals) {
 }
 
 std::vector<std::string> Includes(std::string_view text) {
-  static const std::regex kInclude(R"re((?:^|\n)[ \t]*#[ \t]*include[ \t]*["<]([^">\n]+)[">])re");
-  const std::string code = WithoutComments(text, Literals::kKeep);
+  static const std::regex kInclude(R"re([ \t]*#[ \t]*include[ \t]*["<]([^">\n]+)[">].*)re");
   std::vector<std::string> includes;
-  for (std::sregex_iterator match(code.begin(), code.end(), kInclude), end; match != end; ++match) {
-    includes.push_back((*match)[1]);
+  std::istringstream code(WithoutComments(text, Literals::kKeep));
+  std::smatch match;
+  for (std::string line; std::getline(code, line);) {
+    const bool is_directive = line.find('#') != std::string::npos;
+    if (is_directive && std::regex_match(line, match, kInclude)) includes.push_back(match[1]);
   }
   return includes;
 }
 
-std::string ResolveInclude(const SourceTree& tree, const std::string& includer,
-                           const std::string& include) {
-  const std::string beside = std::string(DirectoryOf(includer)) + include;
-  if (tree.contains(beside)) return beside;
-  std::string elsewhere;
+IncludeGraph::IncludeGraph(const SourceTree& tree) {
+  std::map<std::string_view, std::vector<std::string_view>> paths_by_name;
+  for (const auto& [path, text] : tree) paths_by_name[NameOf(path)].push_back(path);
+  const auto file_of = [&](const std::string& includer, const std::string& include) {
+    const std::string beside = std::string(DirectoryOf(includer)) + include;
+    if (tree.contains(beside)) return beside;
+    const std::string ending = "/" + include;
+    std::string elsewhere;
+    const auto paths = paths_by_name.find(NameOf(include));
+    if (paths == paths_by_name.end()) return elsewhere;
+    for (const std::string_view path : paths->second) {
+      if (path != include && !path.ends_with(ending)) continue;
+      if (Room(path) == Room(includer)) return std::string(path);
+      if (elsewhere.empty()) elsewhere = path;
+    }
+    return elsewhere;
+  };
   for (const auto& [path, text] : tree) {
-    if (path != include && !path.ends_with("/" + include)) continue;
-    if (Room(path) == Room(includer)) return path;
-    if (elsewhere.empty()) elsewhere = path;
+    if (!IsCxx(path)) continue;
+    std::vector<Include>& includes = includes_[path];
+    for (const std::string& include : Includes(text)) {
+      includes.push_back({include, file_of(path, include)});
+    }
   }
-  return elsewhere;
 }
 
-Reached Reach(const SourceTree& tree, const std::string& file) {
+IncludeGraph::Reached IncludeGraph::Reach(const std::string& file) const {
   Reached reached;
   std::vector<std::string> open = {file};
   while (!open.empty()) {
     const std::string includer = open.back();
     open.pop_back();
-    for (const std::string& include : Includes(tree.at(includer))) {
-      const std::string path = ResolveInclude(tree, includer, include);
-      if (path.empty()) {
-        reached.foreign.insert(include);
-      } else if (reached.ours.insert(path).second) {
-        open.push_back(path);
+    const auto found = includes_.find(includer);
+    if (found == includes_.end()) continue;
+    for (const Include& include : found->second) {
+      if (include.file.empty()) {
+        reached.foreign.insert(include.text);
+      } else if (reached.ours.insert(include.file).second) {
+        open.push_back(include.file);
       }
     }
   }

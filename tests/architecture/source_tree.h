@@ -25,18 +25,30 @@ std::string WithoutComments(std::string_view text, Literals literals);
 /// The includes of a file in order: the text between quotes or brackets.
 std::vector<std::string> Includes(std::string_view text);
 
-/// The file that `include` means in `includer`: searched in the includer's directory, its room
-/// (first directory), then all others. Empty for foreign headers.
-std::string ResolveInclude(const SourceTree& tree, const std::string& includer,
-                           const std::string& include);
+/// Which file of a tree includes which. Requires: the tree outlives the graph and does not change.
+class IncludeGraph {
+ public:
+  explicit IncludeGraph(const SourceTree& tree);
 
-/// Files that `file` includes, directly or through files of the tree: ours by path, foreign headers
-/// by their names.
-struct Reached {
-  std::set<std::string> ours;
-  std::set<std::string> foreign;
+  struct Include {
+    std::string text;  // Between quotes or brackets.
+    std::string file;  // The file that it means; empty for foreign headers.
+  };
+  /// The includes of a C++ file in order. Each is searched in the includer's directory, its room
+  /// (first directory), then all others.
+  const std::vector<Include>& Of(const std::string& file) const { return includes_.at(file); }
+
+  /// Files that `file` includes, directly or through files of the tree: ours by path, foreign
+  /// headers by their names.
+  struct Reached {
+    std::set<std::string> ours;
+    std::set<std::string> foreign;
+  };
+  Reached Reach(const std::string& file) const;
+
+ private:
+  std::map<std::string, std::vector<Include>> includes_;
 };
-Reached Reach(const SourceTree& tree, const std::string& file);
 
 bool IsCxx(std::string_view path);
 /// "core" for "core/src/bins/bins.cc".
