@@ -22,24 +22,24 @@ std::uint64_t KeptBytesBeyondHistories(const ServerLimits& limits) {
 }
 
 MemoryPlan::MemoryPlan(const ServerLimits& limits, unsigned threads)
-    : parts{
-          {kProgramBytes, "the program"},
-          {threads * kWorkerBytes, absl::StrFormat("%d compute threads (--threads)", threads)},
-          {limits.AllHistoryBytes(), "results for who goes back (--history-bytes, --max-streams)"},
-          {KeptBytesBeyondHistories(limits),
-           "newest results of streams, beyond that (--history-bytes, --max-streams)"},
-          {limits.FrameBudget(), "requests and answers (the rest of --memory-budget)"},
-          {limits.ReadBytesBeyond(),
-           absl::StrFormat("frames of %d streams beyond that (--streams-beyond-budget, "
-                           "--max-frame-bytes, --max-parts)",
-                           limits.streams_beyond_budget)},
-          {limits.WorkerBytesBeyond(),
-           "computing one frame beyond that (--max-particles, --max-frame-bytes)"},
-          {limits.StateBytes(), "states of streams between their frames (--memory-budget)"},
-          {limits.FrameBudget() / kPartsOfBudgetBeyond, "results that watchers have not taken"},
-          {kOnTheirWayBytes, "messages on their way"},
-          {(std::uint64_t{limits.max_streams} + limits.max_parts) * kUnreadBytes,
-           "what streams have sent before they are read from (--max-streams, --max-parts)"}} {}
+    : parts{{kProgramBytes, "the program"},
+            {threads * kWorkerBytes, absl::StrFormat("%d compute threads (--threads)", threads)},
+            {limits.AllHistoryBytes(),
+             "results for watchers that go back (--history-bytes, --max-streams)"},
+            {KeptBytesBeyondHistories(limits),
+             "newest results of streams beyond their histories (--history-bytes, --max-streams)"},
+            {limits.FrameBudget(), "requests and answers (the rest of --memory-budget)"},
+            {limits.ReadBytesBeyond(),
+             absl::StrFormat("frames of %d streams beyond the budget (--streams-beyond-budget, "
+                             "--max-frame-bytes, --max-parts)",
+                             limits.streams_beyond_budget)},
+            {limits.WorkerBytesBeyond(),
+             "computing one frame beyond the budget (--max-particles, --max-frame-bytes)"},
+            {limits.StateBytes(), "states of streams between their frames (--memory-budget)"},
+            {limits.FrameBudget() / kPartsOfBudgetBeyond, "results that watchers have not taken"},
+            {kOnTheirWayBytes, "messages in transfer"},
+            {(std::uint64_t{limits.max_streams} + limits.max_parts) * kUnreadBytes,
+             "messages that the server has not read yet (--max-streams, --max-parts)"}} {}
 
 std::uint64_t MemoryPlan::bytes() const {
   std::uint64_t bytes = 0;
@@ -53,7 +53,7 @@ std::string MemoryPlan::ToString() const {
     absl::StrAppendFormat(&text, "%8.0f MiB  %s\n", static_cast<double>(part) / (1 << 20), what);
   };
   for (const Part& part : parts) line(part.bytes, part.what);
-  line(bytes(), "in all: a container's limit is to be above that");
+  line(bytes(), "in total; give a container more than this");
   return text;
 }
 

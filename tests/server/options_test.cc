@@ -63,15 +63,15 @@ TEST(CommandLineOptions, TheMemoryPlanAddsUpWhatTheOptionsMayTake) {
   ASSERT_NE(early, nullptr);
   EXPECT_EQ(early->code, 0);
   EXPECT_THAT(early->text, HasSubstr("      48 MiB  3 compute threads"));
-  EXPECT_THAT(early->text, HasSubstr("       8 MiB  results for who goes back"));
+  EXPECT_THAT(early->text, HasSubstr("       8 MiB  results for watchers that go back"));
   EXPECT_THAT(early->text, HasSubstr("    1016 MiB  requests and answers"));
-  EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond that"));
-  EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond that"));
+  EXPECT_THAT(early->text, HasSubstr("     640 MiB  frames of 2 streams beyond the budget"));
+  EXPECT_THAT(early->text, HasSubstr("     305 MiB  computing one frame beyond the budget"));
   EXPECT_THAT(early->text, HasSubstr("     256 MiB  states of streams"));
   // 64 MiB of newest results, of which the histories cover 8.
   EXPECT_THAT(early->text, HasSubstr("      56 MiB  newest results"));
   // 24 + 48 + 8 + 56 + 1016 + 640 + 305 + 256 + 63.5 + 64 + 66
-  EXPECT_THAT(early->text, HasSubstr("    2547 MiB  in all"));
+  EXPECT_THAT(early->text, HasSubstr("    2547 MiB  in total"));
 }
 
 TEST(CommandLineOptions, WhatIsAdvertisedIsAnAddressThatOthersReach) {
