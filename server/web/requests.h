@@ -60,7 +60,7 @@ enum class WebMethod { kInfo, kStreams, kFrame, kWatch, kReconstruct };
 struct WebCall {
   WebMethod method = WebMethod::kInfo;
   std::optional<std::string> authorization = {};  ///< See CallOrigin::authorization.
-  bool from_page = false;  ///< Has an Origin header, so a browser sent it (SocketCall).
+  bool from_page = false;  ///< Has an Origin header, so a browser sent it (MakeSocketCall).
 };
 
 /// A file of the page. `path` is relative to the root: names separated by '/', none of which begins

@@ -19,6 +19,7 @@
 #include "server/web/connection.h"
 #include "server/web/context.h"
 #include "server/web/http_session.h"
+#include "server/web/responses.h"
 #include "server/web/tls_contexts.h"
 
 namespace partiemc::server {
@@ -90,20 +91,16 @@ absl::StatusOr<CheckedOptions> Check(const WebOptions& options, bool is_secure) 
   return checked;
 }
 
-void Converse(const std::shared_ptr<WebConnectionOver<WebSocket>>& connection) {
-  std::make_shared<HttpSession<WebSocket>>(connection)->ReadRequest();
-}
-
-void Converse(const std::shared_ptr<WebConnectionOver<TlsWebSocket>>& connection) {
+void Converse(const std::shared_ptr<WebConnection>& connection) {
+  if (!connection->stream.has_tls()) return ServeHttp(connection);
   connection->CloseAfter(kWebHeaderTime);
-  connection->stream.async_handshake(
-      boost::asio::ssl::stream_base::server, [connection](error_code error) {
-        if (error) {
-          connection->context.refusals.Count(WebRefusal::kMalformed);
-          return connection->Close();
-        }
-        std::make_shared<HttpSession<TlsWebSocket>>(connection)->ReadRequest();
-      });
+  connection->stream.async_handshake([connection](error_code error) {
+    if (error) {
+      connection->context.refusals.Count(WebRefusal::kMalformed);
+      return connection->Close();
+    }
+    ServeHttp(connection);
+  });
 }
 
 }  // namespace
@@ -230,21 +227,12 @@ class WebGateway::Implementation {
     const auto endpoint = socket.remote_endpoint(error);
     if (error) return;  // The connection is already closed.
     socket.set_option(tcp::no_delay(true), error);
-    const WebExecutor executor = socket.get_executor();
-    if (!tls_) {
-      return Enter<WebSocket>(executor, PeerOf(endpoint), std::move(socket));
-    }
     // The connection keeps a reference to the part of the context that it needs, so the context may
     // be released.
-    const auto context = tls_->Get();
-    if (context == nullptr) return context_.refusals.Count(WebRefusal::kMalformed);
-    Enter<TlsWebSocket>(executor, PeerOf(endpoint), std::move(socket), *context);
-  }
-
-  template <typename Stream, typename... Arguments>
-  void Enter(const WebExecutor& executor, std::string peer, Arguments&&... arguments) {
-    auto connection = std::make_shared<WebConnectionOver<Stream>>(
-        context_, executor, std::move(peer), std::forward<Arguments>(arguments)...);
+    const auto tls = tls_ ? tls_->Get() : nullptr;
+    if (tls_ && tls == nullptr) return context_.refusals.Count(WebRefusal::kMalformed);
+    const auto connection =
+        std::make_shared<WebConnection>(context_, PeerOf(endpoint), std::move(socket), tls.get());
     bool evicted = false;
     connection->slot = context_.slots.Enter(
         HostOfPeer(connection->peer),
@@ -253,7 +241,7 @@ class WebGateway::Implementation {
         },
         evicted);
     if (evicted) context_.refusals.Count(WebRefusal::kFull);
-    boost::asio::post(executor, [connection] { Converse(connection); });
+    boost::asio::post(connection->executor(), [connection] { Converse(connection); });
   }
 
   boost::asio::io_context io_{kThreads};
