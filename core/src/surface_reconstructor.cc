@@ -97,7 +97,8 @@ SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& co
   }
   const double h = parameters.spacing;
   ThrowIfCancelled();
-  space::FindBodies(frame, b.bins, b.field, h, b.bodies);
+  space::FindBodies(frame, b.bins, b.field, h, parameters.kernel_radius / parameters.cell_size,
+                    b.bodies);
   if (copied.any) {
     space::ChooseImages({.lifted = lifted,
                          .bins = b.bins,

@@ -112,17 +112,18 @@ void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
 // Largest distance from the cell of a particle to an inside node of its body, in layers of nodes.
 // Small drops require it: most of their particles lie in cells without inside nodes.
 constexpr int kMostLayers = 2;
+constexpr float kFar = std::numeric_limits<float>::infinity();
 
 /// The nearest inside node among the corners of the cell of a particle and `layers` layers around
-/// them; brick kNoIndex if there is none.
+/// them, nearer than `reach`; brick kNoIndex if there is none.
 BrickPlace NearestInside(const SpaceBins& bins, const SpaceField& field, std::uint32_t brick,
-                         std::uint32_t particle, int layers) {
+                         std::uint32_t particle, int layers, float reach) {
   const std::array<float, 3> at{bins.x[particle], bins.y[particle], bins.z[particle]};
   const std::array<int, 3> cell{static_cast<int>(at[0]), static_cast<int>(at[1]),
                                 static_cast<int>(at[2])};
   BrickPlace nearest{kNoIndex, 0, 0, 0};
-  float least = std::numeric_limits<float>::infinity();
   const auto square = [](float value) { return value * value; };
+  float least = square(reach);
   for (int k = cell[2] - layers; k <= cell[2] + 1 + layers; ++k) {
     for (int j = cell[1] - layers; j <= cell[1] + 1 + layers; ++j) {
       for (int i = cell[0] - layers; i <= cell[0] + 1 + layers; ++i) {
@@ -158,7 +159,8 @@ std::uint32_t OnlyBodyAround(const BrickDirectory& bricks, const Bodies& bodies,
 /// The body of a particle (FindBodies); kNoIndex if no inside node is near. `only`: OnlyBodyAround
 /// of the brick.
 std::uint32_t BodyOfParticle(const SpaceBins& bins, const SpaceField& field, const Bodies& bodies,
-                             std::uint32_t brick, std::uint32_t only, std::uint32_t particle) {
+                             std::uint32_t brick, std::uint32_t only, float kernel_radius,
+                             std::uint32_t particle) {
   if (only != kNoIndex) {
     // Any inside node near the particle will do. Most particles have one at the lowest corner.
     const BrickPlace corner{brick, static_cast<int>(bins.x[particle]),
@@ -166,21 +168,24 @@ std::uint32_t BodyOfParticle(const SpaceBins& bins, const SpaceField& field, con
     if (field.IsInside(corner)) return only;
   }
   for (int layers = 0; layers <= kMostLayers; ++layers) {
-    const BrickPlace node = NearestInside(bins, field, brick, particle, layers);
+    const bool is_limited = layers > 0 && !bins.size.empty();
+    const float reach = is_limited ? kernel_radius * bins.size[particle] : kFar;
+    const BrickPlace node = NearestInside(bins, field, brick, particle, layers, reach);
     if (node.brick != kNoIndex) return bodies.BodyOf(node);
   }
   return kNoIndex;
 }
 
 void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField& field,
-                    double spacing, Bodies& bodies) {
+                    double spacing, float kernel_radius, Bodies& bodies) {
   const double usual = spacing * spacing * spacing;
   bodies.body_of_particle.assign(bins.source.size(), kNoIndex);
   for (std::uint32_t brick = 0; brick < bins.bricks.size(); ++brick) {
     const std::uint32_t only = OnlyBodyAround(bins.bricks, bodies, brick);
     for (std::uint32_t p = bins.FirstOf(brick); p < bins.EndOf(brick); ++p) {
       if (p % kItemsPerCheck == 0) ThrowIfCancelled();
-      const std::uint32_t index = BodyOfParticle(bins, field, bodies, brick, only, p);
+      const std::uint32_t index =
+          BodyOfParticle(bins, field, bodies, brick, only, kernel_radius, p);
       bodies.body_of_particle[p] = index;
       if (index == kNoIndex) continue;
       Body& body = bodies.bodies[index];
@@ -197,7 +202,7 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
 }  // namespace
 
 void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
-                Bodies& bodies) {
+                double kernel_radius, Bodies& bodies) {
   bodies.bodies.clear();
   bodies.parts.clear();
   bodies.first.clear();
@@ -208,7 +213,7 @@ void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& fie
   bodies.first.push_back(static_cast<std::uint32_t>(bodies.parts.size()));
   JoinParts(bins.bricks, bodies);
   NumberBodies(bins.bricks, bodies);
-  CountParticles(frame, bins, field, spacing, bodies);
+  CountParticles(frame, bins, field, spacing, static_cast<float>(kernel_radius), bodies);
 }
 
 }  // namespace partiemc::space

@@ -68,9 +68,10 @@ struct Bodies {
 /// Finds the bodies, in the order of their first parts, and counts their particles. A particle
 /// belongs to the body of the nearest inside corner of its cell. If no corner is inside, it belongs
 /// to the body of the nearest inside node in the first layer of nodes around the cell, else in the
-/// second layer, else to no body.
+/// second layer, else to no body. With own sizes its kernel must reach a node of the layers.
 /// `spacing` is in world units; without volumes, each particle has the volume spacing^3.
+/// `kernel_radius` is in cells, of a particle of the spacing.
 void FindBodies(const Frame& frame, const SpaceBins& bins, const SpaceField& field, double spacing,
-                Bodies& bodies);
+                double kernel_radius, Bodies& bodies);
 
 }  // namespace partiemc::space

@@ -129,7 +129,7 @@ TEST(SpaceCleaning, DropsBodiesWithoutParticles) {
   }
   Bodies bodies;
   CleaningScratch scratch;
-  FindBodies(particles.AsFrame(), bins, field, 1, bodies);
+  FindBodies(particles.AsFrame(), bins, field, 1, 3, bodies);
   const std::size_t found = bodies.bodies.size();
   ASSERT_GE(found, 2u);
   EXPECT_EQ(DropBodies({}, scratch, bodies, field).empty, 0u);
@@ -143,7 +143,7 @@ TEST(SpaceCleaning, DropsBodiesWithoutParticles) {
   EXPECT_EQ(inside, 3);
   // The parts have been renumbered, too.
   Bodies again;
-  FindBodies(particles.AsFrame(), bins, field, 1, again);
+  FindBodies(particles.AsFrame(), bins, field, 1, 3, again);
   EXPECT_EQ(again.first, bodies.first);
   ASSERT_EQ(again.parts.size(), bodies.parts.size());
   EXPECT_EQ(again.parts[0].body, bodies.parts[0].body);

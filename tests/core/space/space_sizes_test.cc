@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -143,6 +144,30 @@ TEST(SpaceSizes, LoneParticlesAreBallsOfTheirVolume) {
   double volume = 0;
   for (const ShellMeasures& shell : surface.measures) volume += shell.volume;
   EXPECT_NEAR(volume, wanted, 1e-4 * wanted);
+}
+
+// The small particle often has no inside node. It once belonged to the body of the large one, whose
+// surface then became flat.
+TEST(SpaceSizes, ASmallParticleFarFromALargeOneIsABallOfItsOwn) {
+  Random random(5);
+  for (const double distance : {3., 4.}) {
+    for (int placed = 0; placed < 40; ++placed) {
+      SCOPED_TRACE(::testing::Message() << "distance " << distance << ", placement " << placed);
+      const Vec3 from = {random.Uniform(0, 1), random.Uniform(0, 1), random.Uniform(0, 1)};
+      const Vec3 along = {random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1)};
+      const Vec3 to = from + (distance / std::sqrt(Dot(along, along))) * along;
+      SpaceParticles particles;
+      particles.Add(from);
+      particles.Add(to);
+      particles.volumes = {1, .125f};
+      const Surface surface = ReconstructOnce(
+          {.placement = SurfacePlacement::kVirtualPlane, .sizes = Sizes::kOwn}, particles);
+      ASSERT_EQ(surface.ShellCount(), 2u);
+      const double first = surface.measures[0].volume, second = surface.measures[1].volume;
+      EXPECT_NEAR(std::min(first, second), .125, 1e-5);
+      EXPECT_NEAR(std::max(first, second), 1, 1e-4);
+    }
+  }
 }
 
 TEST(SpaceSizes, LargerUnitsScaleTheSurface) {

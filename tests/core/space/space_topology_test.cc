@@ -106,7 +106,7 @@ struct Signs {
     }
     FindCrossings(bins.bricks, field, crossings);
     ListSteps(bins.bricks, crossings);
-    FindBodies({}, bins, field, 1, bodies);
+    FindBodies({}, bins, field, 1, 3, bodies);
   }
 };
 

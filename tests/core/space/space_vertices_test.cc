@@ -51,7 +51,7 @@ struct Anchored {
     FindCrossings(bins.bricks, field, crossings);
     ListSteps(bins.bricks, crossings);
     EvaluateNodes(bins, scale, crossings.near, field);
-    FindBodies(particles.AsFrame(), bins, field, 1, bodies);
+    FindBodies(particles.AsFrame(), bins, field, 1, 3, bodies);
     PlaceOnCrossings(bins.bricks, field, crossings, kAnchorMargin, anchors);
   }
 
