@@ -84,6 +84,12 @@ TEST(GaugesTest, MeasuresTheWettedPartOfASegment) {
   EXPECT_THAT(Reading("w=wetted:-1,2,9,2", Shapes()), ElementsAre(DoubleNear(3, 1e-12)));
   EXPECT_THAT(Reading("w=wetted:0.5,2,1.5,2", Shapes()), ElementsAre(DoubleNear(0.5, 1e-12)));
   EXPECT_THAT(Reading("w=wetted:7,-1,7,5", Shapes()), ElementsAre(DoubleNear(2, 1e-12)));
+  // The bottoms of the square and of the triangle, in both directions; the side of the hole.
+  EXPECT_THAT(Reading("w=wetted:-1,0,9,0", Shapes()), ElementsAre(DoubleNear(6, 1e-12)));
+  EXPECT_THAT(Reading("w=wetted:9,0,-1,0", Shapes()), ElementsAre(DoubleNear(6, 1e-12)));
+  EXPECT_THAT(Reading("w=wetted:2,0,2,4", Shapes()), ElementsAre(DoubleNear(4, 1e-12)));
+  // The tip of the triangle.
+  EXPECT_THAT(Reading("w=wetted:5,2,9,2", Shapes()), ElementsAre(DoubleNear(0, 1e-12)));
 }
 
 TEST(GaugesTest, MeasuresTheAreaInABox) {

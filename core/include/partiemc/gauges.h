@@ -21,8 +21,8 @@ enum class GaugeKind {
   /// Farthest point of the outline in a direction: its `position` (the distance from the origin
   /// along the direction) and its coordinates `x`, `y`. Numbers: dx, dy.
   kFront,
-  /// The `length` of the part of a line segment that lies inside the outline. Numbers: x0, y0, x1,
-  /// y1 (the ends of the segment).
+  /// The `length` of the part of a line segment that lies inside the outline or on its sides.
+  /// Numbers: x0, y0, x1, y1 (the ends of the segment).
   kWetted,
   /// `area` and centroid (`x`, `y`) of the part of a box that lies inside the outline. Numbers:
   /// min_x, min_y, max_x, max_y.

@@ -119,7 +119,7 @@ std::vector<double> MeasureFront(const Rings& rings, const Point& direction) {
   return values;
 }
 
-double MeasureWetted(const Rings& rings, const Point& from, const Point& to) {
+double LengthInside(const Rings& rings, const Point& from, const Point& to) {
   const Point line{to.x - from.x, to.y - from.y};
   const std::vector<double> crossings = LineCrossings(rings, from, line);
   double inside = 0;
@@ -127,6 +127,12 @@ double MeasureWetted(const Rings& rings, const Point& from, const Point& to) {
     inside += std::clamp(crossings[k + 1], 0.0, 1.0) - std::clamp(crossings[k], 0.0, 1.0);
   }
   return inside * std::sqrt(line.x * line.x + line.y * line.y);
+}
+
+double MeasureWetted(const Rings& rings, const Point& from, const Point& to) {
+  // A vertex on the line counts as left of it. Sides of an outline that lie on the line, as on a
+  // wall, count in one of the directions.
+  return std::max(LengthInside(rings, from, to), LengthInside(rings, to, from));
 }
 
 std::vector<double> MeasurePacking(const Rings& rings, const Point& min, const Point& max,
