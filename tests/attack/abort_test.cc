@@ -16,7 +16,7 @@
 namespace partiemc::attack {
 namespace {
 
-constexpr std::chrono::seconds kPatience(20);
+constexpr std::chrono::seconds kAbortPatience(20);
 
 // A call that is begun and cancelled in the same packet as its neighbours.
 void QueueCancelled(Http2Client& client, const char* method, const Headers& more = {}) {
@@ -28,8 +28,8 @@ void HoldStream(Http2Client& client, const std::string& name) {
   bool opened = false;
   client.OnFrame([&](const ReceivedFrame& frame) { opened |= frame.type == FrameType::kData; });
   client.Data(client.Call(CallHeaders(kReconstruct)), Prefixed(Open(name).SerializeAsString()));
-  client.Flush(kPatience);
-  EXPECT_TRUE(client.Read(kPatience, [&] { return opened; })) << "no stream to hold";
+  client.Flush(kAbortPatience);
+  EXPECT_TRUE(client.Read(kAbortPatience, [&] { return opened; })) << "no stream to hold";
   client.OnFrame(nullptr);
 }
 
@@ -41,7 +41,7 @@ std::uint64_t CancelCalls(AttackedServer& server, const char* method, std::uint6
   while (begun < calls && server.Lives()) {
     if (!client || client->closed()) client = std::make_unique<Http2Client>(server.address());
     for (std::uint64_t k = 0; k < at_once; ++k, ++begun) QueueCancelled(*client, method);
-    client->Flush(kPatience);
+    client->Flush(kAbortPatience);
     client->Read(std::chrono::milliseconds(1));
   }
   return begun;
@@ -55,7 +55,7 @@ class FullServer : public ::testing::TestWithParam<const char*> {
     // Watchers above the limit are refused, too.
     held_.Data(held_.Call(CallHeaders(kWatchStream)),
                Prefixed(Watch("one", 1).SerializeAsString()));
-    held_.Flush(kPatience);
+    held_.Flush(kAbortPatience);
   }
 
   AttackedServer server_{{"--max-streams", "2", "--max-watchers", "1", "--grace-seconds", "0.5"}};
@@ -84,11 +84,11 @@ TEST_P(DrainingServer, RefusesAndCancelsAtOnce) {
     server.process().Signal(SIGTERM);
     for (int k = 0; k < 400 && !client.closed(); ++k) {
       QueueCancelled(client, GetParam());
-      client.Flush(kPatience);
+      client.Flush(kAbortPatience);
       client.Read(std::chrono::milliseconds(1));
     }
     // Not by a second signal, which would end it at once.
-    EXPECT_EQ(server.process().WaitFor(kPatience), 0) << server.Output();
+    EXPECT_EQ(server.process().WaitFor(kAbortPatience), 0) << server.Output();
   }
 }
 
@@ -98,7 +98,7 @@ TEST_P(DefaultLimits, AHundredAtATime) {
   AttackedServer server;
   const std::uint64_t begun = CancelCalls(server, GetParam(), 8'000, 100);
   EXPECT_TRUE(server.Lives()) << "dead after " << begun << " calls: " << server.Output();
-  EXPECT_EQ(server.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server.GaugesNotAtZero(kAbortPatience), "");
   EXPECT_EQ(server.Terminate(), 0);
 }
 

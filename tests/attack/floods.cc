@@ -166,7 +166,7 @@ struct Counts {
 };
 
 // One attacker, which reconnects after each lost connection.
-void Attack(const Flood& flood, const FloodSettings& settings, Counts& counts) {
+void SendFlood(const Flood& flood, const FloodSettings& settings, Counts& counts) {
   const auto began = Clock::now(), end = began + settings.time;
   const std::uint64_t most = settings.most_bytes / settings.connections;
   const double rate = settings.bytes_per_second / static_cast<double>(settings.connections);
@@ -211,7 +211,7 @@ FloodOutcome RunFlood(const Flood& flood, const FloodSettings& settings) {
   for (std::size_t k = 0; k < settings.connections; ++k) {
     attackers.emplace_back([&] {
       if (settings.yield_processors) YieldProcessors();
-      Attack(flood, settings, counts);
+      SendFlood(flood, settings, counts);
     });
   }
   for (std::thread& attacker : attackers) attacker.join();

@@ -150,8 +150,6 @@ TEST_P(FloodTest, TakesLittleMemoryAndOthersAreServed) {
 
 INSTANTIATE_TEST_SUITE_P(All, FloodTest, testing::ValuesIn(Cases()), NameOf);
 
-constexpr char kHonestToken[] = "honest-0123456789abcdef", kToken[] = "hostile-0123456789abcdef";
-
 // Files for TLS and two tokens.
 struct Files {
   const CertificateAuthority authority{"floods"};
@@ -159,8 +157,8 @@ struct Files {
   const support::TemporaryFolder folder;
   const std::string certificate = folder.Write("server.crt", issued.certificate);
   const std::string key = folder.Write("server.key", issued.key);
-  const std::string tokens =
-      folder.Write("tokens", std::string(kHonestToken) + " honest\n" + kToken + " hostile\n");
+  const std::string tokens = folder.Write(
+      "tokens", std::string(kHonestToken) + " honest\n" + kHostileToken + " hostile\n");
 };
 
 class FloodOverTls : public testing::TestWithParam<Case> {};
@@ -191,7 +189,7 @@ INSTANTIATE_TEST_SUITE_P(All, FloodOverTls, testing::ValuesIn(CasesOverTls()), N
 // a token, so its calls reach the server. Its sixteen connections run on idle processors only.
 class FloodBehindProxy : public testing::TestWithParam<Case> {
  protected:
-  const Files files_;
+  const Files files_{};
   AttackedServer server_{{"--memory-budget", "256MB", "--connections-per-address", "0",
                           "--new-connections-per-address", "0", "--token-file", files_.tokens}};
 };
@@ -199,16 +197,16 @@ class FloodBehindProxy : public testing::TestWithParam<Case> {
 TEST_P(FloodBehindProxy, TakesLittleMemoryAndOthersAreServed) {
   const Proxy proxy(server_.address());
   HonestStream honest(proxy.address(), kHonestToken, 1);
-  Try(GetParam(), {.address = proxy.address(), .token = kToken, .yield_processors = true}, server_,
-      honest, &proxy);
+  Try(GetParam(), {.address = proxy.address(), .token = kHostileToken, .yield_processors = true},
+      server_, honest, &proxy);
 }
 
 TEST_P(FloodBehindProxy, OverTls) {
   const Proxy proxy(server_.address(), files_.certificate);
   HonestStream honest(proxy.address(), kHonestToken, 1, files_.authority.certificate());
   Try(GetParam(),
-      {.address = proxy.address(), .token = kToken, .tls = true, .yield_processors = true}, server_,
-      honest, &proxy);
+      {.address = proxy.address(), .token = kHostileToken, .tls = true, .yield_processors = true},
+      server_, honest, &proxy);
 }
 
 std::vector<Case> CasesOfMany() {

@@ -10,6 +10,10 @@
 
 namespace partiemc::attack {
 
+/// Tokens of the honest producer and of the callers that attack.
+inline constexpr char kHonestToken[] = "honest-0123456789abcdef";
+inline constexpr char kHostileToken[] = "hostile-0123456789abcdef";
+
 /// Streams frames of about ten thousand particles at a steady rate, one at a time, from its
 /// construction until Stop. Compares every answer with the core in this process. The first wrong
 /// answer or the end of the call fails the test and stops it.

@@ -26,7 +26,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience(3'000);
+constexpr milliseconds kAttackPatience(3'000);
 // Pause between two rounds of an attacker, because several share two cores with the server.
 constexpr milliseconds kPause(300);
 constexpr std::size_t kMegabyte = 1'000'000, kMebibyte = 1 << 20;
@@ -63,8 +63,8 @@ std::uint32_t OpenStream(Http2Client& client, const Hostility& hostility,
     answered |=
         frame.stream == call && (frame.type == FrameType::kData || frame.type == FrameType::kReset);
   });
-  client.SendData(call, Prefixed(open), false, kPatience);
-  client.Read(kPatience, [&] { return answered; });
+  client.SendData(call, Prefixed(open), false, kAttackPatience);
+  client.Read(kAttackPatience, [&] { return answered; });
   client.OnFrame(nullptr);
   return call;
 }
@@ -84,7 +84,7 @@ void UnknownFields(Hostility& hostility) {
       const std::string frame = Blob(sequence, 1, 60).frame().SerializeAsString();
       const std::string message =
           sequence % 2 == 0 ? InField(2, frame + unknown) : InField(2, frame) + unknown;
-      if (!client.SendData(call, Prefixed(message), false, kPatience)) break;
+      if (!client.SendData(call, Prefixed(message), false, kAttackPatience)) break;
     }
   });
 }
@@ -97,9 +97,9 @@ void RepeatedFields(Hostility& hostility) {
     std::vector<std::uint32_t> calls;
     for (int k = 0; k < 8; ++k) calls.push_back(OpenStream(client, hostility));
     for (const auto call : calls) {
-      if (!client.SendData(call, frame, false, kPatience)) break;
+      if (!client.SendData(call, frame, false, kAttackPatience)) break;
     }
-    client.Read(kPatience);
+    client.Read(kAttackPatience);
   });
 }
 
@@ -116,9 +116,9 @@ void HugeOpens(Hostility& hostility) {
   Rounds(hostility, 0, [&](Http2Client& client) {
     for (const std::string& open : opens) {
       const auto call = client.Call(CallHeaders(kReconstruct, Bearer(hostility)));
-      if (!client.SendData(call, open, false, kPatience)) return;
+      if (!client.SendData(call, open, false, kAttackPatience)) return;
     }
-    client.Read(kPatience);
+    client.Read(kAttackPatience);
   });
 }
 
@@ -128,7 +128,7 @@ void UnreadAnswers(Hostility& hostility) {
          [&](Http2Client& client) {
            for (int k = 0; k < 16 && !hostility.stop; ++k) {
              const auto call = client.Call(CallHeaders(kReconstructFrame, Bearer(hostility)));
-             if (!client.SendData(call, request, true, kPatience)) return;
+             if (!client.SendData(call, request, true, kAttackPatience)) return;
            }
            client.Read(milliseconds(500));
          },
@@ -147,7 +147,7 @@ void UnfinishedCalls(Hostility& hostility) {
     }
     // Also endless headers.
     client.CallBlock(HeaderBlock(CallHeaders(kReconstruct, Bearer(hostility))), 0);
-    client.Flush(kPatience);
+    client.Flush(kAttackPatience);
   });
 }
 
@@ -162,7 +162,7 @@ void CallersWithoutToken(Hostility& hostility) {
       client.Data(client.Call(CallHeaders(k % 2 == 0 ? kHealthCheck : kGetServerInfo)),
                   Prefixed(""), true);
     }
-    client.Flush(kPatience);
+    client.Flush(kAttackPatience);
     client.Read(milliseconds(100));
   });
 }
@@ -183,10 +183,10 @@ void BadFrames(Hostility& hostility) {
       const std::string& message = hostility.random.Chance(0.2)
                                        ? bad[hostility.random.Below(bad.size())]
                                        : Prefixed(Blob(sequence, 1, 1'000).SerializeAsString());
-      if (!client.SendData(call, message, false, kPatience)) break;
+      if (!client.SendData(call, message, false, kAttackPatience)) break;
     }
     client.Data(call, "", true);
-    client.Flush(kPatience);
+    client.Flush(kAttackPatience);
     client.Read(milliseconds(500));
   });
 }
@@ -213,7 +213,7 @@ void CallsThatStay(Hostility& hostility) {
       client.Call(
           CallHeaders(kMethods[k % kMethods.size()], k % 2 == 0 ? Headers{} : Bearer(hostility)));
     }
-    client.Flush(kPatience);
+    client.Flush(kAttackPatience);
     client.Read(milliseconds(100));
   });
 }
@@ -235,12 +235,13 @@ void AllAtOnce(std::size_t count, const std::function<void(std::size_t)>& work) 
 }
 
 // Frames of the maximum size, in more streams than there is memory for.
-void LargeFrames(Hostility& hostility) {
+void SendLargeFrames(Hostility& hostility) {
   const std::string frame = SquareFrame(1, 400, kLarge);
   while (!hostility.stop) {
     AllAtOnce(31, [&](std::size_t) {
       Sender sender(hostility.address, hostility.token);
-      if (sender.Open() && sender.Send(frame, true, kPatience)) sender.IsAnswered(kPatience);
+      if (sender.Open() && sender.Send(frame, true, kAttackPatience))
+        sender.IsAnswered(kAttackPatience);
     });
     ++hostility.rounds;
   }
@@ -263,7 +264,7 @@ void PartsWithoutPart0(Hostility& hostility) {
       Sender sender(hostility.address, hostility.token);
       const auto part = static_cast<std::uint32_t>(1 + k % (kParts - 1));
       if (!sender.Open({"parts-" + round + std::to_string(k / (kParts - 1)), part, kParts})) return;
-      if (sender.Send(frame, false, kPatience)) sender.IsAnswered(kPatience);
+      if (sender.Send(frame, false, kAttackPatience)) sender.IsAnswered(kAttackPatience);
     });
     ++hostility.rounds;
   }
@@ -320,7 +321,7 @@ constexpr std::array kAttacks = {
     Attack{"bad-frames", "every fifth frame breaks a rule", BadFrames},
     Attack{"killed-clients", "connections cut with frames in flight", KilledClients},
     Attack{"calls-that-stay", "hundreds of calls that say nothing", CallsThatStay},
-    Attack{"large-frames", "31 streams with a frame of 32.9 MB each", LargeFrames},
+    Attack{"large-frames", "31 streams with a frame of 32.9 MB each", SendLargeFrames},
     Attack{"parts-without-part-0", "24 parts of 32.9 MB, and part 0 is silent", PartsWithoutPart0},
     Attack{"every-flood", "each flood of tests/attack/floods.h for a second", EveryFlood},
     Attack{"mute-handshakes", "256 WebSocket calls without a request", MuteHandshakes},

@@ -28,8 +28,7 @@ namespace partiemc::attack {
 namespace {
 
 constexpr double kMostFloodMib = 32;
-constexpr char kHonestToken[] = "honest-0123456789abcdef", kToken[] = "hostile-0123456789abcdef";
-constexpr std::chrono::seconds kPatience(90);
+constexpr std::chrono::seconds kHostilePatience(90);
 
 double Percentile99(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -47,7 +46,7 @@ class Attackers {
       rounds_.emplace_back(attack.name, 0);
       threads_.emplace_back([this, &attack, &rounds = rounds_.back().second, address, web] {
         YieldProcessors();
-        Hostility hostility{address, web,   kToken, support::Random(GetOptions().seed),
+        Hostility hostility{address, web,   kHostileToken, support::Random(GetOptions().seed),
                             stop_,   rounds};
         attack.run(hostility);
       });
@@ -82,15 +81,15 @@ class Hostile : public ::testing::Test {
   }
 
   std::vector<std::string> Arguments(const std::string& web) const {
-    return {
-        "--memory-budget",
-        "256MB",
-        "--web",
-        web,
-        "--threads",
-        "2",
-        "--token-file",
-        folder_.Write("tokens", std::string(kHonestToken) + " honest\n" + kToken + " hostile\n")};
+    return {"--memory-budget",
+            "256MB",
+            "--web",
+            web,
+            "--threads",
+            "2",
+            "--token-file",
+            folder_.Write("tokens",
+                          std::string(kHonestToken) + " honest\n" + kHostileToken + " hostile\n")};
   }
 
   const support::TemporaryFolder folder_;
@@ -129,7 +128,7 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
   ASSERT_TRUE(server_.Lives()) << server_.Output();
   EXPECT_LE(peak, planned_mib_);
   EXPECT_LE(disturbed, options.slowdown * undisturbed);
-  EXPECT_EQ(server_.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server_.GaugesNotAtZero(kHostilePatience), "");
   EXPECT_EQ(server_.Terminate(), 0) << server_.Output();
 }
 
@@ -161,7 +160,7 @@ TEST_F(Hostile, AFloodWithoutATokenTakesLittle) {
               static_cast<unsigned long>(options.flood_seconds), idle, peak);
   ASSERT_TRUE(server_.Lives()) << server_.Output();
   EXPECT_LE(peak - idle, kMostFloodMib);
-  EXPECT_EQ(server_.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server_.GaugesNotAtZero(kHostilePatience), "");
   EXPECT_EQ(server_.Terminate(), 0) << server_.Output();
 }
 

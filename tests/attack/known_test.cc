@@ -27,7 +27,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr seconds kPatience(20);
+constexpr seconds kKnownPatience(20);
 // Maximum growth of the process by an attack.
 constexpr double kMaxGrowthMib = 32;
 
@@ -42,8 +42,8 @@ int Serves(const std::string& address, const Headers& more = {}) {
       if (frame.type == FrameType::kHeaders) status = std::max(status, GrpcStatusOf(frame.payload));
     });
     client.Data(client.Call(CallHeaders(kGetServerInfo, more)), Prefixed(""), true);
-    client.Flush(kPatience);
-    client.Read(kPatience, [&] { return status >= 0; });
+    client.Flush(kKnownPatience);
+    client.Read(kKnownPatience, [&] { return status >= 0; });
   } catch (const std::runtime_error&) {
   }
   return status;
@@ -99,7 +99,7 @@ TEST_F(Known, HeadersThatAbort) {
         } else {
           client.CallBlock(block);
         }
-        client.Flush(kPatience);
+        client.Flush(kKnownPatience);
         client.Read(milliseconds(20));
       }
     }
@@ -113,9 +113,9 @@ TEST_F(Known, TinyContinuations) {
   const auto call = client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)), 0);
   for (int k = 0; k < 500'000 && !client.closed(); ++k) {
     client.Frame(FrameType::kContinuation, 0, call, "");
-    if (client.queued() > (1u << 20)) client.Flush(kPatience);
+    if (client.queued() > (1u << 20)) client.Flush(kKnownPatience);
   }
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   ExpectBorne("500,000 empty CONTINUATION");
 }
 
@@ -130,9 +130,9 @@ TEST_F(Known, ABombOfReferences) {
     std::string bomb = HeaderBlock(CallHeaders(kGetServerInfo));
     bomb += std::string(8'000, static_cast<char>(0x80 | 62));
     client.CallBlock(bomb);
-    if (client.queued() > (1u << 20)) client.Flush(kPatience);
+    if (client.queued() > (1u << 20)) client.Flush(kKnownPatience);
   }
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   ExpectBorne("2,000 calls that refer 8,000 times to a header of 4 kB");
 }
 
@@ -142,7 +142,7 @@ template <typename Queue>
 void Flood(const std::string& address, const Queue& queue) {
   Http2Client client(address, {.source = "127.0.0.2"});
   const auto call = client.Call(CallHeaders(kReconstruct));
-  client.Flush(kPatience, false);
+  client.Flush(kKnownPatience, false);
   for (int k = 0; k < 300'000 && !client.closed(); ++k) {
     queue(client, call);
     if (client.queued() > (1u << 16) && !client.Flush(seconds(1), false)) break;
@@ -201,7 +201,7 @@ TEST_F(Known, ReflectionThatSaysNothingTakesFewThreads) {
   for (int k = 0; k < 200; ++k) {
     client.Call(CallHeaders("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"));
   }
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   client.Read(seconds(1));
   std::printf("200 mute calls of reflection: %td -> %td threads\n", before, threads());
   EXPECT_LE(threads() - before, 20);
@@ -222,7 +222,7 @@ TEST(KnownOfHandshakes, HalfOpenConnectionsEnd) {
     silent.push_back(std::make_unique<Http2Client>(k % 2 == 0 ? plain.address() : tls.address(),
                                                    Http2Client::Options{.greet = false}));
     if (k % 4 < 2) silent.back()->Bytes(k % 2 == 0 ? "PRI * HT" : "\x16\x03\x01\x02");
-    silent.back()->Flush(kPatience);
+    silent.back()->Flush(kKnownPatience);
   }
   const double after = plain.ResidentMib() + tls.ResidentMib();
   const auto began = std::chrono::steady_clock::now();
@@ -275,9 +275,9 @@ std::uint64_t Continue(Http2Client& client, std::uint32_t call, const std::strin
   while (sent < bytes && !client.closed()) {
     client.Frame(FrameType::kContinuation, 0, call, part);
     sent += part.size();
-    if (client.queued() > (1u << 17)) client.Flush(kPatience);
+    if (client.queued() > (1u << 17)) client.Flush(kKnownPatience);
   }
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   client.Read(milliseconds(20));
   std::printf("  %s after %.2f MiB\n", client.closed() ? "ended by the server" : "not ended",
               static_cast<double>(sent) / (1 << 20));
@@ -305,9 +305,9 @@ TEST_F(BehindProxy, RapidReset) {
   for (int k = 0; k < 50'000; ++k) {
     if (!client || client->closed()) client = std::make_unique<Http2Client>(proxy_.address());
     client->Reset(client->CallBlock(block));
-    if (client->queued() > (1u << 16)) client->Flush(kPatience);
+    if (client->queued() > (1u << 16)) client->Flush(kKnownPatience);
   }
-  client->Flush(kPatience);
+  client->Flush(kKnownPatience);
   ExpectBorne("50,000 calls reset at once");
 }
 
@@ -328,13 +328,13 @@ TEST_F(BehindProxy, ABadBinaryHeaderEndsItsCallAlone) {
     ended |= frame.EndsStream();
   });
   client.Data(held, Prefixed(Open("held").SerializeAsString()));
-  client.Flush(kPatience);
-  EXPECT_TRUE(client.Read(kPatience, [&] { return opened; }));
+  client.Flush(kKnownPatience);
+  EXPECT_TRUE(client.Read(kKnownPatience, [&] { return opened; }));
   for (const char* value : {"!", "a", "====", "\xff\xfe"}) {
     client.Data(client.Call(CallHeaders(kGetServerInfo, {{"x-bad-bin", value}})), Prefixed(""),
                 true);
   }
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   client.Read(milliseconds(200));
   EXPECT_FALSE(client.closed()) << "the connection has ended";
   EXPECT_FALSE(ended);
@@ -359,13 +359,13 @@ TEST_F(BehindProxy, ABadHeaderDoesNotPoisonTheConnection) {
                    indexed("x-good", "1"));
   client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)) +
                    indexed("x-large", std::string(10'000, 'a')) + indexed("x-good", "2"));
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   client.Read(milliseconds(100));
   // Another client's call behind the same proxy refers to the entry x-good.
   const auto call =
       client.CallBlock(HeaderBlock(CallHeaders(kGetServerInfo)) + static_cast<char>(0x80 | 62));
   client.Data(call, Prefixed(""), true);
-  client.Flush(kPatience);
+  client.Flush(kKnownPatience);
   client.Read(seconds(2), [&] { return !statuses.empty() && statuses.back() == 0; });
   EXPECT_FALSE(client.closed()) << "the connection has ended";
   EXPECT_TRUE(!statuses.empty() && statuses.back() == 0) << "the other's call has failed";

@@ -24,7 +24,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr seconds kPatience(120);
+constexpr seconds kLargeFramesPatience(120);
 // Codes that clients treat as a lost connection.
 constexpr int kCancelled = 1, kUnavailable = 14;
 constexpr char kToken[] = "large-frames-0123456789", kOther[] = "another-0123456789abcde";
@@ -47,7 +47,7 @@ class LargeFrames : public ::testing::Test {
     std::printf("at most %.0f MiB of %.0f planned, in a group: %s (%.0f MiB)\n", peak, planned_,
                 group_->available() ? "yes" : "no", group_->PeakMib());
     EXPECT_LE(peak, planned_);
-    EXPECT_EQ(server_->GaugesNotAtZero(kPatience), "");
+    EXPECT_EQ(server_->GaugesNotAtZero(kLargeFramesPatience), "");
     EXPECT_EQ(server_->Terminate(), 0) << server_->Output();
   }
 

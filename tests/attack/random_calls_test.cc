@@ -23,7 +23,7 @@
 namespace partiemc::attack {
 namespace {
 
-constexpr std::chrono::seconds kPatience(60);
+constexpr std::chrono::seconds kRandomCallsPatience(60);
 
 std::shared_ptr<grpc::Channel> Channel(const std::string& address) {
   grpc::ChannelArguments arguments;
@@ -61,7 +61,7 @@ void ExpectBorne(const char* what, std::vector<std::string> arguments, double sh
     EXPECT_LE(storm.counts().left, 0) << "callers found nobody to call";
   }
   ASSERT_TRUE(server.Lives()) << server.Output();
-  EXPECT_EQ(server.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server.GaugesNotAtZero(kRandomCallsPatience), "");
   EXPECT_EQ(server::StreamedDigests(Channel(server.address()), 6, 20), server::LocalDigests(6, 20));
   std::printf("%s: %.1f MiB, at most %.1f\n", what, server.ResidentMib(), server.PeakMib());
   EXPECT_EQ(server.Terminate(), 0) << server.Output();
@@ -97,7 +97,7 @@ TEST(RandomCalls, AFullServerBearsThemOverTlsWithAToken) {
   }
   for (std::thread& caller : callers) caller.join();
   ASSERT_TRUE(server.Lives()) << server.Output();
-  EXPECT_EQ(server.GaugesNotAtZero(kPatience), "");
+  EXPECT_EQ(server.GaugesNotAtZero(kRandomCallsPatience), "");
   EXPECT_EQ(server.Terminate(), 0) << server.Output();
 }
 

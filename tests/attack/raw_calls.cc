@@ -14,7 +14,7 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience(2000);
+constexpr milliseconds kRawCallPatience(2000);
 constexpr std::size_t kMostOpen = 48;
 
 template <typename Container>
@@ -39,7 +39,7 @@ class RawCaller {
         }
       }
       if (counts_.left <= 0) return;
-      client_->Flush(kPatience, random_.Chance(0.9));
+      client_->Flush(kRawCallPatience, random_.Chance(0.9));
       Pause();
       if (random_.Chance(0.01)) Disturb();
     }
@@ -162,11 +162,11 @@ class RawCaller {
     switch (random_.Below(4)) {
       case 0:
         client_->Bytes(std::string(40, static_cast<char>(random_.Below(256))));
-        client_->Flush(kPatience);
+        client_->Flush(kRawCallPatience);
         break;
       case 1:
         client_->GoAway();
-        client_->Flush(kPatience);
+        client_->Flush(kRawCallPatience);
         break;
       case 2:
         client_->Close(/*reset=*/true);

@@ -26,13 +26,13 @@ namespace {
 
 using Function = std::function<double(double, double)>;
 
-constexpr double kRadius = 60;  // Spacings.
+constexpr double kBodyRadius = 60;  // Spacings.
 
 // Jittered particles of a disc, with a value each.
 struct Body {
   std::vector<float> positions, values;
 
-  explicit Body(const Function& field, double radius = kRadius) {
+  explicit Body(const Function& field, double radius = kBodyRadius) {
     std::mt19937 random(3);
     const auto offset = [&] { return .3 * (static_cast<double>(random()) / 4294967296.0 - .5); };
     const int reach = static_cast<int>(radius) + 1;
@@ -48,7 +48,7 @@ struct Body {
   }
 };
 
-Result MeshOf(const Body& body, ReconstructionParameters parameters = {}) {
+Result MeshedBody(const Body& body, ReconstructionParameters parameters = {}) {
   parameters.spacing = 1;
   const auto components = static_cast<int>(2 * body.values.size() / body.positions.size());
   const std::vector<Attribute> attributes = {{"value", components, body.values}};
@@ -127,8 +127,8 @@ struct Field {
 };
 
 std::vector<Field> Fields() {
-  return {{"linear", [](double x, double y) { return .5 + (.6 * x + .8 * y) / (2 * kRadius); }},
-          {"radial", [](double x, double y) { return std::hypot(x, y) / kRadius; }},
+  return {{"linear", [](double x, double y) { return .5 + (.6 * x + .8 * y) / (2 * kBodyRadius); }},
+          {"radial", [](double x, double y) { return std::hypot(x, y) / kBodyRadius; }},
           {"step of phase", [](double x, double y) { return x + .3 * y > 5 ? 1.0 : 0.0; }},
           {"vortex",  // The speed of a Lamb-Oseen vortex.
            [](double x, double y) {
@@ -136,7 +136,7 @@ std::vector<Field> Fields() {
              return 1.567 * (1 - std::exp(-r * r)) / r;
            }},
           {"boundary layer",
-           [](double, double y) { return 1 - std::exp(-std::max(0.0, y + kRadius) / 8); }}};
+           [](double, double y) { return 1 - std::exp(-std::max(0.0, y + kBodyRadius) / 8); }}};
 }
 
 class AttributeMesh : public ::testing::TestWithParam<Field> {};
@@ -144,7 +144,7 @@ class AttributeMesh : public ::testing::TestWithParam<Field> {};
 TEST_P(AttributeMesh, IsAccurateWithAThirdOfTheTrianglesOfGrid) {
   const auto& [name, field] = GetParam();
   const Body body(field);
-  const Result mesh = MeshOf(body), grid = MeshOf(body, {.fill = Fill::kGrid});
+  const Result mesh = MeshedBody(body), grid = MeshedBody(body, {.fill = Fill::kGrid});
   const double error = MeanError(mesh, field), error_of_grid = MeanError(grid, field);
   std::printf("%s: mean error %.4f, of grid %.4f; %lu triangles of %lu\n", name.c_str(), error,
               error_of_grid, static_cast<unsigned long>(mesh.mesh.TriangleCount()),
@@ -160,7 +160,7 @@ TEST_P(AttributeMesh, IsAccurateWithAThirdOfTheTrianglesOfGrid) {
 // The mesh of `grid` has the values at the nodes that the coarse mesh omits.
 TEST_P(AttributeMesh, DeviatesFromEachNodeByTheToleranceAtMost) {
   const Body body(GetParam().at);
-  const Result grid = MeshOf(body, {.fill = Fill::kGrid});
+  const Result grid = MeshedBody(body, {.fill = Fill::kGrid});
   std::map<std::pair<double, double>, double> nodes;
   double least = INFINITY, most = -INFINITY;
   for (std::size_t k = grid.rings.points.size() / 2; k < grid.mesh.points.size() / 2; ++k) {
@@ -170,7 +170,7 @@ TEST_P(AttributeMesh, DeviatesFromEachNodeByTheToleranceAtMost) {
     most = std::max(most, value);
   }
   for (const double tolerance : {.001, .01, .1}) {
-    const Result mesh = MeshOf(body, {.attribute_tolerance = tolerance});
+    const Result mesh = MeshedBody(body, {.attribute_tolerance = tolerance});
     std::size_t compared = 0;
     double largest = 0;
     ForEachSample(mesh, kOnNodes, 0, [&](const Point& p, double value) {
@@ -205,21 +205,21 @@ TEST(AttributeMeshes, ShowASubmergedDrop) {
                   [&](const Point&, double value) { sum += value > .5 ? kSampleArea : 0; });
     return sum;
   };
-  const Result mesh = MeshOf(body);
-  const double fine = area(MeshOf(body, {.fill = Fill::kGrid, .cell_size = .25}));
+  const Result mesh = MeshedBody(body);
+  const double fine = area(MeshedBody(body, {.fill = Fill::kGrid, .cell_size = .25}));
   std::printf("drop: area above .5 %.2f, in a fine grid %.2f\n", area(mesh), fine);
   EXPECT_NEAR(area(mesh), fine, .05 * fine);
   EXPECT_NEAR(area(mesh), 30, 6);
   EXPECT_GT(*std::ranges::max_element(mesh.attributes[0].values), .95);
   EXPECT_LE(mesh.mesh.TriangleCount(), mesh.statistics.triangles_grid / 3);
-  EXPECT_LT(area(MeshOf(body, {.attribute_tolerance = 1})), .1 * fine);
+  EXPECT_LT(area(MeshedBody(body, {.attribute_tolerance = 1})), .1 * fine);
 }
 
 // Large blocks are tested at few nodes, and a drop may lie between them.
 TEST(AttributeMeshes, ShowADropAtAnyPlace) {
   for (int k = 0; k < 16; ++k) {
     const double cx = -23 + 3.1 * k, cy = 19 - 2.3 * k;
-    const Result mesh = MeshOf(
+    const Result mesh = MeshedBody(
         Body([&](double x, double y) { return std::hypot(x - cx, y - cy) < 2.6 ? 1.0 : 0.0; }));
     EXPECT_GT(*std::ranges::max_element(mesh.attributes[0].values), .85) << cx << ", " << cy;
   }
@@ -232,25 +232,25 @@ TEST(AttributeMeshes, RepresentTheLengthOfVectors) {
   for (std::size_t k = 0; k < body.positions.size(); k += 2) {
     body.values.insert(body.values.end(), {-body.positions[k + 1], body.positions[k]});
   }
-  const Result mesh = MeshOf(body);
+  const Result mesh = MeshedBody(body);
   const Function speed = [](double x, double y) { return std::hypot(x, y); };
-  EXPECT_LE(MeanError(mesh, speed, kLength), .02 * kRadius);
+  EXPECT_LE(MeanError(mesh, speed, kLength), .02 * kBodyRadius);
   double largest = 0;  // At the centre, where the speed has a tip.
   ForEachSample(mesh, kAside, kLength, [&](const Point& p, double value) {
     largest = std::max(largest, std::abs(value - speed(p.x, p.y)));
   });
-  EXPECT_LE(largest, .02 * 2 * kRadius);
+  EXPECT_LE(largest, .02 * 2 * kBodyRadius);
   EXPECT_LE(MeanError(
                 mesh, [](double, double y) { return -y; }, 0),
-            .001 * kRadius);
+            .001 * kBodyRadius);
   EXPECT_LE(mesh.mesh.TriangleCount(), mesh.statistics.triangles_grid / 3);
 }
 
 TEST(AttributeMeshes, OfNoiseAreTheGrid) {
   std::mt19937 random(5);
   const Body body([&](double, double) { return static_cast<double>(random() % 1000); }, 20);
-  const Result mesh = MeshOf(body, {.attribute_tolerance = 0});
-  const Result grid = MeshOf(body, {.fill = Fill::kGrid});
+  const Result mesh = MeshedBody(body, {.attribute_tolerance = 0});
+  const Result grid = MeshedBody(body, {.fill = Fill::kGrid});
   EXPECT_GE(mesh.mesh.TriangleCount(), grid.mesh.TriangleCount());
   EXPECT_EQ(CountTJunctions(mesh), 0u);
 }
@@ -261,14 +261,14 @@ TEST(AttributeMeshes, OfTheLargestFloatsAreValid) {
   Body body([&](double, double) { return random() % 2 == 0 ? most : -most; }, 20);
   body.values.insert(body.values.end(), body.values.rbegin(), body.values.rend());
   for (const double tolerance : {0., .01, .9}) {
-    const Result mesh = MeshOf(body, {.attribute_tolerance = tolerance});
+    const Result mesh = MeshedBody(body, {.attribute_tolerance = tolerance});
     EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus()) << tolerance;
   }
 }
 
 TEST(AttributeMeshes, OfAConstantHaveAFewLargeBlocks) {
   const Body body([](double, double) { return 7.0; });
-  const Result mesh = MeshOf(body);
+  const Result mesh = MeshedBody(body);
   EXPECT_LE(mesh.mesh.TriangleCount(), mesh.statistics.triangles_grid / 5);
   EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus());
 }
@@ -276,14 +276,14 @@ TEST(AttributeMeshes, OfAConstantHaveAFewLargeBlocks) {
 // The square root of 2 is no float, so sums of lengths round.
 TEST(AttributeMeshes, OfAConstantVectorAreThoseOfAConstant) {
   Body body([](double, double) { return 1.0; });
-  const Result scalar = MeshOf(body);
+  const Result scalar = MeshedBody(body);
   body.values.insert(body.values.end(), body.values.begin(), body.values.end());
-  EXPECT_EQ(MeshOf(body).mesh, scalar.mesh);
+  EXPECT_EQ(MeshedBody(body).mesh, scalar.mesh);
 }
 
 TEST(AttributeMeshes, WithToleranceOneAreThoseWithoutAttributes) {
   const Body body([](double x, double y) { return std::sin(x / 7) + y; });
-  const Result with = MeshOf(body, {.attribute_tolerance = 1});
+  const Result with = MeshedBody(body, {.attribute_tolerance = 1});
   const auto reconstructor = Reconstructor::Create({.spacing = 1});
   State state;
   Workspace workspace;
@@ -299,7 +299,7 @@ TEST(AttributeMeshes, HaveTheSameBitsForAnyNumberOfThreads) {
   std::vector<std::uint64_t> digests;
   for (const int threads : {1, 2, 5}) {
     Arena arena(threads);
-    arena.Execute([&] { digests.push_back(DigestMesh(MeshOf(body).mesh)); });
+    arena.Execute([&] { digests.push_back(DigestMesh(MeshedBody(body).mesh)); });
   }
   EXPECT_THAT(digests, ::testing::Each(digests[0]));
 }
@@ -325,15 +325,15 @@ TEST(AttributeMeshes, OfManyShapesAreValid) {
       }
     }
     for (const double tolerance : {.01, .2}) {
-      const Result mesh = MeshOf(body, {.attribute_tolerance = tolerance});
+      const Result mesh = MeshedBody(body, {.attribute_tolerance = tolerance});
       EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus()) << round;
     }
     const Placement placement = AllPlacements()[round % AllPlacements().size()];
-    const Result mesh = MeshOf(body, {.placement = placement});
+    const Result mesh = MeshedBody(body, {.placement = placement});
     if (KeepsGuarantees(placement)) {
       EXPECT_EQ(Validate(mesh, Fill::kConforming), absl::OkStatus()) << round;
     }
-    const Result grid = MeshOf(body, {.placement = placement, .fill = Fill::kGrid});
+    const Result grid = MeshedBody(body, {.placement = placement, .fill = Fill::kGrid});
     EXPECT_EQ(mesh.statistics.triangles_grid, grid.mesh.TriangleCount()) << round;
   }
 }

@@ -4,17 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "partiemc/status.h"
+#include "support/numbers.h"
 #include "support/particles.h"
 
 namespace partiemc {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using support::kInfinity;
+using support::kNan;
 
 Scale ScaleOf(double spacing, double kernel_radius, double cell_size) {
   const ReconstructionParameters parameters =

@@ -23,7 +23,7 @@ namespace {
 
 using support::Particles;
 
-constexpr int kFrames = 4;
+constexpr int kFrameCount = 4;
 
 // A body that moves, with holes, beside drops, with ids: every stage has something to do.
 Particles SceneAt(int frame) {
@@ -62,7 +62,7 @@ class CancelAfter final : public StageObserver {
 class Cancellation : public testing::TestWithParam<unsigned> {
  protected:
   Cancellation() {
-    for (int k = 0; k < kFrames; ++k) frames_.push_back(SceneAt(k));
+    for (int k = 0; k < kFrameCount; ++k) frames_.push_back(SceneAt(k));
     for (const Particles& frame : frames_) {
       values_.emplace_back(frame.xy.begin(), frame.xy.end());
       attributes_.push_back({.name = "place", .components = 2, .values = values_.back()});
@@ -70,7 +70,7 @@ class Cancellation : public testing::TestWithParam<unsigned> {
     State state;
     Workspace workspace;
     Result result;
-    for (int k = 0; k < kFrames; ++k) {
+    for (int k = 0; k < kFrameCount; ++k) {
       EXPECT_TRUE(reconstructor_->Reconstruct(FrameAt(k), state, workspace, result).ok());
       expected_.push_back(result);
       states_.push_back(state);
@@ -132,7 +132,7 @@ TEST_P(Cancellation, AtAnyMomentLeavesNoTrace) {
   int cancelled = 0, whole = 0;
   for (int round = 0; round < 60; ++round) {
     SCOPED_TRACE(testing::Message() << "round " << round);
-    const int done = round % (kFrames - 1);
+    const int done = round % (kFrameCount - 1);
     state = done == 0 ? State() : states_[done - 1];
     std::atomic<bool> flag = false;
     std::atomic<bool> has_begun = false;

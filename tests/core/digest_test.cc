@@ -12,7 +12,7 @@
 namespace partiemc {
 namespace {
 
-Rings Triangle() {
+Rings TriangleRing() {
   Rings rings;
   rings.points = {0, 0, 1, 0, 0, 1};
   rings.offsets = {0, 3};
@@ -41,7 +41,8 @@ std::uint64_t Fold(const std::vector<std::uint64_t>& words) {
 
 TEST(Digest, IsTheOneOfTheProtocol) {
   constexpr std::uint64_t kOne = 0x3ff0000000000000u;  // 1.0
-  EXPECT_EQ(DigestRings(Triangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 2, 0, 3, 1, 0xffffffffu}));
+  EXPECT_EQ(DigestRings(TriangleRing()),
+            Fold({6, 0, 0, kOne, 0, 0, kOne, 2, 0, 3, 1, 0xffffffffu}));
   EXPECT_EQ(DigestMesh(OneTriangle()), Fold({6, 0, 0, kOne, 0, 0, kOne, 3, 0, 1, 2, 1, 0}));
   EXPECT_EQ(DigestRings(Rings{}), Fold({0, 1, 0, 0}));
   EXPECT_EQ(DigestMesh(Mesh{}), Fold({0, 0, 0}));
@@ -87,25 +88,25 @@ TEST(Digest, OfTheExampleOfTheProtocolIsTheOneThatStandsThere) {
 }
 
 TEST(Digest, TellsEveryChangeOfGeometryApart) {
-  std::set<std::uint64_t> digests = {DigestRings(Triangle())};
+  std::set<std::uint64_t> digests = {DigestRings(TriangleRing())};
   const auto expect_new = [&](const Rings& rings) {
     EXPECT_TRUE(digests.insert(DigestRings(rings)).second);
   };
   for (std::size_t k = 0; k < 6; ++k) {
-    Rings rings = Triangle();
+    Rings rings = TriangleRing();
     rings.points[k] += 0x1p-50;
     expect_new(rings);
   }
-  Rings negative_zero = Triangle();
+  Rings negative_zero = TriangleRing();
   negative_zero.points[0] = -0.0;
   expect_new(negative_zero);
-  Rings hole = Triangle();
+  Rings hole = TriangleRing();
   hole.outer_of[0] = 0;
   expect_new(hole);
-  Rings split = Triangle();
+  Rings split = TriangleRing();
   split.offsets = {0, 2, 3};
   expect_new(split);
-  Rings turned = Triangle();
+  Rings turned = TriangleRing();
   turned.points = {1, 0, 0, 1, 0, 0};
   expect_new(turned);
 }
@@ -120,11 +121,11 @@ TEST(Digest, OfAMeshTellsTrianglesAndClassesApart) {
 }
 
 TEST(Digest, LooksAtTheGeometryOnly) {
-  Rings measured = Triangle();
+  Rings measured = TriangleRing();
   measured.measures.resize(1);
   measured.measures[0].identity = 7;
   measured.normals = {1, 0, 1, 0, 1, 0};
-  EXPECT_EQ(DigestRings(measured), DigestRings(Triangle()));
+  EXPECT_EQ(DigestRings(measured), DigestRings(TriangleRing()));
 }
 
 }  // namespace

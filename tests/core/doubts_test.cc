@@ -8,39 +8,23 @@
 
 #include "partiemc/partiemc.h"
 #include "support/particles.h"
+#include "support/result_stream.h"
 
 namespace partiemc {
 namespace {
 
 using support::Particles;
-
-struct Stream {
-  explicit Stream(const ReconstructionParameters& parameters)
-      : reconstructor(*Reconstructor::Create(parameters)) {}
-
-  const Result& Take(const Frame& frame) {
-    const absl::Status status = reconstructor.Reconstruct(frame, state, workspace, result);
-    EXPECT_TRUE(status.ok()) << status;
-    return result;
-  }
-  const Result& Take(const Particles& particles) { return Take(particles.AsFrame()); }
-
-  Reconstructor reconstructor;
-  State state;
-  Workspace workspace;
-  Result result;
-};
+using support::ResultStream;
 
 bool Has(const Result& result, Doubt doubt) { return result.statistics.doubts.Has(doubt); }
 
 bool IsContradicted(double spacing, const Particles& particles) {
-  return Has(Stream({.spacing = spacing}).Take(particles), Doubt::kSpacingContradicted);
+  return Has(ResultStream({.spacing = spacing}).Next(particles), Doubt::kSpacingContradicted);
 }
 
-Particles Shaken(Particles particles, double most) {
+Particles Shaken(const Particles& particles, double most) {
   support::Random random(31);
-  for (double& coordinate : particles.xy) coordinate += random.Uniform(-most, most);
-  return particles;
+  return support::Jittered(particles, random, most);
 }
 
 // First frames of a stream before a body exists.
@@ -60,38 +44,38 @@ std::vector<Particles> Beginnings() {
 TEST(Doubts, NothingIsFixedByFramesThatAgreeOnNoSpacing) {
   const Particles body = Shaken(support::Lattice(30, 20), 0.1);
   for (const SpacingRule rule : {SpacingRule::kFirstFrame, SpacingRule::kEveryFrame}) {
-    Stream undisturbed({.spacing_rule = rule});
-    undisturbed.Take(body);
+    ResultStream undisturbed({.spacing_rule = rule});
+    undisturbed.Next(body);
     EXPECT_TRUE(undisturbed.result.statistics.doubts.empty());
     EXPECT_NEAR(undisturbed.result.statistics.area, 600, 12);
-    Stream stream({.spacing_rule = rule});
+    ResultStream stream({.spacing_rule = rule});
     for (const Particles& beginning : Beginnings()) {
-      stream.Take(beginning);
+      stream.Next(beginning);
       EXPECT_TRUE(Has(stream.result, Doubt::kSpacingProvisional));
       EXPECT_TRUE(Validate(stream.result).ok());
       EXPECT_EQ(stream.state, State{});
       for (const RingMeasures& ring : stream.result.rings.measures) EXPECT_EQ(ring.identity, 0u);
       // From the first frame that agrees on, the stream is one that begins with it.
-      Stream next(stream.reconstructor.parameters());
+      ResultStream next(stream.reconstructor.parameters());
       next.state = stream.state;
-      EXPECT_EQ(next.Take(body), undisturbed.result);
+      EXPECT_EQ(next.Next(body), undisturbed.result);
       EXPECT_EQ(next.state, undisturbed.state);
     }
   }
 }
 
 TEST(Doubts, AGuessIsMadeOfTheFrameAlone) {
-  Stream stream({});
+  ResultStream stream({});
   Particles pair;
   pair.Add(0, 0);
   pair.Add(3, 4);
-  EXPECT_EQ(stream.Take(pair).statistics.spacing, 5);
+  EXPECT_EQ(stream.Next(pair).statistics.spacing, 5);
   EXPECT_GT(stream.result.rings.RingCount(), 0u);
-  EXPECT_EQ(stream.Take(support::Scaled(pair, 0.1)).statistics.spacing, 0.5);
-  EXPECT_EQ(stream.Take(support::Lattice(1, 1)).statistics.spacing, 0);
+  EXPECT_EQ(stream.Next(support::Scaled(pair, 0.1)).statistics.spacing, 0.5);
+  EXPECT_EQ(stream.Next(support::Lattice(1, 1)).statistics.spacing, 0);
   EXPECT_EQ(stream.result.rings.RingCount(), 0u);
   // Without particles there is nothing to doubt.
-  EXPECT_TRUE(stream.Take(Frame{}).statistics.doubts.empty());
+  EXPECT_TRUE(stream.Next(Frame{}).statistics.doubts.empty());
 }
 
 TEST(Doubts, VolumesAreABetterGuessThanDistances) {
@@ -99,8 +83,8 @@ TEST(Doubts, VolumesAreABetterGuessThanDistances) {
   drops.Add(0, 0);
   drops.Add(3000, 4000);
   drops.volumes = {0.25f, 0.25f};
-  Stream stream({});
-  EXPECT_EQ(stream.Take(drops).statistics.spacing, 0.5);
+  ResultStream stream({});
+  EXPECT_EQ(stream.Next(drops).statistics.spacing, 0.5);
   EXPECT_TRUE(Has(stream.result, Doubt::kSpacingProvisional));
   // The outlines of single particles are about twice as large as these.
   EXPECT_LT(stream.result.statistics.area, 1);
@@ -108,24 +92,24 @@ TEST(Doubts, VolumesAreABetterGuessThanDistances) {
 }
 
 TEST(Doubts, AStreamThatIsResumedWhileItsSpacingIsAGuessGivesTheSameBits) {
-  Stream stream({});
+  ResultStream stream({});
   for (const Particles& beginning : Beginnings()) {
-    stream.Take(beginning);
-    Stream resumed({});
+    stream.Next(beginning);
+    ResultStream resumed({});
     resumed.state = *ParseState(Serialize(stream.state));
-    Stream next({});
+    ResultStream next({});
     next.state = stream.state;
     for (const int frame : {0, 1, 2}) {
-      EXPECT_EQ(resumed.Take(support::MovingBody(frame)), next.Take(support::MovingBody(frame)));
+      EXPECT_EQ(resumed.Next(support::MovingBody(frame)), next.Next(support::MovingBody(frame)));
     }
   }
 }
 
 TEST(Doubts, WithEveryFramesSpacingThoseThatAgreeOnNoneTakeTheLastOne) {
-  Stream stream({.spacing_rule = SpacingRule::kEveryFrame});
-  stream.Take(support::Lattice(20, 20));
+  ResultStream stream({.spacing_rule = SpacingRule::kEveryFrame});
+  stream.Next(support::Lattice(20, 20));
   for (const Particles& others : Beginnings()) {
-    EXPECT_EQ(stream.Take(others).statistics.spacing, 1);
+    EXPECT_EQ(stream.Next(others).statistics.spacing, 1);
     EXPECT_FALSE(Has(stream.result, Doubt::kSpacingProvisional));
   }
 }
@@ -146,12 +130,12 @@ TEST(Doubts, ASpacingThatParticlesContradictIsTold) {
 }
 
 TEST(Doubts, ASpacingOfTheStreamThatLaterFramesContradictIsToldToo) {
-  Stream stream({});
+  ResultStream stream({});
   const Particles body = support::Lattice(30, 30);
-  EXPECT_TRUE(stream.Take(body).statistics.doubts.empty());
-  EXPECT_TRUE(Has(stream.Take(support::Scaled(body, 0.3)), Doubt::kSpacingContradicted));
-  EXPECT_TRUE(Has(stream.Take(support::Scaled(body, 3)), Doubt::kSpacingContradicted));
-  EXPECT_TRUE(stream.Take(body).statistics.doubts.empty());
+  EXPECT_TRUE(stream.Next(body).statistics.doubts.empty());
+  EXPECT_TRUE(Has(stream.Next(support::Scaled(body, 0.3)), Doubt::kSpacingContradicted));
+  EXPECT_TRUE(Has(stream.Next(support::Scaled(body, 3)), Doubt::kSpacingContradicted));
+  EXPECT_TRUE(stream.Next(body).statistics.doubts.empty());
 }
 
 TEST(Doubts, SprayAndFilmsContradictNothing) {
@@ -179,7 +163,7 @@ TEST(Doubts, VolumesInAnotherUnitThanTheSpacingAreTold) {
   const auto doubted = [&](float volume) {
     body.volumes.assign(body.size(), volume);
     body.volumes[0] = 1;
-    return Has(Stream({.spacing = 1.0}).Take(body), Doubt::kVolumesContradictSpacing);
+    return Has(ResultStream({.spacing = 1.0}).Next(body), Doubt::kVolumesContradictSpacing);
   };
   // Discs of a diameter h, and hexagonal packing.
   for (const float volume : {0.785f, 0.866f, 1.0f, 1.9f, 0.55f}) EXPECT_FALSE(doubted(volume));
@@ -187,7 +171,7 @@ TEST(Doubts, VolumesInAnotherUnitThanTheSpacingAreTold) {
   // A few large ones among many of the usual size.
   body.volumes.assign(body.size(), 1.0f);
   for (std::size_t k = 0; k < body.size() / 3; ++k) body.volumes[k] = 50;
-  EXPECT_TRUE(Stream({.spacing = 1.0}).Take(body).statistics.doubts.empty());
+  EXPECT_TRUE(ResultStream({.spacing = 1.0}).Next(body).statistics.doubts.empty());
 }
 
 // A frame as float32, `offset` away from the origin.
@@ -205,16 +189,16 @@ TEST(Doubts, FloatsThatAreTooCoarseForTheSpacingAreAnErrorOrADoubt) {
   const Particles body = support::Scaled(support::Disc(12), 0.01);
   // Steps of float32 there, in spacings: 1/10240 to 6.
   for (const double offset : {5.0, 1000.0, 5000.0}) {
-    EXPECT_TRUE(Stream({.spacing = 0.01})
-                    .Take(FloatFrame(body, offset).AsFrame())
+    EXPECT_TRUE(ResultStream({.spacing = 0.01})
+                    .Next(FloatFrame(body, offset).AsFrame())
                     .statistics.doubts.empty())
         << offset;
   }
-  EXPECT_TRUE(Has(Stream({.spacing = 0.01}).Take(FloatFrame(body, 10'000).AsFrame()),
+  EXPECT_TRUE(Has(ResultStream({.spacing = 0.01}).Next(FloatFrame(body, 10'000).AsFrame()),
                   Doubt::kPositionsCoarse));
   for (const auto& spacing : {std::optional(0.01), std::optional<double>()}) {
-    Stream stream({.spacing = spacing});
-    stream.Take(body);
+    ResultStream stream({.spacing = spacing});
+    stream.Next(body);
     const State before = stream.state;
     const absl::Status status = stream.reconstructor.Reconstruct(
         FloatFrame(body, 1e6).AsFrame(), stream.state, stream.workspace, stream.result);
@@ -227,7 +211,7 @@ TEST(Doubts, FloatsThatAreTooCoarseForTheSpacingAreAnErrorOrADoubt) {
     EXPECT_EQ(stream.state, before);
     EXPECT_EQ(stream.result, Result{});
     // The same as float64 is fine.
-    EXPECT_TRUE(stream.Take(support::Shifted(body, 1e6, 1e6)).statistics.doubts.empty());
+    EXPECT_TRUE(stream.Next(support::Shifted(body, 1e6, 1e6)).statistics.doubts.empty());
   }
 }
 
@@ -237,9 +221,9 @@ TEST(Doubts, ACoordinateAcrossThePlaneMayBeAsCoarseAsItLikes) {
   for (std::size_t k = 0; k < body.size(); ++k) {
     xyz.insert(xyz.end(), {static_cast<float>(body.x(k)), 1e7f, static_cast<float>(body.y(k))});
   }
-  Stream stream({.spacing = 0.01, .plane = Plane::kXz});
+  ResultStream stream({.spacing = 0.01, .plane = Plane::kXz});
   const Frame frame{.positions = std::span<const float>(xyz), .components = 3};
-  EXPECT_TRUE(stream.Take(frame).statistics.doubts.empty());
+  EXPECT_TRUE(stream.Next(frame).statistics.doubts.empty());
 }
 
 }  // namespace

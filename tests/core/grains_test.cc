@@ -76,7 +76,7 @@ class GrainOracle {
 };
 
 // Relative to the largest kernel radius. Seen: 3e-7.
-constexpr double kFieldTolerance = 1e-5;
+constexpr double kGrainFieldTolerance = 1e-5;
 
 TEST(Grains, FieldAgreesWithSumsOverAllParticles) {
   int crossed = 0, inside = 0, planes = 0;
@@ -92,7 +92,7 @@ TEST(Grains, FieldAgreesWithSumsOverAllParticles) {
     const GrainOracle oracle(stages.particles);
     const double cell = stages.scale.cell_size;
     EXPECT_EQ(cell, parameters.cell_size / 2);
-    const double tolerance = kFieldTolerance * stages.scale.reach * cell;
+    const double tolerance = kGrainFieldTolerance * stages.scale.reach * cell;
     Random random(seed);
     const auto& cells = stages.crossings.cells;
     for (int k = 0; k < 300 && !cells.empty(); ++k) {
@@ -211,19 +211,19 @@ std::vector<Grading> AllGradings() {
           {"1:10, one of fifty", of_two(10, .02)}};
 }
 
-struct Scene {
+struct GrainScene {
   std::string_view name;
   Particles (*make)(Random& random, std::size_t count, const DrawDiameter& draw);
 };
 
 TEST(Grains, OutlinesDoNotCutGrains) {
-  constexpr Scene kScenes[] = {{"heap", support::GrainHeap},
-                               {"column", support::GrainColumn},
-                               {"spray", support::GrainSpray}};
+  constexpr GrainScene kScenes[] = {{"heap", support::GrainHeap},
+                                    {"column", support::GrainColumn},
+                                    {"spray", support::GrainSpray}};
   constexpr std::size_t kCount = 120;
   std::printf("%-20s %-8s %6s %10s %9s %6s\n", "", "", "rings", "worst cut", "farthest", "area");
   for (const Grading& grading : AllGradings()) {
-    for (const Scene& scene : kScenes) {
+    for (const GrainScene& scene : kScenes) {
       SCOPED_TRACE(testing::Message() << grading.name << ", " << scene.name);
       GrainFigures worst;
       std::size_t rings = 0;

@@ -19,7 +19,7 @@ namespace partiemc {
 namespace {
 
 using support::Particles;
-using Stream = support::RingStream;
+using support::RingStream;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::UnorderedElementsAre;
@@ -38,7 +38,7 @@ Particles Bar(bool whole, double y = 0) {
 }
 
 TEST(Identities, FirstFrameHasDistinctRingsWithoutParents) {
-  Stream stream;
+  RingStream stream;
   const Rings& rings = stream.Next(
       Together({support::Disc(6, 0, 0), support::Annulus(20, 40), support::Disc(3, 60, 0)}));
   ASSERT_EQ(rings.RingCount(), 4u);
@@ -52,7 +52,7 @@ TEST(Identities, FirstFrameHasDistinctRingsWithoutParents) {
 }
 
 TEST(Identities, PassingDiscsKeepTheirIdentities) {
-  Stream stream;
+  RingStream stream;
   std::uint64_t right_going = 0, left_going = 0;
   for (int k = 0; k <= 40; ++k) {
     const double x = 2.0 * k;
@@ -74,7 +74,7 @@ TEST(Identities, PassingDiscsKeepTheirIdentities) {
 TEST(Identities, NeighbourThatMovesInIsNoParent) {
   // Two blocks side by side; both move right by a third of their width, so that the left one comes
   // to lie where the edge of the right one was.
-  Stream stream;
+  RingStream stream;
   stream.Next(Together({support::Lattice(18, 18, 0, 0), support::Lattice(18, 18, 22, 0)}));
   const std::uint64_t left = stream.Identity(9, 9);
   const std::uint64_t right = stream.Identity(31, 9);
@@ -87,7 +87,7 @@ TEST(Identities, NeighbourThatMovesInIsNoParent) {
 }
 
 TEST(Identities, LargerPartKeepsIdentityAfterSplit) {
-  Stream stream;
+  RingStream stream;
   stream.Next(Bar(true));
   ASSERT_EQ(stream.rings().RingCount(), 1u);
   const std::uint64_t whole = stream.Identity(25, 6);
@@ -100,7 +100,7 @@ TEST(Identities, LargerPartKeepsIdentityAfterSplit) {
 }
 
 TEST(Identities, LargerPartIsContinuedAfterMerge) {
-  Stream stream;
+  RingStream stream;
   stream.Next(Bar(false));
   const std::uint64_t large = stream.Identity(15, 6);
   const std::uint64_t small = stream.Identity(46, 6);
@@ -115,7 +115,7 @@ TEST(Identities, LargerPartIsContinuedAfterMerge) {
 }
 
 TEST(Identities, SmallDropBecomesParentOfLargeBody) {
-  Stream stream;
+  RingStream stream;
   stream.Next(Together({support::Lattice(40, 20), support::Disc(2.5, 20, 25)}));
   ASSERT_EQ(stream.rings().RingCount(), 2u);
   const std::uint64_t body = stream.Identity(20, 9);
@@ -128,7 +128,7 @@ TEST(Identities, SmallDropBecomesParentOfLargeBody) {
 
 TEST(Identities, HolesAndIslandsAreTrackedSeparately) {
   // A ring of fluid with an island in it; the island drifts, then the fluid ring opens.
-  Stream stream;
+  RingStream stream;
   const auto scene = [](double x, bool open) {
     Particles fluid = support::Annulus(15, 25);
     if (open) {
@@ -164,7 +164,7 @@ TEST(Identities, HolesAndIslandsAreTrackedSeparately) {
 }
 
 TEST(Identities, RingMissingInOneFrameIsNew) {
-  Stream stream;
+  RingStream stream;
   stream.Next(Together({support::Disc(6), support::Disc(6, 40, 0)}));
   const std::uint64_t kept = stream.Identity(0, 0);
   const std::uint64_t lost = stream.Identity(40, 0);
@@ -176,7 +176,7 @@ TEST(Identities, RingMissingInOneFrameIsNew) {
 }
 
 TEST(Identities, EmptyFrameEndsAllIdentities) {
-  Stream stream;
+  RingStream stream;
   stream.Next(support::Disc(6));
   EXPECT_EQ(stream.Identity(0, 0), 1u);
   stream.Next(Particles{});
@@ -189,7 +189,7 @@ TEST(Identities, EmptyFrameEndsAllIdentities) {
 }
 
 TEST(Identities, RefusedFrameChangesNothing) {
-  Stream disturbed, undisturbed;
+  RingStream disturbed, undisturbed;
   Particles bad = support::Disc(6);
   bad.xy[3] = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 5; ++k) {
@@ -216,7 +216,7 @@ Particles Turmoil(std::uint64_t seed, int frame) {
 TEST(Identities, AreUniqueAndParentsAreOfTheLastFrame) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    Stream stream;
+    RingStream stream;
     std::map<std::uint64_t, bool> before;  // Identity: is it a hole?
     std::uint64_t highest = 0;
     int splits = 0, merges = 0;
@@ -260,7 +260,7 @@ TEST(Identities, AreUniqueAndParentsAreOfTheLastFrame) {
 TEST(Identities, DoNotDependOnOrderThreadsOrRestarts) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    Stream stream, permuted, restored;
+    RingStream stream, permuted, restored;
     support::Random random(seed);
     for (int k = 0; k < 8; ++k) {
       const Particles particles = Turmoil(seed, k);
@@ -287,7 +287,7 @@ TEST(Identities, DoNotDependOnOrderThreadsOrRestarts) {
 TEST(Identities, DoNotDependOnTheOrderOfRings) {
   // Shifted by part of a tile, the same scene has its rings in another order.
   for (const auto& [dx, dy] : {std::pair(16.0, 16.0), {-16.0, 0.0}, {7.0, 21.0}}) {
-    Stream here, there;
+    RingStream here, there;
     int reordered = 0;
     for (int k = 0; k < 6; ++k) {
       const Particles particles = support::Snapped(Turmoil(5, k), 1);
@@ -311,7 +311,7 @@ TEST(Identities, DoNotDependOnTheOrderOfRings) {
 
 TEST(Identities, EveryPlacementTracksTheRingsThatItKeeps) {
   for (const Placement placement : AllPlacements()) {
-    Stream stream({.placement = placement, .spacing = 1.0});
+    RingStream stream({.placement = placement, .spacing = 1.0});
     // A lone particle's ring is dropped by `farthest-particle`.
     stream.Next(Together({support::Lattice(1, 1, -20, 0), support::Disc(6)}));
     const std::uint64_t disc = stream.Identity(0, 0);
@@ -323,7 +323,7 @@ TEST(Identities, EveryPlacementTracksTheRingsThatItKeeps) {
 }
 
 TEST(Identities, StateGrowsWithOutlineNotArea) {
-  Stream stream;
+  RingStream stream;
   stream.Next(support::Lattice(200, 200));
   EXPECT_LT(stream.state().history.runs.size(), 210u);
 }

@@ -16,15 +16,10 @@
 namespace partiemc {
 namespace {
 
-using testing::Random;
-using testing::Rectangle;
-using testing::Region;
-
-Region RingsOf(const std::vector<std::vector<Point>>& rings) {
-  Region region;
-  for (const auto& ring : rings) region.AddLoop(ring);
-  return region;
-}
+using support::RandomEngine;
+using support::Rectangle;
+using support::Region;
+using support::RegionOf;
 
 std::size_t Count(const Region& rings) {
   TouchingPairsBuffers buffers;
@@ -68,34 +63,34 @@ std::size_t CountAllPairs(const Region& rings) {
 
 TEST(CountTouchingPairs, IgnoresNeighboursOnARing) {
   EXPECT_EQ(Count(Region{}), 0u);
-  EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 0}, {0, 1}}})), 0u);
-  EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 0}, {2, 0}, {2, 1}, {0, 1}}})), 0u) << "straight on";
-  EXPECT_EQ(Count(RingsOf({Rectangle(0, 0, 1, 1), Rectangle(2, 0, 3, 1)})), 0u);
+  EXPECT_EQ(Count(RegionOf({{{0, 0}, {1, 0}, {0, 1}}})), 0u);
+  EXPECT_EQ(Count(RegionOf({{{0, 0}, {1, 0}, {2, 0}, {2, 1}, {0, 1}}})), 0u) << "straight on";
+  EXPECT_EQ(Count(RegionOf({Rectangle(0, 0, 1, 1), Rectangle(2, 0, 3, 1)})), 0u);
 }
 
 TEST(CountTouchingPairs, CountsEveryKindOfTouchOnce) {
-  EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}})), 1u) << "crossing";
-  EXPECT_EQ(Count(RingsOf({{{0, 0}, {2, 0}, {1, 0}, {1, 1}}})), 2u)
+  EXPECT_EQ(Count(RegionOf({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}})), 1u) << "crossing";
+  EXPECT_EQ(Count(RegionOf({{{0, 0}, {2, 0}, {1, 0}, {1, 1}}})), 2u)
       << "folds back, and the side after that begins on the first side";
-  EXPECT_EQ(Count(RingsOf({{{0, 0}, {1, 0}}})), 1u) << "there and back";
-  EXPECT_EQ(Count(RingsOf({{{0, 0}}})), 0u) << "a point";
-  EXPECT_EQ(Count(RingsOf({Rectangle(0, 0, 2, 2), {{2, 1}, {3, 0}, {3, 2}}})), 2u)
+  EXPECT_EQ(Count(RegionOf({{{0, 0}, {1, 0}}})), 1u) << "there and back";
+  EXPECT_EQ(Count(RegionOf({{{0, 0}}})), 0u) << "a point";
+  EXPECT_EQ(Count(RegionOf({Rectangle(0, 0, 2, 2), {{2, 1}, {3, 0}, {3, 2}}})), 2u)
       << "a corner on a side";
-  EXPECT_EQ(Count(RingsOf({Rectangle(0, 0, 1, 1), Rectangle(1, 1, 2, 2)})), 4u)
+  EXPECT_EQ(Count(RegionOf({Rectangle(0, 0, 1, 1), Rectangle(1, 1, 2, 2)})), 4u)
       << "two corners at one place";
 }
 
 TEST(CountTouchingPairs, ListsThePairsThatTouch) {
   TouchingPairsBuffers buffers;
-  const Region rings = RingsOf({Rectangle(5, 5, 6, 6), {{0, 0}, {1, 1}, {1, 0}, {0, 1}}});
+  const Region rings = RegionOf({Rectangle(5, 5, 6, 6), {{0, 0}, {1, 1}, {1, 0}, {0, 1}}});
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.loop_offsets, buffers), 1u);
   EXPECT_EQ(buffers.pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{{4, 6}}));
 }
 
 TEST(CountTouchingPairs, AgreesWithAllPairsOnDegenerateLattices) {
-  Random random(8);
+  RandomEngine random(8);
   for (int round = 0; round < support::Tries(20'000); ++round) {
-    const Region indexed = testing::RandomGarbage(random, 2 + round % 9, 4, 9);
+    const Region indexed = support::RandomGarbage(random, 2 + round % 9, 4, 9);
     Region rings;
     for (std::size_t k = 0; k < indexed.LoopCount(); ++k) rings.AddLoop(indexed.Loop(k));
     ASSERT_EQ(Count(rings), CountAllPairs(rings)) << "seed 8, round " << round;
@@ -104,12 +99,12 @@ TEST(CountTouchingPairs, AgreesWithAllPairsOnDegenerateLattices) {
 
 TEST(CountTouchingPairs, AgreesWithAllPairsForMixedLengths) {
   for (std::uint64_t seed = 0; seed < support::Tries(100u); ++seed) {
-    Random random(seed);
+    RandomEngine random(seed);
     Region rings;
     for (int k = 0; k < 20; ++k) {
       const double size = std::ldexp(1.0, -static_cast<int>(random() % (seed % 2 == 0 ? 12 : 120)));
-      const Point centre{testing::Uniform(random, -1, 1), testing::Uniform(random, -1, 1)};
-      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % 20);
+      const Point centre{support::Uniform(random, -1, 1), support::Uniform(random, -1, 1)};
+      std::vector<Point> ring = support::RandomStar(random, 3 + random() % 20);
       for (Point& point : ring) point = {centre.x + size * point.x, centre.y + size * point.y};
       rings.AddLoop(ring);
     }
@@ -119,12 +114,12 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForMixedLengths) {
 
 TEST(CountTouchingPairs, AgreesWithAllPairsForDistantRings) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
-    Random random(seed);
+    RandomEngine random(seed);
     Region rings;
     for (int k = 0; k < 12; ++k) {
-      const Point centre{10 * (k + testing::Uniform(random, -1, 1)),
-                         testing::Uniform(random, -3, 3)};
-      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % (k % 4 == 0 ? 600 : 60));
+      const Point centre{10 * (k + support::Uniform(random, -1, 1)),
+                         support::Uniform(random, -3, 3)};
+      std::vector<Point> ring = support::RandomStar(random, 3 + random() % (k % 4 == 0 ? 600 : 60));
       for (Point& point : ring) point = {centre.x + 5 * point.x, centre.y + 5 * point.y};
       // Crossings, near each other and far apart along the ring.
       for (std::size_t swaps = random() % 3; swaps > 0; --swaps) {
@@ -139,9 +134,9 @@ TEST(CountTouchingPairs, AgreesWithAllPairsForDistantRings) {
 /// Segments as long as cells, with ends on the borders of cells: where indices are rounded.
 TEST(CountTouchingPairs, AgreesWithAllPairsAtBordersOfCells) {
   for (std::uint64_t seed = 0; seed < support::Tries(100u); ++seed) {
-    Random random(seed);
-    const testing::Cells cells = testing::RandomCells(random, 12, 12, 0.5);
-    const Region staircases = testing::Staircases(cells, random, seed % 2 == 0);
+    RandomEngine random(seed);
+    const support::Cells cells = support::RandomCells(random, 12, 12, 0.5);
+    const Region staircases = support::Staircases(cells, random, seed % 2 == 0);
     Region rings;
     for (std::size_t k = 0; k < staircases.LoopCount(); ++k) rings.AddLoop(staircases.Loop(k));
     const std::size_t expected = CountAllPairs(rings);
@@ -153,8 +148,8 @@ TEST(CountTouchingPairs, AgreesWithAllPairsAtBordersOfCells) {
 }
 
 TEST(CountTouchingPairs, ContoursTouchOnlyAfterAPointMoved) {
-  Random random(9);
-  Region rings = testing::RandomContours(random, 200).Transformed(0.01, 1e3);
+  RandomEngine random(9);
+  Region rings = support::RandomContours(random, 200).Transformed(0.01, 1e3);
   ASSERT_GT(rings.loop_points.size(), 2'000u);
   EXPECT_EQ(Count(rings), 0u);
   rings.points[1000] += 0.5;
@@ -166,9 +161,9 @@ TEST(CountTouchingPairs, ContoursTouchOnlyAfterAPointMoved) {
 TEST(CountTouchingPairs, ReusedBuffersHaveNoEffect) {
   TouchingPairsBuffers warm;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    Random random(seed);
-    Region rings = testing::RandomContours(random, 10 + seed % 40);
-    if (rings.points.size() > 20) rings.points[12] += testing::Uniform(random, -5, 5);
+    RandomEngine random(seed);
+    Region rings = support::RandomContours(random, 10 + seed % 40);
+    if (rings.points.size() > 20) rings.points[12] += support::Uniform(random, -5, 5);
     EXPECT_EQ(CountTouchingPairs(rings.points, rings.loop_offsets, warm), Count(rings))
         << "seed " << seed;
   }

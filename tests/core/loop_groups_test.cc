@@ -13,15 +13,15 @@
 namespace partiemc {
 namespace {
 
-using testing::ExpectCover;
-using testing::Random;
-using testing::Rectangle;
-using testing::Region;
-using testing::Reversed;
+using support::ExpectCover;
+using support::RandomEngine;
+using support::Rectangle;
+using support::Region;
+using support::Reversed;
 
 /// Separate regions of all kinds: suitable for a strip, unsuitable, with one loop or many.
-std::vector<Region> Regions(std::size_t count) {
-  Random random(8);
+std::vector<Region> AllKindsOfRegions(std::size_t count) {
+  RandomEngine random(8);
   std::vector<Region> regions;
   for (std::size_t k = 0; k < count; ++k) {
     Region region;
@@ -32,13 +32,13 @@ std::vector<Region> Regions(std::size_t count) {
         break;
       case 1:
         region.AddLoop(Rectangle(-20, -20, 60, 60));
-        region.AddLoop(Reversed(testing::Comb(random, 1 + random() % 20)));
+        region.AddLoop(Reversed(support::Comb(random, 1 + random() % 20)));
         break;
       case 2:
-        region = testing::RandomBand(random, 10 + random() % 20);
+        region = support::RandomBand(random, 10 + random() % 20);
         break;
       default:
-        region.AddLoop(testing::RandomStar(random, 3 + random() % 100));
+        region.AddLoop(support::RandomStar(random, 3 + random() % 100));
     }
     if (region.LoopCount() == 0) continue;
     regions.push_back(region.Transformed(1, 200.0 * static_cast<double>(k)));
@@ -77,7 +77,7 @@ Region Deal(const std::vector<Region>& regions, LoopGroups& groups) {
 }
 
 TEST(LoopGroups, CoverAllRegionsForAnyNumberOfThreads) {
-  const std::vector<Region> regions = Regions(400);
+  const std::vector<Region> regions = AllKindsOfRegions(400);
   std::vector<std::uint32_t> expected;
   for (const unsigned threads : {1u, 2u, 7u}) {
     Arena arena(threads);
@@ -99,7 +99,7 @@ TEST(LoopGroups, CoverAllRegionsForAnyNumberOfThreads) {
 }
 
 TEST(LoopGroups, FailsIfOneGroupOfManyIsNoRegion) {
-  std::vector<Region> regions = Regions(100);
+  std::vector<Region> regions = AllKindsOfRegions(100);
   Region spoiled;
   spoiled.AddLoop(Rectangle(1e6, 0, 1e6 + 3, 3));
   spoiled.AddLoop(Rectangle(1e6 + 1, 1, 1e6 + 2, 2));  // A hole the wrong way round.

@@ -17,12 +17,12 @@
 namespace partiemc {
 namespace {
 
-using testing::ExpectCover;
-using testing::Random;
-using testing::Rectangle;
-using testing::Region;
-using testing::Reversed;
-using testing::Uniform;
+using support::ExpectCover;
+using support::RandomEngine;
+using support::Rectangle;
+using support::Region;
+using support::Reversed;
+using support::Uniform;
 
 std::optional<std::vector<std::uint32_t>> Strip(const Region& region, LoopStrip& strip) {
   EXPECT_EQ(region.LoopCount(), 2u);
@@ -51,15 +51,12 @@ void ExpectStrip(const Region& region) {
   ExpectCover(region, *triangles);
 }
 
-Region RegionOf(const std::vector<Point>& loop, const std::vector<Point>& other) {
-  Region region;
-  region.AddLoop(loop);
-  region.AddLoop(other);
-  return region;
+Region RegionBetween(const std::vector<Point>& loop, const std::vector<Point>& other) {
+  return support::RegionOf({loop, other});
 }
 
 /// A loop around the origin with a wavy random radius.
-std::vector<Point> Wobbly(Random& random, double radius, std::size_t count) {
+std::vector<Point> Wobbly(RandomEngine& random, double radius, std::size_t count) {
   constexpr double kTurn = 6.283185307179586;
   const double depth = Uniform(random, 0, 0.1);
   const double waves = std::floor(Uniform(random, 2, 9));
@@ -74,28 +71,28 @@ std::vector<Point> Wobbly(Random& random, double radius, std::size_t count) {
 }
 
 TEST(LoopStrip, FrameHasOneTriangleForEachPoint) {
-  ExpectStrip(RegionOf(Rectangle(0, 0, 4, 4), Reversed(Rectangle(1, 1, 3, 3))));
-  ExpectStrip(RegionOf(Reversed(Rectangle(1, 1, 3, 3)), Rectangle(0, 0, 4, 4)));
+  ExpectStrip(RegionBetween(Rectangle(0, 0, 4, 4), Reversed(Rectangle(1, 1, 3, 3))));
+  ExpectStrip(RegionBetween(Reversed(Rectangle(1, 1, 3, 3)), Rectangle(0, 0, 4, 4)));
 }
 
 TEST(LoopStrip, ManyPointsOnOneSideAndFewOnTheOther) {
-  Random random(3);
+  RandomEngine random(3);
   std::vector<Point> fine;
   for (int k = 0; k < 40; ++k) fine.push_back({0.1 * k, 0});
   for (int k = 0; k < 40; ++k) fine.push_back({4, 0.1 * k});
   for (int k = 40; k > 0; --k) fine.push_back({0.1 * k, 4});
   for (int k = 40; k > 0; --k) fine.push_back({0, 0.1 * k});
-  ExpectStrip(RegionOf(fine, Reversed(Rectangle(1, 1, 3, 3))));
-  ExpectStrip(RegionOf(Wobbly(random, 10, 300), Reversed(Rectangle(-1, -1, 1, 1))));
+  ExpectStrip(RegionBetween(fine, Reversed(Rectangle(1, 1, 3, 3))));
+  ExpectStrip(RegionBetween(Wobbly(random, 10, 300), Reversed(Rectangle(-1, -1, 1, 1))));
 }
 
 TEST(LoopStrip, WobblyRingsAreCoveredAtAnyScaleAndPlace) {
-  Random random(4);
+  RandomEngine random(4);
   for (int round = 0; round < support::Tries(100); ++round) {
     SCOPED_TRACE("seed 4, round " + std::to_string(round));
     const auto count = [&] { return static_cast<std::size_t>(Uniform(random, 30, 200)); };
     const Region region =
-        RegionOf(Wobbly(random, 10, count()), Reversed(Wobbly(random, 7, count())));
+        RegionBetween(Wobbly(random, 10, count()), Reversed(Wobbly(random, 7, count())));
     ExpectStrip(region);
     ExpectStrip(region.Transformed(1e-30, 0));
     ExpectStrip(region.Transformed(1e30, 0));
@@ -114,8 +111,8 @@ TEST(LoopStrip, AcceptedBandsAreCovered) {
   std::size_t strips = 0, bands = 0;
   for (std::uint64_t seed = 0; seed < support::Tries(600u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    const Region band = testing::RandomBand(random, 8 + seed % 12);
+    RandomEngine random(seed);
+    const Region band = support::RandomBand(random, 8 + seed % 12);
     if (band.LoopCount() != 2) continue;
     ++bands;
     if (const auto triangles = Strip(band)) {
@@ -129,11 +126,11 @@ TEST(LoopStrip, AcceptedBandsAreCovered) {
 
 // For any loops, accepted triangles are counter-clockwise, and their sides sum to the loops.
 TEST(LoopStrip, AcceptedRandomLoopsKeepTheirSides) {
-  Random random(5);
+  RandomEngine random(5);
   LoopStrip strip;
   std::size_t taken = 0;
   for (int round = 0; round < 200'000; ++round) {
-    const Region region = testing::RandomGarbage(random, 3 + round % 3, 2, 3 + round % 6);
+    const Region region = support::RandomGarbage(random, 3 + round % 3, 2, 3 + round % 6);
     if (region.LoopCount() != 2) continue;
     const auto triangles = Strip(region, strip);
     if (!triangles.has_value()) continue;
@@ -145,11 +142,11 @@ TEST(LoopStrip, AcceptedRandomLoopsKeepTheirSides) {
 }
 
 TEST(LoopStrip, RingWithOnePointMovedIsCoveredOrRefused) {
-  Random random(9);
+  RandomEngine random(9);
   std::size_t taken = 0;
   for (int round = 0; round < support::Tries(2'000); ++round) {
     SCOPED_TRACE("seed 9, round " + std::to_string(round));
-    Region region = RegionOf(Wobbly(random, 10, 30), Reversed(Wobbly(random, 7, 25)));
+    Region region = RegionBetween(Wobbly(random, 10, 30), Reversed(Wobbly(random, 7, 25)));
     region.points[random() % region.points.size()] += Uniform(random, -6, 6);
     if (const auto triangles = Strip(region)) {
       ++taken;
@@ -162,27 +159,27 @@ TEST(LoopStrip, RingWithOnePointMovedIsCoveredOrRefused) {
 
 TEST(LoopStrip, RefusesOtherRegions) {
   const auto square = Rectangle(0, 0, 4, 4);
-  EXPECT_FALSE(Strip(RegionOf(square, Rectangle(1, 1, 3, 3)))) << "the same way round";
-  EXPECT_FALSE(Strip(RegionOf(Rectangle(1, 1, 3, 3), square))) << "the same way round";
-  EXPECT_FALSE(Strip(RegionOf(square, Reversed(Rectangle(-1, -1, 5, 5))))) << "inside out";
-  EXPECT_FALSE(Strip(RegionOf(square, Reversed(square)))) << "no region between them";
-  EXPECT_FALSE(Strip(RegionOf(square, Rectangle(9, 9, 10, 10)))) << "beside each other";
+  EXPECT_FALSE(Strip(RegionBetween(square, Rectangle(1, 1, 3, 3)))) << "the same way round";
+  EXPECT_FALSE(Strip(RegionBetween(Rectangle(1, 1, 3, 3), square))) << "the same way round";
+  EXPECT_FALSE(Strip(RegionBetween(square, Reversed(Rectangle(-1, -1, 5, 5))))) << "inside out";
+  EXPECT_FALSE(Strip(RegionBetween(square, Reversed(square)))) << "no region between them";
+  EXPECT_FALSE(Strip(RegionBetween(square, Rectangle(9, 9, 10, 10)))) << "beside each other";
   const std::vector<Point> coil{{0, 0}, {5, 0}, {5, 5}, {0, 5}, {-1, -1}, {6, -1}, {6, 6}, {-1, 6}};
-  EXPECT_FALSE(Strip(RegionOf(coil, Reversed(Rectangle(2, 2, 3, 3))))) << "turns twice";
-  EXPECT_FALSE(Strip(RegionOf(Rectangle(-9, -9, 9, 9), Reversed(coil)))) << "turns twice";
+  EXPECT_FALSE(Strip(RegionBetween(coil, Reversed(Rectangle(2, 2, 3, 3))))) << "turns twice";
+  EXPECT_FALSE(Strip(RegionBetween(Rectangle(-9, -9, 9, 9), Reversed(coil)))) << "turns twice";
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
                            std::numeric_limits<double>::infinity(), 1e200, 1e-200}) {
-    EXPECT_FALSE(Strip(RegionOf(square, {{1, 1}, {1, 3}, {3, bad}}))) << bad;
-    EXPECT_FALSE(Strip(RegionOf({{0, 0}, {4, bad}, {4, 4}}, {{1, 1}, {1, 3}, {3, 3}}))) << bad;
+    EXPECT_FALSE(Strip(RegionBetween(square, {{1, 1}, {1, 3}, {3, bad}}))) << bad;
+    EXPECT_FALSE(Strip(RegionBetween({{0, 0}, {4, bad}, {4, 4}}, {{1, 1}, {1, 3}, {3, 3}}))) << bad;
   }
 }
 
 TEST(LoopStrip, EarlierInputHasNoEffect) {
-  Random random(6);
+  RandomEngine random(6);
   LoopStrip warm;
   for (int round = 0; round < 20; ++round) {
     const Region region =
-        RegionOf(Wobbly(random, 10, 20 + random() % 200), Reversed(Wobbly(random, 7, 100)));
+        RegionBetween(Wobbly(random, 10, 20 + random() % 200), Reversed(Wobbly(random, 7, 100)));
     EXPECT_EQ(Strip(region, warm), Strip(region)) << "seed 6, round " << round;
   }
 }

@@ -20,14 +20,14 @@ namespace {
 using support::Particles;
 using support::ReconstructOnce;
 
-struct Scene {
+struct NamedParticles {
   std::string name;
   Particles particles;
 
-  friend void PrintTo(const Scene& scene, std::ostream* out) { *out << scene.name; }
+  friend void PrintTo(const NamedParticles& scene, std::ostream* out) { *out << scene.name; }
 };
 
-std::vector<Scene> Scenes() {
+std::vector<NamedParticles> Scenes() {
   support::Random random(1);
   Particles spray = support::Blob(random, 9);
   spray.Add(support::Noise(random, 40, 30));
@@ -41,9 +41,9 @@ std::vector<Scene> Scenes() {
           {"Lone", support::Lattice(1, 1, 5, 5)}};
 }
 
-class MeshOf : public testing::TestWithParam<std::tuple<Scene, Placement>> {
+class MeshOf : public testing::TestWithParam<std::tuple<NamedParticles, Placement>> {
  protected:
-  const Scene& scene() const { return std::get<0>(GetParam()); }
+  const NamedParticles& scene() const { return std::get<0>(GetParam()); }
   Placement placement() const { return std::get<1>(GetParam()); }
   bool IsFarthest() const { return !KeepsGuarantees(placement()); }
   Result With(Fill fill) const {

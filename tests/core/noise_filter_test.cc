@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "partiemc/arena.h"
@@ -17,6 +16,7 @@
 #include "partiemc/validate.h"
 #include "support/motion_oracle.h"
 #include "support/noisy_particles.h"
+#include "support/numbers.h"
 #include "support/reconstruct.h"
 #include "support/ring_stream.h"
 
@@ -24,14 +24,13 @@ namespace partiemc {
 namespace {
 
 using support::Filtering;
+using support::kNan;
 using support::LargestOffset;
 using support::Particles;
 using support::Random;
 using support::RingStream;
 using support::Shaken;
 using support::WithIds;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // A disc of which some particles are new and some have gone, in any order.
 Particles ChangingDisc(int frame, Random& random) {

@@ -17,10 +17,6 @@ namespace {
 using support::AngleBetween;
 using support::Stages;
 
-const ActiveCell& CellOf(const Stages& stages, std::size_t k) {
-  return stages.crossings.cells[stages.crossings.segments[stages.topology.segments[k]].cell];
-}
-
 CellNormal KeyOf(const Stages& stages, std::size_t k) {
   const Point origin = CellOrigin(stages.bins.tiles, CellOf(stages, k));
   CellNormal key;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -11,14 +10,15 @@
 #include "frame/scale.h"
 #include "partiemc/reconstructor.h"
 #include "partiemc/status.h"
+#include "support/numbers.h"
 #include "support/oracle.h"
 #include "support/particles.h"
 
 namespace partiemc {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using support::kInfinity;
+using support::kNan;
 
 struct BadParameters {
   std::string field;

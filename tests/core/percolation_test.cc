@@ -34,14 +34,14 @@ using support::ReconstructOnce;
 using support::RingStream;
 using testing::ElementsAre;
 
-constexpr double kWidth = 60, kHeight = 50;
+constexpr double kBoxWidth = 60, kBoxHeight = 50;
 
-// The particles of a lattice below a wave that repeats after kWidth, above a flat bottom.
+// The particles of a lattice below a wave that repeats after kBoxWidth, above a flat bottom.
 Particles Wave(double phase, double amplitude = 4, double noise = 0, std::uint64_t seed = 1) {
   Random random(seed);
   Particles wave;
-  for (int i = 0; i < kWidth; ++i) {
-    const double top = 20 + amplitude * std::sin(2 * M_PI * (i + phase) / kWidth);
+  for (int i = 0; i < kBoxWidth; ++i) {
+    const double top = 20 + amplitude * std::sin(2 * M_PI * (i + phase) / kBoxWidth);
     for (int j = 0; j < top; ++j) {
       const double x = random.Uniform(-noise, noise), y = random.Uniform(-noise, noise);
       wave.Add(i + .5 + x, j + 10 + y);
@@ -106,13 +106,13 @@ TEST(Percolation, FullBoxHasNoPerimeter) {
 // Where the face lies does not matter: area and perimeter of a body stay.
 TEST(Percolation, FaceMayLieAnywhere) {
   const Particles wave = Wave(0, 4, .2);
-  const Result first = ReconstructOnce(In(BoxOf(kWidth, kHeight)), wave);
+  const Result first = ReconstructOnce(In(BoxOf(kBoxWidth, kBoxHeight)), wave);
   ASSERT_EQ(first.rings.RingCount(), 1u);
   EXPECT_NEAR(first.statistics.area, static_cast<double>(wave.size()),
               1e-6 * static_cast<double>(wave.size()));
   for (const double x : {7.0, 20.0, 31.0, 59.0, -12.0}) {
     SCOPED_TRACE(x);
-    const PeriodicBox box = BoxOf(kWidth, kHeight, x, 0);
+    const PeriodicBox box = BoxOf(kBoxWidth, kBoxHeight, x, 0);
     const Result moved = ReconstructOnce(In(box), Wrapped(wave, box));
     ExpectValid(moved, Fill::kGreedy);
     ASSERT_EQ(moved.rings.RingCount(), 1u);
@@ -124,12 +124,12 @@ TEST(Percolation, FaceMayLieAnywhere) {
 
 // Both faces cut the outline at the same height.
 TEST(Percolation, OutlineContinuesAtTheOppositeFace) {
-  const Result result = ReconstructOnce(In(BoxOf(kWidth, kHeight)), Wave(11, 4, .2));
+  const Result result = ReconstructOnce(In(BoxOf(kBoxWidth, kBoxHeight)), Wave(11, 4, .2));
   std::vector<double> left, right;
   for (std::size_t k = 0; k < result.rings.PointCount(); ++k) {
     const double x = result.rings.points[2 * k], y = result.rings.points[2 * k + 1];
     if (x == 0) left.push_back(y);
-    if (x == kWidth) right.push_back(y);
+    if (x == kBoxWidth) right.push_back(y);
   }
   std::ranges::sort(left);
   std::ranges::sort(right);
@@ -140,7 +140,7 @@ TEST(Percolation, OutlineContinuesAtTheOppositeFace) {
 
 // Bodies near a percolating one, in one cluster with it.
 TEST(Percolation, DropAcrossTheFaceIsWhole) {
-  const PeriodicBox box = BoxOf(kWidth, 80);
+  const PeriodicBox box = BoxOf(kBoxWidth, 80);
   const auto count = support::Disc(5, 20, 42).size();
   std::optional<double> area;
   for (const double x : {0.0, 2.0, 58.0, 30.0}) {
@@ -209,7 +209,7 @@ TEST_P(DriftingBodies, KeepTheirIdentities) { Drift(false); }
 TEST_P(DriftingBodies, KeepTheirIdentitiesWrapped) { Drift(true); }
 
 void DriftingBodies::Drift(bool wraps) {
-  PeriodicBox box = BoxOf(kWidth, 80);
+  PeriodicBox box = BoxOf(kBoxWidth, 80);
   box.wraps = wraps;
   RingStream stream(In(box));
   for (int frame = 0; frame < 100; ++frame) {
@@ -280,7 +280,7 @@ TEST(Percolation, RandomFramesKeepTheGuarantees) {
 
 TEST(Percolation, ThreadsAndOrderChangeNoBit) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 5);
-  const PeriodicBox box = BoxOf(kWidth, kHeight);
+  const PeriodicBox box = BoxOf(kBoxWidth, kBoxHeight);
   const Particles wave = Wave(3, 4, .25);
   Arena one(1);
   Result first;

@@ -23,6 +23,7 @@
 #include "periodic/image_sets.h"
 #include "periodic/lift.h"
 #include "periodic/run_periods.h"
+#include "support/numbers.h"
 #include "support/reconstruct.h"
 #include "support/ring_stream.h"
 #include "support/tracked_scene.h"
@@ -30,6 +31,8 @@
 namespace partiemc {
 namespace {
 
+using support::kInfinity;
+using support::kNan;
 using support::Particles;
 using support::Random;
 using support::ReconstructOnce;
@@ -37,9 +40,6 @@ using support::RefusalOf;
 using support::RingStream;
 using testing::ElementsAre;
 using testing::IsEmpty;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Area and perimeter of each outer ring, ascending.
 std::vector<std::pair<double, double>> SizesOf(const Rings& rings) {

@@ -41,7 +41,7 @@ Distance Both(Distance a, Distance b) {
   return [=](double x, double y) { return std::max(a(x, y), b(x, y)); };
 }
 
-Distance Drop(double x0, double y0, double radius) {
+Distance CircleAt(double x0, double y0, double radius) {
   return [=](double x, double y) { return std::hypot(x - x0, y - y0) - radius; };
 }
 
@@ -73,9 +73,9 @@ std::vector<KnownScene> AllScenes(std::uint64_t seed) {
   scenes.back().angles = {90 + tilt, 90 - tilt};
   scenes.back().most_turned = 4;
   scenes.back().most_turned_with_noise = 6;
-  const Distance large = Drop(x, y, 9);
+  const Distance large = CircleAt(x, y, 9);
   scenes.push_back({"drop of 254", TwoPhases(large), large, nowhere, nowhere, .05, .055});
-  const Distance small = Drop(x, y, std::sqrt(30 / std::numbers::pi));
+  const Distance small = CircleAt(x, y, std::sqrt(30 / std::numbers::pi));
   scenes.push_back({"drop of 30", TwoPhases(small), small, nowhere, nowhere, .06, .065});
   const double third = 2 * std::numbers::pi / 3;
   const auto sector = [&](int k) {
@@ -202,7 +202,7 @@ TEST(PhasesAccuracy, JunctionsOfALens) {
         const double turn = random.Uniform(0, 3);
         const double radius = width / std::sqrt(3), away = radius / 2;
         const double x = away * std::cos(turn), y = away * std::sin(turn);
-        const Distance lens = Both(Drop(x, y, radius), Drop(-x, -y, radius));
+        const Distance lens = Both(CircleAt(x, y, radius), CircleAt(-x, -y, radius));
         const Distance half = Line(0, 0, turn + std::numbers::pi / 2);
         const PhaseScene scene{support::DiscBody(kRadius),
                                {{1, Both(Reversed(lens), half)},
@@ -250,9 +250,9 @@ TEST(PhasesAccuracy, ContactsOfAFloatingLens) {
       const double above = kWidth / 2 / std::sin(kAbove), below = kWidth / 2 / std::sin(kBelow);
       const double down = -above * std::cos(kAbove), up = below * std::cos(kBelow);
       const Distance lens =
-          Both(Drop(down * up_x, down * up_y, above), Drop(up * up_x, up * up_y, below));
+          Both(CircleAt(down * up_x, down * up_y, above), CircleAt(up * up_x, up * up_y, below));
       const Distance bath =
-          Both(Drop(0, 0, kRadius), [=](double x, double y) { return x * up_x + y * up_y; });
+          Both(CircleAt(0, 0, kRadius), [=](double x, double y) { return x * up_x + y * up_y; });
       const Distance body = [=](double x, double y) { return std::min(lens(x, y), bath(x, y)); };
       const PhaseScene scene{{body, kRadius + 1}, {{1, Both(bath, Reversed(lens))}, {2, lens}}};
       Particles particles = Filled(scene, random);
@@ -293,7 +293,7 @@ TEST(PhasesAccuracy, BodiesWithContactsKeepTheirArea) {
     const Distance slab = [=](double x, double y) {
       return std::max(std::abs(x) - half, std::max(y, -6 - y));
     };
-    const Distance drop = Both(Drop(0, down, radius), [](double, double y) { return -y; });
+    const Distance drop = Both(CircleAt(0, down, radius), [](double, double y) { return -y; });
     const Distance body = [=](double x, double y) { return std::min(slab(x, y), drop(x, y)); };
     const PhaseScene scene{{body, 24}, {{1, slab}, {2, drop}}};
     Particles particles = Filled(scene, random);

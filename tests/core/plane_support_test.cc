@@ -38,7 +38,7 @@ NeighbourRows OneBand(const std::vector<float>& xs, const std::vector<float>& ys
 }
 
 // A position, rounded like a particle's, so that it is the same after any period.
-float Rounded(double position) {
+float RoundedPosition(double position) {
   return static_cast<float>(std::round(position * 131072) / 131072);
 }
 
@@ -53,7 +53,7 @@ struct Rows {
     for (int row = 0; row < 5; ++row) {
       for (int bucket = 0; bucket < 4; ++bucket) {
         for (int n = static_cast<int>(random.Uniform(0, most)); n > 0; --n) {
-          x.push_back(Rounded(random.Uniform(-3, 3)));
+          x.push_back(RoundedPosition(random.Uniform(-3, 3)));
           columns.push_back(InPeriod(x.back()));
           y.push_back(static_cast<float>(random.Uniform(-3, 3)));
           weight.push_back(static_cast<float>(random.Uniform(0.5, 2)));

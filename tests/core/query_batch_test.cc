@@ -13,11 +13,11 @@
 namespace partiemc {
 namespace {
 
-struct Place {
+struct GroupPoint {
   double x = 0, y = 0;
 };
 
-using Group = PointGroup<Place>;
+using Group = PointGroup<GroupPoint>;
 
 // Points of segments of a ring, none to two of each, by runs of a tile.
 struct Points {
@@ -38,7 +38,7 @@ struct Points {
 std::vector<Group> GroupsOf(const Points& points, std::size_t first, std::size_t last,
                             std::vector<std::size_t>& at_once) {
   std::vector<Group> all;
-  auto groups = CollectPoints<Place>([&](std::span<const Group> some) {
+  auto groups = CollectPoints<GroupPoint>([&](std::span<const Group> some) {
     all.insert(all.end(), some.begin(), some.end());
     at_once.push_back(some.size());
   });

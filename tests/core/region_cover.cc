@@ -8,7 +8,7 @@
 
 #include "base/predicates.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 void ExpectCover(const Region& region, const std::vector<std::uint32_t>& triangles) {
   using PointKey = std::pair<double, double>;
@@ -43,4 +43,4 @@ void ExpectCover(const Region& region, const std::vector<std::uint32_t>& triangl
   EXPECT_NEAR(area, expected, 1e-9 * expected);
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

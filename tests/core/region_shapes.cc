@@ -9,7 +9,7 @@
 
 #include "base/predicates.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 std::uint32_t Region::AddPoint(const Point& point) {
   points.insert(points.end(), {point.x, point.y});
@@ -40,6 +40,12 @@ Region Region::Transformed(double scale, double shift) const {
   return result;
 }
 
+Region RegionOf(const std::vector<std::vector<Point>>& loops) {
+  Region region;
+  for (const std::vector<Point>& loop : loops) region.AddLoop(loop);
+  return region;
+}
+
 double DoubleArea(const std::vector<Point>& loop) {
   double sum = 0;
   for (std::size_t i = 1; i + 1 < loop.size(); ++i) {
@@ -56,7 +62,7 @@ double DoubleArea(const Region& region) {
   return sum;
 }
 
-double Uniform(Random& random, double low, double high) {
+double Uniform(RandomEngine& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
@@ -69,7 +75,7 @@ std::vector<Point> Reversed(std::vector<Point> loop) {
   return loop;
 }
 
-std::vector<Point> RandomStar(Random& random, std::size_t count) {
+std::vector<Point> RandomStar(RandomEngine& random, std::size_t count) {
   std::vector<Point> loop;
   for (std::size_t i = 0; i < count; ++i) {
     const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(count);
@@ -92,7 +98,7 @@ std::vector<Point> Spiral(std::size_t points_per_side, double turns) {
   return outer;
 }
 
-std::vector<Point> Comb(Random& random, std::size_t teeth) {
+std::vector<Point> Comb(RandomEngine& random, std::size_t teeth) {
   std::vector<Point> loop{{0, 0}, {2 * static_cast<double>(teeth), 0}};
   for (std::size_t tooth = teeth; tooth-- > 0;) {
     const double x = 2 * static_cast<double>(tooth);
@@ -105,7 +111,7 @@ std::vector<Point> Comb(Random& random, std::size_t teeth) {
   return loop;
 }
 
-std::vector<Point> HangingComb(Random& random, std::size_t teeth) {
+std::vector<Point> HangingComb(RandomEngine& random, std::size_t teeth) {
   std::vector<Point> loop = Comb(random, teeth);
   for (Point& point : loop) point = {-point.x, -point.y};
   return loop;
@@ -178,7 +184,7 @@ class FieldContours {
 
 }  // namespace
 
-Region RandomContours(Random& random, std::size_t size) {
+Region RandomContours(RandomEngine& random, std::size_t size) {
   struct Wave {
     double x, y, phase;
   };
@@ -207,13 +213,13 @@ bool Cells::At(std::ptrdiff_t x, std::ptrdiff_t y) const {
   return column < width && row < height && inside[column + row * width] != 0;
 }
 
-Cells RandomCells(Random& random, std::size_t width, std::size_t height, double density) {
+Cells RandomCells(RandomEngine& random, std::size_t width, std::size_t height, double density) {
   Cells cells{width, height, std::vector<char>(width * height)};
   for (char& inside : cells.inside) inside = Uniform(random, 0, 1) < density ? 1 : 0;
   return cells;
 }
 
-Region Staircases(const Cells& cells, Random& random, bool corners_only) {
+Region Staircases(const Cells& cells, RandomEngine& random, bool corners_only) {
   using Node = std::pair<std::ptrdiff_t, std::ptrdiff_t>;
   std::multimap<Node, Node> sides;
   const auto width = static_cast<std::ptrdiff_t>(cells.width);
@@ -256,7 +262,7 @@ Region Staircases(const Cells& cells, Random& random, bool corners_only) {
   return region;
 }
 
-Region RandomBand(Random& random, std::size_t size) {
+Region RandomBand(RandomEngine& random, std::size_t size) {
   Region band = RandomContours(random, size);
   Cells cells{size, size, std::vector<char>(size * size)};
   std::vector<char> touched(size * size);
@@ -302,7 +308,7 @@ Region RandomBand(Random& random, std::size_t size) {
   return band;
 }
 
-Region RandomGarbage(Random& random, std::size_t lattice_size, std::size_t max_loops,
+Region RandomGarbage(RandomEngine& random, std::size_t lattice_size, std::size_t max_loops,
                      std::size_t max_points) {
   Region region;
   for (std::size_t i = 0; i < lattice_size * lattice_size; ++i) {
@@ -318,4 +324,4 @@ Region RandomGarbage(Random& random, std::size_t lattice_size, std::size_t max_l
   return region;
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

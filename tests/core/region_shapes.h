@@ -8,7 +8,7 @@
 
 #include "base/point.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// Loops in the format of Triangulator and CountTouchingPairs.
 struct Region {
@@ -29,26 +29,29 @@ struct Region {
   Region Transformed(double scale, double shift) const;
 };
 
+/// The region of these loops.
+Region RegionOf(const std::vector<std::vector<Point>>& loops);
+
 /// Twice the signed area of one loop, or of all loops.
 double DoubleArea(const std::vector<Point>& loop);
 double DoubleArea(const Region& region);
 
-using Random = std::mt19937_64;
-double Uniform(Random& random, double low, double high);
+using RandomEngine = std::mt19937_64;
+double Uniform(RandomEngine& random, double low, double high);
 
 std::vector<Point> Rectangle(double left, double bottom, double right, double top);
 std::vector<Point> Reversed(std::vector<Point> loop);
-std::vector<Point> RandomStar(Random& random, std::size_t count);
+std::vector<Point> RandomStar(RandomEngine& random, std::size_t count);
 /// A band of `turns` turns that winds outwards.
 std::vector<Point> Spiral(std::size_t points_per_side, double turns);
 /// A comb: teeth of random length above a common back, about 4 points each.
-std::vector<Point> Comb(Random& random, std::size_t teeth);
+std::vector<Point> Comb(RandomEngine& random, std::size_t teeth);
 /// The same comb with its teeth hanging down.
-std::vector<Point> HangingComb(Random& random, std::size_t teeth);
+std::vector<Point> HangingComb(RandomEngine& random, std::size_t teeth);
 
 /// Contours of a sum of random waves on a lattice of size x size nodes of spacing 1, outside at its
 /// rim: rings with holes and islands.
-Region RandomContours(Random& random, std::size_t size);
+Region RandomContours(RandomEngine& random, std::size_t size);
 
 /// Whether a cell of a lattice is inside.
 struct Cells {
@@ -56,17 +59,17 @@ struct Cells {
   std::vector<char> inside;
   bool At(std::ptrdiff_t x, std::ptrdiff_t y) const;
 };
-Cells RandomCells(Random& random, std::size_t width, std::size_t height, double density);
+Cells RandomCells(RandomEngine& random, std::size_t width, std::size_t height, double density);
 /// Boundary of the cells; each lattice point has one index. At a pinch a loop turns left or right
 /// at random. `corners_only` omits points in the middle of straight sides.
-Region Staircases(const Cells& cells, Random& random, bool corners_only);
+Region Staircases(const Cells& cells, RandomEngine& random, bool corners_only);
 
 /// Contours of a random field, and as holes the staircases around the inside cells that no contour
 /// crosses.
-Region RandomBand(Random& random, std::size_t size);
+Region RandomBand(RandomEngine& random, std::size_t size);
 
 /// Random closed loops on a small lattice, which rarely bound a region.
-Region RandomGarbage(Random& random, std::size_t lattice_size, std::size_t max_loops,
+Region RandomGarbage(RandomEngine& random, std::size_t lattice_size, std::size_t max_loops,
                      std::size_t max_points);
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -15,8 +15,9 @@
 namespace partiemc {
 namespace {
 
-using testing::Random;
-using testing::Region;
+using support::RandomEngine;
+using support::Region;
+using support::RegionOf;
 
 std::vector<std::int32_t> DepthsOf(const Region& region, RingDepths& nesting) {
   nesting.Find(region.points, region.loop_offsets);
@@ -70,45 +71,39 @@ std::uint32_t AroundOneByOne(const Region& region, std::size_t ring) {
   return around;
 }
 
-std::vector<Point> Square(double x, double y, double half, bool is_hole = false) {
+std::vector<Point> SquareLoop(double x, double y, double half, bool is_hole = false) {
   std::vector<Point> ring{
       {x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};
   if (is_hole) std::reverse(ring.begin(), ring.end());
   return ring;
 }
 
-Region RegionOf(const std::vector<std::vector<Point>>& rings) {
-  Region region;
-  for (const std::vector<Point>& ring : rings) region.AddLoop(ring);
-  return region;
-}
-
 TEST(RingDepths, HolesLieInTheirOuterRings) {
   EXPECT_EQ(Depths(Region{}), std::vector<std::int32_t>{});
-  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 10), Square(0, 0, 5, true), Square(0, 0, 2),
-                             Square(20, 0, 3), Square(0, 7, 1, true)})),
+  EXPECT_EQ(Depths(RegionOf({SquareLoop(0, 0, 10), SquareLoop(0, 0, 5, true), SquareLoop(0, 0, 2),
+                             SquareLoop(20, 0, 3), SquareLoop(0, 7, 1, true)})),
             (std::vector<std::int32_t>{0, 1, 0, 0, 1}));
 }
 
 TEST(RingDepths, NestedOuterRingsAddUp) {
-  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3, true)})),
+  EXPECT_EQ(Depths(RegionOf({SquareLoop(0, 0, 1), SquareLoop(0, 0, 2), SquareLoop(0, 0, 3, true)})),
             (std::vector<std::int32_t>{0, -1, 0}));
-  EXPECT_EQ(Depths(RegionOf({Square(0, 0, 1), Square(0, 0, 2), Square(0, 0, 3)})),
+  EXPECT_EQ(Depths(RegionOf({SquareLoop(0, 0, 1), SquareLoop(0, 0, 2), SquareLoop(0, 0, 3)})),
             (std::vector<std::int32_t>{2, 1, 0}));
 }
 
 TEST(RingDepths, RingIsFoundAtItsLowestPoint) {
   // Its other minima lie above a square between its legs.
   const std::vector<Point> legs{{0, 4}, {0, -1}, {1, 3}, {3, 3}, {4, 0}, {4, 4}};
-  EXPECT_EQ(Depths(RegionOf({legs, Square(2, 1, 0.5)})), (std::vector<std::int32_t>{0, 0}));
+  EXPECT_EQ(Depths(RegionOf({legs, SquareLoop(2, 1, 0.5)})), (std::vector<std::int32_t>{0, 0}));
 }
 
 /// Staircases have many points at one height, and horizontal sides: ties of the sweep.
 TEST(RingDepths, AgreeWithWindingNumbersOfStaircases) {
   for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
-    Random random(seed);
-    const testing::Cells cells = testing::RandomCells(random, 14, 14, 0.6);
-    const Region staircases = testing::Staircases(cells, random, seed % 2 == 0);
+    RandomEngine random(seed);
+    const support::Cells cells = support::RandomCells(random, 14, 14, 0.6);
+    const Region staircases = support::Staircases(cells, random, seed % 2 == 0);
     Region region;
     for (std::size_t k = 0; k < staircases.LoopCount(); ++k) region.AddLoop(staircases.Loop(k));
     TouchingPairsBuffers buffers;
@@ -122,13 +117,13 @@ TEST(RingDepths, AgreeWithWindingNumbersOfStarsThatDoNotCross) {
   int nested = 0;
   RingDepths warm;
   for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
-    Random random(seed);
+    RandomEngine random(seed);
     Region region;
     TouchingPairsBuffers buffers;
     for (int tries = 0; tries < 60; ++tries) {
-      std::vector<Point> ring = testing::RandomStar(random, 3 + random() % 30);
-      const double size = testing::Uniform(random, 0.1, 8);
-      const Point centre{testing::Uniform(random, -8, 8), testing::Uniform(random, -8, 8)};
+      std::vector<Point> ring = support::RandomStar(random, 3 + random() % 30);
+      const double size = support::Uniform(random, 0.1, 8);
+      const Point centre{support::Uniform(random, -8, 8), support::Uniform(random, -8, 8)};
       for (Point& point : ring) point = {centre.x + size * point.x, centre.y + size * point.y};
       if (random() % 3 == 0) std::reverse(ring.begin(), ring.end());
       Region with = region;

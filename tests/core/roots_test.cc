@@ -176,7 +176,7 @@ TEST_P(RootsWithout, AnyClampCrossOrTouch) {
   EXPECT_GT(broken, support::Tries(100u));  // Seen: 490, 346, 428 and 208.
 }
 
-std::string NameOf(const testing::TestParamInfo<Clamping>& tested) {
+std::string ClampingName(const testing::TestParamInfo<Clamping>& tested) {
   constexpr const char* kNames[] = {"", "Any", "TheSaddles", "TheMargin", "TheMarginOfNodes"};
   return kNames[static_cast<int>(tested.param)];
 }
@@ -184,7 +184,7 @@ std::string NameOf(const testing::TestParamInfo<Clamping>& tested) {
 INSTANTIATE_TEST_SUITE_P(Clamps, RootsWithout,
                          testing::Values(Clamping::kNone, Clamping::kCellOnly, Clamping::kToSides,
                                          Clamping::kToNodes),
-                         NameOf);
+                         ClampingName);
 
 // Points moved at random, far over other rings. The repair ends with simple, nested rings, because
 // it can always return to the roots.

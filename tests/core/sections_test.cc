@@ -21,7 +21,7 @@ namespace {
 
 using support::Random;
 
-constexpr double kRadius = 3;  // Kernel radius in spacings of 1.
+constexpr double kKernelRadius = 3;  // Kernel radius in spacings of 1.
 
 // A shaken lattice in a disc around (x, 0).
 std::vector<double> Disc(double radius, double x, double jitter, std::uint64_t seed) {
@@ -38,7 +38,7 @@ std::vector<double> Disc(double radius, double x, double jitter, std::uint64_t s
 }
 
 // A lattice in a ball around (x, 0, 0).
-std::vector<double> Ball(double radius, double x) {
+std::vector<double> LatticeBall(double radius, double x) {
   std::vector<double> xyz;
   for (double i = -radius; i <= radius; ++i) {
     for (double j = -radius; j <= radius; ++j) {
@@ -57,10 +57,10 @@ double Density(const std::vector<double>& xy, double x, double y) {
   double sum = 0;
   for (std::size_t k = 0; k < xy.size(); k += 2) {
     const double dx = xy[k] - x, dy = xy[k + 1] - y;
-    const double t = 1 - (dx * dx + dy * dy) / (kRadius * kRadius);
+    const double t = 1 - (dx * dx + dy * dy) / (kKernelRadius * kKernelRadius);
     if (t > 0) sum += t * t * t;
   }
-  return sum * 4 / (std::numbers::pi * kRadius * kRadius);
+  return sum * 4 / (std::numbers::pi * kKernelRadius * kKernelRadius);
 }
 
 // The same in space, at a point of the plane at height z.
@@ -68,10 +68,10 @@ double DensityInSpace(const std::vector<double>& xyz, double x, double y, double
   double sum = 0;
   for (std::size_t k = 0; k < xyz.size(); k += 3) {
     const double dx = xyz[k] - x, dy = xyz[k + 1] - y, dz = xyz[k + 2] - z;
-    const double t = 1 - (dx * dx + dy * dy + dz * dz) / (kRadius * kRadius);
+    const double t = 1 - (dx * dx + dy * dy + dz * dz) / (kKernelRadius * kKernelRadius);
     if (t > 0) sum += t * t * t;
   }
-  return sum * 315 / (64 * std::numbers::pi * kRadius * kRadius * kRadius);
+  return sum * 315 / (64 * std::numbers::pi * kKernelRadius * kKernelRadius * kKernelRadius);
 }
 
 class Sequence {
@@ -131,7 +131,7 @@ TEST(Isoline, HasTheDensityAtItsVertices) {
 }
 
 TEST(Isoline, HasTheDensityOfSpaceInASlice) {
-  const std::vector<double> xyz = Ball(10, 0);
+  const std::vector<double> xyz = LatticeBall(10, 0);
   const Result result = Once(
       InSpace(xyz), {.spacing = 1, .slice = SlicePlane{.origin = {0, 0, 2.5}}, .isovalue = 0.4});
   ASSERT_EQ(result.rings.RingCount(), 1u);
@@ -204,7 +204,7 @@ TEST(Sections, AreWhatEachWouldBeAlone) {
 
 TEST(Sections, LieOnPlanesOfTheirOwn) {
   const double radius = 12;
-  const std::vector<double> xyz = Ball(radius, 0);
+  const std::vector<double> xyz = LatticeBall(radius, 0);
   const SlicePlane middle{.origin = {0, 0, 0}};
   const SlicePlane above{.origin = {0, 0, 6}};
   const SlicePlane upright{.origin = {0, 0, 0}, .normal = {1, 0, 0}};

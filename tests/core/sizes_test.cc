@@ -79,7 +79,7 @@ class SizedOracle {
 };
 
 // Relative to the largest kernel radius. Seen: 3e-7.
-constexpr double kFieldTolerance = 1e-5;
+constexpr double kSizedFieldTolerance = 1e-5;
 
 void ExpectFieldAgrees(std::uint64_t seed, double ratio, const ReconstructionParameters& wanted,
                        int& crossed, int& roots) {
@@ -88,7 +88,7 @@ void ExpectFieldAgrees(std::uint64_t seed, double ratio, const ReconstructionPar
   stages.Run(support::Snapped(RandomSizes(seed, ratio), wanted.cell_size), wanted);
   const SizedOracle oracle(stages.particles, stages.parameters);
   const double cell = stages.scale.cell_size;
-  const double tolerance = kFieldTolerance * stages.scale.reach * cell;
+  const double tolerance = kSizedFieldTolerance * stages.scale.reach * cell;
   Random random(seed);
   for (int k = 0; k < 200; ++k) {
     auto tile = static_cast<std::uint32_t>(random.Below(stages.bins.tiles.size()));

@@ -28,47 +28,47 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using Vector = std::array<double, 3>;
+using Vector3 = std::array<double, 3>;
 
-double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double Dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-Vector operator+(const Vector& a, const Vector& b) {
+Vector3 operator+(const Vector3& a, const Vector3& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
-Vector operator*(double s, const Vector& a) { return {s * a[0], s * a[1], s * a[2]}; }
+Vector3 operator*(double s, const Vector3& a) { return {s * a[0], s * a[1], s * a[2]}; }
 
 // Particles in space, spacing 1.
-struct Cloud {
+struct SpaceCloud {
   std::vector<double> xyz;
   std::vector<std::uint64_t> ids;
 
   std::size_t size() const { return xyz.size() / 3; }
-  Vector At(std::size_t k) const { return {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]}; }
-  void Add(const Vector& p) { xyz.insert(xyz.end(), p.begin(), p.end()); }
+  Vector3 At(std::size_t k) const { return {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]}; }
+  void Add(const Vector3& p) { xyz.insert(xyz.end(), p.begin(), p.end()); }
   Frame AsFrame() const { return {.positions = std::span(xyz), .components = 3, .ids = ids}; }
 };
 
-using Body = std::function<bool(const Vector&)>;
+using Solid = std::function<bool(const Vector3&)>;
 
 // The nodes of a lattice that lie in a body within `extent` of the origin, turned and shifted at
 // random, and each moved by up to `jitter` along each axis.
-Cloud CloudOf(const Body& body, int extent, std::uint64_t seed, double jitter = 0) {
+SpaceCloud CloudOf(const Solid& body, int extent, std::uint64_t seed, double jitter = 0) {
   Random random(seed);
   const auto any = [&] { return random.Uniform(-1, 1); };
-  Vector a{any(), any(), any()}, b{any(), any(), any()};
+  Vector3 a{any(), any(), any()}, b{any(), any(), any()};
   a = 1 / std::sqrt(Dot(a, a)) * a;
   b = b + -Dot(a, b) * a;
   b = 1 / std::sqrt(Dot(b, b)) * b;
-  const Vector c{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  const Vector shift{any(), any(), any()};
-  Cloud cloud;
+  const Vector3 c{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  const Vector3 shift{any(), any(), any()};
+  SpaceCloud cloud;
   const int reach = static_cast<int>(extent * 1.8) + 2;
   for (int i = -reach; i <= reach; ++i) {
     for (int j = -reach; j <= reach; ++j) {
       for (int k = -reach; k <= reach; ++k) {
-        Vector p = shift + static_cast<double>(i) * a + static_cast<double>(j) * b +
-                   static_cast<double>(k) * c;
-        if (jitter > 0) p = p + jitter * Vector{any(), any(), any()};
+        Vector3 p = shift + static_cast<double>(i) * a + static_cast<double>(j) * b +
+                    static_cast<double>(k) * c;
+        if (jitter > 0) p = p + jitter * Vector3{any(), any(), any()};
         if (body(p)) cloud.Add(p);
       }
     }
@@ -76,23 +76,23 @@ Cloud CloudOf(const Body& body, int extent, std::uint64_t seed, double jitter = 
   return cloud;
 }
 
-Body Ball(double radius, const Vector& centre = {}) {
-  return [=](const Vector& p) {
-    const Vector d = p + -1.0 * centre;
+Solid Ball(double radius, const Vector3& centre = {}) {
+  return [=](const Vector3& p) {
+    const Vector3 d = p + -1.0 * centre;
     return Dot(d, d) < radius * radius;
   };
 }
 
 // Around the z axis.
-Body Torus(double middle, double radius) {
-  return [=](const Vector& p) {
+Solid Torus(double middle, double radius) {
+  return [=](const Vector3& p) {
     const double away = std::hypot(p[0], p[1]) - middle;
     return away * away + p[2] * p[2] < radius * radius;
   };
 }
 
-Body Box(const Vector& low, const Vector& high) {
-  return [=](const Vector& p) {
+Solid Box(const Vector3& low, const Vector3& high) {
+  return [=](const Vector3& p) {
     return p[0] > low[0] && p[1] > low[1] && p[2] > low[2] && p[0] < high[0] && p[1] < high[1] &&
            p[2] < high[2];
   };
@@ -123,13 +123,13 @@ struct AreaErrors {
   double largest = 0;
 };
 
-AreaErrors ErrorsOf(const Body& body, int extent, double radius, double jitter,
+AreaErrors ErrorsOf(const Solid& body, int extent, double radius, double jitter,
                     std::size_t ring_count, const std::function<double(double)>& area_at,
                     Placement placement = Placement::kVirtualPlane) {
   constexpr int kClouds = 3;
   AreaErrors errors;
   for (int seed = 1; seed <= kClouds; ++seed) {
-    const Cloud cloud = CloudOf(body, extent, seed, jitter);
+    const SpaceCloud cloud = CloudOf(body, extent, seed, jitter);
     for (std::size_t k = 0; k < kHeights.size(); ++k) {
       const double z = kHeights[k] * radius;
       ReconstructionParameters parameters = AtHeight(z);
@@ -180,17 +180,17 @@ TEST(Slice, OtherPlacementsCutTheSameBall) {
 }
 
 TEST(Slice, TheBasisIsRightHandedAndNamesTheAxesThatPeopleExpect) {
-  const auto basis = [](const Vector& normal) { return BasisOf({.normal = normal}); };
-  const Vector x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
+  const auto basis = [](const Vector3& normal) { return BasisOf({.normal = normal}); };
+  const Vector3 x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
   EXPECT_EQ(basis({0, 0, 3}).first, x);
   EXPECT_EQ(basis({0, 0, 3}).second, y);
   EXPECT_EQ(basis({0, -1e-50, 0}).first, x);
   EXPECT_EQ(basis({0, -1e-50, 0}).second, z);
   EXPECT_EQ(basis({1e60, 0, 0}).first, y);
   EXPECT_EQ(basis({1e60, 0, 0}).second, z);
-  for (const Vector& normal : {Vector{1, 2, 3}, Vector{-5, 0.1, 2}, Vector{1, 1, 1}}) {
+  for (const Vector3& normal : {Vector3{1, 2, 3}, Vector3{-5, 0.1, 2}, Vector3{1, 1, 1}}) {
     const auto [origin, u, v, n] = basis(normal);
-    for (const Vector& unit : {u, v, n}) EXPECT_NEAR(Dot(unit, unit), 1, 1e-14);
+    for (const Vector3& unit : {u, v, n}) EXPECT_NEAR(Dot(unit, unit), 1, 1e-14);
     EXPECT_NEAR(Dot(u, v), 0, 1e-14);
     EXPECT_NEAR(Dot(u, n), 0, 1e-14);
     EXPECT_NEAR(Dot(v, n), 0, 1e-14);
@@ -201,11 +201,11 @@ TEST(Slice, TheBasisIsRightHandedAndNamesTheAxesThatPeopleExpect) {
 
 // A torus that stands on edge is cut where the other one is, with the plane turned alike.
 TEST(Slice, APlaneMayLieAnyWay) {
-  const Cloud cloud = CloudOf(Torus(20, 10), 30, 5);
+  const SpaceCloud cloud = CloudOf(Torus(20, 10), 30, 5);
   const double turned = std::sqrt(0.5);
-  Cloud on_edge;
+  SpaceCloud on_edge;
   for (std::size_t k = 0; k < cloud.size(); ++k) {
-    const Vector p = cloud.At(k);
+    const Vector3 p = cloud.At(k);
     // Round the x axis, by 45 degrees, and away from the origin.
     on_edge.Add({p[0] + 300, turned * (p[1] - p[2]) - 200, turned * (p[1] + p[2]) + 100});
   }
@@ -222,9 +222,9 @@ TEST(Slice, APlaneMayLieAnyWay) {
 
 TEST(Slice, BodiesAboveAndBelowThePlaneAreNotInIt) {
   // Two plates with a gap of four spacings, and a third plate that the plane cuts.
-  Cloud cloud = CloudOf(Box({-20, -20, 2}, {0, 20, 10}), 30, 1);
-  for (const Cloud& other : {CloudOf(Box({-20, -20, -10}, {0, 20, -2}), 30, 2),
-                             CloudOf(Box({8, -20, -10}, {28, 20, 10}), 40, 3)}) {
+  SpaceCloud cloud = CloudOf(Box({-20, -20, 2}, {0, 20, 10}), 30, 1);
+  for (const SpaceCloud& other : {CloudOf(Box({-20, -20, -10}, {0, 20, -2}), 30, 2),
+                                  CloudOf(Box({8, -20, -10}, {28, 20, 10}), 40, 3)}) {
     cloud.xyz.insert(cloud.xyz.end(), other.xyz.begin(), other.xyz.end());
   }
   const Result result = Reconstructed(cloud.AsFrame(), AtHeight(0));
@@ -236,7 +236,7 @@ TEST(Slice, BodiesAboveAndBelowThePlaneAreNotInIt) {
 // As bodies in the plane do (core/METHOD.md, "Spurious contours"), whatever the angle of the plane.
 TEST(Slice, PlatesApartByLessThanTwoSpacingsStayApart) {
   constexpr double kGap = 1.8;
-  Cloud cloud;
+  SpaceCloud cloud;
   for (int i = -20; i <= 20; ++i) {
     for (int j = -20; j <= 20; ++j) {
       for (int k = 0; k < 9; ++k) {
@@ -262,7 +262,7 @@ TEST(Slice, PlatesApartByLessThanTwoSpacingsStayApart) {
 }
 
 TEST(Slice, VolumesCount) {
-  const Cloud cloud = CloudOf(Ball(12), 12, 4);
+  const SpaceCloud cloud = CloudOf(Ball(12), 12, 4);
   const std::vector<float> ones(cloud.size(), 1);
   Frame frame = cloud.AsFrame();
   const Result without = Reconstructed(frame, AtHeight(3));
@@ -276,10 +276,10 @@ TEST(Slice, VolumesCount) {
 }
 
 TEST(Slice, UnitsDoNotMatter) {
-  const Cloud cloud = CloudOf(Ball(12), 12, 4);
+  const SpaceCloud cloud = CloudOf(Ball(12), 12, 4);
   const Result usual = Reconstructed(cloud.AsFrame(), AtHeight(3));
   for (const double unit : {1.0 / 1024, 65536.0}) {
-    Cloud scaled = cloud;
+    SpaceCloud scaled = cloud;
     for (double& value : scaled.xyz) value *= unit;
     const std::vector<float> volumes(cloud.size(), static_cast<float>(unit * unit * unit));
     ReconstructionParameters parameters = AtHeight(3 * unit);
@@ -294,11 +294,11 @@ TEST(Slice, UnitsDoNotMatter) {
 }
 
 TEST(Slice, ALinearFieldIsReproducedAtVertices) {
-  const Cloud cloud = CloudOf(Ball(15), 15, 6, 0.2);
+  const SpaceCloud cloud = CloudOf(Ball(15), 15, 6, 0.2);
   const auto linear = [](double x, double y, double z) { return 7 + 0.3 * x - 0.5 * y + 0.8 * z; };
   std::vector<float> values;
   for (std::size_t k = 0; k < cloud.size(); ++k) {
-    const Vector p = cloud.At(k);
+    const Vector3 p = cloud.At(k);
     values.push_back(static_cast<float>(linear(p[0], p[1], p[2])));
   }
   const std::vector<Attribute> attributes = {{"pressure", 1, values}};
@@ -320,7 +320,7 @@ TEST(Slice, ALinearFieldIsReproducedAtVertices) {
 }
 
 TEST(Slice, TheSameBitsForAnyNumberOfThreads) {
-  const Cloud cloud = CloudOf(Torus(40, 20), 60, 2);
+  const SpaceCloud cloud = CloudOf(Torus(40, 20), 60, 2);
   std::vector<std::uint64_t> digests;
   for (const int threads : {1, 3}) {
     Arena arena(threads);
@@ -335,8 +335,8 @@ TEST(Slice, TheSameBitsForAnyNumberOfThreads) {
 }
 
 TEST(Slice, RingsKeepTheirIdentities) {
-  Cloud cloud = CloudOf(Ball(10, {-15, 0, 0}), 30, 1);
-  const Cloud other = CloudOf(Ball(10, {15, 0, 0}), 30, 2);
+  SpaceCloud cloud = CloudOf(Ball(10, {-15, 0, 0}), 30, 1);
+  const SpaceCloud other = CloudOf(Ball(10, {15, 0, 0}), 30, 2);
   cloud.xyz.insert(cloud.xyz.end(), other.xyz.begin(), other.xyz.end());
   for (std::size_t k = 0; k < cloud.size(); ++k) cloud.ids.push_back(k);
   const auto reconstructor = Reconstructor::Create(AtHeight(0));
@@ -358,7 +358,7 @@ TEST(Slice, RingsKeepTheirIdentities) {
 }
 
 TEST(Slice, ParticlesThatTheKernelDoesNotReachCostNothing) {
-  const Cloud cloud = CloudOf(Box({-10, -10, -40}, {10, 10, 40}), 45, 1);
+  const SpaceCloud cloud = CloudOf(Box({-10, -10, -40}, {10, 10, 40}), 45, 1);
   Slab slab;
   slab.Take(cloud.AsFrame(), {.origin = {0, 0, 5}}, 3);
   EXPECT_EQ(slab.heights().size(), slab.AsFrame().ParticleCount());
@@ -373,9 +373,9 @@ TEST(Slice, ParticlesThatTheKernelDoesNotReachCostNothing) {
 // Every branch of the level set, and so each kind of gradient.
 TEST(Slice, GradientsAreThoseOfTheLevelSet) {
   // The lower plate leans, so that the gap opens and closes along the plane.
-  Cloud cloud = CloudOf(Box({-20, -8, 0.9}, {20, 8, 10}), 30, 1, 0.1);
-  const Cloud below = CloudOf(
-      [](const Vector& p) {
+  SpaceCloud cloud = CloudOf(Box({-20, -8, 0.9}, {20, 8, 10}), 30, 1, 0.1);
+  const SpaceCloud below = CloudOf(
+      [](const Vector3& p) {
         return std::abs(p[0]) < 20 && std::abs(p[1]) < 8 && p[2] < -0.8 - 0.05 * p[0] && p[2] > -9;
       },
       30, 2, 0.1);

@@ -38,15 +38,6 @@ Particles Hexagonal(int columns, int rows) {
   return particles;
 }
 
-Particles Shaken(const Particles& particles, support::Random& random, double most) {
-  Particles shaken;
-  for (std::size_t k = 0; k < particles.size(); ++k) {
-    shaken.Add(particles.xy[2 * k] + random.Uniform(-most, most),
-               particles.xy[2 * k + 1] + random.Uniform(-most, most));
-  }
-  return shaken;
-}
-
 // Two particles, this far from each other, for each that there was.
 Particles InPairs(const Particles& particles, support::Random& random, double apart) {
   Particles pairs;
@@ -161,13 +152,14 @@ TEST(Spacing, IsAgreedWhereABodyIsHoweverItsParticlesAreArranged) {
   EXPECT_TRUE(IsAgreed(lattice));
   EXPECT_TRUE(IsAgreed(Hexagonal(40, 40)));
   for (const double most : {0.1, 0.3, 0.5}) {
-    EXPECT_TRUE(IsAgreed(Shaken(lattice, random, most))) << most;
+    EXPECT_TRUE(IsAgreed(support::Jittered(lattice, random, most))) << most;
   }
   for (const double most : {0.1, 0.3}) {
-    EXPECT_TRUE(IsAgreed(Shaken(Hexagonal(40, 40), random, most))) << most;
+    EXPECT_TRUE(IsAgreed(support::Jittered(Hexagonal(40, 40), random, most))) << most;
   }
   for (const double apart : {1e-6, 0.1, 0.4, 0.6}) {
-    EXPECT_TRUE(IsAgreed(InPairs(Shaken(lattice, random, 0.05), random, apart))) << apart;
+    EXPECT_TRUE(IsAgreed(InPairs(support::Jittered(lattice, random, 0.05), random, apart)))
+        << apart;
   }
   Particles thinned;
   for (std::size_t k = 0; k < lattice.size(); ++k) {

@@ -14,9 +14,9 @@
 namespace partiemc {
 namespace {
 
-using testing::Random;
-using testing::Region;
-using testing::Uniform;
+using support::RandomEngine;
+using support::Region;
+using support::Uniform;
 
 using Passage = std::tuple<double, double, std::uint32_t, std::uint32_t, std::uint32_t>;
 
@@ -56,12 +56,12 @@ std::vector<Passage> Collected(const Region& region, SweepEvents& events) {
 }
 
 TEST(SweepEvents, AgreeWithSort) {
-  Random random(21);
+  RandomEngine random(21);
   SweepEvents events;
   for (int round = 0; round < support::Tries(300); ++round) {
     SCOPED_TRACE("seed 21, round " + std::to_string(round));
     // Lattices have many points of equal height, and some points occur several times.
-    Region region = testing::RandomGarbage(random, 2 + round % 30, 6, 60);
+    Region region = support::RandomGarbage(random, 2 + round % 30, 6, 60);
     EXPECT_EQ(Collected(region, events), Expected(region));
     for (double& coordinate : region.points) coordinate += Uniform(random, -1e-9, 1e-9);
     EXPECT_EQ(Collected(region, events), Expected(region));
@@ -69,7 +69,7 @@ TEST(SweepEvents, AgreeWithSort) {
 }
 
 TEST(SweepEvents, AreInOrderForAnyHeights) {
-  Random random(22);
+  RandomEngine random(22);
   SweepEvents events;
   for (const double spread : {0.0, 1e-100, 1e-15, 1.0, 1e15, 1e149}) {
     for (const double base : {0.0, 1.0, -1e149}) {

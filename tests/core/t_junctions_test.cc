@@ -20,7 +20,7 @@ namespace {
 using ::testing::StartsWith;
 
 // The rings of a square of side 2.
-Result Square() {
+Result SquareRings() {
   Result result;
   result.rings.points = {0, 0, 2, 0, 2, 2, 0, 2};
   result.rings.offsets = {0, 4};
@@ -64,7 +64,7 @@ std::size_t CountTJunctionsByBruteForce(const Result& result) {
 TEST(TJunctions, M4FindsVertexInsideASide) {
   // A square as two rectangles side by side on top of a third: one vertex inside its upper side,
   // three inside sides of the ring.
-  Result result = Square();
+  Result result = SquareRings();
   result.mesh.points = result.rings.points;
   result.mesh.points.insert(result.mesh.points.end(), {0, 1, 2, 1, 0.7, 1, 0.7, 2});
   result.mesh.triangles = {0, 1, 5, 0, 5, 4, 4, 6, 7, 4, 7, 3, 6, 5, 2, 6, 2, 7};
@@ -82,7 +82,7 @@ TEST(TJunctions, M4FindsVertexInsideASide) {
 }
 
 TEST(TJunctions, FilledResultNeedsAMesh) {
-  Result result = Square();
+  Result result = SquareRings();
   result.mesh.points = result.rings.points;
   result.mesh.triangles = {0, 1, 2, 0, 2, 3};
   result.mesh.classes.assign(2, TriangleClass::kInterior);

@@ -19,12 +19,13 @@
 namespace partiemc {
 namespace {
 
-using testing::Cells;
-using testing::ExpectCover;
-using testing::Random;
-using testing::Rectangle;
-using testing::Region;
-using testing::Reversed;
+using support::Cells;
+using support::ExpectCover;
+using support::RandomEngine;
+using support::Rectangle;
+using support::Region;
+using support::RegionOf;
+using support::Reversed;
 
 std::optional<std::vector<std::uint32_t>> Triangulate(const Region& region) {
   std::vector<std::uint32_t> triangles;
@@ -41,7 +42,7 @@ std::optional<std::vector<std::uint32_t>> Triangulate(const Region& region) {
 std::size_t ExpectedCount(const Region& region) {
   std::size_t count = region.loop_points.size();
   for (std::size_t loop = 0; loop < region.LoopCount(); ++loop) {
-    count += testing::DoubleArea(region.Loop(loop)) > 0 ? -2 : 2;
+    count += support::DoubleArea(region.Loop(loop)) > 0 ? -2 : 2;
   }
   return count;
 }
@@ -51,12 +52,6 @@ void ExpectTriangulated(const Region& region) {
   ASSERT_TRUE(triangles.has_value());
   EXPECT_EQ(triangles->size(), 3 * ExpectedCount(region));
   ExpectCover(region, *triangles);
-}
-
-Region RegionOf(const std::vector<std::vector<Point>>& loops) {
-  Region region;
-  for (const auto& loop : loops) region.AddLoop(loop);
-  return region;
 }
 
 TEST(Triangulator, TriangleStaysUnchanged) {
@@ -135,21 +130,21 @@ TEST(Triangulator, AcceptsLoopThatPassesAPointTwice) {
 }
 
 TEST(Triangulator, StarsSpiralsAndCombsAreCovered) {
-  Random random(20);
+  RandomEngine random(20);
   for (const std::size_t count : {3u, 4u, 7u, 50u, 1000u}) {
     SCOPED_TRACE("seed 20, count " + std::to_string(count));
-    ExpectTriangulated(RegionOf({testing::RandomStar(random, count)}));
-    ExpectTriangulated(RegionOf({testing::Comb(random, count)}));
-    ExpectTriangulated(RegionOf({testing::HangingComb(random, count)}));
-    if (count >= 50) ExpectTriangulated(RegionOf({testing::Spiral(count, 3)}));
+    ExpectTriangulated(RegionOf({support::RandomStar(random, count)}));
+    ExpectTriangulated(RegionOf({support::Comb(random, count)}));
+    ExpectTriangulated(RegionOf({support::HangingComb(random, count)}));
+    if (count >= 50) ExpectTriangulated(RegionOf({support::Spiral(count, 3)}));
   }
 }
 
 TEST(Triangulator, ContoursAreCoveredAtAnyScaleAndPosition) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    const Region region = testing::RandomContours(random, 10 + seed);
+    RandomEngine random(seed);
+    const Region region = support::RandomContours(random, 10 + seed);
     ExpectTriangulated(region);
     ExpectTriangulated(region.Transformed(1e-30, 0));
     ExpectTriangulated(region.Transformed(1e30, 0));
@@ -173,10 +168,10 @@ std::size_t ExpectedCount(const Region& staircases, const Cells& cells) {
 TEST(Triangulator, UnionsOfRandomLatticeCellsWithPinchesAreCovered) {
   for (std::uint64_t seed = 0; seed < support::Tries(300u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    const Cells cells = testing::RandomCells(random, 3 + seed % 17, 3 + seed % 13,
+    RandomEngine random(seed);
+    const Cells cells = support::RandomCells(random, 3 + seed % 17, 3 + seed % 13,
                                              0.3 + 0.001 * static_cast<double>(seed));
-    const Region region = testing::Staircases(cells, random, seed % 2 == 0);
+    const Region region = support::Staircases(cells, random, seed % 2 == 0);
     const auto triangles = Triangulate(region);
     ASSERT_TRUE(triangles.has_value());
     EXPECT_EQ(triangles->size() / 3, ExpectedCount(region, cells));
@@ -189,8 +184,8 @@ TEST(Triangulator, UnionsOfRandomLatticeCellsWithPinchesAreCovered) {
 TEST(Triangulator, BandsBetweenContoursAndStaircasesAreCovered) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    const Region band = testing::RandomBand(random, 12 + seed);
+    RandomEngine random(seed);
+    const Region band = support::RandomBand(random, 12 + seed);
     const auto triangles = Triangulate(band);
     ASSERT_TRUE(triangles.has_value());
     ExpectCover(band, *triangles);
@@ -198,17 +193,17 @@ TEST(Triangulator, BandsBetweenContoursAndStaircasesAreCovered) {
 }
 
 TEST(Triangulator, AHundredThousandPointsAreCovered) {
-  Random random(5);
-  ExpectTriangulated(RegionOf({testing::RandomStar(random, 100'000)}));
-  ExpectTriangulated(RegionOf({testing::Comb(random, 33'000)}));
-  ExpectTriangulated(testing::RandomContours(random, 300).Transformed(1, 1e6));
+  RandomEngine random(5);
+  ExpectTriangulated(RegionOf({support::RandomStar(random, 100'000)}));
+  ExpectTriangulated(RegionOf({support::Comb(random, 33'000)}));
+  ExpectTriangulated(support::RandomContours(random, 300).Transformed(1, 1e6));
 }
 
 TEST(Triangulator, EarlierInputHasNoEffect) {
-  Random random(6);
+  RandomEngine random(6);
   Triangulator warm;
   for (int round = 0; round < 20; ++round) {
-    const Region region = testing::RandomContours(random, 10 + random() % 30);
+    const Region region = support::RandomContours(random, 10 + random() % 30);
     std::vector<std::uint32_t> triangles;
     ASSERT_TRUE(
         warm.Triangulate(region.points, region.loop_points, region.loop_offsets, triangles));
@@ -306,11 +301,11 @@ bool IsRegion(const Region& region) {
 }
 
 TEST(Triangulator, AcceptsRandomLoopsExactlyWhenTheyBoundARegion) {
-  Random random(7);
+  RandomEngine random(7);
   std::size_t accepted = 0;
   for (int round = 0; round < support::Tries(200'000); ++round) {
     const Region region =
-        testing::RandomGarbage(random, 3 + round % 3, 1 + round % 3, 3 + round % 6);
+        support::RandomGarbage(random, 3 + round % 3, 1 + round % 3, 3 + round % 6);
     const auto triangles = Triangulate(region);
     ASSERT_EQ(triangles.has_value(), IsRegion(region)) << "seed 7, round " << round;
     if (!triangles.has_value()) continue;
@@ -323,8 +318,8 @@ TEST(Triangulator, AcceptsRandomLoopsExactlyWhenTheyBoundARegion) {
 
 TEST(Triangulator, LargeGarbageIsRefused) {
   for (std::uint64_t seed = 0; seed < support::Tries(200u); ++seed) {
-    Random random(seed);
-    EXPECT_FALSE(Triangulate(testing::RandomGarbage(random, 2 + seed, 20, 1000)))
+    RandomEngine random(seed);
+    EXPECT_FALSE(Triangulate(support::RandomGarbage(random, 2 + seed, 20, 1000)))
         << "seed " << seed;
   }
 }
@@ -332,10 +327,10 @@ TEST(Triangulator, LargeGarbageIsRefused) {
 TEST(Triangulator, RegionWithOnePointMovedIsCoveredOrRefused) {
   for (std::uint64_t seed = 0; seed < support::Tries(500u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    Region region = testing::RandomContours(random, 8 + seed % 20);
+    RandomEngine random(seed);
+    Region region = support::RandomContours(random, 8 + seed % 20);
     if (region.points.empty()) continue;
-    region.points[random() % region.points.size()] += testing::Uniform(random, -3, 3);
+    region.points[random() % region.points.size()] += support::Uniform(random, -3, 3);
     if (const auto triangles = Triangulate(region)) ExpectCover(region, *triangles);
   }
 }

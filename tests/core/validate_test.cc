@@ -18,10 +18,10 @@
 namespace partiemc {
 namespace {
 
+using support::RandomEngine;
+using support::Rectangle;
+using support::Reversed;
 using ::testing::HasSubstr;
-using testing::Random;
-using testing::Rectangle;
-using testing::Reversed;
 using ::testing::StartsWith;
 
 void AddRing(const std::vector<Point>& ring, std::uint32_t outer, Rings& rings) {
@@ -80,12 +80,12 @@ TEST(Validate, EmptyResultAndRingsWithoutMeshPass) {
 
 TEST(Validate, ContoursOfRandomFieldsPass) {
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
-    Random random(seed);
-    const testing::Region contours = testing::RandomContours(random, 20 + seed);
+    RandomEngine random(seed);
+    const support::Region contours = support::RandomContours(random, 20 + seed);
     Result result;
     for (std::size_t k = 0; k < contours.LoopCount(); ++k) {
       // Without holes there is nothing to assign.
-      if (testing::DoubleArea(contours.Loop(k)) < 0) continue;
+      if (support::DoubleArea(contours.Loop(k)) < 0) continue;
       result.rings = {};
       result.mesh.Clear();
       AddRing(contours.Loop(k), kNoRing, result.rings);
@@ -278,7 +278,7 @@ TEST(Validate, M3FindsMissingAndChangedPoint) {
 }
 
 TEST(Validate, RefusesGarbage) {
-  Random random(12);
+  RandomEngine random(12);
   for (int round = 0; round < support::Tries(20'000); ++round) {
     Result result = GoodResult();
     Rings& rings = result.rings;

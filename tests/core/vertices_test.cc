@@ -23,10 +23,6 @@ const Segment& SegmentOf(const Stages& stages, std::size_t k) {
   return stages.crossings.segments[stages.topology.segments[k]];
 }
 
-const ActiveCell& CellOf(const Stages& stages, std::size_t k) {
-  return stages.crossings.cells[SegmentOf(stages, k).cell];
-}
-
 VertexInput InputOf(const Stages& stages, const Frame& frame) {
   return {frame,        stages.bins,   stages.level_set,  stages.crossings, stages.topology,
           stages.field, stages.planes, stages.parameters, stages.variant,   stages.scale};

@@ -18,7 +18,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 // Particles of spacing 1 in a disc: rings of them, each half a spacing inside of the next boundary,
 // `noise` spacings off at random.
-std::vector<double> Disc(double radius, double noise, std::uint64_t seed) {
+std::vector<double> NoisyDisc(double radius, double noise, std::uint64_t seed) {
   support::Random random(seed);
   std::vector<double> positions;
   for (double r = radius - 0.5; r > 0.2; r -= 1) {
@@ -77,7 +77,7 @@ double Roughness(const Rings& rings) {
 
 TEST(VirtualPlane, FindsTheRadiusOfADisc) {
   for (const double radius : {6.0, 10.0, 15.0}) {
-    const Result result = Reconstructed(Disc(radius, 0, 1));
+    const Result result = Reconstructed(NoisyDisc(radius, 0, 1));
     ASSERT_EQ(result.rings.RingCount(), 1u);
     EXPECT_NEAR(std::sqrt(result.statistics.area / kPi), radius, 0.06) << radius;
     EXPECT_LT(Roughness(result.rings), 0.03) << radius;
@@ -87,7 +87,7 @@ TEST(VirtualPlane, FindsTheRadiusOfADisc) {
 // Area of a disc without the area step; `steps` selects the other steps.
 double DiscArea(double radius, VirtualPlaneSteps steps) {
   steps.area = false;
-  const Result result = Reconstructed(Disc(radius, 0.05, 5), {}, steps);
+  const Result result = Reconstructed(NoisyDisc(radius, 0.05, 5), {}, steps);
   return result.rings.RingCount() == 1 ? result.rings.measures[0].area : -1;
 }
 
@@ -115,7 +115,7 @@ TEST(VirtualPlane, MeanOfSupportDoesNotChangeTheArea) {
 TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
   double rough = 0, smooth = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const std::vector<double> positions = Disc(10, 0.2, seed);
+    const std::vector<double> positions = NoisyDisc(10, 0.2, seed);
     rough += Roughness(Reconstructed(positions, {}, VirtualPlaneSteps::None()).rings);
     smooth += Roughness(Reconstructed(positions).rings);
   }
@@ -123,7 +123,7 @@ TEST(VirtualPlane, IsSmootherThanItsStartUnderNoise) {
 }
 
 TEST(VirtualPlane, MatchesKnownVolume) {
-  const std::vector<double> positions = Disc(12, 0.1, 3);
+  const std::vector<double> positions = NoisyDisc(12, 0.1, 3);
   const auto volume = static_cast<double>(positions.size() / 2);
   const ReconstructionParameters small{.reference_radius = 0.78};  // About 0.06 spacings inward.
   const VirtualPlaneSteps unmatched{.area = false};
@@ -135,7 +135,7 @@ TEST(VirtualPlane, MatchesKnownVolume) {
 }
 
 TEST(VirtualPlane, LimitsAndStoresChangeOfAreaOffset) {
-  const std::vector<double> positions = Disc(12, 0.05, 4);
+  const std::vector<double> positions = NoisyDisc(12, 0.05, 4);
   const double change = VirtualPlaneConstants{}.area_change;
   State state;
   Reconstructed(positions, {}, state);
@@ -153,7 +153,7 @@ TEST(VirtualPlane, LimitsAndStoresChangeOfAreaOffset) {
 }
 
 TEST(VirtualPlane, SprayDoesNotCountForTheArea) {
-  std::vector<double> positions = Disc(12, 0.05, 4);
+  std::vector<double> positions = NoisyDisc(12, 0.05, 4);
   State alone, beside_spray;
   Reconstructed(positions, {}, alone);
   for (int k = 0; k < 100; ++k) {
@@ -164,7 +164,7 @@ TEST(VirtualPlane, SprayDoesNotCountForTheArea) {
 }
 
 TEST(VirtualPlane, LimitsAreaOffsetForAnyVolume) {
-  const std::vector<double> positions = Disc(12, 0.05, 5);
+  const std::vector<double> positions = NoisyDisc(12, 0.05, 5);
   for (const float volume : {0.5f, 1.5f}) {
     const std::vector<float> volumes(positions.size() / 2, volume);
     const auto reconstructor = Reconstructor::Create({.spacing = 1.0});
@@ -199,7 +199,7 @@ TEST(VirtualPlane, TinyOffsetLeavesVerticesOnAnAxis) {
 }
 
 TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
-  const std::vector<double> positions = Disc(15, 0.05, 6);
+  const std::vector<double> positions = NoisyDisc(15, 0.05, 6);
   const auto squares =
       Reconstructed(positions, {.placement = Placement::kMarchingSquares}).rings.PointCount();
   const auto planes = Reconstructed(positions).rings.PointCount();
@@ -209,9 +209,9 @@ TEST(VirtualPlane, KeepsFewMoreVerticesThanMarchingSquares) {
 
 // A ring of many stretches, and bodies of more points than one batch of the mesh.
 TEST(VirtualPlane, SameBitsForAnyThreadsAndInstructionSet) {
-  std::vector<double> positions = Disc(170, 0.2, 11);
+  std::vector<double> positions = NoisyDisc(170, 0.2, 11);
   for (int k = 0; k < 60; ++k) {
-    const std::vector<double> island = Disc(12, 0.2, k);
+    const std::vector<double> island = NoisyDisc(12, 0.2, k);
     for (std::size_t n = 0; n < island.size(); n += 2) {
       positions.push_back(island[n] + 200 + 30 * (k % 8));
       positions.push_back(island[n + 1] - 200 + 30 * (k / 8));

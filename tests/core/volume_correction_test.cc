@@ -7,29 +7,26 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/point.h"
 #include "support/random.h"
 
 namespace partiemc {
 namespace {
-
-struct Vector {
-  double x, y;
-};
 
 // The same offset, computed point by point.
 std::vector<double> OffsetPlainly(const std::vector<double>& points, double offset) {
   const std::size_t count = points.size() / 2;
   const auto normal_after = [&](std::size_t k) {
     const std::size_t next = (k + 1) % count;
-    Vector normal{points[2 * next + 1] - points[2 * k + 1], points[2 * k] - points[2 * next]};
+    Point normal{points[2 * next + 1] - points[2 * k + 1], points[2 * k] - points[2 * next]};
     const double length = std::sqrt(normal.x * normal.x + normal.y * normal.y);
     if (length > 0) normal = {normal.x / length, normal.y / length};
     return normal;
   };
   std::vector<double> target;
   for (std::size_t k = 0; k < count; ++k) {
-    const Vector a = normal_after((k + count - 1) % count);
-    const Vector b = normal_after(k);
+    const Point a = normal_after((k + count - 1) % count);
+    const Point b = normal_after(k);
     const double divisor = std::max(1 + a.x * b.x + a.y * b.y, 0.5);
     target.push_back(points[2 * k] + offset * (a.x + b.x) / divisor);
     target.push_back(points[2 * k + 1] + offset * (a.y + b.y) / divisor);

@@ -14,7 +14,7 @@ namespace partiemc::fuzz {
 namespace {
 
 constexpr std::size_t kSequenceBytes = 8;
-constexpr std::size_t kChecksumBytes = 8;
+constexpr std::size_t kStateChecksumBytes = 8;
 const server::StreamTerms kTerms{.lineage = std::string(32, '7'), .name = "tank"};
 
 const server::CheckpointKeys& Keys() {
@@ -47,8 +47,8 @@ std::string PutRight(std::string_view bytes, const ReconstructionParameters& par
   const std::size_t signature = keys == nullptr ? 0 : server::CheckpointKeys::kSignatureBytes;
   std::string checkpoint = made.substr(0, made.size() - SerializedBytes(State{}) - signature);
   std::string state(bytes.substr(std::min(bytes.size(), kSequenceBytes)));
-  if (state.size() >= kChecksumBytes) {
-    state.resize(state.size() - kChecksumBytes);
+  if (state.size() >= kStateChecksumBytes) {
+    state.resize(state.size() - kStateChecksumBytes);
     PutNumber(ChecksumOf(state), state);
   }
   checkpoint += state;

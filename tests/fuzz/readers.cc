@@ -36,15 +36,6 @@ void RequireWhole(const ParticleRows& rows) {
           "volumes are there for every particle");
 }
 
-void RequireWhole(const RecordedFrame& frame) {
-  const std::size_t count = frame.ParticleCount();
-  Require(frame.positions.size() == 2 * count, "two coordinates a particle");
-  Require(frame.ids.empty() || frame.ids.size() == count, "ids of all particles, or none");
-  Require(frame.volumes.empty() || frame.volumes.size() == count, "volumes of all, or none");
-  Require(frame.velocities.empty() || frame.velocities.size() == 2 * count,
-          "velocities of all particles, or none");
-}
-
 // Reads to the end; skips the frames if `rows` is null.
 void ReadAll(FrameReader& reader, const std::string& path, ParticleRows* rows) {
   client::input::PlaneProjection plane;
@@ -57,7 +48,7 @@ void ReadAll(FrameReader& reader, const std::string& path, ParticleRows* rows) {
     if (!more.ok() || !*more) return;
     if (rows == nullptr) continue;
     RequireWhole(*rows);
-    if (plane.Project(*rows, frame, notices).ok()) RequireWhole(frame);
+    if (plane.Project(*rows, frame, notices).ok()) RequireSameCounts(frame);
   }
 }
 

@@ -27,15 +27,6 @@ std::string Recording(Choices& choices) {
   return file;
 }
 
-void RequireWhole(const client::RecordedFrame& frame) {
-  const std::size_t count = frame.ParticleCount();
-  Require(frame.positions.size() == 2 * count, "two coordinates a particle");
-  Require(frame.ids.empty() || frame.ids.size() == count, "ids of all particles, or none");
-  Require(frame.volumes.empty() || frame.volumes.size() == count, "volumes of all, or none");
-  Require(frame.velocities.empty() || frame.velocities.size() == 2 * count,
-          "velocities of all particles, or none");
-}
-
 void ReadAll(const std::string& path, const std::string& range) {
   const auto reader = client::RecordingReader::Open(path, range);
   if (!reader.ok()) return;
@@ -48,7 +39,7 @@ void ReadAll(const std::string& path, const std::string& range) {
       return;
     }
     if (!*more) return;
-    RequireWhole(frame);
+    RequireSameCounts(frame);
     Require(!before || frame.index > *before, "frames come in order");
     before = frame.index;
   }

@@ -22,14 +22,14 @@ using relay::v1::RelayMessage;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMaxBytes = 4096;
-constexpr std::size_t kMaxSteps = 256;
+constexpr std::size_t kMaxMessages = 256;
 constexpr char kStreamId[] = "s-1";
 
 // A watcher that accepts every frame at once.
-class Watch final : private server::WatchTransport {
+class ReadyWatch final : private server::WatchTransport {
  public:
-  Watch(std::shared_ptr<server::ResultBroadcaster> broadcaster,
-        std::optional<std::uint64_t> from_sequence)
+  ReadyWatch(std::shared_ptr<server::ResultBroadcaster> broadcaster,
+             std::optional<std::uint64_t> from_sequence)
       : terms_{.broadcaster = std::move(broadcaster),
                .mode = server::WatchMode::kEvery,
                .credit = std::uint64_t{1} << 40,
@@ -37,7 +37,7 @@ class Watch final : private server::WatchTransport {
     machine_->Start();
     machine_->ReadDone({.kind = server::WatchRequest::Kind::kOpen, .credit = terms_.credit});
   }
-  ~Watch() override {
+  ~ReadyWatch() override {
     machine_->Cancelled();
     if (writing_) WriteDone();
     if (reading_) machine_->ReadEnded();
@@ -117,11 +117,11 @@ void AttackRelayMessages(Bytes bytes) {
        .waiting_bytes = kMaxBytes,
        .history = choices.Flip() ? &room : nullptr},
       port, now);
-  std::unique_ptr<Watch> watch;
+  std::unique_ptr<ReadyWatch> watch;
   stream.Await([&](const absl::Status& status) {
-    if (status.ok()) watch = std::make_unique<Watch>(stream.broadcaster(), from);
+    if (status.ok()) watch = std::make_unique<ReadyWatch>(stream.broadcaster(), from);
   });
-  for (std::size_t step = 0; step < kMaxSteps && !choices.empty(); ++step) {
+  for (std::size_t step = 0; step < kMaxMessages && !choices.empty(); ++step) {
     RelayMessage message;
     const std::uint8_t what = choices.Take<std::uint8_t>();
     switch (what % 8) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "fuzz/choices.h"
 #include "fuzz/require.h"
 #include "fuzz/targets.h"
@@ -168,9 +169,9 @@ RelayMessage AnnouncementOf(Choices& choices) {
   for (std::size_t k = choices.Below(4); k > 0; --k) {
     auto& stream = *announcement.add_streams();
     const auto which = choices.Take<std::uint8_t>();
-    stream.mutable_summary()->set_stream_id("s-" + std::to_string(which % 5));
-    stream.mutable_summary()->set_stream_name("n" + std::to_string(which / 5 % 4));
-    stream.set_lineage("l" + std::to_string(which / 20 % 3));
+    stream.mutable_summary()->set_stream_id(absl::StrCat("s-", which % 5));
+    stream.mutable_summary()->set_stream_name(absl::StrCat("n", which / 5 % 4));
+    stream.set_lineage(absl::StrCat("l", which / 20 % 3));
     stream.set_opened_unix_ms(choices.Take<std::int8_t>());
   }
   return message;

@@ -26,4 +26,13 @@ void RequireViolation(const absl::Status& status) {
           absl::StrCat("a refusal names reason, field, value and rule: ", status.ToString()));
 }
 
+void RequireSameCounts(const client::RecordedFrame& frame) {
+  const std::size_t count = frame.ParticleCount();
+  Require(frame.positions.size() == 2 * count, "two coordinates a particle");
+  Require(frame.ids.empty() || frame.ids.size() == count, "ids of all particles, or none");
+  Require(frame.volumes.empty() || frame.volumes.size() == count, "volumes of all, or none");
+  Require(frame.velocities.empty() || frame.velocities.size() == 2 * count,
+          "velocities of all particles, or none");
+}
+
 }  // namespace partiemc::fuzz

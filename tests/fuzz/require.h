@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "client/input/sequence.h"
 
 namespace partiemc::fuzz {
 
@@ -16,5 +17,8 @@ void RequireOk(const absl::Status& status, std::string_view promise);
 
 /// Requires that a refusal has field, value and rule.
 void RequireViolation(const absl::Status& status);
+
+/// Requires that a frame has as many ids, volumes and velocities as particles, or none.
+void RequireSameCounts(const client::RecordedFrame& frame);
 
 }  // namespace partiemc::fuzz

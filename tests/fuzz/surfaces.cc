@@ -31,7 +31,8 @@ ReconstructionParameters HostileSurface(Choices& choices) {
   if (choices.Flip()) parameters.surface.max_drop_particles = choices.Take<std::uint8_t>();
   constexpr std::array kErrors = {.0, .0, .0, .05, .5, 1.5};
   parameters.surface.simplify = kErrors[choices.Below(kErrors.size())];
-  if (choices.Below(4) == 1) parameters.surface.min_component_volume = choices.Below(8);
+  if (choices.Below(4) == 1)
+    parameters.surface.min_component_volume = static_cast<double>(choices.Below(8));
   if (choices.Below(4) == 1) {
     parameters.sections.push_back(
         {.slice = SlicePlane{.origin = {0, 0, .25}, .normal = {0, 1, 2}}});

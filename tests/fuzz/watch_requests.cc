@@ -14,7 +14,7 @@ namespace partiemc::fuzz {
 namespace {
 
 constexpr std::size_t kMaxWatcherBytes = 4096;
-constexpr std::size_t kMaxSteps = 256;
+constexpr std::size_t kMaxWatchSteps = 256;
 
 // A watch without a connection: its writes end on request.
 class Watch final : private server::WatchTransport {
@@ -129,7 +129,7 @@ void AttackWatchRequests(Bytes bytes) {
   {
     Watch watch(broadcaster);
     bool over = false;
-    for (std::size_t step = 0; step < kMaxSteps && !choices.empty(); ++step) {
+    for (std::size_t step = 0; step < kMaxWatchSteps && !choices.empty(); ++step) {
       const std::uint8_t what = choices.Take<std::uint8_t>();
       switch (what % 8) {
         case 0:

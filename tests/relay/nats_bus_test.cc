@@ -4,27 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "relay/eventually.h"
 #include "relay/nats_process.h"
 
 namespace partiemc::server {
 namespace {
-
-using std::chrono::milliseconds;
-
-bool Eventually(const std::function<bool()>& is_true) {
-  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!is_true()) {
-    if (std::chrono::steady_clock::now() > give_up) return false;
-    std::this_thread::sleep_for(milliseconds(2));
-  }
-  return true;
-}
 
 std::unique_ptr<MessageBus> Connect(const std::string& url) {
   auto bus = ConnectToNats(url);

@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "relay/eventually.h"
 #include "relay/memory_replica.h"
 #include "server/base/call_errors.h"
 #include "server/relay/pieces.h"
@@ -20,15 +21,6 @@ namespace partiemc::server {
 namespace {
 
 using std::chrono::milliseconds;
-
-bool Eventually(const std::function<bool()>& is_true) {
-  const auto give_up = std::chrono::steady_clock::now() + milliseconds(20'000);
-  while (!is_true()) {
-    if (std::chrono::steady_clock::now() > give_up) return false;
-    std::this_thread::sleep_for(milliseconds(2));
-  }
-  return true;
-}
 
 class RelayFlood : public testing::Test {
  protected:

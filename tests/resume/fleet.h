@@ -15,6 +15,9 @@
 
 namespace partiemc::resume {
 
+/// Limit of a connection, and of a server that terminates.
+inline constexpr std::chrono::seconds kGrace(20);
+
 class Fleet {
  public:
   /// Starts each server with these arguments and its address. With --other-server every second

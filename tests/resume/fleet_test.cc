@@ -21,7 +21,6 @@ namespace {
 constexpr std::size_t kServers = 3;
 // Frames per second of one stream: typical for a simulation, and affordable on a shared machine.
 constexpr double kRate = 40;
-constexpr std::chrono::seconds kGrace(20);
 // Limit from a disturbance to the next answer (tests/PROMISES.md).
 constexpr double kMaxRecoveryMs = 1000;
 

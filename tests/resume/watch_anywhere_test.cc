@@ -25,9 +25,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::size_t kServers = 3, kProducers = 8, kWatchers = 16;
-constexpr double kRate = 30;
-constexpr std::chrono::seconds kGrace(20);
+constexpr std::size_t kWatchedServers = 3, kProducers = 8, kWatchers = 16;
+constexpr double kWatchedRate = 30;
 // Limits from a disturbance to the next frame (tests/PROMISES.md).
 constexpr double kMaxProducerGapMs = 1000, kMaxWatcherGapMs = 2000;
 
@@ -56,7 +55,7 @@ double Percentile(std::vector<double> values, double part) {
 
 class WatchAnywhere : public testing::TestWithParam<Route> {
  protected:
-  WatchAnywhere() : fleet_(kServers, {"--nats", nats_.url()}) {
+  WatchAnywhere() : fleet_(kWatchedServers, {"--nats", nats_.url()}) {
     for (std::size_t k = 0; k < kProducers; ++k) {
       workloads_.push_back(k % 2 == 0 ? DamBreak() : k == 1 ? Merge() : Leap());
       workloads_.back().name += "-" + std::to_string(k);
@@ -83,7 +82,7 @@ class WatchAnywhere : public testing::TestWithParam<Route> {
     for (std::size_t k = 0; k < kProducers; ++k) {
       windows.push_back(streams[k]->info().frames_in_flight);
       threads.emplace_back([&, k] {
-        histories[k] = RunThrough(*streams[k], workloads_[k], kRate,
+        histories[k] = RunThrough(*streams[k], workloads_[k], kWatchedRate,
                                   [&](std::uint64_t) -> bool { return over; });
       });
     }
@@ -175,10 +174,10 @@ INSTANTIATE_TEST_SUITE_P(Behind, WatchAnywhere, testing::Values(Route::kHaproxy,
 
 TEST_P(WatchAnywhere, RollingUpdatesAreSeenByNobody) {
   Run("updates", [&](Disturbances& disturbances) {
-    for (std::uint64_t k = 0; k < kServers * GetOptions().updates; ++k) {
+    for (std::uint64_t k = 0; k < kWatchedServers * GetOptions().updates; ++k) {
       std::this_thread::sleep_for(milliseconds(400));
       disturbances.Now();
-      EXPECT_EQ(fleet_.TerminateAndRestart(k % kServers, kGrace), std::optional(0));
+      EXPECT_EQ(fleet_.TerminateAndRestart(k % kWatchedServers, kGrace), std::optional(0));
     }
   });
 }
@@ -195,7 +194,7 @@ TEST_P(WatchAnywhere, KillsAndABusThatGoesAreSeenInNoFrame) {
         nats_.Start();
       } else {
         disturbances.Now();
-        fleet_.KillAndRestart(random.Below(kServers));
+        fleet_.KillAndRestart(random.Below(kWatchedServers));
       }
     }
   });

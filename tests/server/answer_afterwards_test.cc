@@ -12,8 +12,6 @@
 namespace partiemc::server {
 namespace {
 
-constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
-
 class AnswerAfterwards : public ::testing::Test {
  protected:
   // The write in progress when the worker ran the work after an answer.
@@ -36,7 +34,7 @@ class AnswerAfterwards : public ::testing::Test {
 
   SteppedPool pool_;
   MemoryBudget budget_{std::uint64_t{1} << 30};
-  ScriptedTransport transport_{pool_, budget_, 4, BlobParameters(), kLimits};
+  ScriptedTransport transport_{pool_, budget_, 4, BlobParameters(), kBlobLimits};
   std::vector<Moment> moments_;
 };
 

@@ -18,14 +18,12 @@
 #include "server/memory_watcher.h"
 #include "server/watch/result_broadcaster.h"
 #include "server/watch/watch_dispatcher.h"
+#include "server/watch_fixture.h"
 
 namespace partiemc::server {
 namespace {
 
 using ::testing::ElementsAre;
-
-constexpr std::size_t kFrameBytes = 1000;
-constexpr std::size_t kMaxBytes = 10 * (kFrameBytes + kPublishedBytes);
 
 TEST(ResultMailbox, HoldsNoMoreBytesThanItMayAndDropsTheOlderOnes) {
   ResultMailbox mailbox(3 * (kFrameBytes + kPublishedBytes));
@@ -101,7 +99,9 @@ TEST_F(DroppedResults, ALossIsReportedEvenIfTheResultAfterItIsDropped) {
       broadcaster_->PublishNumbered(
           {std::make_shared<NumberedFrame>(number, kFrameBytes), number, number, last_loss});
       // Takes the result out of the mailbox, so that it is dropped later.
-      if (is_collected) EXPECT_EQ(broadcaster_->LastNumber(), number);
+      if (is_collected) {
+        EXPECT_EQ(broadcaster_->LastNumber(), number);
+      }
     }
   };
   publish(1, 0, false);

@@ -12,8 +12,6 @@
 namespace partiemc::server {
 namespace {
 
-constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
-
 class LastPart : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -28,7 +26,7 @@ class LastPart : public ::testing::Test {
 
   SteppedPool pool_;
   MemoryBudget budget_{std::uint64_t{1} << 30};
-  ScriptedTransport transport_{pool_, budget_, 4, BlobParameters(), kLimits};
+  ScriptedTransport transport_{pool_, budget_, 4, BlobParameters(), kBlobLimits};
 };
 
 TEST_F(LastPart, IsAnsweredAlthoughTheStreamOfPartZeroHasEnded) {

@@ -6,11 +6,15 @@
 #include <random>
 #include <vector>
 
+#include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc::server {
 
 inline constexpr double kBlobSpacing = 0.05;
+
+/// A frame of MovingBlob is within these.
+inline constexpr FrameLimits kBlobLimits{.max_particles = 2000, .max_tiles = 1000};
 
 inline ReconstructionParameters BlobParameters() {
   ReconstructionParameters parameters;

@@ -17,7 +17,7 @@
 namespace partiemc::server {
 namespace {
 
-using Clock = FrameAssembler::Clock;
+using AssemblerClock = FrameAssembler::Clock;
 using std::chrono::milliseconds;
 
 constexpr std::size_t kWindow = 3;
@@ -27,7 +27,7 @@ constexpr milliseconds kTimeout(5000);
 struct World {
   SteppedPool& pool;
   MemoryBudget& budget;
-  Clock::time_point now{};
+  AssemblerClock::time_point now{};
   std::string broken = {};  // The first violated promise.
 
   void Require(bool holds, const std::string& promise) {
@@ -108,7 +108,7 @@ class Rank final : private StreamTransport, private StreamHandler {
  private:
   struct Slot {
     std::uint64_t sequence = 0;
-    Clock::time_point came;
+    AssemblerClock::time_point came;
     absl::Status refusal;
   };
 

@@ -10,12 +10,10 @@
 #include <vector>
 
 #include "server/memory_watcher.h"
+#include "server/watch_fixture.h"
 
 namespace partiemc::server {
 namespace {
-
-constexpr std::size_t kFrameBytes = 1000;
-constexpr std::uint64_t kCost = kFrameBytes + kPublishedBytes;
 
 Published Frame(std::uint64_t number, std::size_t bytes = kFrameBytes) {
   return {std::make_shared<NumberedFrame>(number, bytes), number, 10 * number};
@@ -50,7 +48,7 @@ TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
 }
 
 TEST(ResultHistory, ACopyHasTheNewestThatFitBeforeASequence) {
-  HistoryRoom room(8 * kCost, 11 * kCost);
+  HistoryRoom room(8 * kFrameCost, 11 * kFrameCost);
   ResultHistory history(room);
   for (std::uint64_t number = 1; number <= 8; ++number) history.Add(Frame(number));
   const auto numbers = [&](std::uint64_t sequence) {
@@ -62,16 +60,16 @@ TEST(ResultHistory, ACopyHasTheNewestThatFitBeforeASequence) {
   {
     ResultHistory others[] = {ResultHistory(room), ResultHistory(room), ResultHistory(room)};
     EXPECT_EQ(numbers(99), (std::vector<std::uint64_t>{7, 8})) << "a share of five has two";
-    EXPECT_EQ(room.held(), 8 * kCost);
+    EXPECT_EQ(room.held(), 8 * kFrameCost);
   }
   const auto copy = history.CopyBefore(31);
-  EXPECT_EQ(room.held(), 11 * kCost);
+  EXPECT_EQ(room.held(), 11 * kFrameCost);
   copy->Add(Frame(4));
   EXPECT_EQ(NumbersOf(*copy), (std::vector<std::uint64_t>{2, 3, 4}));
 }
 
 TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
-  HistoryRoom room(8 * kCost, 8 * kCost);
+  HistoryRoom room(8 * kFrameCost, 8 * kFrameCost);
   ResultHistory history(room);
   for (std::uint64_t number = 1; number <= 11; ++number) history.Add(Frame(number));
   EXPECT_TRUE(history.TakeFrom(999).empty());
@@ -79,7 +77,7 @@ TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
   ASSERT_EQ(taken.size(), 5u);
   EXPECT_EQ(taken.front().number, 7u);
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6}));
-  EXPECT_EQ(room.held(), 3 * kCost);
+  EXPECT_EQ(room.held(), 3 * kFrameCost);
   for (std::uint64_t number = 7; number <= 11; ++number) history.Add(Frame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6, 7, 8, 9, 10, 11}));
   EXPECT_EQ(history.TakeFrom(0).size(), 8u);
@@ -87,48 +85,48 @@ TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
 }
 
 TEST(ResultHistory, HasNoHole) {
-  HistoryRoom room(100 * kCost, 100 * kCost);
+  HistoryRoom room(100 * kFrameCost, 100 * kFrameCost);
   ResultHistory history(room);
   for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(Frame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{5}));
-  history.Add(Frame(6, 101 * kCost));  // Too large, so the next result has a gap before it.
+  history.Add(Frame(6, 101 * kFrameCost));  // Too large, so the next result has a gap before it.
   EXPECT_TRUE(history.empty());
   history.Add(Frame(7));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{7}));
 }
 
 TEST(ResultHistory, ManyHaveEqualSharesAndNeverMoreThanThereIs) {
-  HistoryRoom room(6 * kCost, 12 * kCost);
+  HistoryRoom room(6 * kFrameCost, 12 * kFrameCost);
   ResultHistory first(room), second(room);
   EXPECT_FALSE(room.is_scarce());
   for (std::uint64_t number = 1; number <= 9; ++number) {
     first.Add(Frame(number));
     second.Add(Frame(number));
   }
-  EXPECT_EQ(room.held(), 12 * kCost);
+  EXPECT_EQ(room.held(), 12 * kFrameCost);
   {
     ResultHistory third(room);
     EXPECT_TRUE(room.is_scarce());
-    EXPECT_EQ(room.share(), 4 * kCost);
+    EXPECT_EQ(room.share(), 4 * kFrameCost);
     third.Add(Frame(1));  // The others have not been notified yet.
     EXPECT_TRUE(third.empty());
-    EXPECT_EQ(room.held(), 12 * kCost);
+    EXPECT_EQ(room.held(), 12 * kFrameCost);
     first.Shrink();
     EXPECT_EQ(NumbersOf(first), (std::vector<std::uint64_t>{6, 7, 8, 9}));
     third.Add(Frame(2));
     third.Add(Frame(3));
     third.Add(Frame(4));  // The second still exceeds its share, so one of its results is dropped.
     EXPECT_EQ(NumbersOf(third), (std::vector<std::uint64_t>{3, 4}));
-    EXPECT_EQ(room.held(), 12 * kCost);
+    EXPECT_EQ(room.held(), 12 * kFrameCost);
     second.Add(Frame(10));
     EXPECT_EQ(second.size(), 4u);
   }
-  EXPECT_EQ(room.held(), 8 * kCost);
-  EXPECT_EQ(room.share(), 6 * kCost);
+  EXPECT_EQ(room.held(), 8 * kFrameCost);
+  EXPECT_EQ(room.share(), 6 * kFrameCost);
 }
 
 TEST(ResultHistory, FindsTheFirstFromANumberOrASequenceOn) {
-  HistoryRoom room(5 * kCost, 5 * kCost);
+  HistoryRoom room(5 * kFrameCost, 5 * kFrameCost);
   ResultHistory history(room);
   EXPECT_EQ(history.FromNumber(0), nullptr);
   EXPECT_EQ(history.FromSequence(0), nullptr);

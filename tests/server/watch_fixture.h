@@ -15,8 +15,10 @@
 namespace partiemc::server {
 
 inline constexpr std::size_t kFrameBytes = 1000;
+/// What a frame counts.
+inline constexpr std::uint64_t kFrameCost = kFrameBytes + kPublishedBytes;
 /// Limit of a watcher: ten frames.
-inline constexpr std::size_t kMaxBytes = 10 * (kFrameBytes + kPublishedBytes);
+inline constexpr std::size_t kMaxBytes = 10 * kFrameCost;
 
 class WatchTest : public ::testing::Test {
  protected:

@@ -16,13 +16,12 @@
 #include "server/memory_watcher.h"
 #include "server/watch/result_broadcaster.h"
 #include "server/watch/watch_registry.h"
+#include "server/watch_fixture.h"
 
 namespace partiemc::server {
 namespace {
 
-constexpr std::size_t kFrameBytes = 1000;
-constexpr std::uint64_t kCost = kFrameBytes + kPublishedBytes;
-constexpr std::size_t kMaxBytes = 4 * kCost;
+constexpr std::size_t kFourFrames = 4 * kFrameCost;
 constexpr std::uint64_t kMany = 1000;  // Credit for all frames.
 
 class WatchBack : public ::testing::TestWithParam<WatchMode> {
@@ -31,7 +30,7 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
 
   std::shared_ptr<ResultBroadcaster> Begin(ResultBroadcaster* former, std::uint64_t next) {
     auto broadcaster = std::make_shared<ResultBroadcaster>(
-        dispatcher_, ResultBroadcaster::Limits{.mailbox_bytes = 20 * kCost, .kept_bytes = 0});
+        dispatcher_, ResultBroadcaster::Limits{.mailbox_bytes = 20 * kFrameCost, .kept_bytes = 0});
     broadcaster->BeginHistory(room_, former, next);
     return broadcaster;
   }
@@ -47,7 +46,7 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
   }
   std::unique_ptr<MemoryWatcher> Join(std::uint64_t credit, std::optional<std::uint64_t> from) {
     auto watcher =
-        std::make_unique<MemoryWatcher>(broadcaster_, GetParam(), credit, kMaxBytes, from);
+        std::make_unique<MemoryWatcher>(broadcaster_, GetParam(), credit, kFourFrames, from);
     watcher->WaitUntilOpened();
     return watcher;
   }
@@ -67,7 +66,7 @@ class WatchBack : public ::testing::TestWithParam<WatchMode> {
     return numbers;
   }
 
-  HistoryRoom room_{10 * kCost, 20 * kCost};
+  HistoryRoom room_{10 * kFrameCost, 20 * kFrameCost};
   WatchDispatcher dispatcher_;
   std::shared_ptr<ResultBroadcaster> broadcaster_;
 };
@@ -119,7 +118,7 @@ TEST_P(WatchBack, OneThatPausesGoesOnWhereItWas) {
   const auto watcher = Join(2, 1);
   watcher->WaitForFrames(2);
   PublishAll(4, 10);
-  EXPECT_LE(watcher->machine().counts().most_held_bytes, kCost);
+  EXPECT_LE(watcher->machine().counts().most_held_bytes, kFrameCost);
   watcher->Credit(kMany);
   watcher->WaitForFrames(10);
   EXPECT_EQ(NumbersOf(*watcher), From(1, 10));
@@ -158,13 +157,13 @@ TEST_P(WatchBack, AFrameThatTheHistoryHasNoRoomForComesInItsTurn) {
   ResultHistory others[] = {ResultHistory(room_), ResultHistory(room_), ResultHistory(room_),
                             ResultHistory(room_), ResultHistory(room_), ResultHistory(room_),
                             ResultHistory(room_), ResultHistory(room_), ResultHistory(room_)};
-  EXPECT_EQ(room_.share(), 2 * kCost);
+  EXPECT_EQ(room_.share(), 2 * kFrameCost);
   for (std::uint64_t k = 4; k <= 9; ++k) {
     k % 3 == 0 ? large(k) : Publish(k);
     watcher->WaitForFrames(k);
   }
   EXPECT_EQ(NumbersOf(*watcher), From(1, 9));
-  EXPECT_LE(room_.held(), 2 * kCost);
+  EXPECT_LE(room_.held(), 2 * kFrameCost);
 }
 
 TEST_P(WatchBack, WhatIsHeldStillComesAfterTheEndOfTheStream) {
@@ -237,7 +236,7 @@ TEST_P(WatchBack, AnEndedStreamDropsItsHistoryAfterItsLastReader) {
   Publish(9);  // `other` has no credit for it.
   EndStream();
   dispatcher_.Flush();
-  EXPECT_EQ(room_.held(), 9 * kCost);
+  EXPECT_EQ(room_.held(), 9 * kFrameCost);
   reader.reset();
   dispatcher_.Flush();
   EXPECT_EQ(room_.held(), 0u);
@@ -267,10 +266,10 @@ TEST_P(WatchBack, AnEndedStreamSharesTheRoomWithOpenOnes) {
   const auto ended = std::exchange(broadcaster_, Begin(nullptr, 1));
   ended->End(WatchEnd::OfStream(absl::OkStatus()));
   PublishAll(1, 10);
-  EXPECT_EQ(room_.held(), 20 * kCost);
+  EXPECT_EQ(room_.held(), 20 * kFrameCost);
   const auto third = Begin(nullptr, 1);
   dispatcher_.Flush();
-  EXPECT_LE(room_.held(), 12 * kCost) << "each of three may have six";
+  EXPECT_LE(room_.held(), 12 * kFrameCost) << "each of three may have six";
   for (std::uint64_t k = 1; k <= 6; ++k) PublishTo(*third, k);
   EXPECT_EQ(third->oldest_here(), 1u);
 }
@@ -316,7 +315,7 @@ TEST_P(WatchBack, ATakeoverMovesTheHistoryAndReturnsTheRest) {
   const auto rest = next->BeginHistory(room_, broadcaster_.get(), 8);
   ASSERT_EQ(rest.size(), 3u);
   EXPECT_EQ(rest.front().sequence, 8u);
-  EXPECT_EQ(room_.held(), 7 * kCost);
+  EXPECT_EQ(room_.held(), 7 * kFrameCost);
   EXPECT_EQ(broadcaster_->HeldFrom(1).frame, nullptr);
   EXPECT_EQ(next->oldest_here(), 1u);
   EXPECT_EQ(next->Newest().sequence, 7u);
@@ -336,8 +335,8 @@ TEST_P(WatchBack, OthersGetAllWhileOneReadsSlowly) {
     other->WaitForFrames(k);
   }
   EXPECT_EQ(NumbersOf(*other), From(1, 200));
-  EXPECT_LE(slow->machine().counts().most_held_bytes, kCost);
-  EXPECT_LE(room_.held(), 10 * kCost);
+  EXPECT_LE(slow->machine().counts().most_held_bytes, kFrameCost);
+  EXPECT_LE(room_.held(), 10 * kFrameCost);
 }
 
 TEST_P(WatchBack, RandomWatchersMissNoFrameThatIsNotReported) {
@@ -351,7 +350,7 @@ TEST_P(WatchBack, RandomWatchersMissNoFrameThatIsNotReported) {
       while (!over) {
         const std::uint64_t now = published, back = random() % 12;
         const std::uint64_t from = now > back ? now - back : 0;
-        MemoryWatcher watcher(broadcaster_, GetParam(), 1 + random() % 5, kMaxBytes, from);
+        MemoryWatcher watcher(broadcaster_, GetParam(), 1 + random() % 5, kFourFrames, from);
         watcher.WaitUntilOpened();
         const std::size_t frames = random() % 30;
         for (std::size_t k = 1; k <= frames && !over; ++k) {
@@ -382,7 +381,7 @@ TEST_P(WatchBack, RandomWatchersMissNoFrameThatIsNotReported) {
   over = true;
   EndStream();  // For watchers that wait for a frame.
   for (std::thread& watcher : audience) watcher.join();
-  EXPECT_LE(room_.held(), 10 * kCost);
+  EXPECT_LE(room_.held(), 10 * kFrameCost);
 #ifndef PARTIEMC_SANITIZED  // Sanitizers' allocators delay this.
   EXPECT_EQ(broadcaster_->producer_waits(), 0u);
 #endif
@@ -408,7 +407,7 @@ TEST_P(WatchBehind, OneOfEveryThatMayHoldNoMoreWaitsInTheHistory) {
     watcher->WaitForFrames(k);
   }
   EXPECT_EQ(NumbersOf(*watcher), From(1, 13));
-  EXPECT_LE(watcher->machine().counts().most_held_bytes, kMaxBytes);
+  EXPECT_LE(watcher->machine().counts().most_held_bytes, kFourFrames);
 }
 
 INSTANTIATE_TEST_SUITE_P(Mode, WatchBehind, ::testing::Values(WatchMode::kEvery),

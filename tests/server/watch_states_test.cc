@@ -18,7 +18,7 @@
 namespace partiemc::server {
 namespace {
 
-constexpr std::size_t kMaxBytes = 4 * (100 + kPublishedBytes);
+constexpr std::size_t kScriptedMaxBytes = 4 * (100 + kPublishedBytes);
 
 // The other side of the watch is the test.
 class ScriptedWatch final : private WatchTransport {
@@ -52,7 +52,7 @@ class ScriptedWatch final : private WatchTransport {
   bool reading = false, opening = false, writing = false, writing_frame = false;
   std::optional<absl::Status> finished;
   const std::shared_ptr<WatchStateMachine> machine =
-      std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), kMaxBytes);
+      std::make_shared<WatchStateMachine>(static_cast<WatchTransport&>(*this), kScriptedMaxBytes);
 
  private:
   void StartRead() override { Begin(reading); }
@@ -116,9 +116,9 @@ class Order {
         watch_.EndWrite(random_.Chance(0.95));
       }
     } else if (dice < 17) {
-      const Published frame{
-          std::make_shared<NumberedFrame>(number_ + 1, random_.Chance(0.02) ? kMaxBytes : 100),
-          number_ + 1, number_ + 1};
+      const Published frame{std::make_shared<NumberedFrame>(
+                                number_ + 1, random_.Chance(0.02) ? kScriptedMaxBytes : 100),
+                            number_ + 1, number_ + 1};
       ++number_;
       watch_.machine->Offer({&frame, 1});
     } else if (random_.Chance(0.3)) {
@@ -166,7 +166,7 @@ class Order {
 TEST(WatchStates, RandomEventsReachLegalStatesOnly) {
   WatchDispatcher dispatcher;
   const auto broadcaster = std::make_shared<ResultBroadcaster>(
-      dispatcher, ResultBroadcaster::Limits{.mailbox_bytes = kMaxBytes, .kept_bytes = 256});
+      dispatcher, ResultBroadcaster::Limits{.mailbox_bytes = kScriptedMaxBytes, .kept_bytes = 256});
   ReachedStates reached;
   for (std::uint64_t seed = 1; seed <= 20'000 && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);

@@ -18,8 +18,6 @@
 namespace partiemc::server {
 namespace {
 
-constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
-
 class CallRefused : public ErrorTable {
  protected:
   void Expect(const grpc::Status& status, const std::string& found, grpc::StatusCode code,

@@ -14,6 +14,8 @@
 
 namespace partiemc::server {
 
+inline constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
+
 /// Expects the same information in Google's error model, and an existing field.
 inline void ExpectDetails(const grpc::Status& status, const std::string& reason) {
   if (reason.empty()) {

@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -15,6 +16,7 @@
 namespace partiemc::server {
 
 inline constexpr char kToken[] = "alice-secret-0123456789";
+inline constexpr std::chrono::seconds kHealthTimeout{30};
 inline constexpr char kOtherToken[] = "bob-secret-0123456789ab";
 
 // Credentials of a client.

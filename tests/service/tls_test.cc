@@ -18,8 +18,6 @@
 namespace partiemc::server {
 namespace {
 
-constexpr std::chrono::seconds kHealthTimeout{30};
-
 TEST_F(Security, StreamsOverTlsAreTheSameBits) {
   WriteIdentity(authority_.Issue("server"));
   server_ = StartServer(Options(/*tls=*/true, /*client_ca=*/false, /*tokens=*/false));

@@ -17,8 +17,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr std::chrono::seconds kHealthTimeout{30};
-
 TEST_F(Security, EveryMethodWantsAToken) {
   Write("tokens", std::string(kToken) + " alice\n");
   server_ = StartServer(Options(false, false, /*tokens=*/true));

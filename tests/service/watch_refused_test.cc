@@ -20,8 +20,6 @@ namespace {
 
 using grpc::StatusCode;
 
-constexpr char kToken[] = "0123456789abcdef0123456789abcdef";
-
 class WatchRefused : public ErrorTable {
  protected:
   void SetUp() override { options_.limits.max_watchers = 1; }

@@ -63,7 +63,8 @@ TEST_F(WebGatewayTest, WhatIsNoWebSocketIsCut) {
     EXPECT_TRUE(client.pipe().IsClosedWithin(60'000)) << what;
   }
   // The connection is closed before its end is counted.
-  EXPECT_TRUE(Eventually([&] { return Refusals("bad_message") == all.size(); }));
+  EXPECT_TRUE(
+      Eventually([&] { return Refusals("bad_message") == static_cast<double>(all.size()); }));
   EXPECT_TRUE(Eventually([&] { return Connections() == 0; }));
 }
 

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace partiemc::support {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Decisions within this number of cells may differ by rounding.
 constexpr double kCloseCall = 1e-4;
@@ -23,7 +22,7 @@ FieldOracle::FieldOracle(const Particles& particles, const ReconstructionParamet
   for (std::size_t k = 0; k < particles.size(); ++k) {
     const double volume =
         particles.volumes.empty() ? spacing * spacing : static_cast<double>(particles.volumes[k]);
-    weights_.push_back(volume * 4 / (kPi * radius_ * radius_));
+    weights_.push_back(volume * 4 / (std::numbers::pi * radius_ * radius_));
     lightest = std::min(lightest, weights_.back());
   }
   guard_ = std::min(0.9 / (parameters.kernel_radius * parameters.kernel_radius), 0.7 * lightest);
@@ -83,8 +82,8 @@ double FieldOracle::Spread(Vector at) const {
     return sum / (weight * radius_ * radius_);
   };
   const double p = along(0);
-  const double q = along(kPi / 3);
-  const double r = along(2 * kPi / 3);
+  const double q = along(std::numbers::pi / 3);
+  const double r = along(2 * std::numbers::pi / 3);
   const double mean = (p + q + r) / 3;
   return mean + std::hypot(p - mean, (q - r) / std::sqrt(3.0));
 }

@@ -1,12 +1,11 @@
 #include "support/particles.h"
 
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace partiemc::support {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Calls visit(x, y) for the integer points of a square of half side `radius` around the origin.
 template <typename Visit>
@@ -97,7 +96,7 @@ Particles Blob(Random& random, double radius) {
   }
   const double waves = static_cast<double>(2 + random.Below(5));
   const double depth = random.Uniform(0, 0.4);
-  const double phase = random.Uniform(0, 2 * kPi);
+  const double phase = random.Uniform(0, 2 * std::numbers::pi);
   const double jitter = random.Uniform(0, 0.3);
   Particles particles;
   ForEachNode(1.5 * radius, [&](double x, double y) {
@@ -133,7 +132,7 @@ Particles Noise(Random& random, std::size_t count, double extent) {
 }
 
 Particles Collinear(Random& random, std::size_t count) {
-  const double angle = random.Uniform(0, kPi);
+  const double angle = random.Uniform(0, std::numbers::pi);
   Particles particles;
   double along = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -221,6 +220,11 @@ Particles Permuted(const Particles& particles, Random& random) {
     }
   }
   return permuted;
+}
+
+Particles Jittered(Particles particles, Random& random, double most) {
+  for (double& coordinate : particles.xy) coordinate += random.Uniform(-most, most);
+  return particles;
 }
 
 Particles WithDuplicates(Particles particles, Random& random, std::size_t count) {

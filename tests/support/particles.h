@@ -66,6 +66,8 @@ Particles Shifted(Particles particles, double dx, double dy);
 /// Positions times `factor`, volumes times its square.
 Particles Scaled(Particles particles, double factor);
 Particles Permuted(const Particles& particles, Random& random);
+/// Moves each particle by up to `most` along each axis.
+Particles Jittered(Particles particles, Random& random, double most);
 /// Repeats some of the particles at the same positions.
 Particles WithDuplicates(Particles particles, Random& random, std::size_t count);
 /// Positions rounded to the precision of the bins: multiples of 2^-17 cells.

@@ -73,4 +73,9 @@ struct Stages {
   void RunFromRings(std::span<const CellNormal> previous);
 };
 
+/// The cell of point `k` of the rings.
+inline const ActiveCell& CellOf(const Stages& stages, std::size_t k) {
+  return stages.crossings.cells[stages.crossings.segments[stages.topology.segments[k]].cell];
+}
+
 }  // namespace partiemc::support

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 // A LAMMPS dump of three frames: two grains and one wall particle, far from the origin.
-void WriteDump(const std::string& path, double origin) {
+void WriteGrainDump(const std::string& path, double origin) {
   std::ofstream file(path);
   for (int k = 0; k < 3; ++k) {
     file << "ITEM: TIMESTEP\n"
@@ -35,7 +35,7 @@ void WriteDump(const std::string& path, double origin) {
 
 TEST(Convert, KeepsTheFramesAndTheParticlesThatWereAskedFor) {
   const support::TemporaryFolder directory;
-  WriteDump(directory.Path("dump.lammpstrj"), 0);
+  WriteGrainDump(directory.Path("dump.lammpstrj"), 0);
   const Ran ran = RunPartiemc({"convert", directory.Path("dump.lammpstrj"),
                                directory.Path("out.pemc"), "--select", "type=1", "--frames", "1:3",
                                "--spacing", "0.5", "--title", "two grains"});
@@ -145,7 +145,7 @@ TEST(Convert, ATruncatedRecordingIsReportedEvenIfQuiet) {
 
 TEST(Convert, RefusesFloat32FarFromTheOriginAndLeavesNothingBehind) {
   const support::TemporaryFolder directory;
-  WriteDump(directory.Path("far.lammpstrj"), 1e6);
+  WriteGrainDump(directory.Path("far.lammpstrj"), 1e6);
   const std::vector<std::string> arguments = {"convert", directory.Path("far.lammpstrj"),
                                               directory.Path("far.pemc"), "--spacing", "0.1"};
   const Ran refused = RunPartiemc(arguments);

@@ -21,7 +21,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 // Three frames of 900 particles with times, which a notice reports.
-void WriteFrames(const support::TemporaryFolder& directory) {
+void WriteFramesWithTimes(const support::TemporaryFolder& directory) {
   for (int k = 0; k < 3; ++k) {
     std::ofstream file(directory.Path("frame_" + std::to_string(k) + ".csv"));
     file << "x,y\n";
@@ -34,7 +34,7 @@ void WriteFrames(const support::TemporaryFolder& directory) {
 
 TEST(FullDisk, EndsWithTheErrorInTheLastLine) {
   const support::TemporaryFolder input, output;
-  WriteFrames(input);
+  WriteFramesWithTimes(input);
   const std::string frames = input.path().string();
   const std::vector<std::vector<std::string>> commands = {
       {"replay", frames, "--local", "--output-dir", output.Path("frames")},

@@ -23,7 +23,7 @@ void WriteColumn(const std::string& path) {
   for (int k = 0; k < 300; ++k) file << k % 20 + .5 << "," << k / 20 + .5 << "\n";
 }
 
-Ran Replayed(const std::string& input, std::vector<std::string> more) {
+Ran RanReplay(const std::string& input, std::vector<std::string> more) {
   more.insert(more.begin(), {"replay", input, "--spacing", "1"});
   return RunPartiemc(more);
 }
@@ -39,7 +39,7 @@ TEST(WallsReplay, ColumnWetsTheTank) {
     std::vector<std::string> flags = {"--wall",   kTank,     "--stats",      folder.Path("s.csv"),
                                       "--format", "csv,svg", "--output-dir", out};
     flags.insert(flags.end(), where.begin(), where.end());
-    const Ran ran = Replayed(folder.Path("column.csv"), flags);
+    const Ran ran = RanReplay(folder.Path("column.csv"), flags);
     ASSERT_EQ(ran.exit_code, 0) << ran.error;
     const std::string stats = Content(folder.Path("s.csv"));
     digests.push_back(Column(stats, "rings_digest").at(0));
@@ -67,8 +67,8 @@ TEST(WallsReplay, WithoutWallsFilesAreAsBefore) {
   const support::TemporaryFolder folder;
   WriteColumn(folder.Path("column.csv"));
   const Ran ran =
-      Replayed(folder.Path("column.csv"), {"--local", "--stats", folder.Path("s.csv"), "--format",
-                                           "csv,svg", "--output-dir", folder.Path("out")});
+      RanReplay(folder.Path("column.csv"), {"--local", "--stats", folder.Path("s.csv"), "--format",
+                                            "csv,svg", "--output-dir", folder.Path("out")});
   ASSERT_EQ(ran.exit_code, 0) << ran.error;
   EXPECT_THAT(Content(folder.Path("s.csv")), HasSubstr(",section\n"));
   EXPECT_THAT(Content(folder.Path("out/frame_000000.csv")), HasSubstr("ring,index,x,y,nx,ny\n"));
@@ -96,7 +96,7 @@ TEST(WallsReplay, ParticlesOfATypeAreATank) {
        {std::vector<std::string>{"--local", "--check"}, {"--server", server.address()}}) {
     std::vector<std::string> flags = {"--wall", "type=3", "--stats", folder.Path("s.csv")};
     flags.insert(flags.end(), where.begin(), where.end());
-    const Ran ran = Replayed(folder.Path("tank.csv"), flags);
+    const Ran ran = RanReplay(folder.Path("tank.csv"), flags);
     ASSERT_EQ(ran.exit_code, 0) << ran.error;
     const std::string stats = Content(folder.Path("s.csv"));
     digests.push_back(Column(stats, "rings_digest").at(0));
@@ -111,9 +111,9 @@ TEST(WallsReplay, ParticlesOfATypeAreATank) {
 TEST(WallsReplay, ReportListsTheWalls) {
   const support::TemporaryFolder folder;
   WriteColumn(folder.Path("column.csv"));
-  const Ran ran = Replayed(folder.Path("column.csv"),
-                           {"--local", "--wall", "-1,0,1,0", "--wall", "28,4,28,8,32,8,32,4",
-                            "--report", folder.Path("report.html")});
+  const Ran ran = RanReplay(folder.Path("column.csv"),
+                            {"--local", "--wall", "-1,0,1,0", "--wall", "28,4,28,8,32,8,32,4",
+                             "--report", folder.Path("report.html")});
   ASSERT_EQ(ran.exit_code, 0) << ran.error;
   const std::string report = Content(folder.Path("report.html"));
   EXPECT_THAT(report, HasSubstr("wall 1</th><td>-1,0,1,0</td>"));
@@ -129,21 +129,21 @@ TEST(WallsReplay, BlockFillsItsTankInSpace) {
   }
   file.close();
   const Ran ran =
-      Replayed(folder.Path("block.csv"),
-               {"--local", "--surface", "--wall-plane", "z=0", "--wall-plane", "x=10,below",
-                "--wall-plane", "x=0,above", "--wall-plane", "y=0", "--wall-plane", "y=9,below",
-                "--format", "obj", "--output-dir", folder.Path("out")});
+      RanReplay(folder.Path("block.csv"),
+                {"--local", "--surface", "--wall-plane", "z=0", "--wall-plane", "x=10,below",
+                 "--wall-plane", "x=0,above", "--wall-plane", "y=0", "--wall-plane", "y=9,below",
+                 "--format", "obj", "--output-dir", folder.Path("out")});
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
   for (const std::string text : {"w=0", "z", "z=", "z=1,2", "z=x", "z=0,beside", ""}) {
-    const Ran wrong = Replayed(folder.Path("block.csv"), {"--local", "--wall-plane", text});
+    const Ran wrong = RanReplay(folder.Path("block.csv"), {"--local", "--wall-plane", text});
     EXPECT_EQ(wrong.exit_code, 2);
     EXPECT_THAT(wrong.error, HasSubstr("--wall-plane"));
   }
-  const Ran twice = Replayed(folder.Path("block.csv"), {"--local", "--surface", "--wall-plane",
-                                                        "z=0", "--wall-plane", "z=1"});
+  const Ran twice = RanReplay(folder.Path("block.csv"), {"--local", "--surface", "--wall-plane",
+                                                         "z=0", "--wall-plane", "z=1"});
   EXPECT_EQ(twice.exit_code, 2);
   EXPECT_THAT(twice.error, HasSubstr("--wall-plane number 2: "));
-  const Ran outline = Replayed(folder.Path("block.csv"), {"--local", "--wall-plane", "z=0"});
+  const Ran outline = RanReplay(folder.Path("block.csv"), {"--local", "--wall-plane", "z=0"});
   EXPECT_EQ(outline.exit_code, 2);
   EXPECT_THAT(outline.error, HasSubstr("--wall-plane: "));
 }
@@ -190,7 +190,7 @@ TEST(WallsReplay, WrongWallsAreRefused) {
   WriteColumn(folder.Path("column.csv"));
   const auto refusal = [&](std::vector<std::string> flags) {
     flags.push_back("--local");
-    const Ran ran = Replayed(folder.Path("column.csv"), flags);
+    const Ran ran = RanReplay(folder.Path("column.csv"), flags);
     EXPECT_EQ(ran.exit_code, 2) << ran.error;
     return ran.error;
   };

@@ -269,8 +269,8 @@ void ExpectPassedOver(const std::function<void(v1::StreamOpened&)>& otherwise,
   });
   FakeServer other([&](grpc::ServerContext& context, FakeServer::Rpc& rpc) {
     AcceptResumable(rpc, 1, otherwise);
-    v1::ParticleFrame frame;
-    EXPECT_FALSE(ReadFrame(rpc, frame)) << "a frame of a stream that it cannot go on with";
+    v1::ParticleFrame message;
+    EXPECT_FALSE(ReadFrame(rpc, message)) << "a frame of a stream that it cannot go on with";
     return WaitForCancel(context);
   });
   FakeServer good([&](grpc::ServerContext&, FakeServer::Rpc& rpc) {

@@ -20,11 +20,6 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-const Surface& Scene() {
-  static const Surface scene = HollowBallAndTorus();
-  return scene;
-}
-
 Result SceneResult() {
   Result result;
   result.statistics.particles = 1234;
@@ -32,13 +27,13 @@ Result SceneResult() {
   return result;
 }
 
-struct Decoded {
+struct DecodedSurface {
   wire::ReconstructedFrame frame;
   std::vector<double> particles;
 };
 
 /// Reads the format of report_surface.h, written from its description.
-Decoded Decode(const std::string& bytes) {
+DecodedSurface DecodeSurface(const std::string& bytes) {
   std::size_t next = 0;
   const auto count = [&] {
     std::uint64_t value = 0;
@@ -52,7 +47,7 @@ Decoded Decode(const std::string& bytes) {
     const std::uint64_t value = count();
     return static_cast<std::int64_t>(value >> 1) ^ -static_cast<std::int64_t>(value & 1);
   };
-  Decoded out;
+  DecodedSurface out;
   const std::uint64_t size = count();
   v1::ReconstructedFrame message;
   EXPECT_TRUE(message.ParseFromString(bytes.substr(next, size)));
@@ -72,7 +67,7 @@ Decoded Decode(const std::string& bytes) {
   return out;
 }
 
-std::string Page(const ReportOptions& options, int frames) {
+std::string SurfacePage(const ReportOptions& options, int frames) {
   support::TemporaryFolder directory;
   auto report = ReportWriter::Create(directory / "report.html", options);
   EXPECT_TRUE(report.ok()) << report.status();
@@ -91,7 +86,7 @@ std::string Page(const ReportOptions& options, int frames) {
   return ReadFile(directory / "report.html");
 }
 
-json Numbers(const std::string& page, std::size_t frame) {
+json FrameNumbers(const std::string& page, std::size_t frame) {
   const std::string mark = "class=\"frame-numbers\">";
   std::size_t at = 0;
   for (std::size_t k = 0; k <= frame; ++k) at = page.find(mark, at) + mark.size();
@@ -101,7 +96,7 @@ json Numbers(const std::string& page, std::size_t frame) {
 TEST(ReportSurface, HoldsTheSurfaceRoundedAndItsAttributes) {
   const Result result = SceneResult();
   const ReportSurface shown = EncodeReportSurface({.result = result, .surface = &Scene()}, {});
-  const Decoded decoded = Decode(shown.bytes);
+  const DecodedSurface decoded = DecodeSurface(shown.bytes);
   const Surface& surface = decoded.frame.result.surface;
   EXPECT_EQ(shown.triangles, Scene().TriangleCount());
   EXPECT_EQ(surface.point_offsets, Scene().point_offsets);
@@ -128,7 +123,7 @@ TEST(ReportSurface, SimplifiesALargeSurfaceAndKeepsItsMeasures) {
   const std::size_t most = Scene().TriangleCount() / 2;
   const ReportSurface shown =
       EncodeReportSurface({.result = result, .surface = &Scene()}, {.max_triangles = most});
-  const Decoded decoded = Decode(shown.bytes);
+  const DecodedSurface decoded = DecodeSurface(shown.bytes);
   EXPECT_GT(shown.triangles, 0u);
   EXPECT_LE(shown.triangles, most);
   EXPECT_EQ(decoded.frame.result.surface.TriangleCount(), shown.triangles);
@@ -141,7 +136,7 @@ TEST(ReportSurface, LeavesOutASurfaceThatCannotBeSimplifiedEnough) {
     const ReportSurface shown =
         EncodeReportSurface({.result = result, .surface = &Scene()}, {.max_triangles = most});
     EXPECT_EQ(shown.triangles, 0u);
-    EXPECT_EQ(Decode(shown.bytes).frame.result.surface.TriangleCount(), 0u);
+    EXPECT_EQ(DecodeSurface(shown.bytes).frame.result.surface.TriangleCount(), 0u);
   }
 }
 
@@ -151,10 +146,11 @@ TEST(ReportSurface, SelectsParticlesEvenlyAndRoundsThem) {
   particles[3] = std::numeric_limits<double>::quiet_NaN();
   const Result result = SceneResult();
   const auto decoded = [&](std::size_t most) {
-    return Decode(EncodeReportSurface(
-                      {.result = result, .surface = &Scene(), .particles_in_space = particles},
-                      {.max_particles = most})
-                      .bytes)
+    return DecodeSurface(
+               EncodeReportSurface(
+                   {.result = result, .surface = &Scene(), .particles_in_space = particles},
+                   {.max_particles = most})
+                   .bytes)
         .particles;
   };
   EXPECT_EQ(decoded(5000).size(), 3 * 999u);
@@ -177,12 +173,12 @@ TEST(ReportSurface, SurvivesExtremeCoordinates) {
   const ReportSurface shown = EncodeReportSurface(
       {.result = result, .surface = &wide, .particles_in_space = particles}, {});
   EXPECT_EQ(shown.triangles, 0u);
-  EXPECT_EQ(Decode(shown.bytes).particles.size(), 6u);
+  EXPECT_EQ(DecodeSurface(shown.bytes).particles.size(), 6u);
 }
 
 TEST(ReportSurface, PageHasNumbersAndThePartThatDraws) {
-  const std::string page = Page({}, 2);
-  const json numbers = Numbers(page, 1);
+  const std::string page = SurfacePage({}, 2);
+  const json numbers = FrameNumbers(page, 1);
   EXPECT_EQ(numbers.at("frame"), 1);
   EXPECT_EQ(numbers.at("particles"), 1234);
   EXPECT_EQ(numbers.at("bodies"), 2);
@@ -193,14 +189,15 @@ TEST(ReportSurface, PageHasNumbersAndThePartThatDraws) {
   EXPECT_EQ(numbers.at("has_picture"), true);
   EXPECT_THAT(page, HasSubstr("id=\"space-part\""));
   EXPECT_THAT(page, Not(HasSubstr("{{")));
-  EXPECT_LT(Page({}, 0).size(), 200'000u) << "a report without surfaces has no part for them";
+  EXPECT_LT(SurfacePage({}, 0).size(), 200'000u)
+      << "a report without surfaces has no part for them";
 }
 
 TEST(ReportSurface, FramesBeyondTheLimitHaveNumbersOnly) {
-  const std::string page = Page({.max_surface_bytes = 200'000}, 6);
-  EXPECT_EQ(Numbers(page, 0).at("has_picture"), true);
-  EXPECT_EQ(Numbers(page, 5).at("has_picture"), false);
-  EXPECT_EQ(Numbers(page, 5).at("genus"), 1);
+  const std::string page = SurfacePage({.max_surface_bytes = 200'000}, 6);
+  EXPECT_EQ(FrameNumbers(page, 0).at("has_picture"), true);
+  EXPECT_EQ(FrameNumbers(page, 5).at("has_picture"), false);
+  EXPECT_EQ(FrameNumbers(page, 5).at("genus"), 1);
   EXPECT_LT(page.size(), 200'000u + 430'000u + 6 * 2000u);
 }
 

@@ -29,11 +29,6 @@ using ::testing::UnorderedElementsAre;
 
 const Result kNoOutline;
 
-const Surface& Scene() {
-  static const Surface scene = HollowBallAndTorus();
-  return scene;
-}
-
 std::string Encode(FrameFormat format, const Surface& surface,
                    const FrameWriterOptions& options = {}) {
   auto bytes = EncodeFrame(

@@ -116,11 +116,11 @@ std::vector<Facet> FacetsOf(std::string_view svg) {
   }
 }
 
-struct Numbers {
+struct FacetNumbers {
   double width = 0, lowest_y = 0;
 };
 
-Numbers NumbersOf(const Facet& facet) {
+FacetNumbers NumbersOf(const Facet& facet) {
   double x = 0, y = 0, left = 1e9, right = -1e9, lowest = -1e9;
   std::string numbers = facet.path;
   std::ranges::replace_if(

@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-namespace partiemc::testing {
+namespace partiemc::support {
 namespace {
 
 using support::Random;
@@ -167,6 +167,8 @@ void Repel(const ExactShape& shape, SpaceParticles& particles) {
   particles.xyz = moved;
 }
 
+}  // namespace
+
 double DistanceToTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const auto to_segment = [&](const Vec3& u, const Vec3& v) {
     const Vec3 along = v - u;
@@ -180,8 +182,6 @@ double DistanceToTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec
   if (is_over) return std::abs(Dot(p - a, normal)) / Length(normal);
   return std::min({to_segment(a, b), to_segment(b, c), to_segment(c, a)});
 }
-
-}  // namespace
 
 std::unique_ptr<ExactShape> MakeSphere(const Vec3& centre, double radius) {
   auto shape = std::make_unique<Sphere>(radius);
@@ -270,4 +270,4 @@ SurfaceError ErrorOf(const Surface& surface, const ExactShape& shape, std::size_
   return error;
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

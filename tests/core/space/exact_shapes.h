@@ -11,7 +11,7 @@
 #include "space/space_particles.h"
 #include "support/random.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// A solid in general position. Lengths in spacings.
 class ExactShape {
@@ -32,6 +32,9 @@ std::unique_ptr<ExactShape> MakeTorus(const Vec3& centre, const Vec3& axis, doub
 /// Turned by a random rotation.
 std::unique_ptr<ExactShape> MakeBox(const Vec3& centre, const Vec3& half, support::Random& random);
 
+/// The distance of `p` from a triangle.
+double DistanceToTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
 enum class Sampler { kLattice, kJittered, kRelaxed };
 
 /// Particles of volume 1: a turned lattice, the same shaken by .2, or repelled from each other and
@@ -47,4 +50,4 @@ struct SurfaceError {
 SurfaceError ErrorOf(const Surface& surface, const ExactShape& shape, std::size_t particles,
                      support::Random& random);
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -12,10 +12,11 @@
 #include "base/vec3.h"
 #include "partiemc/parameters.h"
 #include "partiemc/surface.h"
+#include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 #include "support/tries.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// Periodic along the axes whose length is not 0.
 inline PeriodicBox BoxOf(double x, double y, double z, const Vec3& origin = {}) {
@@ -30,6 +31,11 @@ inline PeriodicBox BoxOf(double x, double y, double z, const Vec3& origin = {}) 
 inline PeriodicBox Cube(double length, bool wraps = false, double origin = 0) {
   const PeriodicAxis axis{origin, length};
   return {.axes = {axis, axis, axis}, .wraps = wraps};
+}
+
+inline SurfaceParameters In(const PeriodicBox& box,
+                            SurfacePlacement placement = SurfacePlacement::kVirtualPlane) {
+  return {.placement = placement, .box = box};
 }
 
 /// Moves coordinates into the box, as simulators do.
@@ -99,4 +105,4 @@ inline SpaceParticles Uniform(std::size_t count, const Vec3& lengths, support::R
   return particles;
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

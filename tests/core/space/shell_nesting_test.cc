@@ -22,11 +22,11 @@
 namespace partiemc {
 namespace {
 
+using support::BallShell;
+using support::BoxShell;
+using support::InsideOut;
 using support::Random;
-using testing::BallShell;
-using testing::BoxShell;
-using testing::InsideOut;
-using testing::Shell;
+using support::Shell;
 
 /// Appends a shell without normals and measures, which nesting does not need.
 void Append(const Shell& shell, Surface& surface) {

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 Shell BoxShell(const Vec3& low, const Vec3& high) {
   Shell shell;
@@ -108,4 +108,4 @@ void Measure(Surface& surface) {
   }
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -7,7 +7,7 @@
 #include "base/vec3.h"
 #include "partiemc/surface.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 struct Shell {
   std::vector<Vec3> points;
@@ -25,4 +25,4 @@ void AddShell(const Shell& shell, std::uint32_t outer, Surface& surface);
 /// Sets the measures of the shells to what the triangles enclose.
 void Measure(Surface& surface);
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace partiemc::testing {
+namespace partiemc::support {
 namespace {
 
 using support::Random;
@@ -49,7 +49,7 @@ double PushAt(double apart) {
   return within > 0 ? within * within : 0;
 }
 
-Vec3 GradientOf(const ExactShape& shape, const Vec3& at) {
+Vec3 OutwardFrom(const ExactShape& shape, const Vec3& at) {
   constexpr double kStep = 1e-4;
   const auto along = [&](const Vec3& by) {
     return shape.Distance(at + by) - shape.Distance(at - by);
@@ -73,12 +73,12 @@ void Relax(const ExactShape& shape, double step, Packing& packing) {
     Vec3& at = packing.at[a];
     const double size = packing.size[a], depth = -shape.Distance(at);
     if (depth < kRange * size) {
-      push[a] = push[a] - size * PushAt(std::max(2 * depth, 0.0) / size) * GradientOf(shape, at);
+      push[a] = push[a] - size * PushAt(std::max(2 * depth, 0.0) / size) * OutwardFrom(shape, at);
     }
     const double length = Length(push[a]), most = .2 * size;
     at = at + (length * step > most ? most / length : step) * push[a];
     const double outside = shape.Distance(at) + .05 * size;
-    if (outside > 0) at = at - outside * GradientOf(shape, at);
+    if (outside > 0) at = at - outside * OutwardFrom(shape, at);
   }
 }
 
@@ -170,4 +170,4 @@ double SizedDeviation(const Surface& surface, const ExactShape& shape,
   return area > 0 ? sum / area : 1e300;
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

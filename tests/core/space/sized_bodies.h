@@ -10,7 +10,7 @@
 #include "space/space_particles.h"
 #include "support/random.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// Draws the size of a particle at a point; 0: there is none. Zones of large particles need fewer.
 using DrawSize = std::function<double(support::Random& random, const Vec3& at)>;
@@ -34,4 +34,4 @@ double MeanSpacing(const SpaceParticles& particles);
 double SizedDeviation(const Surface& surface, const ExactShape& shape,
                       const SpaceParticles& particles);
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

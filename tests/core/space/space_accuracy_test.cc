@@ -17,13 +17,13 @@
 namespace partiemc {
 namespace {
 
+using support::ErrorOf;
+using support::ExactShape;
+using support::Fill;
 using support::Random;
-using testing::ErrorOf;
-using testing::ExactShape;
-using testing::Fill;
-using testing::Sampler;
-using testing::SpaceParticles;
-using testing::SurfaceError;
+using support::Sampler;
+using support::SpaceParticles;
+using support::SurfaceError;
 
 enum class Kind { kSphere, kTorus, kBox };
 
@@ -32,16 +32,16 @@ std::unique_ptr<ExactShape> Make(Kind kind, Random& random) {
   const Vec3 centre{x, y, random.Uniform(-1, 1)};
   switch (kind) {
     case Kind::kSphere:
-      return testing::MakeSphere(centre, random.Uniform(5, 11));
+      return support::MakeSphere(centre, random.Uniform(5, 11));
     case Kind::kTorus: {
       const double large = random.Uniform(8, 11), small = random.Uniform(3, 4.5);
-      return testing::MakeTorus(centre, Normalised({x, y, 1}), large, small);
+      return support::MakeTorus(centre, Normalised({x, y, 1}), large, small);
     }
     case Kind::kBox:
       break;
   }
   const double a = random.Uniform(4, 8), b = random.Uniform(4, 8);
-  return testing::MakeBox(centre, {a, b, random.Uniform(4, 8)}, random);
+  return support::MakeBox(centre, {a, b, random.Uniform(4, 8)}, random);
 }
 
 SurfaceError Measure(SurfacePlacement placement, const ExactShape& shape,

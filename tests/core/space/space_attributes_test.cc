@@ -17,8 +17,8 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
-using testing::SurfaceStream;
+using support::SpaceParticles;
+using support::SurfaceStream;
 
 // A ball, a box and lone particles, far from the origin.
 struct SpaceCloud {
@@ -27,8 +27,8 @@ struct SpaceCloud {
 
   SpaceCloud() {
     Random random(5);
-    particles = testing::Ball({0, 0, 0}, 6, .2, random);
-    particles.Add(testing::Box({12, -3, -3}, {17, 3, 3}, .2, random));
+    particles = support::Ball({0, 0, 0}, 6, .2, random);
+    particles.Add(support::Box({12, -3, -3}, {17, 3, 3}, .2, random));
     for (const double x : {-14.3, -20.6}) particles.Add(Vec3{x, 1.2, .4});
     for (std::size_t k = 0; k < particles.size(); ++k) {
       particles.xyz[3 * k] += 300;

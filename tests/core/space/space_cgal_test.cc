@@ -67,7 +67,7 @@ bool HasContacts(const Surface& surface) {
 Surface SurfaceOf(std::uint64_t seed, const SurfaceParameters& parameters) {
   static auto* const workspace = new SurfaceWorkspace;
   Surface surface;
-  const testing::SpaceParticles particles = testing::RandomSpaceScene(seed);
+  const support::SpaceParticles particles = support::RandomSpaceScene(seed);
   const absl::Status status = SurfaceReconstructor::Create(parameters)
                                   ->Reconstruct(particles.AsFrame(), *workspace, surface);
   EXPECT_TRUE(status.ok()) << status;
@@ -77,7 +77,7 @@ Surface SurfaceOf(std::uint64_t seed, const SurfaceParameters& parameters) {
 class SurfacesByCgal : public ::testing::TestWithParam<SurfaceParameters> {};
 
 TEST_P(SurfacesByCgal, AreClosedManifoldAndDoNotIntersect) {
-  for (std::uint64_t seed = 0; seed < testing::Frames(40); ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Frames(40); ++seed) {
     const Surface surface = SurfaceOf(seed, GetParam());
     const Soup soup = SoupOf(surface);
     ASSERT_TRUE(pmp::is_polygon_soup_a_polygon_mesh(soup.triangles)) << "seed " << seed;
@@ -91,7 +91,7 @@ TEST_P(SurfacesByCgal, AreClosedManifoldAndDoNotIntersect) {
 // One point of each surface moves, so that some surfaces intersect themselves.
 TEST_P(SurfacesByCgal, HaveTheVerdictOfTheChecks) {
   int broken = 0;
-  const auto frames = testing::Frames(40);
+  const auto frames = support::Frames(40);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     Surface surface = SurfaceOf(seed, GetParam());
     if (surface.PointCount() == 0) continue;

@@ -20,10 +20,10 @@
 namespace partiemc::space {
 namespace {
 
+using support::Ball;
 using support::Random;
-using testing::Ball;
-using testing::SpaceParticles;
-using testing::SurfaceOf;
+using support::SpaceParticles;
+using support::SurfaceOf;
 
 /// Sides of 16 x 16 x 16 nodes in eight bricks.
 struct Sides {

@@ -13,6 +13,7 @@
 #include "partiemc/surface_reconstructor.h"
 #include "space/shells.h"
 #include "space/space_particles.h"
+#include "space/surface_of.h"
 #include "space_cut/surface_cut.h"
 #include "support/random.h"
 #include "support/tries.h"
@@ -22,13 +23,10 @@ namespace {
 
 using space::AxisPlane;
 using support::Random;
-using testing::SpaceParticles;
+using support::SpaceParticles;
+using support::SurfaceOf;
+using support::VolumeOf;
 
-double VolumeOf(const Surface& surface) {
-  double volume = 0;
-  for (const ShellMeasures& measures : surface.measures) volume += measures.volume;
-  return volume;
-}
 double AreaOf(const Surface& surface) {
   double area = 0;
   for (const ShellMeasures& measures : surface.measures) area += measures.area;
@@ -89,15 +87,6 @@ void ExpectCutsOn(const Surface& surface, const std::vector<AxisPlane>& planes) 
   }
 }
 
-Surface SurfaceOf(const SpaceParticles& particles, SurfacePlacement placement) {
-  SurfaceWorkspace workspace;
-  Surface surface;
-  const absl::Status status = SurfaceReconstructor::Create({.placement = placement})
-                                  ->Reconstruct(particles.AsFrame(), workspace, surface);
-  EXPECT_TRUE(status.ok()) << status;
-  return surface;
-}
-
 // A place in the range of a surface along an axis: anywhere, or at a vertex.
 double PlaceIn(const Surface& surface, int axis, Random& random) {
   if (random.Chance(.5)) return surface.points[3 * random.Below(surface.PointCount()) + axis];
@@ -107,7 +96,7 @@ double PlaceIn(const Surface& surface, int axis, Random& random) {
 
 TEST(SurfaceCut, HalvesOfBoxAreExact) {
   Surface box;
-  testing::AddShell(testing::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
+  support::AddShell(support::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
   for (int axis = 0; axis < 3; ++axis) {
     const double size = std::array{3.0, 2.0, 1.0}[axis], face = 6 / size;
     const Surface upper = Part(box, {{axis, .25 * size, true}});
@@ -128,7 +117,7 @@ TEST(SurfaceCut, HalvesOfBoxAreExact) {
 
 TEST(SurfaceCut, PlaneInFaceMoves) {
   Surface box;
-  testing::AddShell(testing::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
+  support::AddShell(support::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
   EXPECT_NEAR(VolumeOf(Part(box, {{0, 0, true}})), 6, 1e-7);
   EXPECT_EQ(Part(box, {{0, 3, true}}).ShellCount(), 0u);
   EXPECT_NEAR(VolumeOf(Part(box, {{2, 1, false}})), 6, 1e-7);
@@ -136,7 +125,7 @@ TEST(SurfaceCut, PlaneInFaceMoves) {
 
 TEST(SurfaceCut, BoxInsideBodyIsTheBox) {
   Surface ball;
-  testing::AddShell(testing::BallShell({0, 0, 0}, 10, 3), kNoShell, ball);
+  support::AddShell(support::BallShell({0, 0, 0}, 10, 3), kNoShell, ball);
   std::vector<AxisPlane> planes;
   for (int axis = 0; axis < 3; ++axis) {
     planes.push_back({axis, -1.0 - axis, true});
@@ -152,8 +141,8 @@ TEST(SurfaceCut, BoxInsideBodyIsTheBox) {
 
 TEST(SurfaceCut, FlatFacesHaveInnerPointsOnRequest) {
   Surface box;
-  testing::AddShell(testing::BoxShell({0, 0, 0}, {20, 12, 8}), kNoShell, box);
-  testing::AddShell(testing::InsideOut(testing::BoxShell({6, 4, 2}, {10, 8, 6})), 0, box);
+  support::AddShell(support::BoxShell({0, 0, 0}, {20, 12, 8}), kNoShell, box);
+  support::AddShell(support::InsideOut(support::BoxShell({6, 4, 2}, {10, 8, 6})), 0, box);
   const std::vector<AxisPlane> planes = {{2, 4.5, true}};
   space::SurfaceCutScratch scratch;
   space::SurfacePieces pieces;
@@ -175,10 +164,10 @@ TEST(SurfaceCut, FlatFacesHaveInnerPointsOnRequest) {
 TEST(SurfaceCut, CavitiesOpenOrStayInTheirPiece) {
   // A dumbbell: boxes with cavities, joined by a bar.
   Surface box;
-  testing::AddShell(testing::BoxShell({0, 0, 0}, {9, 3, 3}), kNoShell, box);
-  testing::AddShell(testing::InsideOut(testing::BoxShell({1, 1, 1}, {2, 2, 2})), 0, box);
-  testing::AddShell(testing::InsideOut(testing::BoxShell({4, 1, 1}, {5, 2, 2})), 0, box);
-  testing::AddShell(testing::BallShell({4.5, 1.5, 1.5}, .3, 1), kNoShell, box);
+  support::AddShell(support::BoxShell({0, 0, 0}, {9, 3, 3}), kNoShell, box);
+  support::AddShell(support::InsideOut(support::BoxShell({1, 1, 1}, {2, 2, 2})), 0, box);
+  support::AddShell(support::InsideOut(support::BoxShell({4, 1, 1}, {5, 2, 2})), 0, box);
+  support::AddShell(support::BallShell({4.5, 1.5, 1.5}, .3, 1), kNoShell, box);
   space::SurfacePieces pieces;
   const Surface opened = Part(box, {{0, 4.1, true}}, &pieces);
   ASSERT_EQ(opened.ShellCount(), 2u);  // The open cavity is a part of the outer shell.
@@ -194,16 +183,16 @@ TEST(SurfaceCut, CavityStaysInOneOfSeveralPieces) {
   // A U whose legs have a cavity each falls apart without its bottom.
   SpaceParticles u;
   Random random(1);
-  u.Add(testing::Box({0, 0, 0}, {40, 12, 8}, 0, random));
-  u.Add(testing::Box({0, 0, 8}, {14, 12, 40}, 0, random));
-  u.Add(testing::Box({26, 0, 8}, {40, 12, 40}, 0, random));
+  u.Add(support::Box({0, 0, 0}, {40, 12, 8}, 0, random));
+  u.Add(support::Box({0, 0, 8}, {14, 12, 40}, 0, random));
+  u.Add(support::Box({26, 0, 8}, {40, 12, 40}, 0, random));
   SpaceParticles hollow;
   for (std::size_t k = 0; k < u.size(); ++k) {
     const Vec3 at = u.At(k);
     const bool is_hole = Length(at - Vec3{7, 6, 28}) < 3.5 || Length(at - Vec3{33, 6, 28}) < 3.5;
     if (!is_hole) hollow.Add(at);
   }
-  const Surface surface = SurfaceOf(hollow, SurfacePlacement::kMarchingCubes);
+  const Surface surface = SurfaceOf(hollow, {.placement = SurfacePlacement::kMarchingCubes});
   ASSERT_EQ(surface.ShellCount(), 3u);
   const Surface legs = Part(surface, {{2, 15, true}});
   EXPECT_EQ(legs.ShellCount(), 4u);
@@ -212,7 +201,7 @@ TEST(SurfaceCut, CavityStaysInOneOfSeveralPieces) {
 
 TEST(SurfaceCut, LargestPieceHasTheIdentity) {
   Surface box;
-  testing::AddShell(testing::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
+  support::AddShell(support::BoxShell({0, 0, 0}, {3, 2, 1}), kNoShell, box);
   box.measures[0].particles = 6;
   box.measures[0].identity = 9;
   box.parents = {4, 5};
@@ -225,8 +214,8 @@ TEST(SurfaceCut, LargestPieceHasTheIdentity) {
 
 TEST(SurfaceCut, ShellsThatAreNotCutKeepTheirBits) {
   Surface both;
-  testing::AddShell(testing::BallShell({0, 0, 0}, 3, 2), kNoShell, both);
-  testing::AddShell(testing::BallShell({10, 0, 0}, 3, 2), kNoShell, both);
+  support::AddShell(support::BallShell({0, 0, 0}, 3, 2), kNoShell, both);
+  support::AddShell(support::BallShell({10, 0, 0}, 3, 2), kNoShell, both);
   const std::vector<AxisPlane> planes = {{2, .1, true}};
   const std::vector<std::uint8_t> is_cut = {1, 0};
   Surface part = both;
@@ -246,10 +235,10 @@ TEST(SurfaceCut, FlatLayerIsCutAtFourFaces) {
   for (const double shift : {0.0, 1e5}) {
     SpaceParticles layer;
     Random random(1);
-    layer.Add(testing::Box(Vec3{shift, 0, 0}, Vec3{shift + 24, 24, 4}, 0, random));
+    layer.Add(support::Box(Vec3{shift, 0, 0}, Vec3{shift + 24, 24, 4}, 0, random));
     for (const auto placement : {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
                                  SurfacePlacement::kVirtualPlane}) {
-      const Surface surface = SurfaceOf(layer, placement);
+      const Surface surface = SurfaceOf(layer, {.placement = placement});
       const std::vector<AxisPlane> planes = {
           {0, shift + 7, true}, {0, shift + 16, false}, {1, 7, true}, {1, 16, false}};
       const Surface part = Part(surface, planes);
@@ -274,12 +263,12 @@ TEST(SurfaceCut, FlatLayerIsCutAtFourFaces) {
 }
 
 TEST(SurfaceCut, PartsOfRandomSurfacesMakeTheWhole) {
-  for (std::uint64_t seed = 1; seed <= testing::Frames(60); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(60); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     const auto placement = std::array{SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
                                       SurfacePlacement::kVirtualPlane}[random.Below(3)];
-    const Surface surface = SurfaceOf(testing::RandomSpaceScene(seed), placement);
+    const Surface surface = SurfaceOf(support::RandomSpaceScene(seed), {.placement = placement});
     if (surface.ShellCount() == 0) continue;
     const int axis = static_cast<int>(random.Below(3));
     const double at = PlaceIn(surface, axis, random);

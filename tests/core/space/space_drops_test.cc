@@ -16,7 +16,7 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
+using support::SpaceParticles;
 
 Surface Reconstruct(const SpaceParticles& particles, std::uint64_t max_drop_particles = 30,
                     std::uint64_t min_component_particles = 0) {
@@ -67,7 +67,7 @@ TEST(SpaceDrops, LoneParticlesHaveTheirVolumeWhereverTheyAre) {
 
 TEST(SpaceDrops, KeepTheirShapeWhenTheyMove) {
   Random random(2);
-  SpaceParticles drop = testing::Ball({0, 0, 0}, 1.6, .2, random), moved;
+  SpaceParticles drop = support::Ball({0, 0, 0}, 1.6, .2, random), moved;
   ASSERT_GT(drop.size(), 12u);
   ASSERT_LE(drop.size(), 30u);
   const Vec3 step{3.3, -1.7, .4};
@@ -102,7 +102,7 @@ TEST(SpaceDrops, FollowTheMomentsOfTheirParticles) {
 TEST(SpaceDrops, KeepTheirSurfaceNearOthersAndWhereTheyAreBent) {
   Random random(3);
   // Over a slab, from touching it to far away from it.
-  const SpaceParticles slab = testing::Box({-5, -5, -4}, {5, 5, 0}, .1, random);
+  const SpaceParticles slab = support::Box({-5, -5, -4}, {5, 5, 0}, .1, random);
   int ellipsoids = 0, joined = 0;
   for (int step = 0; step < 20; ++step) {
     SpaceParticles particles = slab;
@@ -207,7 +207,7 @@ TEST(SpaceDrops, KeepS1ToS5) {
     const double side = random.Uniform(6, 30);
     const Vec3 origin = seed % 3 == 0 ? 1e6 * AnyPlace(random) : Vec3{};
     if (seed % 4 == 0) {
-      const SpaceParticles block = testing::Box({0, 0, 0}, {16, 16, 16}, .2, random);
+      const SpaceParticles block = support::Box({0, 0, 0}, {16, 16, 16}, .2, random);
       for (std::size_t k = 0; k < block.size(); ++k) {
         const Vec3 from = block.At(k) - Vec3{8, 8, 8};
         if (Length(from) > 6) particles.Add(origin + block.At(k));

@@ -13,16 +13,18 @@
 #include "space/level_set.h"
 #include "space/point_sampler.h"
 #include "space/space_particles.h"
+#include "space/space_stages.h"
 #include "support/tries.h"
 
 namespace partiemc::space {
 namespace {
 
+using support::Ball;
 using support::Random;
-using testing::Ball;
-using testing::RandomSpaceScene;
-using testing::Shuffled;
-using testing::SpaceParticles;
+using support::RandomSpaceScene;
+using support::Shuffled;
+using support::SpaceParticles;
+using support::SpaceStages;
 
 Scale ScaleFor(double kernel_radius = 3, double cell_size = 1, double lightest = 1) {
   ReconstructionParameters parameters;
@@ -31,19 +33,6 @@ Scale ScaleFor(double kernel_radius = 3, double cell_size = 1, double lightest =
   parameters.slice = SlicePlane{};
   return MakeScale(parameters, 1, cell_size, lightest);
 }
-
-struct Stages {
-  SpaceBins bins;
-  SpaceField field;
-  SpaceCrossings crossings;
-
-  Stages(const SpaceParticles& particles, const Scale& scale) {
-    EXPECT_TRUE(BinParticles(particles.AsFrame(), scale, {}, bins).ok());
-    SampleField(bins, scale, field);
-    FindCrossings(bins.bricks, field, crossings);
-    EvaluateNodes(bins, scale, crossings.near, field);
-  }
-};
 
 /// Sums over all particles; `at` in cells.
 Sums SumsAt(const SpaceParticles& particles, const Scale& scale, const Vec3& at) {
@@ -71,7 +60,7 @@ Sums SumsAt(const SpaceParticles& particles, const Scale& scale, const Vec3& at)
 }
 
 void ExpectField(const SpaceParticles& particles, const Scale& scale) {
-  const Stages stages(particles, scale);
+  const SpaceStages stages(particles, scale);
   std::size_t inside = 0;
   for (std::uint32_t brick = 0; brick < stages.bins.bricks.size(); ++brick) {
     const Vec3 origin = OriginOf(stages.bins.bricks[brick]);
@@ -125,11 +114,11 @@ TEST(SpaceField, HasTheSameBitsForAnyOrderAndThreads) {
   Random random(4);
   for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
     const SpaceParticles particles = RandomSpaceScene(seed);
-    const Stages stages(particles, ScaleFor());
+    const SpaceStages stages(particles, ScaleFor());
     for (const unsigned threads : {1u, 2u, 7u}) {
       const SpaceParticles shuffled = Shuffled(particles, random);
       Arena(threads).Execute([&] {
-        const Stages other(shuffled, ScaleFor());
+        const SpaceStages other(shuffled, ScaleFor());
         EXPECT_EQ(other.field.values, stages.field.values);
         EXPECT_EQ(other.field.inside, stages.field.inside);
         EXPECT_EQ(other.bins.x, stages.bins.x);
@@ -145,8 +134,8 @@ TEST(SpaceBins, SortWeightsAtOnePosition) {
     particles.Add({1.5 * (k % 6), .5, .25});
     particles.volumes.push_back(static_cast<float>(random.Uniform(.3, 2)));
   }
-  const Stages stages(particles, ScaleFor(3, 1, .3));
-  const Stages other(Shuffled(particles, random), ScaleFor(3, 1, .3));
+  const SpaceStages stages(particles, ScaleFor(3, 1, .3));
+  const SpaceStages other(Shuffled(particles, random), ScaleFor(3, 1, .3));
   EXPECT_EQ(other.bins.weight, stages.bins.weight);
   EXPECT_EQ(other.field.values, stages.field.values);
 }

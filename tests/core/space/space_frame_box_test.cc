@@ -23,24 +23,20 @@
 namespace partiemc {
 namespace {
 
+using support::Cube;
+using support::ExpectInBox;
+using support::In;
 using support::Known;
 using support::Random;
-using testing::Cube;
-using testing::ExpectInBox;
-using testing::SpaceParticles;
-using testing::Sums;
-using testing::SumsOf;
-using testing::SurfaceStream;
-using testing::TrackedParticles;
-using testing::Wrap;
-
-SurfaceParameters In(const PeriodicBox& box,
-                     SurfacePlacement placement = SurfacePlacement::kVirtualPlane) {
-  return {.placement = placement, .box = box};
-}
+using support::SpaceParticles;
+using support::Sums;
+using support::SumsOf;
+using support::SurfaceStream;
+using support::TrackedParticles;
+using support::Wrap;
 
 // The first surface of a stream, with identities.
-Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
+Surface FirstSurface(const SurfaceParameters& parameters, const SpaceParticles& particles) {
   SurfaceStream stream(parameters);
   const absl::Status status = stream.Try(particles.AsFrame());
   EXPECT_TRUE(status.ok()) << status;
@@ -49,9 +45,9 @@ Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& par
   return stream.surface();
 }
 
-SpaceParticles BallAt(const Vec3& centre, double radius) {
+SpaceParticles MovedBall(const Vec3& centre, double radius) {
   Random random(1);
-  SpaceParticles ball = testing::Ball({0, 0, 0}, radius, .2, random), moved;
+  SpaceParticles ball = support::Ball({0, 0, 0}, radius, .2, random), moved;
   for (std::size_t k = 0; k < ball.size(); ++k) moved.Add(ball.At(k) + centre);
   return moved;
 }
@@ -63,13 +59,13 @@ INSTANTIATE_TEST_SUITE_P(Placements, WrappedSurface,
 
 TEST_P(WrappedSurface, BallAcrossFaceEdgeAndCornerIsCut) {
   const PeriodicBox box = Cube(32, true);
-  const Sums middle = SumsOf(SurfaceOf(In(Cube(32), GetParam()), BallAt({16, 16, 16}, 6)));
+  const Sums middle = SumsOf(FirstSurface(In(Cube(32), GetParam()), MovedBall({16, 16, 16}, 6)));
   std::size_t pieces = 2;
   for (const Vec3& centre : {Vec3{0, 16, 16}, {16, 0, 0}, {0, 0, 0}}) {
     SCOPED_TRACE(pieces);
-    SpaceParticles ball = BallAt(centre, 6);
+    SpaceParticles ball = MovedBall(centre, 6);
     Wrap(ball.xyz, box);
-    const Surface surface = SurfaceOf(In(box, GetParam()), ball);
+    const Surface surface = FirstSurface(In(box, GetParam()), ball);
     EXPECT_EQ(surface.ShellCount(), pieces);
     ExpectInBox(surface, box);
     EXPECT_GT(surface.cuts.size(), 0u);
@@ -81,7 +77,7 @@ TEST_P(WrappedSurface, BallAcrossFaceEdgeAndCornerIsCut) {
     pieces *= 2;
   }
   // In the middle of the box, nothing is cut.
-  const Surface whole = SurfaceOf(In(box, GetParam()), BallAt({16, 16, 16}, 6));
+  const Surface whole = FirstSurface(In(box, GetParam()), MovedBall({16, 16, 16}, 6));
   EXPECT_EQ(whole.ShellCount(), 1u);
   EXPECT_TRUE(whole.cuts.empty());
 }
@@ -89,7 +85,7 @@ TEST_P(WrappedSurface, BallAcrossFaceEdgeAndCornerIsCut) {
 // Drops are ellipsoids, as without wrapping, and those across faces are cut.
 TEST(WrappedSpace, SmallDropsKeepTheirVolumes) {
   const PeriodicBox box = Cube(33, true);
-  for (std::uint64_t seed = 1; seed <= testing::Frames(20); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(20); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SpaceParticles all;
@@ -102,9 +98,9 @@ TEST(WrappedSpace, SmallDropsKeepTheirVolumes) {
       }
     }
     Wrap(all.xyz, box);
-    const Surface surface = SurfaceOf(In(box), all);
+    const Surface surface = FirstSurface(In(box), all);
     ExpectInBox(surface, box);
-    const Sums sums = SumsOf(surface), whole = SumsOf(SurfaceOf(In(Cube(33)), all));
+    const Sums sums = SumsOf(surface), whole = SumsOf(FirstSurface(In(Cube(33)), all));
     EXPECT_EQ(sums.particles, all.size());
     EXPECT_NEAR(sums.volume, whole.volume, 1e-3 * whole.volume);
     EXPECT_NEAR(sums.area, whole.area, 1e-3 * whole.area);
@@ -131,7 +127,7 @@ TEST_P(WrappedBodies, KeepTheirIdentities) {
     SCOPED_TRACE(frame);
     TrackedParticles particles{.known = GetParam(), .time = 1.0 * frame};
     const Vec3 a{.9, -.8, .7}, b{.4, 0, -.3};
-    particles.Add(BallAt({0, 0, 0}, 5), 0, a, Vec3{20, 20, 20} + (1.0 * frame) * a);
+    particles.Add(MovedBall({0, 0, 0}, 5), 0, a, Vec3{20, 20, 20} + (1.0 * frame) * a);
     SpaceParticles lone;
     lone.Add({0, 0, 0});
     if (GetParam().ids || GetParam().velocities) {
@@ -148,17 +144,17 @@ TEST_P(WrappedBodies, KeepTheirIdentities) {
 TEST(WrappedSpace, ThreadsAndOrderChangeNoBit) {
   const PeriodicBox box = Cube(36.5, true);
   Random random(4);
-  SpaceParticles all = BallAt({1, 2, 3}, 6);
-  all.Add(BallAt({18, 1, 18}, 4));
+  SpaceParticles all = MovedBall({1, 2, 3}, 6);
+  all.Add(MovedBall({18, 1, 18}, 4));
   for (int k = 0; k < 60; ++k) {
     const double x = random.Uniform(0, 36), y = random.Uniform(0, 36);
     all.Add({x, y, random.Uniform(0, 36)});
   }
   Wrap(all.xyz, box);
-  const Surface first = SurfaceOf(In(box), all);
-  EXPECT_EQ(SurfaceOf(In(box), testing::Shuffled(all, random)), first);
+  const Surface first = FirstSurface(In(box), all);
+  EXPECT_EQ(FirstSurface(In(box), support::Shuffled(all, random)), first);
   Arena arena(2);
-  arena.Execute([&] { EXPECT_EQ(SurfaceOf(In(box), all), first); });
+  arena.Execute([&] { EXPECT_EQ(FirstSurface(In(box), all), first); });
 }
 
 double StretchAt(int frame) {
@@ -198,8 +194,8 @@ TEST_P(BreathingSpace, BodiesKeepIdentitiesAndVolumes) {
   for (int frame = 0; frame < 50; ++frame) {
     SCOPED_TRACE(frame);
     TrackedParticles particles{.known = known, .time = 1.0 * frame};
-    particles.Add(BallAt({-7, -7, -7}, 4), 0);
-    particles.Add(BallAt({100, 200, -7}, 5), 5000);
+    particles.Add(MovedBall({-7, -7, -7}, 4), 0);
+    particles.Add(MovedBall({100, 200, -7}, 5), 5000);
     const std::array<double, 3> stretch{StretchAt(frame), StretchAt(2 * frame),
                                         StretchAt(frame + 7)};
     const PeriodicBox now = Stretch(box, stretch, particles.xyz);
@@ -233,7 +229,7 @@ TEST(SpaceFrameBox, BoxOfTheStreamChangesNoBit) {
     const PeriodicBox box = Cube(30.4, wraps, 1);
     SurfaceStream with(In(box)), without(In(box));
     for (int frame = 0; frame < 3; ++frame) {
-      SpaceParticles ball = BallAt({0, 1. * frame, 2}, 5);
+      SpaceParticles ball = MovedBall({0, 1. * frame, 2}, 5);
       Wrap(ball.xyz, box);
       Frame view = ball.AsFrame();
       ASSERT_TRUE(without.Try(view).ok());
@@ -247,7 +243,7 @@ TEST(SpaceFrameBox, BoxOfTheStreamChangesNoBit) {
 }
 
 TEST(SpaceFrameBox, WrongBoxesAreRefused) {
-  const SpaceParticles ball = BallAt({8, 8, 8}, 4);
+  const SpaceParticles ball = MovedBall({8, 8, 8}, 4);
   const auto field_of = [&](const std::optional<PeriodicBox>& of_stream, const PeriodicBox& given) {
     SurfaceParameters parameters = In(Cube(20));
     parameters.box = of_stream;
@@ -273,7 +269,7 @@ TEST(SpaceFrameBox, StateHoldsTheBox) {
   const PeriodicBox box = Cube(60);
   SurfaceStream stream(In(box)), resumed(In(box));
   const auto next = [&](double stretch, SurfaceStream& to) {
-    SpaceParticles ball = BallAt({0, 0, 0}, 5);
+    SpaceParticles ball = MovedBall({0, 0, 0}, 5);
     Frame view = ball.AsFrame();
     view.box = Stretch(box, {stretch, 1, 2 - stretch}, ball.xyz);
     view.positions = std::span<const double>(ball.xyz);
@@ -299,7 +295,7 @@ TEST(SpaceFrameBox, StateHoldsTheBox) {
 // Noise of any density in boxes that leap, wrapped or not.
 TEST(SpaceFrameBox, RandomFramesKeepTheGuarantees) {
   SurfaceWorkspace workspace;
-  for (std::uint64_t seed = 1; seed <= testing::Frames(8); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(8); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SurfaceParameters parameters = In(Cube(20, seed % 3 != 0));

@@ -20,23 +20,23 @@ using support::kNothing;
 using support::Known;
 using support::kVelocities;
 using support::Random;
+using support::SpaceParticles;
+using support::SurfaceStream;
+using support::TrackedParticles;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::SpaceParticles;
-using testing::SurfaceStream;
-using testing::TrackedParticles;
 using ::testing::UnorderedElementsAre;
 
 constexpr SurfaceParameters kPlanes{.placement = SurfacePlacement::kVirtualPlane};
 
 SpaceParticles Block(double x, int columns) {
   Random random(1);
-  return testing::Box({x, 0, 0}, {x + columns - 1, 4, 4}, 0, random);
+  return support::Box({x, 0, 0}, {x + columns - 1, 4, 4}, 0, random);
 }
 
 SpaceParticles BallAt(const Vec3& centre, double radius) {
   Random random(1);
-  return testing::Ball(centre, radius, 0, random);
+  return support::Ball(centre, radius, 0, random);
 }
 
 class TrackedBodies : public ::testing::TestWithParam<Known> {};

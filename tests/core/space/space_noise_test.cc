@@ -17,8 +17,9 @@
 #include "support/motion_oracle.h"
 #include "support/noisy_particles.h"
 #include "support/random.h"
+#include "support/result_stream.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 namespace {
 
 using support::LargestOffset;
@@ -40,7 +41,7 @@ struct Numbered {
 };
 
 // A ball that moves; `shake` is the largest noise along each axis.
-Numbered BallAt(const Vec3& centre, double radius, double shake, Random& random) {
+Numbered NumberedBall(const Vec3& centre, double radius, double shake, Random& random) {
   Numbered ball{Ball({}, radius, 0, random), {}};
   const std::array<double, 3> shift{centre.x, centre.y, centre.z};
   std::vector<double>& xyz = ball.particles.xyz;
@@ -63,28 +64,6 @@ Numbered Permuted(const Numbered& given, Random& random) {
   return all;
 }
 
-class Stream {
- public:
-  explicit Stream(const ReconstructionParameters& parameters)
-      : reconstructor_(*Reconstructor::Create(parameters)) {}
-
-  const Result& Next(const Frame& frame) {
-    const absl::Status status = Try(frame);
-    EXPECT_TRUE(status.ok()) << status;
-    return result_;
-  }
-  absl::Status Try(const Frame& frame) {
-    return reconstructor_.Reconstruct(frame, state, workspace_, result_);
-  }
-
-  State state;
-
- private:
-  Reconstructor reconstructor_;
-  Workspace workspace_;
-  Result result_;
-};
-
 TEST(SpaceNoiseFilter, EqualsBruteForce) {
   for (const bool is_periodic : {false, true}) {
     SCOPED_TRACE(is_periodic);
@@ -95,11 +74,11 @@ TEST(SpaceNoiseFilter, EqualsBruteForce) {
           .axes = {PeriodicAxis{-7, 18.2}, PeriodicAxis{-14, 21}, PeriodicAxis{0, 16.5}}};
       oracle.box = parameters.box;
     }
-    Stream stream(parameters);
+    ResultStream stream(parameters);
     Random random(3);
     for (int frame = 0; frame < 4; ++frame) {
       const Numbered ball =
-          Permuted(BallAt({1. * frame, -.5 * frame, .3 * frame}, 4.5, .2, random), random);
+          Permuted(NumberedBall({1. * frame, -.5 * frame, .3 * frame}, 4.5, .2, random), random);
       stream.Next(ball.AsFrame());
       std::vector<Vec3> at;
       for (std::size_t k = 0; k < ball.ids.size(); ++k) at.push_back(ball.particles.At(k));
@@ -126,10 +105,10 @@ TEST(SpaceNoiseFilter, WeightOneKeepsBitsAndSectionsAreThoseOfSlices) {
   ReconstructionParameters plain = with, given = with;
   plain.noise_filter.reset();
   given.noise_filter = 1;
-  Stream surfaces(with), slices(sliced), off(plain), one(given);
+  ResultStream surfaces(with), slices(sliced), off(plain), one(given);
   Random random(4);
   for (int frame = 0; frame < 3; ++frame) {
-    const Numbered ball = BallAt({.4 * frame, 0, 0}, 6, .2, random);
+    const Numbered ball = NumberedBall({.4 * frame, 0, 0}, 6, .2, random);
     const Result& filtered = surfaces.Next(ball.AsFrame());
     const Result& slice = slices.Next(ball.AsFrame());
     ASSERT_EQ(filtered.sections.size(), 2u);
@@ -144,11 +123,11 @@ TEST(SpaceNoiseFilter, WeightOneKeepsBitsAndSectionsAreThoseOfSlices) {
 
 TEST(SpaceNoiseFilter, CoarsePositionsAreReported) {
   Random random(4);
-  const Numbered ball = BallAt({4e6, 0, 0}, 6, 0, random);
+  const Numbered ball = NumberedBall({4e6, 0, 0}, 6, 0, random);
   const std::vector<float> coarse(ball.particles.xyz.begin(), ball.particles.xyz.end());
   Frame frame = ball.AsFrame();
   frame.positions = std::span<const float>(coarse);
-  Stream surfaces(Filtering());
+  ResultStream surfaces(Filtering());
   for (int k = 0; k < 2; ++k) {
     const Result& result = surfaces.Next(frame);
     EXPECT_TRUE(result.statistics.doubts.Has(Doubt::kPositionsCoarse));
@@ -160,8 +139,8 @@ TEST(SpaceNoiseFilter, OrderAndThreadsChangeNoBit) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 5);
   Random random(5);
   std::vector<Numbered> frames;
-  for (int k = 0; k < 3; ++k) frames.push_back(BallAt({.4 * k, 0, 0}, 12, .2, random));
-  Stream stream(Filtering());
+  for (int k = 0; k < 3; ++k) frames.push_back(NumberedBall({.4 * k, 0, 0}, 12, .2, random));
+  ResultStream stream(Filtering());
   Result last;
   Arena one(1);
   one.Execute([&] {
@@ -169,7 +148,7 @@ TEST(SpaceNoiseFilter, OrderAndThreadsChangeNoBit) {
   });
   Arena five(5);
   five.Execute([&] {
-    Stream other(Filtering());
+    ResultStream other(Filtering());
     for (const Numbered& frame : frames) {
       const Result& result = other.Next(Permuted(frame, random).AsFrame());
       if (&frame == &frames.back()) {
@@ -183,10 +162,10 @@ TEST(SpaceNoiseFilter, OrderAndThreadsChangeNoBit) {
 TEST(SpaceNoiseFilter, ResumesFromItsBytesAndRefusedFramesChangeNothing) {
   ReconstructionParameters parameters = Filtering();
   parameters.sections = {{.slice = SlicePlane{}}};
-  Stream undisturbed(parameters), resumed(parameters);
+  ResultStream undisturbed(parameters), resumed(parameters);
   Random random(6);
   for (int frame = 0; frame < 5; ++frame) {
-    const Numbered ball = BallAt({.4 * frame, 0, 0}, 5, .2, random);
+    const Numbered ball = NumberedBall({.4 * frame, 0, 0}, 5, .2, random);
     const Result& expected = undisturbed.Next(ball.AsFrame());
     const std::string bytes = Serialize(resumed.state);
     EXPECT_EQ(bytes.size(), SerializedBytes(resumed.state));
@@ -231,13 +210,13 @@ TEST(SpaceNoiseFilter, JitterOfABallFalls) {
         Normalised({random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1)}));
   }
   for (const double motion : {0.0, .4}) {
-    Stream filtered(Filtering()), plain({.output = Output::kSurface, .spacing = 1.0});
+    ResultStream filtered(Filtering()), plain({.output = Output::kSurface, .spacing = 1.0});
     std::vector<std::array<double, 2>> sums(60), squares(60), last(60);
     std::array<double, 2> steps{}, positions{};
     double volumes = 0;
     for (int frame = 0; frame < kFrames; ++frame) {
       const Vec3 centre{motion * frame, 0, 0};
-      const Numbered ball = BallAt(centre, 8, .25, random);
+      const Numbered ball = NumberedBall(centre, 8, .25, random);
       const Surface& given = plain.Next(ball.AsFrame()).surface;
       const Surface& smooth = filtered.Next(ball.AsFrame()).surface;
       volumes += smooth.measures[0].volume / given.measures[0].volume / kFrames;
@@ -270,10 +249,10 @@ TEST(SpaceNoiseFilter, JitterOfABallFalls) {
 
 TEST(SpaceNoiseFilter, RigidMotionDoesNotLagAndPulsationHardlyDoes) {
   for (const bool pulses : {false, true}) {
-    Stream stream(Filtering());
+    ResultStream stream(Filtering());
     Random random(8);
     for (int frame = 0; frame < 40; ++frame) {
-      Numbered ball = BallAt({}, 8, 0, random);
+      Numbered ball = NumberedBall({}, 8, 0, random);
       for (double& at : ball.particles.xyz) {
         at = pulses ? at * (1 + std::sin(frame * .314159265) / 8) : at + .4 * frame;
       }
@@ -284,4 +263,4 @@ TEST(SpaceNoiseFilter, RigidMotionDoesNotLagAndPulsationHardlyDoes) {
 }
 
 }  // namespace
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -7,7 +7,7 @@
 
 #include "support/tries.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 namespace {
 
 using support::Random;
@@ -189,4 +189,4 @@ SpaceParticles Shuffled(const SpaceParticles& particles, Random& random) {
   return shuffled;
 }
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

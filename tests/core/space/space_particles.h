@@ -9,7 +9,7 @@
 #include "partiemc/frame.h"
 #include "support/random.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// A frame in space that owns its particles.
 struct SpaceParticles {
@@ -39,4 +39,4 @@ std::uint64_t Frames(std::uint64_t usual);
 
 SpaceParticles Shuffled(const SpaceParticles& particles, support::Random& random);
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

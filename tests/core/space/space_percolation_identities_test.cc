@@ -17,14 +17,14 @@
 namespace partiemc {
 namespace {
 
+using support::BoxOf;
+using support::Filled;
 using support::Known;
 using support::Random;
-using testing::BoxOf;
-using testing::Filled;
-using testing::SpaceParticles;
-using testing::SurfaceStream;
-using testing::TrackedParticles;
-using testing::Wrapped;
+using support::SpaceParticles;
+using support::SurfaceStream;
+using support::TrackedParticles;
+using support::Wrapped;
 
 /// A wavy layer with a cavity, and a drop above it, that drift along x and y.
 constexpr double kLong = 24, kWide = 16;
@@ -36,7 +36,7 @@ TrackedParticles Drifting(Known known, int frame) {
   });
   const Vec3 velocity{.9, -.35, 0}, shift = (1. * frame) * velocity;
   all.Add(layer, 0, velocity, shift);
-  all.Add(testing::Ball({18, 5, 16}, 3, .1, random), 50000, velocity, shift);
+  all.Add(support::Ball({18, 5, 16}, 3, .1, random), 50000, velocity, shift);
   return Wrapped(all, BoxOf(kLong, kWide, 0));
 }
 
@@ -103,7 +103,7 @@ TEST(PercolatingIdentities, SamplesOfADropAcrossAFaceAreAllItsParticles) {
   const PeriodicBox box = BoxOf(kLong, kWide, 0);
   TrackedParticles all{.known = support::kIds};
   all.Add(Filled(24, 16, 5, 0, random, [](const Vec3&) { return true; }), 100);
-  all.Add(testing::Box({-1, 7, 8}, {1, 8, 9}, 0, random), 0);  // Twelve particles.
+  all.Add(support::Box({-1, 7, 8}, {1, 8, 9}, 0, random), 0);  // Twelve particles.
   all = Wrapped(all, box);
   SurfaceStream stream(ForDrifting());
   const Surface& surface = stream.Next(all);

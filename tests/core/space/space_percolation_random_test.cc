@@ -17,13 +17,13 @@
 namespace partiemc {
 namespace {
 
+using support::BoxOf;
+using support::Filled;
 using support::Random;
-using testing::BoxOf;
-using testing::Filled;
-using testing::SpaceParticles;
-using testing::SumsOf;
-using testing::Uniform;
-using testing::Wrapped;
+using support::SpaceParticles;
+using support::SumsOf;
+using support::Uniform;
+using support::Wrapped;
 
 /// A frame and its box: a scene wrapped into a small box, noise of any density, layers with waves,
 /// holes and balls, or columns along several axes.
@@ -38,7 +38,7 @@ std::pair<SpaceParticles, PeriodicBox> RandomPeriodicFrame(std::uint64_t seed, d
   SpaceParticles particles;
   switch (random.Below(4)) {
     case 0:
-      particles = testing::RandomSpaceScene(seed);
+      particles = support::RandomSpaceScene(seed);
       break;
     case 1:
       particles = Uniform(
@@ -56,7 +56,7 @@ std::pair<SpaceParticles, PeriodicBox> RandomPeriodicFrame(std::uint64_t seed, d
       for (std::size_t k = random.Below(5); k > 0; --k) {
         const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
         const Vec3 centre{x, y, random.Uniform(0, lengths.z)};
-        particles.Add(testing::Ball(centre, random.Uniform(.5, 4), .2, random));
+        particles.Add(support::Ball(centre, random.Uniform(.5, 4), .2, random));
       }
       particles.Add(Uniform(random.Below(30), lengths, random));
       break;
@@ -69,7 +69,7 @@ std::pair<SpaceParticles, PeriodicBox> RandomPeriodicFrame(std::uint64_t seed, d
         const double x = random.Uniform(0, lengths.x), y = random.Uniform(0, lengths.y);
         const Vec3 from{x, y, random.Uniform(0, lengths.z)};
         for (double step = 0; step < steps; ++step) {
-          particles.Add(testing::Ball(from + (step / steps) * along, thickness, .2, random));
+          particles.Add(support::Ball(from + (step / steps) * along, thickness, .2, random));
         }
       }
   }
@@ -134,7 +134,7 @@ bool CheckRandomFrame(std::uint64_t seed, SurfaceWorkspace& workspace) {
 
 TEST(SurfacePercolation, RandomFramesKeepTheGuarantees) {
   std::uint64_t with_cuts = 0;
-  const std::uint64_t frames = testing::Frames(300);
+  const std::uint64_t frames = support::Frames(300);
   SurfaceWorkspace workspace;
   for (std::uint64_t seed = 1; seed <= frames && !HasFailure(); ++seed) {
     with_cuts += CheckRandomFrame(seed, workspace) ? 1 : 0;

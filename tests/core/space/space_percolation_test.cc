@@ -25,16 +25,16 @@
 namespace partiemc {
 namespace {
 
+using support::BoxOf;
+using support::Filled;
 using support::Random;
-using testing::BoxOf;
-using testing::Filled;
-using testing::SpaceParticles;
-using testing::Sums;
-using testing::SumsOf;
-using testing::SurfaceOf;
-using testing::SurfaceStream;
-using testing::Uniform;
-using testing::Wrapped;
+using support::SpaceParticles;
+using support::Sums;
+using support::SumsOf;
+using support::SurfaceOf;
+using support::SurfaceStream;
+using support::Uniform;
+using support::Wrapped;
 
 double Coordinate(const Surface& surface, std::size_t point, std::size_t axis) {
   return surface.points[3 * point + axis];
@@ -107,7 +107,7 @@ double CutArea(const Surface& surface) {
   return area;
 }
 
-void ExpectInBox(const Surface& surface, const PeriodicBox& box) {
+void ExpectCloselyInBox(const Surface& surface, const PeriodicBox& box) {
   for (std::size_t p = 0; p < surface.PointCount(); ++p) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!box.axes[axis]) continue;
@@ -127,7 +127,7 @@ TEST(SurfacePercolation, FlatLayerIsCutAtFourFaces) {
                                SurfacePlacement::kVirtualPlane}) {
     const Surface surface = SurfaceOf(layer, {.placement = placement, .box = box});
     ASSERT_EQ(surface.ShellCount(), 1u);
-    ExpectInBox(surface, box);
+    ExpectCloselyInBox(surface, box);
     const Sums sums = SumsOf(surface);
     const bool is_exact = placement == SurfacePlacement::kVirtualPlane;
     EXPECT_NEAR(sums.volume, 7200, is_exact ? 1e-3 : 150);
@@ -154,7 +154,7 @@ TEST(SurfacePercolation, WavyLayerKeepsItsVolumeAndArea) {
     const PeriodicBox box = BoxOf(40, 24, 0, origin);
     const Surface surface = InBox(Wrapped(wave, box), box);
     ASSERT_EQ(surface.ShellCount(), 1u);
-    ExpectInBox(surface, box);
+    ExpectCloselyInBox(surface, box);
     const Sums sums = SumsOf(surface);
     if (!first) first = sums;
     EXPECT_NEAR(sums.volume / static_cast<double>(wave.size()), 1, .001);
@@ -199,7 +199,7 @@ TEST(SurfacePercolation, FullBoxHasTheAreaOfItsCavity) {
     });
     const Surface surface = InBox(all, box);
     EXPECT_EQ(surface.ShellCount(), centre.x == 15 ? 2u : 1u);
-    ExpectInBox(surface, box);
+    ExpectCloselyInBox(surface, box);
     const Sums sums = SumsOf(surface);
     std::printf("cavity: volume %.6f, area %.4f of the sphere's\n",
                 sums.volume / static_cast<double>(all.size()), sums.area / (4 * M_PI * 49));
@@ -248,7 +248,7 @@ TEST(SurfacePercolation, DiagonalLayerPercolatesAlongAllAxes) {
   });
   const Surface surface = InBox(layer, box);
   EXPECT_EQ(surface.ShellCount(), 2u);
-  ExpectInBox(surface, box);
+  ExpectCloselyInBox(surface, box);
   const Sums sums = SumsOf(surface);
   EXPECT_NEAR(sums.volume / static_cast<double>(layer.size()), 1, .001);
   EXPECT_NEAR(sums.area / (2 * 30 * 30 * std::sqrt(2.)), 1, .03);
@@ -265,7 +265,7 @@ TEST(SurfacePercolation, DropsNearALayerStayWhole) {
     SpaceParticles all = Filled(30, 36, 8, 0, random, [](const Vec3&) { return true; });
     const std::size_t layer = all.size();
     Random of_drop(6);
-    SpaceParticles drop = testing::Ball({0, 0, 0}, 4, .1, of_drop);
+    SpaceParticles drop = support::Ball({0, 0, 0}, 4, .1, of_drop);
     for (std::size_t k = 0; k < drop.size(); ++k) all.Add(drop.At(k) + centre);
     const Surface surface = InBox(Wrapped(all, box), box);
     ASSERT_EQ(surface.ShellCount(), 2u);
@@ -331,7 +331,7 @@ TEST(SurfacePercolation, DropsAcrossTheCornerStayWhole) {
            11;
   });
   const std::size_t fluid = all.size();
-  const SpaceParticles ball = testing::Ball({0, 0, 0}, 4, .1, random);
+  const SpaceParticles ball = support::Ball({0, 0, 0}, 4, .1, random);
   all.Add(ball);
   all.Add(Vec3{0, 0, 7.5});
   all.Add(Vec3{36, 7.5, 36});
@@ -350,7 +350,7 @@ TEST(SurfacePercolation, MinimumSizeCountsAllImages) {
   const PeriodicBox box = BoxOf(24, 24, 0);
   SpaceParticles all = Filled(24, 24, 6, 0, random, [](const Vec3&) { return true; });
   const std::size_t layer = all.size();
-  const SpaceParticles drop = testing::Box({-2, -2, 12}, {1, 1, 14}, 0, random);
+  const SpaceParticles drop = support::Box({-2, -2, 12}, {1, 1, 14}, 0, random);
   all.Add(drop);
   SurfaceParameters parameters{.placement = SurfacePlacement::kVirtualPlane, .box = box};
   for (const std::size_t least : {drop.size(), drop.size() + 1, layer, layer + 1}) {
@@ -366,12 +366,12 @@ TEST(SurfacePercolation, MinimumSizeCountsAllImages) {
 TEST(SurfacePercolation, ShortColumnsAreNoDrops) {
   Random random(12);
   const PeriodicBox box = BoxOf(0, 0, 8);
-  const SpaceParticles column = testing::Box({0, 0, 0}, {1, 0, 7}, 0, random);
+  const SpaceParticles column = support::Box({0, 0, 0}, {1, 0, 7}, 0, random);
   const Surface surface = SurfaceOf(
       column, {.placement = SurfacePlacement::kVirtualPlane, .kernel_radius = 2, .box = box});
   ASSERT_EQ(surface.ShellCount(), 1u);
   EXPECT_FALSE(surface.cuts.empty());
-  ExpectInBox(surface, box);
+  ExpectCloselyInBox(surface, box);
   EXPECT_EQ(surface.measures[0].particles, column.size());
   EXPECT_NEAR(surface.measures[0].volume, 16, .1);
 }
@@ -381,7 +381,7 @@ TEST(SurfacePercolation, ShortColumnsAreNoDrops) {
 TEST(SurfacePercolation, EveryParticleCountsOnce) {
   constexpr double kApart = 5.4, kLength = 4 * kApart;
   const PeriodicBox box = BoxOf(kLength, kLength, 0);
-  for (std::uint64_t seed = 1; seed <= testing::Frames(20); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(20); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SpaceParticles all = Filled(21, 21, 4, .05, random, [](const Vec3&) { return true; });
@@ -411,13 +411,13 @@ TEST(SurfacePercolation, BitsDependNeitherOnThreadsNorOnOrder) {
   Random random(10);
   const PeriodicBox box = BoxOf(30.7, 24.3, 0);
   SpaceParticles all = Wave(30, 24, 3, .3, random);
-  all.Add(testing::Ball({0, 0, 21}, 3, .2, random));
+  all.Add(support::Ball({0, 0, 21}, 3, .2, random));
   all.Add(Uniform(40, {30, 24, 40}, random));
   all = Wrapped(all, box);
   const SurfaceParameters parameters{.placement = SurfacePlacement::kVirtualPlane, .box = box};
   const Surface first = SurfaceOf(all, parameters);
   ASSERT_FALSE(first.cuts.empty());
-  EXPECT_EQ(SurfaceOf(testing::Shuffled(all, random), parameters), first);
+  EXPECT_EQ(SurfaceOf(support::Shuffled(all, random), parameters), first);
   for (const unsigned threads : {1u, 2u, 7u}) {
     const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
     Arena arena(threads);

@@ -20,25 +20,19 @@
 namespace partiemc {
 namespace {
 
+using support::Cube;
+using support::In;
 using support::Known;
 using support::Random;
-using testing::Cube;
-using testing::SpaceParticles;
-using testing::SurfaceStream;
-using testing::TrackedParticles;
-using testing::Wrap;
+using support::SpaceParticles;
+using support::SurfaceOf;
+using support::SurfaceStream;
+using support::TrackedParticles;
+using support::Wrap;
 
-SurfaceParameters In(const PeriodicBox& box, SurfacePlacement placement) {
-  return {.placement = placement, .box = box};
-}
-
-SpaceParticles BallAt(const Vec3& centre, double radius) {
+SpaceParticles ShakenBallAt(const Vec3& centre, double radius) {
   Random random(1);
-  return testing::Ball(centre, radius, .2, random);
-}
-
-Surface SurfaceOf(const SurfaceParameters& parameters, const SpaceParticles& particles) {
-  return testing::SurfaceOf(particles, parameters);
+  return support::Ball(centre, radius, .2, random);
 }
 
 class PeriodicSurface : public ::testing::TestWithParam<SurfacePlacement> {};
@@ -48,15 +42,15 @@ INSTANTIATE_TEST_SUITE_P(Placements, PeriodicSurface,
 
 TEST_P(PeriodicSurface, BallAcrossFaceEdgeAndCornerIsTheBallInTheMiddle) {
   const PeriodicBox box = Cube(32);
-  const Surface middle = SurfaceOf({.placement = GetParam()}, BallAt({16, 16, 16}, 6));
+  const Surface middle = SurfaceOf(ShakenBallAt({16, 16, 16}, 6), {.placement = GetParam()});
   ASSERT_EQ(middle.ShellCount(), 1u);
   for (const Vec3& centre : {Vec3{0, 16, 16}, {16, 0, 0}, {0, 0, 0}, {31, 31, 2}}) {
-    SpaceParticles ball = BallAt({16, 16, 16}, 6);
+    SpaceParticles ball = ShakenBallAt({16, 16, 16}, 6);
     for (std::size_t k = 0; k < ball.xyz.size(); ++k) {
       ball.xyz[k] += std::array{centre.x, centre.y, centre.z}[k % 3] - 16;
     }
     Wrap(ball.xyz, box);
-    const Surface across = SurfaceOf(In(box, GetParam()), ball);
+    const Surface across = SurfaceOf(ball, In(box, GetParam()));
     ASSERT_EQ(across.ShellCount(), 1u);
     EXPECT_TRUE(Validate(across).ok()) << Validate(across);
     const ShellMeasures &is = across.measures[0], &wanted = middle.measures[0];
@@ -64,36 +58,36 @@ TEST_P(PeriodicSurface, BallAcrossFaceEdgeAndCornerIsTheBallInTheMiddle) {
     EXPECT_NEAR(is.area, wanted.area, 1e-6 * wanted.area);
     EXPECT_EQ(is.particles, wanted.particles);
     // Cut by the faces, it has more shells.
-    EXPECT_GT(SurfaceOf({.placement = GetParam()}, ball).ShellCount(), 1u);
+    EXPECT_GT(SurfaceOf(ball, {.placement = GetParam()}).ShellCount(), 1u);
   }
 }
 
 TEST(PeriodicSpace, ThreadsAndOrderChangeNoBit) {
   const PeriodicBox box = Cube(48.5);
   Random random(4);
-  SpaceParticles all = BallAt({1, 2, 3}, 6);
-  all.Add(BallAt({24, 1, 24}, 4));
-  all.Add(BallAt({20, 24, 47}, 5));
+  SpaceParticles all = ShakenBallAt({1, 2, 3}, 6);
+  all.Add(ShakenBallAt({24, 1, 24}, 4));
+  all.Add(ShakenBallAt({20, 24, 47}, 5));
   Wrap(all.xyz, box);
   const SurfaceParameters parameters = In(box, SurfacePlacement::kVirtualPlane);
-  const Surface first = SurfaceOf(parameters, all);
+  const Surface first = SurfaceOf(all, parameters);
   ASSERT_EQ(first.ShellCount(), 3u);
-  EXPECT_EQ(SurfaceOf(parameters, testing::Shuffled(all, random)), first);
+  EXPECT_EQ(SurfaceOf(support::Shuffled(all, random), parameters), first);
   Arena arena(2);
-  arena.Execute([&] { EXPECT_EQ(SurfaceOf(parameters, all), first); });
+  arena.Execute([&] { EXPECT_EQ(SurfaceOf(all, parameters), first); });
 }
 
 // A hollow ball and a ball that cross the faces.
 TrackedParticles Crossing(Known known, int frame) {
   TrackedParticles all{.known = known, .time = 1.0 * frame};
-  const SpaceParticles full = BallAt({0, 0, 0}, 8);
+  const SpaceParticles full = ShakenBallAt({0, 0, 0}, 8);
   SpaceParticles hollow;
   for (std::size_t k = 0; k < full.size(); ++k) {
     if (Length(full.At(k)) > 4) hollow.Add(full.At(k));
   }
   const Vec3 a{.9, -.8, .7}, b{-.6, -.8, .7};
   all.Add(hollow, 0, a, Vec3{20, 20, 20} + (1.0 * frame) * a);
-  all.Add(BallAt({0, 0, 0}, 3), 5000, b, Vec3{20, 45, 45} + (1.0 * frame) * b);
+  all.Add(ShakenBallAt({0, 0, 0}, 3), 5000, b, Vec3{20, 45, 45} + (1.0 * frame) * b);
   return all;
 }
 
@@ -126,8 +120,8 @@ TEST_P(CrossingShells, KeepTheirIdentitiesForHundredFrames) {
 TEST(PeriodicSpace, BodyThatReachesItsOwnImageIsCut) {
   Random random(2);
   const auto cuts = [&](const Vec3& low, const Vec3& high) {
-    const SpaceParticles body = testing::Box(low, high, 0, random);
-    const Surface surface = SurfaceOf(In(Cube(30), SurfacePlacement::kMarchingCubes), body);
+    const SpaceParticles body = support::Box(low, high, 0, random);
+    const Surface surface = SurfaceOf(body, In(Cube(30), SurfacePlacement::kMarchingCubes));
     EXPECT_EQ(surface.ShellCount(), 1u);
     EXPECT_EQ(surface.measures[0].particles, body.size());
     return surface.cuts.size();
@@ -173,7 +167,7 @@ TEST(PeriodicSpace, FarCopyIsReportedAsItsParticle) {
 TEST(PeriodicSpace, StreamOfSurfacesHasTheBox) {
   const PeriodicBox box = Cube(32);
   ReconstructionParameters parameters{.output = Output::kSurface, .spacing = 1.0, .box = box};
-  SpaceParticles ball = BallAt({0, 0, 0}, 6);
+  SpaceParticles ball = ShakenBallAt({0, 0, 0}, 6);
   Wrap(ball.xyz, box);
   State state;
   Workspace workspace;

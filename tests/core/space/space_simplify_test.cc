@@ -27,28 +27,11 @@
 namespace partiemc {
 namespace {
 
+using support::DistanceToTriangle;
 using support::Random;
-using testing::Sampler;
-using testing::SpaceParticles;
-using testing::SurfaceOf;
-
-double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 along = b - a;
-  const double t = Dot(p - a, along) / Dot(along, along);
-  return Length(p - a - std::clamp(t, 0.0, 1.0) * along);
-}
-
-double DistanceToTriangle(const Vec3& p, const std::array<Vec3, 3>& abc) {
-  const Vec3 normal = Normalised(Cross(abc[1] - abc[0], abc[2] - abc[0]));
-  bool is_above = true;
-  double distance = HUGE_VAL;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 &a = abc[k], &b = abc[(k + 1) % 3];
-    is_above = is_above && Dot(normal, Cross(b - a, p - a)) >= 0;
-    distance = std::min(distance, DistanceToSegment(p, a, b));
-  }
-  return is_above ? std::abs(Dot(normal, p - abc[0])) : distance;
-}
+using support::Sampler;
+using support::SpaceParticles;
+using support::SurfaceOf;
 
 /// The distances of the points of `from` to the triangles of the same shell of `to`.
 std::vector<double> Distances(const Surface& from, const Surface& to) {
@@ -59,7 +42,7 @@ std::vector<double> Distances(const Surface& from, const Surface& to) {
       double least = HUGE_VAL;
       for (auto t = to.triangle_offsets[shell]; t < to.triangle_offsets[shell + 1]; ++t) {
         const auto corner = [&](int c) { return Vec3At(to.points, to.triangles[3 * t + c]); };
-        least = std::min(least, DistanceToTriangle(p, {corner(0), corner(1), corner(2)}));
+        least = std::min(least, DistanceToTriangle(p, corner(0), corner(1), corner(2)));
       }
       distances.push_back(least);
     }
@@ -98,10 +81,10 @@ TEST_P(SpaceSimplify, KeepsS1ToS5) {
   constexpr std::array<double, 5> kErrors = {.02, .05, .1, .3, 1};
   std::array<std::uint32_t, 5> repeated{}, certified{};
   std::size_t shells = 0, triangles = 0, left = 0;
-  const std::uint64_t frames = testing::Frames(40);
+  const std::uint64_t frames = support::Frames(40);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     SCOPED_TRACE(seed);
-    const Surface all = SurfaceOf(testing::RandomSpaceScene(seed), {.placement = GetParam()});
+    const Surface all = SurfaceOf(support::RandomSpaceScene(seed), {.placement = GetParam()});
     shells += all.ShellCount();
     triangles += all.TriangleCount();
     for (std::size_t e = 0; e < kErrors.size(); ++e) {
@@ -135,9 +118,9 @@ TEST_P(SpaceSimplify, KeepsS1ToS5) {
 
 TEST_P(SpaceSimplify, HasTheSameBitsForAnyThreadsAndOrder) {
   Random random(4);
-  SpaceParticles particles = testing::Ball({0, 0, 0}, 6, .3, random);
-  particles.Add(testing::Ball({12, 3, 1}, 4, .1, random));
-  particles.Add(testing::Box({-9, -9, -12}, {9, 9, -10}, .4, random));
+  SpaceParticles particles = support::Ball({0, 0, 0}, 6, .3, random);
+  particles.Add(support::Ball({12, 3, 1}, 4, .1, random));
+  particles.Add(support::Box({-9, -9, -12}, {9, 9, -10}, .4, random));
   const SurfaceParameters parameters{.placement = GetParam(), .simplify = .3};
   const Surface expected = SurfaceOf(particles, parameters);
   EXPECT_LT(2 * expected.TriangleCount(),
@@ -145,18 +128,18 @@ TEST_P(SpaceSimplify, HasTheSameBitsForAnyThreadsAndOrder) {
   for (const unsigned threads : {1u, 2u, 7u}) {
     // Otherwise there are no more workers than processors.
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    const SpaceParticles shuffled = testing::Shuffled(particles, random);
+    const SpaceParticles shuffled = support::Shuffled(particles, random);
     Arena(threads).Execute([&] { EXPECT_EQ(SurfaceOf(shuffled, parameters), expected); });
   }
 }
 
 TEST_P(SpaceSimplify, KeepsAttributesIdentitiesAndParents) {
   Random random(6);
-  testing::TrackedParticles particles{.known = {.ids = true}};
-  particles.Add(testing::Ball({0, 0, 0}, 5, .2, random), 0);
-  particles.Add(testing::Ball({14, 0, 0}, 4, .2, random), 10'000);
-  testing::SurfaceStream plain({.placement = GetParam()});
-  testing::SurfaceStream simplified({.placement = GetParam(), .simplify = .2});
+  support::TrackedParticles particles{.known = {.ids = true}};
+  particles.Add(support::Ball({0, 0, 0}, 5, .2, random), 0);
+  particles.Add(support::Ball({14, 0, 0}, 4, .2, random), 10'000);
+  support::SurfaceStream plain({.placement = GetParam()});
+  support::SurfaceStream simplified({.placement = GetParam(), .simplify = .2});
   for (int frame = 0; frame < 2; ++frame) {
     particles.time = frame;
     ASSERT_TRUE(plain.Try(particles.AsFrame(true)).ok());
@@ -186,8 +169,8 @@ TEST_P(SpaceSimplify, KeepsAttributesIdentitiesAndParents) {
 
 TEST(Simplify, RepeatsShellsThatWouldTouch) {
   Surface surface;
-  testing::AddShell(testing::BallShell({}, 10, 4), kNoShell, surface);
-  testing::AddShell(testing::InsideOut(testing::BallShell({}, 9.9, 4)), 0, surface);
+  support::AddShell(support::BallShell({}, 10, 4), kNoShell, surface);
+  support::AddShell(support::InsideOut(support::BallShell({}, 9.9, 4)), 0, surface);
   ASSERT_TRUE(Validate(surface).ok());
   const std::size_t triangles = surface.TriangleCount();
   const auto report = simplify::Simplify({.error = .1, .spacing = .5}, surface);
@@ -200,11 +183,11 @@ TEST(Simplify, RepeatsShellsThatWouldTouch) {
 /// Of two balls that nearly touch, only the triangles between them stay.
 TEST(Simplify, KeepsTrianglesNearContactsOnly) {
   Surface surface;
-  testing::AddShell(testing::BallShell({}, 10, 4), kNoShell, surface);
-  testing::AddShell(testing::InsideOut(testing::BallShell({3.9, 0, 0}, 6, 4)), 0, surface);
+  support::AddShell(support::BallShell({}, 10, 4), kNoShell, surface);
+  support::AddShell(support::InsideOut(support::BallShell({3.9, 0, 0}, 6, 4)), 0, surface);
   ASSERT_TRUE(Validate(surface).ok());
   Surface apart;
-  testing::AddShell(testing::BallShell({}, 10, 4), kNoShell, apart);
+  support::AddShell(support::BallShell({}, 10, 4), kNoShell, apart);
   const auto report_apart = simplify::Simplify({.error = .3, .spacing = .5}, apart);
   EXPECT_EQ(report_apart.repeated_shells, 0u);
   const auto report = simplify::Simplify({.error = .3, .spacing = .5}, surface);
@@ -218,14 +201,14 @@ TEST(Simplify, KeepsTrianglesNearContactsOnly) {
 
 /// The triangles of the large shell would pass the small one without touching it.
 TEST(Simplify, ShellsStayOnTheirSideOfOthers) {
-  const testing::Shell ball = testing::BallShell({}, 10, 4);
+  const support::Shell ball = support::BallShell({}, 10, 4);
   const Vec3 depth{.02, .02, .02};
   int moved = 0;
   for (std::size_t k = 0; k < 60; ++k) {
     const Vec3 at = .997 * ball.points[k];
     Surface surface;
-    testing::AddShell(ball, kNoShell, surface);
-    testing::AddShell(testing::InsideOut(testing::BoxShell(at - depth, at + depth)), 0, surface);
+    support::AddShell(ball, kNoShell, surface);
+    support::AddShell(support::InsideOut(support::BoxShell(at - depth, at + depth)), 0, surface);
     if (!Validate(surface).ok()) continue;
     const auto report = simplify::Simplify({.error = .5, .spacing = 1}, surface);
     const absl::Status status = Validate(surface);
@@ -237,7 +220,7 @@ TEST(Simplify, ShellsStayOnTheirSideOfOthers) {
 
 TEST(Simplify, SmallShellsKeepTheirTriangles) {
   Surface surface;
-  testing::AddShell(testing::BallShell({}, .6, 0), kNoShell, surface);
+  support::AddShell(support::BallShell({}, .6, 0), kNoShell, surface);
   const Surface all = surface;
   const auto report = simplify::Simplify({.error = 1, .spacing = 1}, surface);
   EXPECT_EQ(report.certified_shells, 1u);
@@ -247,10 +230,10 @@ TEST(Simplify, SmallShellsKeepTheirTriangles) {
 
 /// A flat shell. Without blocks, rounding hides errors this small relative to it: .285 are left.
 TEST(Simplify, LargeShellsAreSimplifiedInBlocks) {
-  testing::Shell shell = testing::BallShell({}, 100, 6);
+  support::Shell shell = support::BallShell({}, 100, 6);
   for (Vec3& point : shell.points) point.z *= .1;
   Surface surface;
-  testing::AddShell(shell, kNoShell, surface);
+  support::AddShell(shell, kNoShell, surface);
   const std::size_t triangles = surface.TriangleCount();
   const auto report = simplify::Simplify({.error = .02, .spacing = 1}, surface);
   EXPECT_TRUE(Validate(surface).ok());
@@ -259,8 +242,8 @@ TEST(Simplify, LargeShellsAreSimplifiedInBlocks) {
 }
 
 /// A ring with a cross section of `sides` corners.
-testing::Shell RingShell(double large, double small, std::uint32_t steps, std::uint32_t sides) {
-  testing::Shell shell;
+support::Shell RingShell(double large, double small, std::uint32_t steps, std::uint32_t sides) {
+  support::Shell shell;
   const auto at = [&](std::uint32_t step, std::uint32_t side) {
     return step % steps * sides + side % sides;
   };
@@ -284,7 +267,7 @@ TEST(Simplify, RingsKeepTheirHole) {
     for (const double large : {.3, .7, 1.5, 4.0}) {
       for (const double small : {.05, .1, .25}) {
         Surface surface;
-        testing::AddShell(RingShell(large, small, 24, sides), kNoShell, surface);
+        support::AddShell(RingShell(large, small, 24, sides), kNoShell, surface);
         ASSERT_TRUE(Validate(surface).ok()) << Validate(surface);
         certified += static_cast<int>(
             simplify::Simplify({.error = .4, .spacing = 1}, surface).certified_shells);
@@ -298,7 +281,7 @@ TEST(Simplify, RingsKeepTheirHole) {
 }
 
 TEST(Simplify, FindsPlantedFaults) {
-  const testing::Shell ball = testing::BallShell({}, 1, 1);
+  const support::Shell ball = support::BallShell({}, 1, 1);
   std::vector<double> points;
   for (const double shift : {0.0, 3.0}) {
     for (const Vec3& at : ball.points) points.insert(points.end(), {at.x + shift, at.y, at.z});
@@ -329,15 +312,15 @@ TEST(Simplify, FindsPlantedFaults) {
 }
 
 SpaceParticles ShapeOf(int shape, Random& random) {
-  const auto fill = [&](const testing::ExactShape& solid) {
-    return testing::Fill(solid, Sampler::kJittered, random);
+  const auto fill = [&](const support::ExactShape& solid) {
+    return support::Fill(solid, Sampler::kJittered, random);
   };
-  if (shape == 0) return fill(*testing::MakeSphere({}, 12));
-  if (shape == 1) return fill(*testing::MakeTorus({}, {0, 0, 1}, 14, 5));
-  if (shape == 2) return fill(*testing::MakeBox({}, {12, 9, 6}, random));
+  if (shape == 0) return fill(*support::MakeSphere({}, 12));
+  if (shape == 1) return fill(*support::MakeTorus({}, {0, 0, 1}, 14, 5));
+  if (shape == 2) return fill(*support::MakeBox({}, {12, 9, 6}, random));
   SpaceParticles drops;
   for (int k = 0; k < 60; ++k) {
-    drops.Add(testing::Ball({8.0 * (k % 8), 8.0 * (k / 8), .3 * k}, 1 + .03 * k, .2, random));
+    drops.Add(support::Ball({8.0 * (k % 8), 8.0 * (k / 8), .3 * k}, 1 + .03 * k, .2, random));
   }
   return drops;
 }

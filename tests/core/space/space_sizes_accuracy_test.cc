@@ -20,10 +20,10 @@
 namespace partiemc {
 namespace {
 
+using support::DrawSize;
+using support::ExactShape;
 using support::Random;
-using testing::DrawSize;
-using testing::ExactShape;
-using testing::SpaceParticles;
+using support::SpaceParticles;
 
 struct Sampling {
   std::string_view name;
@@ -67,9 +67,9 @@ std::vector<std::unique_ptr<ExactShape>> BodiesFor(double size, Random& random) 
   const double x = random.Uniform(-.5, .5), y = random.Uniform(-.5, .5);
   const Vec3 centre{x, y, random.Uniform(-.5, .5)};
   std::vector<std::unique_ptr<ExactShape>> bodies;
-  bodies.push_back(testing::MakeSphere(centre, 8 * size));
-  bodies.push_back(testing::MakeBox(centre, {8 * size, 6.5 * size, 5.5 * size}, random));
-  bodies.push_back(testing::MakeTorus(centre, Normalised({x, y, 1}), 8 * size, 3.5 * size));
+  bodies.push_back(support::MakeSphere(centre, 8 * size));
+  bodies.push_back(support::MakeBox(centre, {8 * size, 6.5 * size, 5.5 * size}, random));
+  bodies.push_back(support::MakeTorus(centre, Normalised({x, y, 1}), 8 * size, 3.5 * size));
   return bodies;
 }
 
@@ -80,7 +80,7 @@ struct Outcome {
 double Measure(SurfacePlacement placement, Sizes sizes, const ExactShape& shape,
                const SpaceParticles& particles, double& volume_error) {
   const auto reconstructor = SurfaceReconstructor::Create(
-      {.placement = placement, .spacing = testing::MeanSpacing(particles), .sizes = sizes});
+      {.placement = placement, .spacing = support::MeanSpacing(particles), .sizes = sizes});
   SurfaceWorkspace workspace;
   Surface surface;
   EXPECT_TRUE(reconstructor->Reconstruct(particles.AsFrame(), workspace, surface).ok());
@@ -101,8 +101,8 @@ TEST(SpaceSizesAccuracy, DeviationFromKnownBoundaries) {
     std::array<Outcome, 4> outcomes;
     const auto bodies = BodiesFor(sampling.mean, random);
     for (const auto& body : bodies) {
-      const SpaceParticles rest = testing::FillSized(*body, random, sampling.draw);
-      const SpaceParticles shaken = testing::Shaken(rest, random, kNoise);
+      const SpaceParticles rest = support::FillSized(*body, random, sampling.draw);
+      const SpaceParticles shaken = support::Shaken(rest, random, kNoise);
       for (std::size_t k = 0; k < outcomes.size(); ++k) {
         const auto placement =
             k < 2 ? SurfacePlacement::kMarchingCubes : SurfacePlacement::kVirtualPlane;

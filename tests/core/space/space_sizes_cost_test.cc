@@ -23,7 +23,7 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
+using support::SpaceParticles;
 
 /// A ball of about `count` particles: cubes of the side `large` with one large particle, or with
 /// small ones of the size 1. Positions are shaken by .2 sizes. `is_large(x)` chooses by the centre.
@@ -82,7 +82,7 @@ std::vector<CostCase> AllCases(int count) {
   for (float& volume : cases.back().particles.volumes) {
     volume = static_cast<float>(std::pow(random.Uniform(1, 3), 3));
   }
-  const double spread = testing::MeanSpacing(cases.back().particles);
+  const double spread = support::MeanSpacing(cases.back().particles);
   for (double& value : cases.back().particles.xyz) value *= spread;
   return cases;
 }
@@ -97,7 +97,7 @@ std::vector<double> Measure(SurfacePlacement placement, const std::vector<CostCa
       const SpaceParticles& particles = cases[k].particles;
       const auto reconstructor =
           SurfaceReconstructor::Create({.placement = placement,
-                                        .spacing = testing::MeanSpacing(particles),
+                                        .spacing = support::MeanSpacing(particles),
                                         .sizes = cases[k].sizes});
       Surface surface;
       const std::clock_t begin = std::clock();

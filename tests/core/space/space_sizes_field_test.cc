@@ -19,15 +19,17 @@
 #include "space/point_sampler.h"
 #include "space/sized_bodies.h"
 #include "space/space_particles.h"
+#include "space/space_stages.h"
 
 namespace partiemc::space {
 namespace {
 
 using support::Random;
-using testing::RandomSizedScene;
-using testing::RandomSpaceScene;
-using testing::Shuffled;
-using testing::SpaceParticles;
+using support::RandomSizedScene;
+using support::RandomSpaceScene;
+using support::Shuffled;
+using support::SpaceParticles;
+using support::SpaceStages;
 
 /// Resolved parameters in the form of the stages, for h = 1.
 ReconstructionParameters ParametersFor(double kernel_radius, double cell_size) {
@@ -102,24 +104,11 @@ class SizedOracle {
   double beta_, alpha_;
 };
 
-struct Stages {
-  SpaceBins bins;
-  SpaceField field;
-  SpaceCrossings crossings;
-
-  Stages(const SpaceParticles& particles, const Scale& scale) {
-    EXPECT_TRUE(BinParticles(particles.AsFrame(), scale, {}, bins).ok());
-    SampleField(bins, scale, field);
-    FindCrossings(bins.bricks, field, crossings);
-    EvaluateNodes(bins, scale, crossings.near, field);
-  }
-};
-
 void ExpectFieldAgrees(const SpaceParticles& particles, double ratio, double kernel_radius,
                        double cell_size, int& exact, int& inside) {
   const ReconstructionParameters parameters = ParametersFor(kernel_radius, cell_size);
   const Scale scale = ScaleOf(particles, parameters);
-  const Stages stages(particles, scale);
+  const SpaceStages stages(particles, scale);
   const SizedOracle oracle(particles, parameters);
   Random random(particles.size());
   for (int k = 0; k < 400; ++k) {
@@ -188,9 +177,9 @@ TEST(SpaceSizesField, EqualSizesGiveTheFieldOfEqualSizes) {
     SpaceParticles particles = RandomSpaceScene(seed);
     particles.volumes.assign(particles.size(), 1);
     ReconstructionParameters parameters = ParametersFor(3, 1);
-    const Stages own(particles, ScaleOf(particles, parameters));
+    const SpaceStages own(particles, ScaleOf(particles, parameters));
     parameters.sizes = Sizes::kEqual;
-    const Stages equal(particles, MakeScale(parameters, 1, 1, 1));
+    const SpaceStages equal(particles, MakeScale(parameters, 1, 1, 1));
     ASSERT_EQ(own.field.inside, equal.field.inside);
     ASSERT_EQ(own.field.exact, equal.field.exact);
     for (std::size_t brick = 0; brick < own.field.values.size(); ++brick) {
@@ -207,11 +196,11 @@ TEST(SpaceSizesField, BitsOfTheFieldDependNeitherOnOrderNorOnThreads) {
   for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
     const SpaceParticles particles = RandomSizedScene(seed, 5);
     const Scale scale = ScaleOf(particles, ParametersFor(3, 1));
-    const Stages stages(particles, scale);
+    const SpaceStages stages(particles, scale);
     for (const unsigned threads : {1u, 2u, 7u}) {
       const SpaceParticles shuffled = Shuffled(particles, random);
       Arena(threads).Execute([&] {
-        const Stages other(shuffled, scale);
+        const SpaceStages other(shuffled, scale);
         EXPECT_EQ(other.field.values, stages.field.values);
         EXPECT_EQ(other.field.inside, stages.field.inside);
         EXPECT_EQ(other.bins.x, stages.bins.x);
@@ -225,7 +214,7 @@ TEST(SpaceSizesField, GradientsAgreeWithDifferences) {
   Random random(5);
   int terms[4] = {};
   for (int trial = 0; trial < 600; ++trial) {
-    SpaceParticles particles = testing::Ball({0, 0, 0}, random.Uniform(2, 4), .3, random);
+    SpaceParticles particles = support::Ball({0, 0, 0}, random.Uniform(2, 4), .3, random);
     if (trial % 4 == 0) {
       for (double& value : particles.xyz) value *= .8;
     }

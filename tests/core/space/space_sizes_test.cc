@@ -23,9 +23,9 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::RandomSizedScene;
-using testing::Shuffled;
-using testing::SpaceParticles;
+using support::RandomSizedScene;
+using support::Shuffled;
+using support::SpaceParticles;
 
 Surface ReconstructOnce(const SurfaceParameters& parameters, const SpaceParticles& particles) {
   const auto reconstructor = SurfaceReconstructor::Create(parameters);
@@ -44,7 +44,7 @@ constexpr std::array kPlacements = {SurfacePlacement::kVirtualPlane,
 
 TEST(SpaceSizes, RandomFramesKeepS1ToS5) {
   std::uint64_t shells = 0;
-  for (std::uint64_t seed = 1; seed <= testing::Frames(300); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(300); ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
     Random random(seed);
     SurfaceParameters parameters{.placement = kPlacements[seed % 3], .sizes = Sizes::kOwn};
@@ -60,7 +60,7 @@ TEST(SpaceSizes, RandomFramesKeepS1ToS5) {
     ASSERT_TRUE(status.ok()) << status;
     shells += surface.ShellCount();
   }
-  EXPECT_GT(shells, testing::Frames(300));
+  EXPECT_GT(shells, support::Frames(300));
 }
 
 TEST(SpaceSizes, BitsOfSurfacesDependNeitherOnOrderNorOnThreads) {

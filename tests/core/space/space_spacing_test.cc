@@ -16,7 +16,7 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
+using support::SpaceParticles;
 
 constexpr Vec3 kLow{-5.5, -6.5, -6}, kHigh{6.5, 5.5, 6};
 
@@ -50,24 +50,24 @@ void ExpectNear(const SpaceParticles& particles, double relative, const char* wh
 
 TEST(SpacingInSpace, OfBodiesIsThatOfTheirDensity) {
   Random random(3);
-  ExpectNear(testing::Box(kLow, kHigh, 0, random), 1e-9, "lattice");
-  ExpectNear(testing::Ball({.3, .2, .1}, 8, .1, random), .03, "ball, shaken by .1");
-  ExpectNear(testing::Box(kLow, kHigh, .3, random), .03, "box, shaken by .3");
+  ExpectNear(support::Box(kLow, kHigh, 0, random), 1e-9, "lattice");
+  ExpectNear(support::Ball({.3, .2, .1}, 8, .1, random), .03, "ball, shaken by .1");
+  ExpectNear(support::Box(kLow, kHigh, .3, random), .03, "box, shaken by .3");
   ExpectNear(Darts(.7, random), .03, "darts .7 apart");
   ExpectNear(Darts(0, random), .06, "darts");
 }
 
 TEST(SpacingInSpace, OfThinSheetsIsTheDistanceToNeighbours) {
   Random random(4);
-  ExpectNear(testing::Box({-20, -20, 0}, {20, 20, .5}, 0, random), 1e-9, "a layer");
-  ExpectNear(testing::Box({-20, -20, 0}, {20, 20, 1.5}, .05, random), .1, "two layers");
+  ExpectNear(support::Box({-20, -20, 0}, {20, 20, .5}, 0, random), 1e-9, "a layer");
+  ExpectNear(support::Box({-20, -20, 0}, {20, 20, 1.5}, .05, random), .1, "two layers");
 }
 
 TEST(SpacingInSpace, DoesNotDependOnOrderCopiesAndSpray) {
   Random random(5);
-  SpaceParticles particles = testing::Box(kLow, kHigh, .2, random);
+  SpaceParticles particles = support::Box(kLow, kHigh, .2, random);
   const double alone = EstimateSpacing(particles.AsFrame()).value();
-  EXPECT_EQ(EstimateSpacing(testing::Shuffled(particles, random).AsFrame()), alone);
+  EXPECT_EQ(EstimateSpacing(support::Shuffled(particles, random).AsFrame()), alone);
   particles.Add(SpaceParticles(particles));
   EXPECT_EQ(EstimateSpacing(particles.AsFrame()), alone);
   for (int k = 0; k < 100; ++k) particles.Add(Vec3{100.0 + 20 * k, 0, 0});
@@ -116,8 +116,8 @@ SpaceParticles DensestBall(double radius) {
 
 TEST(SpacingDoubt, AFactorOfTwoOrMoreIsReportedInBodies) {
   Random random(6);
-  const SpaceParticles bodies[] = {testing::Box(kLow, kHigh, 0, random),
-                                   testing::Ball({.3, .2, .1}, 8, .2, random), DensestBall(8),
+  const SpaceParticles bodies[] = {support::Box(kLow, kHigh, 0, random),
+                                   support::Ball({.3, .2, .1}, 8, .2, random), DensestBall(8),
                                    Darts(.7, random)};
   for (const SpaceParticles& body : bodies) {
     for (const double factor : {2.0, 3.0, 8.0}) {
@@ -127,14 +127,14 @@ TEST(SpacingDoubt, AFactorOfTwoOrMoreIsReportedInBodies) {
     for (const double spacing : {.8, 1.0, 1.25}) EXPECT_FALSE(Contradicts(body, spacing));
     EXPECT_FALSE(Contradicts(body, 1, .5));
     EXPECT_TRUE(Contradicts(body, .5, .5));
-    EXPECT_TRUE(Contradicts(testing::Shuffled(body, random), .5));
+    EXPECT_TRUE(Contradicts(support::Shuffled(body, random), .5));
   }
 }
 
 /// All particles are alone then, and most bricks are empty.
 TEST(SpacingDoubt, ASpacingAHundredTimesTooSmallIsReported) {
   Random random(10);
-  const SpaceParticles body = testing::Box({-9, -9, -9}, {9, 9, 9}, .2, random);
+  const SpaceParticles body = support::Box({-9, -9, -9}, {9, 9, 9}, .2, random);
   ASSERT_GT(body.size(), 5000u);
   EXPECT_TRUE(Contradicts(body, .01));
 }
@@ -148,22 +148,22 @@ TEST(SpacingDoubt, SprayDropsThreadsAndFilmsGiveNone) {
   }
   for (int k = 0; k < 40; ++k) {
     const Vec3 at{8.0 * (k % 5), 8.0 * (k / 5 % 4), 8.0 * (k / 20)};
-    drops.Add(testing::Ball(at, 1.3, .1, random));
-    threads.Add(testing::Box(at, at + Vec3{30, .5, .5}, .1, random));
+    drops.Add(support::Ball(at, 1.3, .1, random));
+    threads.Add(support::Box(at, at + Vec3{30, .5, .5}, .1, random));
   }
   for (const double spacing : {.5, 1.0, 2.0}) EXPECT_FALSE(Contradicts(spray, spacing));
   EXPECT_FALSE(Contradicts(drops, 1));
   EXPECT_FALSE(Contradicts(threads, 1));
   for (const double height : {.5, 1.5, 2.5}) {
-    EXPECT_FALSE(Contradicts(testing::Box({-20, -20, 0}, {20, 20, height}, .1, random), 1));
+    EXPECT_FALSE(Contradicts(support::Box({-20, -20, 0}, {20, 20, height}, .1, random), 1));
   }
 }
 
 TEST(SpacingDoubt, OwnSizesCountInTheirOwnSpacings) {
   Random random(8);
-  SpaceParticles mixed = testing::Box(kLow, kHigh, 0, random);
+  SpaceParticles mixed = support::Box(kLow, kHigh, 0, random);
   mixed.volumes.assign(mixed.size(), 1);
-  const SpaceParticles coarse = testing::Box(kLow, kHigh, 0, random);
+  const SpaceParticles coarse = support::Box(kLow, kHigh, 0, random);
   for (std::size_t k = 0; k < coarse.size(); ++k) {
     mixed.Add(3 * coarse.At(k) + Vec3{60, 0, 0});
     mixed.volumes.push_back(27);
@@ -178,7 +178,7 @@ TEST(SpacingDoubt, OwnSizesCountInTheirOwnSpacings) {
 
 TEST(SurfaceDoubts, VolumesAndCoarsePositionsAreReported) {
   Random random(9);
-  SpaceParticles body = testing::Box(kLow, kHigh, 0, random);
+  SpaceParticles body = support::Box(kLow, kHigh, 0, random);
   body.volumes.assign(body.size(), 1);
   EXPECT_TRUE(DoubtsOf(body.AsFrame(), {}).empty());
   for (float& volume : body.volumes) volume = 3;

@@ -19,14 +19,14 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
+using support::SpaceParticles;
 
 /// Balls, a sheet and spray in many bricks.
 SpaceParticles LargeScene() {
   Random random(3);
-  SpaceParticles particles = testing::Ball({0, 0, 0}, 6, .3, random);
-  particles.Add(testing::Ball({10, 3, 1}, 4, .1, random));
-  particles.Add(testing::Box({-9, -9, -12}, {9, 9, -11}, .2, random));
+  SpaceParticles particles = support::Ball({0, 0, 0}, 6, .3, random);
+  particles.Add(support::Ball({10, 3, 1}, 4, .1, random));
+  particles.Add(support::Box({-9, -9, -12}, {9, 9, -11}, .2, random));
   for (int k = 0; k < 60; ++k) {
     const double x = random.Uniform(-16, 16), y = random.Uniform(-16, 16);
     const Vec3 at{x, y, random.Uniform(10, 24)};

@@ -24,9 +24,9 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::RandomSpaceScene;
-using testing::Shuffled;
-using testing::SpaceParticles;
+using support::RandomSpaceScene;
+using support::Shuffled;
+using support::SpaceParticles;
 
 TEST(CellLoops, CoverEveryCrossingOnce) {
   for (unsigned corners = 0; corners < 256; ++corners) {
@@ -125,7 +125,7 @@ Signs RandomSigns(std::uint64_t seed, std::int32_t first = 0) {
 }
 
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
-  const std::uint64_t frames = testing::Frames(300);
+  const std::uint64_t frames = support::Frames(300);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const Signs signs = RandomSigns(seed);
     std::vector<Vec3> positions, normals;
@@ -206,7 +206,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
-  const std::uint64_t frames = testing::Frames(8);
+  const std::uint64_t frames = support::Frames(8);
   int intersections = 0;
   std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
@@ -339,7 +339,7 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
   Surface surface;
-  const std::uint64_t frames = testing::Frames(40);
+  const std::uint64_t frames = support::Frames(40);
   std::size_t triangles = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const SpaceParticles particles = RandomSpaceScene(seed);

@@ -16,6 +16,7 @@
 #include "space/field.h"
 #include "space/point_sampler.h"
 #include "space/space_particles.h"
+#include "space/surface_of.h"
 #include "space_vertices/body_volumes.h"
 #include "space_vertices/edge_vertices.h"
 #include "space_vertices/loop_filters.h"
@@ -28,9 +29,10 @@
 namespace partiemc::space {
 namespace {
 
+using support::Ball;
 using support::Random;
-using testing::Ball;
-using testing::SpaceParticles;
+using support::SpaceParticles;
+using support::VolumeOf;
 
 /// All stages up to the anchors, for particles of spacing 1 and cells of size 1.
 struct Anchored {
@@ -282,7 +284,7 @@ TEST(Qef, FindsTheCornerOfThreePlanes) {
 
 TEST(Qef, FollowsFacesAndCornersOfABox) {
   Random random(4);
-  const Anchored box(testing::Box({0, 0, 0}, {9, 9, 9}, 0, random));
+  const Anchored box(support::Box({0, 0, 0}, {9, 9, 9}, 0, random));
   std::vector<Vec3> positions = box.anchors, normals;
   PlaceByQef(box.bins, box.scale, box.crossings, positions, normals);
   const auto from_middle = [](const Vec3& at) {
@@ -319,12 +321,6 @@ SpaceParticles Drop(int count, Random& random) {
     drop = Ball(centre, radius, .1, same);
   }
   return drop;
-}
-
-double VolumeOf(const Surface& surface) {
-  double volume = 0;
-  for (const ShellMeasures& shell : surface.measures) volume += shell.volume;
-  return volume;
 }
 
 TEST(VirtualPlane, GivesDropsAndBallsTheVolumeOfTheirParticles) {

@@ -27,19 +27,14 @@ namespace partiemc {
 namespace {
 
 using support::Random;
-using testing::SpaceParticles;
-using testing::SurfaceOf;
+using support::SpaceParticles;
+using support::SurfaceOf;
+using support::VolumeOf;
 
 Surface AtWalls(const SpaceParticles& particles, const std::vector<WallPlane>& walls) {
   SurfaceWorkspace workspace;
   return SurfaceOf(particles, {.placement = SurfacePlacement::kVirtualPlane, .wall_planes = walls},
                    workspace);
-}
-
-double VolumeOf(const Surface& surface) {
-  double volume = 0;
-  for (const ShellMeasures& measures : surface.measures) volume += measures.volume;
-  return volume;
 }
 
 double Coordinate(const Surface& surface, std::size_t point, int axis) {
@@ -81,7 +76,7 @@ SpaceParticles OnFloor(double floor, double reach, double shake, Random& random,
 }
 
 TEST(SurfaceWalls, TanksAreFilledToTheirCorners) {
-  for (std::uint64_t seed = 1; seed <= testing::Frames(6); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Frames(6); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     std::array<double, 3> low{}, count{};
@@ -226,7 +221,7 @@ TEST(SurfaceWalls, AttributesVaryOverTheFloor) {
 }
 
 TEST(SurfaceWalls, DropsKeepTheirShapeAtAWall) {
-  const auto tries = testing::Frames(3);
+  const auto tries = support::Frames(3);
   for (const double degrees : {60., 90., 120.}) {
     for (const double shake : {0., .2}) {
       DropErrors mean;
@@ -269,10 +264,10 @@ std::vector<WallPlane> RandomWalls(const SpaceParticles& particles, Random& rand
 TEST(SurfaceWalls, RandomFramesKeepTheGuarantees) {
   SurfaceWorkspace workspace;
   std::size_t with_cuts = 0;
-  const std::uint64_t frames = testing::Frames(150);
+  const std::uint64_t frames = support::Frames(150);
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE(seed);
-    const SpaceParticles particles = testing::RandomSpaceScene(seed);
+    const SpaceParticles particles = support::RandomSpaceScene(seed);
     if (particles.size() == 0) continue;
     Random random(seed);
     const std::vector<WallPlane> walls = RandomWalls(particles, random);
@@ -292,8 +287,8 @@ TEST(SurfaceWalls, RandomFramesKeepTheGuarantees) {
 
 TEST(SurfaceWalls, BitsDependNeitherOnThreadsNorOnOrder) {
   Random random(5);
-  SpaceParticles particles = testing::Ball({0, 0, 0}, 7, .3, random);
-  particles.Add(testing::Box({-9, -9, -7}, {9, 9, -5}, .2, random));
+  SpaceParticles particles = support::Ball({0, 0, 0}, 7, .3, random);
+  particles.Add(support::Box({-9, -9, -7}, {9, 9, -5}, .2, random));
   const std::vector<WallPlane> walls = {{2, -7.5, true}, {0, -4, true}, {1, 8.25, false}};
   const SurfaceParameters parameters{.placement = SurfacePlacement::kVirtualPlane,
                                      .wall_planes = walls};
@@ -307,7 +302,7 @@ TEST(SurfaceWalls, BitsDependNeitherOnThreadsNorOnOrder) {
     });
   }
   SurfaceWorkspace workspace;
-  surfaces.push_back(SurfaceOf(testing::Shuffled(particles, random), parameters, workspace));
+  surfaces.push_back(SurfaceOf(support::Shuffled(particles, random), parameters, workspace));
   EXPECT_FALSE(surfaces[0].cuts.empty());
   EXPECT_EQ(surfaces[1], surfaces[0]);
   EXPECT_EQ(surfaces[2], surfaces[0]);
@@ -315,9 +310,9 @@ TEST(SurfaceWalls, BitsDependNeitherOnThreadsNorOnOrder) {
 
 TEST(SurfaceWalls, ParticlesFarBehindAWallHaveNoEffect) {
   Random random(6);
-  const SpaceParticles before = testing::Ball({0, 0, 6}, 5, .2, random);
+  const SpaceParticles before = support::Ball({0, 0, 6}, 5, .2, random);
   SpaceParticles all = before;
-  all.Add(testing::Ball({0, 0, -4}, 3, .2, random));
+  all.Add(support::Ball({0, 0, -4}, 3, .2, random));
   const std::vector<WallPlane> walls = {{2, 0, true}};
   EXPECT_EQ(AtWalls(all, walls), AtWalls(before, walls));
   // Only particles behind the wall: an empty surface.
@@ -326,7 +321,7 @@ TEST(SurfaceWalls, ParticlesFarBehindAWallHaveNoEffect) {
 
 TEST(SurfaceWalls, AWallFarFromTheFluidChangesNothing) {
   Random random(7);
-  const SpaceParticles particles = testing::Ball({0, 0, 0}, 6, .2, random);
+  const SpaceParticles particles = support::Ball({0, 0, 0}, 6, .2, random);
   const Surface without = AtWalls(particles, {});
   const Surface far = AtWalls(particles, {{2, -40, true}, {0, 31, false}});
   EXPECT_TRUE(far.cuts.empty());
@@ -380,8 +375,8 @@ TEST(SurfaceWalls, DropsAndBodiesKeepTheirIdentities) {
   const auto reconstructor = SurfaceReconstructor::Create(
       {.placement = SurfacePlacement::kVirtualPlane, .wall_planes = {{2, 0, true}}});
   ASSERT_TRUE(reconstructor.ok());
-  SpaceParticles particles = testing::Ball({0, 0, 3}, 5, .1, random);
-  particles.Add(testing::Box({20, 0, .5}, {21.5, 1.5, 1.5}, 0, random));
+  SpaceParticles particles = support::Ball({0, 0, 3}, 5, .1, random);
+  particles.Add(support::Box({20, 0, .5}, {21.5, 1.5, 1.5}, 0, random));
   SurfaceState state;
   SurfaceWorkspace workspace;
   std::vector<std::uint64_t> first;

@@ -17,12 +17,12 @@
 namespace partiemc {
 namespace {
 
-using testing::AddShell;
-using testing::BallShell;
-using testing::BoxShell;
-using testing::InsideOut;
-using testing::Measure;
-using testing::Shell;
+using support::AddShell;
+using support::BallShell;
+using support::BoxShell;
+using support::InsideOut;
+using support::Measure;
+using support::Shell;
 using ::testing::StartsWith;
 
 /// A ball with a cavity, in the cavity a box, and a ball beside.

@@ -6,7 +6,7 @@
 #include "partiemc/surface_reconstructor.h"
 #include "space/space_particles.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// Expects that the surface satisfies S1 to S5.
 inline Surface SurfaceOf(const SpaceParticles& particles, const SurfaceParameters& parameters,
@@ -27,4 +27,11 @@ inline Surface SurfaceOf(const SpaceParticles& particles, const SurfaceParameter
   return SurfaceOf(particles, parameters, workspace);
 }
 
-}  // namespace partiemc::testing
+/// The sum of the volumes of the shells.
+inline double VolumeOf(const Surface& surface) {
+  double volume = 0;
+  for (const ShellMeasures& shell : surface.measures) volume += shell.volume;
+  return volume;
+}
+
+}  // namespace partiemc::support

@@ -16,8 +16,9 @@
 #include "partiemc/validate.h"
 #include "space/space_particles.h"
 #include "support/random.h"
+#include "support/result_stream.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 namespace {
 
 ReconstructionParameters OfSurface() { return {.output = Output::kSurface, .spacing = 1}; }
@@ -43,21 +44,6 @@ SpaceParticles Scene(int frame) {
   return particles;
 }
 
-// A stream of its own workspace and state.
-struct Stream {
-  explicit Stream(const ReconstructionParameters& parameters)
-      : reconstructor(*Reconstructor::Create(parameters)) {}
-
-  absl::Status Take(const Frame& frame, const FrameControl& control = {}) {
-    return reconstructor.Reconstruct(frame, state, workspace, result, control);
-  }
-
-  Reconstructor reconstructor;
-  State state;
-  Workspace workspace;
-  Result result;
-};
-
 TEST(SurfaceOutput, EqualsTheSurfaceReconstructor) {
   for (const auto& [placement, in_space] :
        {std::pair(Placement::kMarchingSquares, SurfacePlacement::kMarchingCubes),
@@ -67,7 +53,7 @@ TEST(SurfaceOutput, EqualsTheSurfaceReconstructor) {
     parameters.placement = placement;
     parameters.min_component_particles = 2;
     parameters.surface = {.thinning_distance = .02, .max_drop_particles = 8, .simplify = .03};
-    Stream stream(parameters);
+    ResultStream stream(parameters);
     const auto reference = SurfaceReconstructor::Create({.placement = in_space,
                                                          .spacing = 1,
                                                          .thinning_distance = .02,
@@ -80,7 +66,7 @@ TEST(SurfaceOutput, EqualsTheSurfaceReconstructor) {
     Surface surface;
     for (int k = 0; k < 4; ++k) {
       const SpaceParticles particles = Scene(k);
-      ASSERT_TRUE(stream.Take(particles.AsFrame()).ok());
+      ASSERT_TRUE(stream.Try(particles.AsFrame()).ok());
       ASSERT_TRUE(reference->Reconstruct(particles.AsFrame(), state, workspace, surface).ok());
       ASSERT_GT(surface.TriangleCount(), 100u);
       EXPECT_EQ(stream.result.surface, surface);
@@ -91,9 +77,9 @@ TEST(SurfaceOutput, EqualsTheSurfaceReconstructor) {
 }
 
 TEST(SurfaceOutput, StatisticsAreThoseOfTheSurface) {
-  Stream stream(OfSurface());
+  ResultStream stream(OfSurface());
   const SpaceParticles particles = Scene(0);
-  ASSERT_TRUE(stream.Take(particles.AsFrame()).ok());
+  ASSERT_TRUE(stream.Try(particles.AsFrame()).ok());
   const FrameStatistics& statistics = stream.result.statistics;
   EXPECT_EQ(statistics.particles, particles.size());
   EXPECT_EQ(statistics.triangles, stream.result.surface.TriangleCount());
@@ -109,7 +95,7 @@ TEST(SurfaceOutput, StatisticsAreThoseOfTheSurface) {
 }
 
 TEST(SurfaceOutput, AttributesAreAtThePointsOfTheSurface) {
-  Stream stream(WithSections());
+  ResultStream stream(WithSections());
   const SpaceParticles particles = Scene(0);
   std::vector<float> heights;
   for (std::size_t k = 0; k < particles.size(); ++k) {
@@ -118,7 +104,7 @@ TEST(SurfaceOutput, AttributesAreAtThePointsOfTheSurface) {
   const std::vector<Attribute> attributes = {{"height", 1, heights}};
   Frame frame = particles.AsFrame();
   frame.attributes = attributes;
-  ASSERT_TRUE(stream.Take(frame).ok());
+  ASSERT_TRUE(stream.Try(frame).ok());
   const Surface& surface = stream.result.surface;
   EXPECT_TRUE(stream.result.attributes.empty());
   ASSERT_EQ(surface.attributes.size(), 1u);
@@ -132,16 +118,16 @@ TEST(SurfaceOutput, AttributesAreAtThePointsOfTheSurface) {
 }
 
 TEST(SurfaceOutput, SectionsAreThoseOfAStreamOfSlices) {
-  Stream stream(WithSections());
+  ResultStream stream(WithSections());
   ReconstructionParameters sliced = WithSections();
   sliced.output = Output::kOutline;
   sliced.slice = sliced.sections[0].slice;
   sliced.sections.erase(sliced.sections.begin());
-  Stream slices(sliced);
+  ResultStream slices(sliced);
   for (int k = 0; k < 4; ++k) {
     const SpaceParticles particles = Scene(k);
-    ASSERT_TRUE(stream.Take(particles.AsFrame()).ok());
-    ASSERT_TRUE(slices.Take(particles.AsFrame()).ok());
+    ASSERT_TRUE(stream.Try(particles.AsFrame()).ok());
+    ASSERT_TRUE(slices.Try(particles.AsFrame()).ok());
     ASSERT_EQ(stream.result.sections.size(), 2u);
     EXPECT_GT(stream.result.sections[0].rings.RingCount(), 0u);
     EXPECT_EQ(stream.result.sections[0].rings, slices.result.rings);
@@ -152,17 +138,17 @@ TEST(SurfaceOutput, SectionsAreThoseOfAStreamOfSlices) {
 
 TEST(SurfaceOutput, ContinuesFromItsSerializedState) {
   for (const auto& parameters : {OfSurface(), WithSections()}) {
-    Stream undisturbed(parameters), resumed(parameters);
+    ResultStream undisturbed(parameters), resumed(parameters);
     for (int k = 0; k < 6; ++k) {
       const SpaceParticles particles = Scene(k);
-      ASSERT_TRUE(undisturbed.Take(particles.AsFrame()).ok());
+      ASSERT_TRUE(undisturbed.Try(particles.AsFrame()).ok());
       const std::string bytes = Serialize(resumed.state);
       EXPECT_EQ(bytes.size(), SerializedBytes(resumed.state));
       auto parsed = ParseState(bytes);
       ASSERT_TRUE(parsed.ok()) << parsed.status();
       EXPECT_EQ(*parsed, resumed.state);
       resumed.state = *std::move(parsed);
-      ASSERT_TRUE(resumed.Take(particles.AsFrame()).ok());
+      ASSERT_TRUE(resumed.Try(particles.AsFrame()).ok());
       EXPECT_EQ(resumed.result, undisturbed.result);
     }
     EXPECT_GT(undisturbed.state.surface.history.identities_given, 1u);
@@ -170,8 +156,8 @@ TEST(SurfaceOutput, ContinuesFromItsSerializedState) {
 }
 
 TEST(SurfaceOutput, RefusesEveryChangedByteOfAState) {
-  Stream stream(WithSections());
-  ASSERT_TRUE(stream.Take(Scene(0).AsFrame()).ok());
+  ResultStream stream(WithSections());
+  ASSERT_TRUE(stream.Try(Scene(0).AsFrame()).ok());
   const std::string bytes = Serialize(stream.state);
   for (std::size_t k = 0; k < bytes.size(); k += 1 + bytes.size() / 997) {
     std::string changed = bytes;
@@ -182,18 +168,18 @@ TEST(SurfaceOutput, RefusesEveryChangedByteOfAState) {
 }
 
 TEST(SurfaceOutput, ARefusedFrameChangesNothing) {
-  Stream stream(WithSections());
-  ASSERT_TRUE(stream.Take(Scene(0).AsFrame()).ok());
+  ResultStream stream(WithSections());
+  ASSERT_TRUE(stream.Try(Scene(0).AsFrame()).ok());
   const State before = stream.state;
   SpaceParticles broken = Scene(1);
   broken.xyz[4] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(stream.Take(broken.AsFrame()).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(stream.Try(broken.AsFrame()).code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(stream.state, before);
   EXPECT_EQ(stream.result, Result{});
 
   const std::atomic<bool> cancelled = true;
   const SpaceParticles next = Scene(1);
-  EXPECT_EQ(stream.Take(next.AsFrame(), {.cancelled = &cancelled}).code(),
+  EXPECT_EQ(stream.Try(next.AsFrame(), {.cancelled = &cancelled}).code(),
             absl::StatusCode::kCancelled);
   EXPECT_EQ(stream.state, before);
 }
@@ -217,29 +203,29 @@ TEST(SurfaceOutput, MemoryOfSectionsAndSurfaceIsAdded) {
   const SpaceParticles particles = Scene(0);
   const auto most_of = [&](const ReconstructionParameters& parameters) {
     Limit none(std::numeric_limits<std::uint64_t>::max());
-    Stream stream(parameters);
-    EXPECT_TRUE(stream.Take(particles.AsFrame(), {.memory = &none}).ok());
+    ResultStream stream(parameters);
+    EXPECT_TRUE(stream.Try(particles.AsFrame(), {.memory = &none}).ok());
     return none.most();
   };
   const std::uint64_t alone = most_of(OfSurface()), all = most_of(WithSections());
   EXPECT_GT(all, alone + 10'000);
 
-  Stream stream(WithSections());
+  ResultStream stream(WithSections());
   Limit limit(all);
-  const absl::Status status = stream.Take(particles.AsFrame(), {.memory = &limit});
+  const absl::Status status = stream.Try(particles.AsFrame(), {.memory = &limit});
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(ReasonOf(status), kReasonOutOfMemory);
   EXPECT_EQ(stream.state, State{});
 }
 
 TEST(SurfaceOutput, RefusesTheStateOfAnotherOutput) {
-  Stream surface(OfSurface()), slice({.spacing = 1, .slice = SlicePlane{}});
+  ResultStream surface(OfSurface()), slice({.spacing = 1, .slice = SlicePlane{}});
   const SpaceParticles particles = Scene(0);
-  ASSERT_TRUE(surface.Take(particles.AsFrame()).ok());
-  ASSERT_TRUE(slice.Take(particles.AsFrame()).ok());
+  ASSERT_TRUE(surface.Try(particles.AsFrame()).ok());
+  ASSERT_TRUE(slice.Try(particles.AsFrame()).ok());
   std::swap(surface.state, slice.state);
-  EXPECT_EQ(ReasonOf(surface.Take(particles.AsFrame())), kReasonCorruptState);
-  EXPECT_EQ(ReasonOf(slice.Take(particles.AsFrame())), kReasonCorruptState);
+  EXPECT_EQ(ReasonOf(surface.Try(particles.AsFrame())), kReasonCorruptState);
+  EXPECT_EQ(ReasonOf(slice.Try(particles.AsFrame())), kReasonCorruptState);
 }
 
 TEST(SurfaceOutput, RefusesParametersOfOutlines) {
@@ -266,8 +252,8 @@ TEST(SurfaceOutput, RefusesParametersOfOutlines) {
 }
 
 TEST(SurfaceOutput, DigestsDifferWithTheGeometry) {
-  Stream stream(OfSurface());
-  ASSERT_TRUE(stream.Take(Scene(0).AsFrame()).ok());
+  ResultStream stream(OfSurface());
+  ASSERT_TRUE(stream.Try(Scene(0).AsFrame()).ok());
   const Surface surface = stream.result.surface;
   const std::uint64_t digest = DigestSurface(surface);
   Surface moved = surface, turned = surface, regrouped = surface, nested = surface;
@@ -282,4 +268,4 @@ TEST(SurfaceOutput, DigestsDifferWithTheGeometry) {
 }
 
 }  // namespace
-}  // namespace partiemc::testing
+}  // namespace partiemc::support

@@ -19,8 +19,8 @@
 namespace partiemc {
 namespace {
 
-using testing::SurfaceStream;
-using testing::TrackedParticles;
+using support::SurfaceStream;
+using support::TrackedParticles;
 
 SurfaceState ExampleSurfaceState() {
   SurfaceState state;
@@ -137,10 +137,10 @@ TrackedParticles MovingBlocks(int frame, bool has_ids) {
   TrackedParticles all{.known = {.ids = has_ids, .velocities = frame % 2 == 0},
                        .time = static_cast<double>(frame)};
   const double x = 1.3 * frame;
-  all.Add(testing::Box({0, 0, 0}, {5, 4, 4}, .1, random), 0, {1.3, 0, 0}, {x, 0, 0});
-  all.Add(testing::Box({6, 0, 0}, {9, 4, 4}, .1, random), 500, {1.3, 0, 0},
+  all.Add(support::Box({0, 0, 0}, {5, 4, 4}, .1, random), 0, {1.3, 0, 0}, {x, 0, 0});
+  all.Add(support::Box({6, 0, 0}, {9, 4, 4}, .1, random), 500, {1.3, 0, 0},
           {x + (frame > 2 ? 5.0 : 0), 0, 0});
-  all.Add(testing::Ball({0, 12, 0}, 0, 0, random), 900, {}, {0, .2 * frame, 0});
+  all.Add(support::Ball({0, 12, 0}, 0, 0, random), 900, {}, {0, .2 * frame, 0});
   return all;
 }
 

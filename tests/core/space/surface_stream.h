@@ -15,7 +15,7 @@
 #include "support/random.h"
 #include "support/tracked_scene.h"
 
-namespace partiemc::testing {
+namespace partiemc::support {
 
 /// Bodies whose particles have ids, velocities, both or neither.
 struct TrackedParticles {
@@ -119,4 +119,4 @@ class SurfaceStream {
   Surface surface_;
 };
 
-}  // namespace partiemc::testing
+}  // namespace partiemc::support
