@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "relay/eventually.h"
 #include "relay/nats_process.h"
+#include "relay/soon.h"
 
 namespace partiemc::server {
 namespace {
@@ -49,7 +49,7 @@ TEST(NatsBus, KeepsASendersOrderAcrossSubjectsWithoutEchoes) {
     const std::string message = std::to_string(k) + (k % 50 == 0 ? large : "");
     ASSERT_TRUE(one->Publish(k % 2 == 0 ? "a" : "b", message));
   }
-  ASSERT_TRUE(Eventually([&] { return heard.count() == 500; }));
+  ASSERT_TRUE(Soon([&] { return heard.count() == 500; }));
   for (int k = 0; k < 500; ++k) EXPECT_EQ(std::stoi(heard.messages[k]), k);
   EXPECT_EQ(echoes.count(), 0u);
 }
@@ -61,15 +61,15 @@ TEST(NatsBus, ComesBackWithItsSubscriptionsAndSendsNothingOld) {
   const auto a = other->Subscribe("a", heard.Handler());
   other->Flush();
   ASSERT_TRUE(one->Publish("a", "first"));
-  ASSERT_TRUE(Eventually([&] { return heard.count() == 1; }));
+  ASSERT_TRUE(Soon([&] { return heard.count() == 1; }));
   nats.Stop();
-  ASSERT_TRUE(Eventually([&] { return !one->connected() && !other->connected(); }));
+  ASSERT_TRUE(Soon([&] { return !one->connected() && !other->connected(); }));
   EXPECT_FALSE(one->Publish("a", "lost"));
   nats.Start();
-  ASSERT_TRUE(Eventually([&] { return one->connected() && other->connected(); }));
+  ASSERT_TRUE(Soon([&] { return one->connected() && other->connected(); }));
   other->Flush();
   ASSERT_TRUE(one->Publish("a", "second"));
-  ASSERT_TRUE(Eventually([&] { return heard.count() == 2; }));
+  ASSERT_TRUE(Soon([&] { return heard.count() == 2; }));
   EXPECT_EQ(heard.messages[1], "second");
 }
 
@@ -80,12 +80,12 @@ TEST(NatsBus, AFrozenServerCountsAsGoneUntilItContinues) {
   const auto a = other->Subscribe("a", heard.Handler());
   other->Flush();
   nats.Freeze();
-  EXPECT_TRUE(Eventually([&] { return !one->connected() && !other->connected(); }));
+  EXPECT_TRUE(Soon([&] { return !one->connected() && !other->connected(); }));
   nats.Continue();
-  ASSERT_TRUE(Eventually([&] { return one->connected() && other->connected(); }));
+  ASSERT_TRUE(Soon([&] { return one->connected() && other->connected(); }));
   other->Flush();
   ASSERT_TRUE(one->Publish("a", "again"));
-  EXPECT_TRUE(Eventually([&] { return heard.count() == 1; }));
+  EXPECT_TRUE(Soon([&] { return heard.count() == 1; }));
 }
 
 TEST(NatsBus, ConnectsToAServerThatComesLater) {
@@ -97,11 +97,11 @@ TEST(NatsBus, ConnectsToAServerThatComesLater) {
   const auto a = bus->Subscribe("a", heard.Handler());
   ASSERT_NE(a, nullptr);
   nats.Start();
-  ASSERT_TRUE(Eventually([&] { return bus->connected(); }));
+  ASSERT_TRUE(Soon([&] { return bus->connected(); }));
   bus->Flush();
   const auto other = Connect(nats.url());
   ASSERT_TRUE(other->Publish("a", "first"));
-  EXPECT_TRUE(Eventually([&] { return heard.count() == 1; }));
+  EXPECT_TRUE(Soon([&] { return heard.count() == 1; }));
 }
 
 TEST(NatsBus, AUrlThatIsNoneIsRefusedWithoutItsPassword) {

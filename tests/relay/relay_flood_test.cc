@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
-#include "relay/eventually.h"
 #include "relay/memory_replica.h"
+#include "relay/soon.h"
 #include "server/base/call_errors.h"
 #include "server/relay/pieces.h"
 #include "server/relay/relay_queue.h"
@@ -31,7 +31,7 @@ class RelayFlood : public testing::Test {
       return false;
     });
     has_->Open("dam", NewStreamToken());
-    EXPECT_TRUE(Eventually([this] { return shows_.relay().remote_streams() == 1; }));
+    EXPECT_TRUE(Soon([this] { return shows_.relay().remote_streams() == 1; }));
   }
   ~RelayFlood() override {
     flooding_ = false;
@@ -55,7 +55,7 @@ class RelayFlood : public testing::Test {
       }
     });
     // More than a relay answers at once.
-    ASSERT_TRUE(Eventually([this] { return sent_ > 20'000; }));
+    ASSERT_TRUE(Soon([this] { return sent_ > 20'000; }));
   }
   static relay::v1::RelayMessage FetchAll(const std::string& stream_id, std::uint64_t number) {
     relay::v1::RelayMessage message;
@@ -67,7 +67,7 @@ class RelayFlood : public testing::Test {
   }
   // The watcher has every frame, and the end of its stream.
   void ExpectFinished(MemoryWatcher& watcher, std::uint64_t frames) {
-    EXPECT_TRUE(Eventually([&] { return !watcher.end_reason().empty(); }));
+    EXPECT_TRUE(Soon([&] { return !watcher.end_reason().empty(); }));
     EXPECT_EQ(watcher.end_reason(), "FINISHED");
     EXPECT_EQ(watcher.seen().size(), frames);
     EXPECT_EQ(watcher.end_dropped(), 0u);

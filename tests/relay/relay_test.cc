@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "partiemc/status.h"
-#include "relay/eventually.h"
 #include "relay/memory_replica.h"
+#include "relay/soon.h"
 #include "server/base/call_errors.h"
 #include "server/relay/watched_result.h"
 #include "server/stream/stream_token.h"
@@ -29,7 +29,7 @@ using testing::ElementsAre;
 
 constexpr milliseconds kSoon(10'000);
 
-bool Soon(const std::function<bool()>& is_true) { return Eventually(is_true, kSoon); }
+bool InTime(const std::function<bool()>& is_true) { return Soon(is_true, kSoon); }
 
 std::string ReasonOf(const absl::Status& status) {
   const auto violation = FindViolation(status);
@@ -62,7 +62,7 @@ class RelayTest : public testing::Test {
   }
 
   static void Both(const std::function<bool()>& know_each_other) {
-    ASSERT_TRUE(Soon(know_each_other));
+    ASSERT_TRUE(InTime(know_each_other));
   }
   void Publish(std::uint64_t first, std::uint64_t last, std::size_t bytes = 1000) {
     for (std::uint64_t k = first; k <= last; ++k) has_.Publish("dam", k, bytes);
@@ -206,7 +206,7 @@ TEST_F(RelayTest, WhileTheBusIsAwayNothingComesAndNothingIsMissingAfterwards) {
     away->bus().SetConnected(false);
     Publish(last + 1, last + 20);
     last += 20;
-    EXPECT_TRUE(Soon([&] { return !away->relay().connected(); }));
+    EXPECT_TRUE(InTime([&] { return !away->relay().connected(); }));
     watcher->WaitForFrames(last - 29);
     EXPECT_EQ(watcher->seen().back().number, last - 20);
     away->bus().SetConnected(true);
@@ -276,7 +276,7 @@ TEST_F(RelayTest, AnEndWhileTheBusIsAwayIsToldOnceItIsBack) {
   ASSERT_NE(watcher, nullptr);
   watcher->WaitForFrames(1);
   has_.bus().SetConnected(false);
-  ASSERT_TRUE(Soon([this] { return !has_.relay().connected(); }));
+  ASSERT_TRUE(InTime([this] { return !has_.relay().connected(); }));
   Publish(11, 40);
   has_.Close("dam");
   std::this_thread::sleep_for(milliseconds(200));
@@ -292,7 +292,7 @@ TEST_F(RelayTest, WhoIsAwayWhileAStreamEndsHearsHowAndHowMuchIsMissing) {
   ASSERT_NE(watcher, nullptr);
   watcher->WaitForFrames(1);
   shows_.bus().SetConnected(false);
-  ASSERT_TRUE(Soon([this] { return !shows_.relay().connected(); }));
+  ASSERT_TRUE(InTime([this] { return !shows_.relay().connected(); }));
   Publish(11, 40);
   has_.Close("dam");
   std::this_thread::sleep_for(milliseconds(200));
@@ -339,16 +339,16 @@ TEST_F(RelayTest, OneThatLeavesIsGoneAtOnce) {
 TEST_F(RelayTest, AddressesAreThoseOfReplicasThatDoNotDrain) {
   MemoryReplica a(hub_, 0, "a.example:50051"), b(hub_, 0, "b.example:50051");
   MemoryReplica path(hub_, 0, "unix:/run/p.sock"), malformed(hub_, 0, "a;b");
-  ASSERT_TRUE(Soon([&] { return shows_.relay().replicas() == 5; }));
+  ASSERT_TRUE(InTime([&] { return shows_.relay().replicas() == 5; }));
   EXPECT_THAT(shows_.relay().Addresses(), ElementsAre("a.example:50051", "b.example:50051"));
-  EXPECT_TRUE(Soon([&] { return !a.relay().Addresses().empty(); }));
+  EXPECT_TRUE(InTime([&] { return !a.relay().Addresses().empty(); }));
   EXPECT_THAT(a.relay().Addresses(), ElementsAre("b.example:50051"));
   b.relay().WillDrain();
-  EXPECT_TRUE(Soon([&] { return shows_.relay().Addresses().size() == 1; }));
+  EXPECT_TRUE(InTime([&] { return shows_.relay().Addresses().size() == 1; }));
   EXPECT_THAT(shows_.relay().Addresses(), ElementsAre("a.example:50051"));
   EXPECT_EQ(shows_.relay().replicas(), 5u);
   a.relay().Drain();
-  EXPECT_TRUE(Soon([&] { return shows_.relay().Addresses().empty(); }));
+  EXPECT_TRUE(InTime([&] { return shows_.relay().Addresses().empty(); }));
 }
 
 TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
@@ -357,7 +357,7 @@ TEST_F(RelayTest, WhoWaitsForAStreamIsRefusedWhereItsReplicaDrains) {
     refused = ReasonOf(found.status()) == kReasonDraining;
   });
   shows_.relay().Drain();
-  EXPECT_TRUE(Soon([&] { return refused.load(); }));
+  EXPECT_TRUE(InTime([&] { return refused.load(); }));
   EXPECT_EQ(ReasonOf(shows_.Find("dam").status()), kReasonDraining);
 }
 
@@ -408,7 +408,7 @@ TEST_F(RelayTest, GarbageOnTheBusHarmsNobody) {
     const std::lock_guard lock(mutex);
     heard.emplace_back(message);
   });
-  ASSERT_TRUE(Soon([&] {
+  ASSERT_TRUE(InTime([&] {
     const std::lock_guard lock(mutex);
     return heard.size() > 1;
   }));

@@ -8,8 +8,8 @@
 namespace partiemc::server {
 
 /// Polls a condition; false if it does not become true in time.
-inline bool Eventually(const std::function<bool()>& is_true,
-                       std::chrono::milliseconds within = std::chrono::seconds(20)) {
+inline bool Soon(const std::function<bool()>& is_true,
+                 std::chrono::milliseconds within = std::chrono::seconds(20)) {
   const auto give_up = std::chrono::steady_clock::now() + within;
   while (!is_true()) {
     if (std::chrono::steady_clock::now() > give_up) return false;
