@@ -205,12 +205,17 @@ def _map(self, frames, times=None):
 
     Sends up to a window of frames ahead, in one thread. With latest=True it never waits to send:
     skipped frames have no result, the last frame always has one. A refused frame raises Error, which
-    ends the iteration. Parts other than 0 yield None for each frame.
+    ends the iteration. To go on, call map again with the same iterator: every frame that map has
+    taken from it is sent. Parts other than 0 yield None for each frame.
     """
+    frames = iter(frames)
     times = None if times is None else iter(times)
-    for frame in frames:
+    while True:
         while not self.latest and self.in_flight >= self.window:
             yield self.receive()
+        frame = next(frames, _ABSENT)
+        if frame is _ABSENT:
+            break
         if not isinstance(frame, dict):
             frame = {"positions": frame}
         elif "positions" not in frame or not frame.keys() <= _SENT:

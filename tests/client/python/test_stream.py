@@ -274,6 +274,21 @@ class Streams(ServerTest):
             with self.assertRaises(partiemc.Error):
                 list(stream.map([numpy.full((3, 2), numpy.nan)]))
 
+    def test_map_goes_on_after_a_refused_frame_and_after_a_break(self):
+        frames = [{"positions": block(), "time": k} for k in range(12)]
+        frames[4] = {"positions": numpy.full((3, 2), numpy.nan), "time": 4}
+        with partiemc.connect(self.address, spacing=1) as stream:
+            rest, times = iter(frames), []
+            with self.assertRaises(partiemc.Error):
+                for result in stream.map(rest):
+                    times.append(result.time)
+            for result in stream.map(rest):
+                times.append(result.time)
+                if len(times) == 6:
+                    break
+            times += [result.time for result in stream.map(rest)]
+        self.assertEqual(times, [k for k in range(12) if k != 4])
+
     def test_latest_finishes_without_a_receive(self):
         for received in (True, False):
             with partiemc.connect(self.address, spacing=1, latest=True) as stream:
