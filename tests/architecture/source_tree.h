@@ -25,7 +25,8 @@ std::string WithoutComments(std::string_view text, Literals literals);
 /// The includes of a file in order: the text between quotes or brackets.
 std::vector<std::string> Includes(std::string_view text);
 
-/// The includes of all C++ files of a tree. Requires: the tree outlives the graph and does not change.
+/// The includes of all C++ files of a tree. Requires: the tree outlives the graph and does not
+/// change.
 class IncludeGraph {
  public:
   explicit IncludeGraph(const SourceTree& tree);
