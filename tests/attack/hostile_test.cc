@@ -53,6 +53,16 @@ class Attackers {
     }
     EXPECT_FALSE(threads_.empty()) << "no attack " << only;
   }
+  /// Waits until each attack has ended a round: on a busy machine, preparing the first one takes
+  /// long.
+  void WaitForFirstRounds(std::chrono::seconds patience) const {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    const auto begun = [](const auto& attack) { return attack.second > 0; };
+    while (!std::all_of(rounds_.begin(), rounds_.end(), begun) &&
+           std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
   ~Attackers() {
     stop_ = true;
     for (std::thread& thread : threads_) thread.join();
@@ -114,6 +124,7 @@ TEST_F(Hostile, HonestStreamsAndMemoryBearIt) {
     if (options.elsewhere) other = std::make_unique<AttackedServer>(Arguments(web));
     const Attackers attackers((other ? *other : server_).address(), web, options.attack);
     disturbed = QuietP99(one, two, all - quiet);
+    attackers.WaitForFirstRounds(kHostilePatience);
   }
   const double peak = memory.PeakMib();
   one.Stop();

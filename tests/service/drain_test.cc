@@ -279,11 +279,16 @@ TEST_F(Drain, ASecondSignalLeavesAtOnceWithItsNumber) {
     ASSERT_TRUE(client.SendAndReceive(OpenRequest()).has_opened());
     // Its response is not read, so the drain would wait for an hour.
     std::atomic<bool> stop = false;
+    std::atomic<std::uint64_t> sent = 0;
     std::thread writer([&] {
-      for (std::uint64_t k = 1; !stop && client.Send(BlobRequest(k, 1, k % 3)); ++k) {
-      }
+      for (std::uint64_t k = 1; !stop && client.Send(BlobRequest(k, 1, k % 3)); ++k) sent = k;
     });
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    // Until no frame is accepted, so that answers wait in the server.
+    std::uint64_t before = 0;
+    do {
+      before = sent;
+      std::this_thread::sleep_for(std::chrono::seconds(1));
+    } while (sent == 0 || sent != before);
     Terminate();
     server_->process().Signal(SIGINT);  // At the same time, so it counts as the same signal.
     while (server_->process().Output().find("draining") == std::string::npos) {
