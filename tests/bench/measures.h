@@ -1,5 +1,5 @@
 // The measures of the benchmark. Each function registers some of them with Google Benchmark; run.py
-// computes the ratios from their medians.
+// computes the ratios from the least times of the repetitions.
 #pragma once
 
 #include <benchmark/benchmark.h>

@@ -84,13 +84,14 @@ class Expectations(unittest.TestCase):
             self.assertLess(row["margin"], 2, row["metric"])
 
 
-class Medians(unittest.TestCase):
-    def test_median_over_repetitions(self):
+class Repetitions(unittest.TestCase):
+    def test_least_time_and_most_calls(self):
         runs = [{"name": "frame/1m/iterations:4/repeats:3", "run_type": "iteration",
-                 "cpu_time": time, "bins_cpu_ms": 1, "field_cpu_ms": 2} for time in (3, 1, 2)]
+                 "cpu_time": time, "calls": time, "bins_cpu_ms": 1, "field_cpu_ms": 2} for time in (3, 1, 2)]
         runs.append({"name": "frame/1m_mean", "run_type": "aggregate", "cpu_time": 9})
         measures = run.Measures({"benchmarks": runs})
-        self.assertEqual(measures.median("frame/1m"), 2)
+        self.assertEqual(measures.least("frame/1m"), 1)
+        self.assertEqual(measures.most("frame/1m", "calls"), 3)
         self.assertEqual(measures.stages("frame/1m", "bins", "field"), 3)
         self.assertEqual(measures.scenes("frame"), ["1m"])
 
