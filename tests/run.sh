@@ -4,14 +4,15 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 
-readonly all_steps=(layout contract release recordings viewer sanitized threads fuzz includes core-alone consumer bench)
+readonly default_steps=(layout contract release recordings viewer sanitized threads fuzz core-alone consumer bench)
+readonly all_steps=("${default_steps[@]}" includes)
 
 readonly buf_version=1.50.0
 
 usage() {
   cat <<'USAGE'
 usage: tests/run.sh [--no-install] [STEP...]
-Steps, all of them by default:
+Steps, by default all but the last:
   layout      every source file has the format of .clang-format
   contract    buf lints the .proto and finds no incompatible change (if npm can fetch buf)
   release     the whole project, optimised, and all of its tests
@@ -21,11 +22,11 @@ Steps, all of them by default:
               UndefinedBehaviorSanitizer
   threads     core and sessions under ThreadSanitizer
   fuzz        a minute of hostile bytes for every parser (tests/fuzz)
-  includes    every source includes the headers it needs (after sanitized and fuzz)
   core-alone  the core without gRPC, Protobuf and VTK, as an installed shared library, and a
               consumer of it
   consumer    tests/consumer finds and uses the installed project (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
+  includes    every source includes the headers it needs: without precompiled headers, each source alone
 Builds are kept in build/, so a second run compiles changed files only.
 With CI=true a skipped test or step fails, unless tests/skips.txt names it with its reason.
 USAGE
@@ -46,7 +47,7 @@ for argument in "$@"; do
       ;;
   esac
 done
-((${#steps[@]})) || steps=("${all_steps[@]}")
+((${#steps[@]})) || steps=("${default_steps[@]}")
 
 passed=0
 failed=0
@@ -246,11 +247,13 @@ step_fuzz() {
 }
 
 step_includes() {
-  check "includes: configure" cmake --preset asan &&
-    check "includes: headers of messages" cmake --build build/asan -j "$jobs" \
+  check "includes: configure" cmake -S . -B build/includes -G Ninja -DCMAKE_CXX_COMPILER=clang++-14 \
+    -DCMAKE_BUILD_TYPE=Debug -DPARTIEMC_UNITE=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
+    -DPARTIEMC_HDF5=OFF -DPARTIEMC_VTK=OFF &&
+    check "includes: headers of messages" cmake --build build/includes -j "$jobs" \
       --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto \
       partiemc_relay_proto &&
-    check "includes" tests/architecture/compile_alone.py build/asan
+    check "includes" tests/architecture/compile_alone.py build/includes
 }
 
 step_core-alone() {

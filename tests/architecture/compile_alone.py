@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Checks that every source includes the headers it needs.
 
-GCC's builds parse common headers once and compile small rooms together, which hides missing includes.
-This script checks the syntax of each source of core, proto, server and client that BUILD, a build of
-Clang, lists but has not compiled. The headers made by protoc must exist.
+Builds parse common headers once and compile small rooms together, which hides missing includes. This
+script checks the syntax of each source of core, proto, server and client that BUILD lists but has not
+compiled. BUILD: a build of Clang without PARTIEMC_UNITE and without precompiled headers, in which the
+headers made by protoc exist.
 """
 import argparse
 import concurrent.futures
