@@ -15,7 +15,7 @@ namespace partiemc {
 namespace {
 
 __extension__ using Wide = __int128;
-using Random = std::mt19937_64;
+using Engine = std::mt19937_64;
 
 struct LatticePoint {
   std::int64_t x, y;
@@ -32,7 +32,7 @@ int TrueOrientation(const LatticePoint& a, const LatticePoint& b, const LatticeP
   return (determinant > 0) - (determinant < 0);
 }
 
-std::int64_t Below(Random& random, std::int64_t bound) {
+std::int64_t Below(Engine& random, std::int64_t bound) {
   return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(bound));
 }
 
@@ -50,7 +50,7 @@ TEST(Orientation, IsRightOnAllTriplesOfASmallLattice) {
 
 /// Points near a random line, with coordinates of all 53 bits, which no filter can decide.
 TEST(Orientation, AgreesWithIntegersForPointsThatAreNearlyCollinear) {
-  Random random(1);
+  Engine random(1);
   int collinear = 0;
   for (int round = 0; round < support::Tries(300'000); ++round) {
     const LatticePoint step{Below(random, 1 << 20) - (1 << 19), Below(random, 1 << 20) - (1 << 19)};
@@ -79,7 +79,7 @@ TEST(Orientation, AgreesWithIntegersForPointsThatAreNearlyCollinear) {
 
 /// Differences that are not exact, so that the whole expansion is needed.
 TEST(Orientation, AgreesWithIntegersForCoordinatesOfDifferentMagnitudes) {
-  Random random(2);
+  Engine random(2);
   const auto coordinate = [&]() {
     // At most 53 bits, anywhere below 2^60.
     const int bits = static_cast<int>(random() % 54);
@@ -114,7 +114,7 @@ TEST(Orientation, SeesTheLastBitOverTheWholeRangeOfMagnitudes) {
 }
 
 TEST(Orientation, IsConsistentUnderPermutationForNeighbouringDoubles) {
-  Random random(3);
+  Engine random(3);
   for (int round = 0; round < support::Tries(100'000); ++round) {
     const double x = 0.5 + static_cast<double>(random() % 1000) / 7;
     const auto near = [&](double value) {
@@ -160,7 +160,7 @@ bool TrulyTouch(const LatticePoint& a, const LatticePoint& b, const LatticePoint
 }
 
 TEST(SegmentsTouch, AgreesWithIntegersOnASmallLatticeWithAllItsDegeneracies) {
-  Random random(4);
+  Engine random(4);
   int touching = 0;
   for (int round = 0; round < support::Tries(500'000); ++round) {
     std::array<LatticePoint, 4> p;
