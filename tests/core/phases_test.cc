@@ -399,6 +399,7 @@ TEST(Phases, RefusesWhatHasNoPhases) {
             }),
             "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.placement = Placement::kQef; }), "parameters.sections[0].phase=1");
+  EXPECT_EQ(with([](P& p) { p.output = Output::kSurface; }), "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) {
               p.sizes = Sizes::kOwn;
               p.boundary = Boundary::kGrains;

@@ -83,10 +83,13 @@ absl::Status CheckIsovalue(const std::string& of, double isovalue) {
 // Checks the phase of a section, and that no other parameter excludes it.
 absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) {
   const Section& of = p.sections[section];
+  const std::string field = absl::StrCat("sections[", section, "].phase");
   const auto refused = [&](const std::string& rule) {
-    return Refused(absl::StrCat("sections[", section, "].phase"), absl::StrCat(*of.phase), rule);
+    return Refused(field, absl::StrCat(*of.phase), rule);
   };
-  if (p.output == Output::kSurface) return refused("must be absent for a surface");
+  if (p.output == Output::kSurface) {
+    return refused("must be absent for a surface: surfaces have no phases");
+  }
   if (p.slice || of.slice) return refused("must be absent with a slice");
   if (p.isovalue || of.isovalue) return refused("must be absent with an isovalue");
   if (p.box) return refused("must be absent with a periodic box");
@@ -94,7 +97,6 @@ absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) 
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
   }
-  const std::string field = absl::StrCat("sections[", section, "].phase");
   if (auto status = CheckPhaseNumber(field, *of.phase); !status.ok()) return status;
   if (auto status = CheckPhaseAttribute(p.phase_attribute, "a section has a phase"); !status.ok()) {
     return status;
@@ -124,6 +126,9 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   for (std::size_t k = 0; k < p.sections.size(); ++k) {
     const Section& section = p.sections[k];
     const std::string of = absl::StrCat("sections[", k, "].");
+    if (section.phase) {
+      if (auto status = CheckPhase(p, k); !status.ok()) return status;
+    }
     if (is_surface && !section.slice) {
       return Refused(of + "slice", "absent", "must be present: the stream has a surface");
     }
@@ -132,9 +137,6 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     }
     if (section.slice) {
       if (auto status = CheckSlice(of, *section.slice); !status.ok()) return status;
-    }
-    if (section.phase) {
-      if (auto status = CheckPhase(p, k); !status.ok()) return status;
     }
     if (section.isovalue) {
       is_isoline = true;

@@ -67,16 +67,15 @@ absl::Status CheckPoints(const std::string& field, std::span<const double> point
   return count == 2 ? absl::OkStatus() : CheckPolygon(field, points);
 }
 
-// Checks that no other parameter excludes walls. `field`: the parameter with the `count` walls.
-absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& field,
-                         std::size_t count) {
-  const auto refused = [&](std::string_view rule) {
-    return Refused(field, absl::StrCat(count), rule);
-  };
-  if (p.output == Output::kSurface) return refused("must be absent for a surface");
+// Checks that no other parameter excludes walls. `field`: the parameter with the walls.
+absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& field) {
+  const auto refused = [&](std::string_view rule) { return Refused(field, "present", rule); };
+  if (p.output == Output::kSurface) {
+    return refused("must be absent for a surface, which has wall planes instead");
+  }
   if (p.slice) return refused("must be absent with a slice");
   if (p.isovalue) return refused("must be absent with an isovalue");
-  if (!p.sections.empty()) return refused("must be absent with sections");
+  if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines, phases");
   if (p.box) return refused("must be absent with a periodic box");
   if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
   if (p.placement != Placement::kVirtualPlane) {
@@ -92,12 +91,9 @@ absl::Status CheckWallPhases(const ReconstructionParameters& p) {
     return Refused("wall_phases", absl::StrCat(phases.size()),
                    absl::StrCat("must be at most ", p.kMaxWallPhases));
   }
-  if (absl::Status status = CheckOthers(p, "wall_phases", phases.size()); !status.ok()) {
-    return status;
-  }
+  if (absl::Status status = CheckOthers(p, "wall_phases"); !status.ok()) return status;
   if (p.noise_filter) {
-    return Refused("wall_phases", absl::StrCat(phases.size()),
-                   "must be absent with a noise filter");
+    return Refused("wall_phases", "present", "must be absent with a noise filter");
   }
   for (std::size_t k = 0; k < phases.size(); ++k) {
     const std::string field = absl::StrCat("wall_phases[", k, "]");
@@ -114,10 +110,10 @@ absl::Status CheckWallPhases(const ReconstructionParameters& p) {
 // Checks that no other parameter excludes the walls of a surface.
 absl::Status CheckOthersOfPlanes(const ReconstructionParameters& p) {
   const auto refused = [&](std::string_view rule) {
-    return Refused("wall_planes", absl::StrCat(p.wall_planes.size()), rule);
+    return Refused("wall_planes", "present", rule);
   };
   if (p.output != Output::kSurface) return refused("must be absent unless the output is a surface");
-  if (!p.sections.empty()) return refused("must be absent with sections");
+  if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines");
   if (p.box) return refused("must be absent with a periodic box");
   if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
   return absl::OkStatus();
@@ -182,7 +178,7 @@ absl::Status CheckWalls(const ReconstructionParameters& p) {
                    absl::StrCat("must have at most ", p.kMaxWallPoints,
                                 " points together, and at least 2 points each"));
   }
-  if (absl::Status status = CheckOthers(p, "walls", p.walls.size()); !status.ok()) return status;
+  if (absl::Status status = CheckOthers(p, "walls"); !status.ok()) return status;
   for (std::size_t k = 0; k < p.walls.size(); ++k) {
     const std::string field = absl::StrCat("walls[", k, "].points");
     if (absl::Status status = CheckPoints(field, p.walls[k].points); !status.ok()) return status;

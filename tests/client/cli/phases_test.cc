@@ -71,6 +71,12 @@ TEST(PhasesReplay, WrongPhasesAreRefused) {
   EXPECT_THAT(refusal({"--phases", "type=1,1"}, 2), HasSubstr("--phases"));
   EXPECT_THAT(refusal({"--phases", "kind=1"}, 3), HasSubstr("kind"));
   EXPECT_THAT(refusal({"--phases", "type=1", "--placement", "qef"}, 2), HasSubstr("--phases"));
+  // The first reason is the last one: no other flag, such as --slice, would help.
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--surface", "--phases", "type=1"},
+        {"--surface", "--phases", "type=1", "--slice", "z=0"}}) {
+    EXPECT_THAT(refusal(flags, 2), HasSubstr("--phases: 1; must be absent for a surface"));
+  }
 }
 
 }  // namespace

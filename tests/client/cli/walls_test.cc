@@ -215,7 +215,7 @@ TEST(WallsReplay, WrongWallsAreRefused) {
                                                 {"--periodic", "x", "--box", "0,40,0,40"}}) {
     std::vector<std::string> flags = {"--wall", kTank};
     flags.insert(flags.end(), other.begin(), other.end());
-    EXPECT_THAT(refusal(flags), HasSubstr("partiemc: --")) << other[0];
+    EXPECT_THAT(refusal(flags), HasSubstr("partiemc: --wall: present; ")) << other[0];
   }
 }
 
