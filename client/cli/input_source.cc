@@ -28,10 +28,12 @@ class SizedRecording final : public Sequence {
 
   absl::StatusOr<bool> Next(RecordedFrame& frame) override {
     const auto more = recording_->Next(frame);
+    frame.volume_column.clear();
     if (!more.ok() || !*more || !(frame.volumes.empty() || needs_diameters_)) return more;
     for (const ParticleAttribute& attribute : frame.attributes) {
       const bool is_diameter = attribute.name == "diameter";
       if (attribute.components != 1 || !(is_diameter || attribute.name == "radius")) continue;
+      frame.volume_column = attribute.name;
       frame.volumes.clear();
       for (const float length : attribute.values) {
         const double size = (is_diameter ? 1 : 2) * double{length};

@@ -34,7 +34,7 @@ absl::StatusOr<double> EstimatedSpacing(const std::string& input, const Sequence
 absl::Status CheckKeepsInput(const std::string& input, const Sequence& frames,
                              const std::vector<std::string>& targets);
 
-/// Prints the notices of an input on standard error; with `quiet` only those of lost frames.
+/// Prints the notices of an input on standard error; with `quiet` only its losses.
 void PrintNotices(const Sequence& frames, bool quiet);
 
 /// Adds --attributes, a list of names.

@@ -47,11 +47,6 @@ std::span<const std::size_t> AxesWithout(std::size_t dropped) {
   return kOthers[dropped];
 }
 
-void TellOnce(bool& told, const ParticleRows& rows, std::string_view what,
-              std::vector<std::string>& notices) {
-  if (!std::exchange(told, true)) notices.push_back(Concat(rows.source, ": ", what));
-}
-
 std::string PlaneName(std::size_t dropped) {
   const auto axes = AxesWithout(dropped);
   return Concat(kAxisNames[axes[0]], "-", kAxisNames[axes[1]]);
@@ -163,6 +158,13 @@ absl::Status PlaneProjection::CheckStaysInPlane(const ParticleRows& rows) {
              ShortestNumber(off_plane.high), "; PartiEMC reconstructs 2D data in one plane"));
 }
 
+void PlaneProjection::Ignore(bool& told, const ParticleRows& rows, std::string_view what,
+                             std::vector<std::string>& notices) {
+  if (std::exchange(told, true)) return;
+  losses_.push_back(Concat(rows.source, ": ", what, "; later frames may have this fault, too"));
+  notices.push_back(losses_.back());
+}
+
 void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows, Axes axes, RecordedFrame& frame,
                                          std::vector<std::string>& notices) {
   frame.velocities.clear();
@@ -176,7 +178,7 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows, Axes axes, Re
                                     [](float velocity) { return std::isfinite(velocity); });
     if (!usable) {
       frame.velocities.clear();
-      TellOnce(told_velocities_, rows, "velocities are ignored: not all are finite", notices);
+      Ignore(told_velocities_, rows, "velocities are ignored: not all are finite", notices);
     }
   }
   frame.ids.clear();
@@ -188,18 +190,23 @@ void PlaneProjection::CopyOptionalArrays(const ParticleRows& rows, Axes axes, Re
     if (unique) {
       frame.ids = rows.ids;
     } else {
-      TellOnce(told_ids_, rows, "ids are ignored: several particles have the same", notices);
+      Ignore(told_ids_, rows, "ids are ignored: several particles have the same", notices);
     }
   }
   frame.attributes = rows.attributes;
   frame.volumes.clear();
+  frame.volume_column = rows.volume_column;
   if (!rows.has_volumes) return;
   frame.volumes.assign(rows.volumes.begin(), rows.volumes.end());
-  const bool usable = std::all_of(frame.volumes.begin(), frame.volumes.end(),
-                                  [](float volume) { return volume > 0 && std::isfinite(volume); });
-  if (usable) return;
+  if (keeps_volumes_) return;
+  const auto wrong = std::ranges::find_if_not(
+      frame.volumes, [](float volume) { return volume > 0 && std::isfinite(volume); });
+  if (wrong == frame.volumes.end()) return;
+  const std::string fault =
+      Concat("volumes are ignored: ", VolumeName(frame, wrong - frame.volumes.begin()), " is ",
+             ShortestNumber(*wrong), ", and must be positive and finite");
   frame.volumes.clear();
-  TellOnce(told_volumes_, rows, "volumes are ignored: not all are above 0 and finite", notices);
+  Ignore(told_volumes_, rows, fault, notices);
 }
 
 }  // namespace partiemc::client::input

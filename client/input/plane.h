@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -20,13 +21,18 @@ namespace partiemc::client::input {
 /// three coordinates.
 class PlaneProjection {
  public:
-  explicit PlaneProjection(bool in_space = false) : in_space_(in_space) {}
+  /// `keeps_volumes`: volumes that are not positive and finite stay in the frame.
+  explicit PlaneProjection(bool in_space = false, bool keeps_volumes = false)
+      : in_space_(in_space), keeps_volumes_(keeps_volumes) {}
 
   /// Fills every field of `frame` except `index`. Appends notices for the user, each once.
   /// Errors: kFailedPrecondition if the particles are 3D or leave the plane, or, with `in_space`,
   /// if they have two coordinates.
   absl::Status Project(const ParticleRows& rows, RecordedFrame& frame,
                        std::vector<std::string>& notices);
+
+  /// The notices of ignored arrays.
+  const std::vector<std::string>& losses() const { return losses_; }
 
  private:
   struct Plane {
@@ -42,7 +48,12 @@ class PlaneProjection {
   void CopyOptionalArrays(const ParticleRows& rows, Axes axes, RecordedFrame& frame,
                           std::vector<std::string>& notices);
 
-  bool in_space_;
+  // Adds the notice of an ignored array, once per array.
+  void Ignore(bool& told, const ParticleRows& rows, std::string_view what,
+              std::vector<std::string>& notices);
+
+  bool in_space_, keeps_volumes_;
+  std::vector<std::string> losses_;
   std::optional<Plane> plane_;
   double largest_extent_ = 0;  // Largest extent of the frames so far; scale of the tolerance.
   bool told_volumes_ = false;

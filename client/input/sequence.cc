@@ -40,7 +40,8 @@ struct Recording {
 class FileSequence final : public Sequence {
  public:
   FileSequence(Recording recording, const SequenceOptions& options)
-      : recording_(std::move(recording)), projection_(options.in_space) {}
+      : recording_(std::move(recording)),
+        projection_(options.in_space, options.needs_sizes || options.needs_diameters) {}
 
   // Opens the first file, so that its errors are reported at once. Required before Next.
   absl::Status OpenFirstFile() { return OpenNextFile(); }
@@ -79,6 +80,7 @@ class FileSequence final : public Sequence {
   }
 
   const std::vector<std::string>& notices() const override { return recording_.notices; }
+  std::vector<std::string> losses() const override { return projection_.losses(); }
 
   std::vector<std::string> files() const override {
     std::vector<std::string> files = recording_.files;
@@ -304,6 +306,21 @@ absl::Status TakeTimes(const std::string& directory, Recording& recording) {
 }
 
 }  // namespace
+
+std::string ParticleName(const RecordedFrame& frame, std::size_t particle) {
+  std::string name = Concat("particle ", particle, " (counted from 0) at (");
+  const auto components = static_cast<std::size_t>(frame.components);
+  for (std::size_t k = 0; k < components; ++k) {
+    AppendAll(name, k == 0 ? "" : ", ", frame.positions[components * particle + k]);
+  }
+  return name + ')';
+}
+
+std::string VolumeName(const RecordedFrame& frame, std::size_t particle) {
+  const std::string name = Concat("volume of ", ParticleName(frame, particle));
+  if (frame.volume_column.empty()) return name;
+  return Concat(name, ", by column '", frame.volume_column, "'");
+}
 
 absl::StatusOr<std::unique_ptr<Sequence>> Sequence::Open(const std::string& input,
                                                          const SequenceOptions& options) {

@@ -33,8 +33,10 @@ struct RecordedFrame {
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
   std::vector<double> positions;
   bool float32 = false;  ///< The recording holds float32: a conversion to float32 is lossless.
-  /// Area (in space, volume) per particle, positive and finite; empty if absent.
+  /// Area (in space, volume) per particle; empty if absent. Positive and finite, unless
+  /// SequenceOptions::needs_sizes or needs_diameters is set.
   std::vector<float> volumes;
+  std::string volume_column;  ///< The column that `volumes` come from; empty if it has no name.
   std::vector<std::uint64_t> ids;  ///< Unique within the frame; empty if absent.
   std::vector<float> velocities;   ///< Interleaved like `positions`, finite; empty if absent.
   /// The requested attributes; for a .pemc recording all of its attributes.
@@ -44,6 +46,13 @@ struct RecordedFrame {
     return positions.size() / static_cast<std::size_t>(components);
   }
 };
+
+/// Names a particle in a message: "particle 17 (counted from 0) at (1, 2)".
+std::string ParticleName(const RecordedFrame& frame, std::size_t particle);
+
+/// Names a volume in a message: "volume of particle 17 (counted from 0) at (1, 2), by column
+/// 'radius'".
+std::string VolumeName(const RecordedFrame& frame, std::size_t particle);
 
 /// Options as text from a command line. Sequence::Open refuses invalid ones with kInvalidArgument.
 struct SequenceOptions {
@@ -68,11 +77,12 @@ struct SequenceOptions {
   std::vector<std::string> attributes = {};
 
   /// Read volumes from a column of diameters d or radii r if there is none of volumes: d^2, (2
-  /// r)^2; with `in_space` d^3, (2 r)^3.
+  /// r)^2; with `in_space` d^3, (2 r)^3. Wrong volumes stay in the frame, so that it is refused;
+  /// without this option, they are ignored.
   bool needs_sizes = false;
 
   /// Read volumes for grains, which are squared diameters: from a column of diameters or radii,
-  /// else from a column of volumes, which are areas A of discs: 4 A / pi.
+  /// else from a column of volumes, which are areas A of discs: 4 A / pi. Wrong volumes stay.
   bool needs_diameters = false;
 
   /// Keep all three coordinates of 3D particles. A file with two coordinates is refused.
@@ -143,7 +153,8 @@ class Sequence {
   /// The files that Next reads, and the file of times.
   virtual std::vector<std::string> files() const = 0;
 
-  /// The notices that report lost frames, for example of a truncated recording.
+  /// The notices of input that is missing in the results: lost frames, for example of a truncated
+  /// recording, and ignored arrays. The caller should show them even if it shows nothing else.
   virtual std::vector<std::string> losses() const { return {}; }
 };
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "client/cli/console.h"
+#include "client/cli/replay/refusal_text.h"
 #include "client/output/text.h"
 #include "partiemc/status.h"
 
@@ -230,7 +231,8 @@ OfferHooks FrameFeeder::Hooks() {
 
 void FrameFeeder::RefuseLast(const absl::Status& status) {
   const MutexLock lock(mutex_);
-  refused_.push_back({unanswered_.back()->source, OneLine(status)});
+  const RecordedFrame& frame = *unanswered_.back();
+  refused_.push_back({frame.source, RefusalText(frame, attribute_names_, OneLine(status))});
   free_.push_back(std::move(unanswered_.back()));
   unanswered_.pop_back();
 }

@@ -12,6 +12,7 @@
 #include "client/cli/replay/frame_feeder.h"
 #include "client/cli/replay/looped_input.h"
 #include "client/cli/replay/missing_phases.h"
+#include "client/cli/replay/refusal_text.h"
 #include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
 #include "client/library/adapters/seconds.h"
@@ -124,7 +125,7 @@ class Receiver {
     missing_phases_.Remove(*frame);
     absl::Status status;
     if (event_.kind == Event::Kind::kRefusal) {
-      Refuse(frame->source, event_.message);
+      Refuse(frame->source, RefusalText(*frame, flags_.sequence.attributes, event_.message));
     } else {
       if (flags_.check) Check(frame->source);
       // A loop has no outputs.
@@ -223,10 +224,7 @@ class Receiver {
 
   void Refuse(const std::string& source, const std::string& message) {
     outputs_.AddRefused();
-    // The core names arrays, but the user of --sizes own and --boundary grains gives columns.
-    const bool lacks_sizes = message.starts_with("volumes: 0 values");
-    progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message),
-                          lacks_sizes ? " (a column volume, diameter or radius)" : ""));
+    progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message)));
   }
 
   const ReplayFlags& flags_;

@@ -304,6 +304,7 @@ absl::StatusOr<ColumnPlan> PlanNamedColumns(const Names& names, const ColumnRequ
                                       "particlearea", "volumetricmeasure"});
   if (request.needs_diameters) plan.per_volume = 4 / std::numbers::pi;
   if (request.needs_diameters || (request.needs_sizes && !plan.volume)) PlanSizes(canonical, plan);
+  if (plan.volume) plan.volume_name = names[*plan.volume];
   const absl::Status positions = request.columns.empty()
                                      ? PlanRecognisedPositions(names, canonical, request, plan)
                                      : PlanAskedPositions(names, canonical, request, plan);

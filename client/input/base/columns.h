@@ -57,6 +57,7 @@ struct ColumnPlan {
   std::array<std::optional<std::size_t>, 3> velocities;
   std::optional<std::size_t> id;
   std::optional<std::size_t> volume;
+  std::string volume_name;  ///< Name of the column `volume`, for messages.
   /// If not 0, `volume` is a column of lengths: a volume is the square, in space the cube, of
   /// size_of_length times the length.
   double size_of_length = 0;

@@ -96,6 +96,7 @@ void ParticleRows::Begin(const ColumnPlan& plan) {
   }
   has_ids = plan.id.has_value();
   has_volumes = plan.volume.has_value();
+  volume_column = plan.volume_name;
   float32 = false;
   time.reset();
   step.reset();

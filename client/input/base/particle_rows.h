@@ -27,6 +27,7 @@ struct ParticleRows {
   std::array<bool, 3> has_velocity = {};
   bool has_ids = false;  ///< Becomes false at the first invalid id.
   bool has_volumes = false;
+  std::string volume_column;  ///< ColumnPlan::volume_name.
   bool float32 = false;
   std::optional<double> time;
   std::optional<double> step;  ///< Number of the time step.

@@ -13,6 +13,7 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 // A square of 20 x 20: on the left particles 2 apart, on the right 1 apart. `column` has their
@@ -159,10 +160,74 @@ TEST(SizedReplay, WrongSizesAreRefused) {
   };
   EXPECT_THAT(refusal({"--sizes", "own"}, 3), HasSubstr("a column volume, diameter or radius"));
   EXPECT_THAT(refusal({"--sizes", "large"}, 2), HasSubstr("equal or own"));
-  EXPECT_THAT(refusal({"--boundary", "grains"}, 3), HasSubstr("volumes"));
+  EXPECT_THAT(refusal({"--boundary", "grains"}, 3),
+              HasSubstr("a column volume, diameter or radius"));
   EXPECT_THAT(refusal({"--boundary", "smooth"}, 2), HasSubstr("bulk or grains"));
   EXPECT_THAT(refusal({"--sizes", "own", "--placement", "farthest-particle"}, 2),
               HasSubstr("--sizes"));
+}
+
+// A frame with a wrong size is refused if the user asked for own sizes, with the name of the column
+// and the particle.
+TEST(SizedReplay, AWrongSizeIsNamedByColumnAndParticle) {
+  const support::TemporaryFolder input;
+  ServerProgram server;
+  for (const std::string column : {"volume", "diameter", "radius"}) {
+    for (const std::string size : {"0", "nan", "-1", "40"}) {
+      std::ofstream file(input.Path("frame.csv"));
+      file << "x,y," << column << "\n";
+      for (int k = 0; k < 400; ++k) {
+        file << k % 20 + .5 << "," << k / 20 + .5 << "," << (k == 110 ? size : "1") << "\n";
+      }
+      file.close();
+      const auto error = [&](std::vector<std::string> flags) {
+        flags.insert(flags.begin(),
+                     {"replay", input.Path("frame.csv"), "--spacing", "1", "--sizes", "own"});
+        const Ran ran = RunPartiemc(flags);
+        // A volume of 40 is within the limits.
+        EXPECT_EQ(ran.exit_code, column == "volume" && size == "40" ? 0 : 3) << column << size;
+        return ran.exit_code == 0 ? "" : ran.error;
+      };
+      const std::string local = error({"--local", "--quiet"});
+      if (local.empty()) continue;
+      EXPECT_THAT(local, HasSubstr("refused: volume of particle 110 (counted from 0) at (10.5, "
+                                   "5.5), by column '" +
+                                   column + "': " + (size == "40" ? "" : size + ";")));
+      EXPECT_EQ(error({"--server", server.address(), "--quiet"}), local);
+    }
+  }
+}
+
+// Without own sizes, wrong volumes are ignored. The note is printed also with --quiet, because the
+// result differs from that with right volumes.
+TEST(SizedReplay, IgnoredVolumesAreReportedInQuiet) {
+  const support::TemporaryFolder input;
+  std::ofstream file(input.Path("frame.csv"));
+  file << "x,y,volume\n";
+  for (int k = 0; k < 400; ++k) {
+    file << k % 20 + .5 << "," << k / 20 + .5 << "," << (k == 110 ? 0 : 1) << "\n";
+  }
+  file.close();
+  const Ran ran =
+      RunPartiemc({"replay", input.Path("frame.csv"), "--local", "--spacing", "1", "--quiet"});
+  EXPECT_EQ(ran.exit_code, 0);
+  EXPECT_THAT(ran.error, AllOf(HasSubstr("volumes are ignored: volume of particle 110 "),
+                               HasSubstr("by column 'volume' is 0")));
+}
+
+TEST(SizedReplay, AWrongAttributeIsNamedByColumnAndParticle) {
+  const support::TemporaryFolder input;
+  std::ofstream file(input.Path("frame.csv"));
+  file << "x,y,p,u\n";
+  for (int k = 0; k < 400; ++k) {
+    file << k % 20 + .5 << "," << k / 20 + .5 << ",1," << (k == 7 ? "inf" : "1") << "\n";
+  }
+  file.close();
+  const Ran ran = RunPartiemc(
+      {"replay", input.Path("frame.csv"), "--local", "--spacing", "1", "--attributes", "p,u"});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error,
+              HasSubstr("attribute 'u' of particle 7 (counted from 0) at (7.5, 0.5): inf; must"));
 }
 
 }  // namespace
