@@ -217,7 +217,7 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
              "--periodic", flags.periodic,
              "Periodic axes of the results: a body that crosses the box is one body, and an "
              "outline or a surface that reaches its own image is cut at the box. Each frame has "
-             "the box of the LAMMPS dump, or --box")
+             "the box of the LAMMPS dump or extended XYZ, or --box")
           ->type_name("x,y,z")
           ->group(kGroup);
   app.add_option("--box", flags.box, "Bounds of the periodic box in world units")

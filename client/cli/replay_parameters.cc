@@ -72,10 +72,13 @@ absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& 
     }
     const auto axis = static_cast<std::size_t>(name[0] - 'x');
     if (!bounds) continue;
+    if (!bounds->is_periodic[axis] && !flags.box.empty()) {
+      return WrongFlag("--box", flags.box, "X0,X1,Y0,Y1,Z0,Z1, because --periodic has the axis z");
+    }
     if (!bounds->is_periodic[axis]) {
       return WrongFlag("--periodic", flags.periodic,
-                       Concat("axes of the box with periodic boundaries (pp); ", name,
-                              " is none. --box gives other bounds"));
+                       Concat("axes along which the box of the input is periodic; it is not along ",
+                              name, ". --box gives another box"));
     }
     box.axes[axis] = PeriodicAxis{bounds->low[axis], bounds->length[axis]};
   }

@@ -33,7 +33,7 @@ absl::Status CheckBox(const RecordedFrame& frame, const std::optional<PeriodicBo
   };
   if (!frame.box) return refuse("has no box for --periodic; give --box");
   if (frame.box->is_tilted) {
-    return refuse("its box is triclinic (xy xz yz); --periodic requires an orthogonal box");
+    return refuse("its box is triclinic; --periodic requires an orthogonal box");
   }
   for (std::size_t k = 0; of_stream && k < of_stream->axes.size(); ++k) {
     if (of_stream->axes[k] && !frame.box->is_periodic[k]) {

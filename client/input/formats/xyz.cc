@@ -1,5 +1,9 @@
 // XYZ text: for each frame a count, a line of comment, then lines of "type x y z". In extended
-// XYZ the comment holds KEY=VALUE pairs and describes the columns: Properties=species:S:1:pos:R:3.
+// XYZ the comment holds KEY=VALUE pairs. Properties=species:S:1:pos:R:3 describes the columns,
+// Lattice="9 0 0 0 9 0 0 0 9" the edges of the box.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "client/input/base/byte_source.h"
@@ -12,6 +16,10 @@ namespace partiemc::client::input {
 namespace {
 
 constexpr std::size_t kMaxXyzColumns = 4096;
+
+// An edge is parallel to an axis if its other components are at most this share of the longest
+// edge. Programs that rotate boxes leave rounding errors of about 1e-16.
+constexpr double kTiltTolerance = 1e-9;
 
 class XyzReader final : public FrameReader {
  public:
@@ -27,6 +35,7 @@ class XyzReader final : public FrameReader {
       rows->Begin(plan_);
       rows->time = ValueOf(comment_, "Time=");
       rows->step = ValueOf(comment_, "Timestep: ");
+      rows->box = BoxOfComment();
       rows->source = Concat(stream_->path(), ", frame ", frame_);
     }
     std::string_view line;
@@ -135,6 +144,42 @@ class XyzReader final : public FrameReader {
 
   static std::optional<double> ValueOf(std::string_view comment, std::string_view key) {
     return ParseNumber(Value(comment, key));
+  }
+
+  // The box by Lattice="..." (nine numbers, edge after edge), Origin="..." (by default 0) and
+  // pbc="T T F" (by default all axes). Empty without nine numbers.
+  std::optional<RecordedBox> BoxOfComment() {
+    const auto edges = NumbersOf<9>("Lattice=");
+    if (!edges) return std::nullopt;
+    RecordedBox box{.low = NumbersOf<3>("Origin=").value_or(std::array<double, 3>{})};
+    const auto longest = std::abs(*std::ranges::max_element(
+        *edges, {}, [](double component) { return std::abs(component); }));
+    SplitAtBlanks(Value(comment_, "pbc="), cells_);
+    for (std::size_t k = 0; k < 9; ++k) {
+      const std::size_t axis = k / 3;
+      if (k % 3 != axis) {
+        box.is_tilted = box.is_tilted || std::abs((*edges)[k]) > kTiltTolerance * longest;
+        continue;
+      }
+      box.length[axis] = (*edges)[k];
+      constexpr std::string_view kYes = "Tt1";
+      box.is_periodic[axis] = cells_.size() != 3 || kYes.find(cells_[axis].front()) != kYes.npos;
+    }
+    return box;
+  }
+
+  // The `count` finite numbers after `key` in the comment. Empty for anything else.
+  template <std::size_t count>
+  std::optional<std::array<double, count>> NumbersOf(std::string_view key) {
+    SplitAtBlanks(Value(comment_, key), cells_);
+    if (cells_.size() != count) return std::nullopt;
+    std::array<double, count> numbers;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto number = ParseNumber(cells_[k]);
+      if (!number || !std::isfinite(*number)) return std::nullopt;
+      numbers[k] = *number;
+    }
+    return numbers;
   }
 
   std::unique_ptr<InputStream> stream_;

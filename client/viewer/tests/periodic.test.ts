@@ -47,6 +47,18 @@ test('a box has the axes of the picture, in space all three', async () => {
   assert.deepEqual(numbersOf((await source.frame(1)).box), [[-1, 9], null, [-1, 9]]);
 });
 
+test('the lattice of extended XYZ is a box', async () => {
+  const xyz = (comment: string) => new File([`2\n${comment}\nA .5 .25 0\nA .25 .5 0\n`], 'a.xyz');
+  const lattice = 'Lattice="10 1e-15 0 0 9 0 0 0 1"';
+  assert.ok((await inspectFiles([xyz(lattice)])).facts.hasBox);
+  const boxOf = async (comment: string) => numbersOf((await openDropped([xyz(comment)], options({ periodic: 'x,y' }))).box);
+  assert.deepEqual(await boxOf(lattice), [[0, 10], [0, 9], null]);
+  assert.deepEqual(await boxOf(`pbc="T T F" Origin="-1 2 0" ${lattice}`), [[-1, 10], [2, 9], null]);
+  await assert.rejects(boxOf(`${lattice} pbc="F T F"`), /no periodic boundary along x/);
+  await assert.rejects(boxOf('Lattice="10 0 0 1 9 0 0 0 1"'), /triclinic/);
+  await assert.rejects(boxOf('Lattice="10 0 0"'), /has no box/);
+});
+
 test('boxes that do not fit are refused', async () => {
   const refused = (dump: File, periodic: string, text: RegExp) => assert.rejects(openDropped([dump], options({ periodic })),
     (error) => error instanceof FieldError && error.field === 'periodic' && text.test(error.message));

@@ -156,14 +156,55 @@ TEST(PeriodicReplay, WrongBoxesAreRefused) {
   };
   const std::string plain = "pp pp pp\n-10 20\n5 25\n-1 1\n";
   EXPECT_THAT(refusal("pp ff pp\n-10 20\n5 25\n-1 1\n", {"--periodic", "x,y"}, 2),
-              HasSubstr("y is none"));
+              HasSubstr("it is not along y"));
   EXPECT_THAT(refusal("xy xz yz pp pp pp\n-10 20 1\n5 25 0\n-1 1 0\n", {"--periodic", "x"}, 3),
               HasSubstr("triclinic"));
   EXPECT_THAT(refusal(plain, {"--periodic", "z"}, 2), HasSubstr("--surface"));
   EXPECT_THAT(refusal(plain, {"--periodic", "x", "--box", "0,9"}, 2), HasSubstr("X0,X1,Y0,Y1"));
+  EXPECT_THAT(refusal(plain, {"--surface", "--periodic", "x,z", "--box", "0,9,0,9"}, 2),
+              HasSubstr("--box: '0,9,0,9'; must be X0,X1,Y0,Y1,Z0,Z1"));
   EXPECT_THAT(refusal(plain, {"--periodic", "x", "--box", "0,9,0,9"}, 2),
               HasSubstr("four kernel radii"));
   EXPECT_THAT(refusal(plain, {"--box", "0,30,0,30"}, 2), HasSubstr("--periodic"));
+}
+
+// A disc across the corner of the box of an extended XYZ file.
+TEST(PeriodicReplay, LatticesOfExtendedXyzAreBoxes) {
+  const support::TemporaryFolder folder;
+  const std::string xyz = folder.Path("disc.xyz");
+  std::string atoms;
+  int count = 0;
+  for (int i = -6; i <= 6; ++i) {
+    for (int j = -6; j <= 6; ++j) {
+      if (i * i + j * j > 36) continue;
+      ++count;
+      atoms += "A " + std::to_string((i + 30) % 30) + " " + std::to_string((j + 30) % 30) + " 0\n";
+    }
+  }
+  const auto write = [&](const std::string& comment) {
+    std::ofstream(xyz) << count << "\n" << comment << "\n" << atoms;
+  };
+  write("Lattice=\"30 0 0 0 30 0 0 0 1\" Properties=species:S:1:pos:R:3");
+  EXPECT_THAT(Replayed(xyz, {"--local"}).rings, ElementsAre("4"));
+  const Columns whole = Replayed(xyz, {"--local", "--periodic", "x,y"});
+  EXPECT_THAT(whole.rings, ElementsAre("1"));
+  EXPECT_EQ(Replayed(xyz, {"--local", "--periodic", "x,y", "--box", "0,30,0,30"}).digest,
+            whole.digest);
+  // A recording keeps the box.
+  const std::string recording = folder.Path("disc.pemc");
+  ASSERT_EQ(RunPartiemc({"convert", xyz, recording}).exit_code, 0);
+  EXPECT_EQ(Replayed(recording, {"--local", "--periodic", "x,y"}).digest, whole.digest);
+
+  const auto refusal = [&](const std::string& comment, int exit_code) {
+    write(comment);
+    const Ran ran = RunPartiemc({"replay", xyz, "--local", "--spacing", "1", "--periodic", "x,y"});
+    EXPECT_EQ(ran.exit_code, exit_code) << ran.error;
+    return ran.error;
+  };
+  EXPECT_THAT(refusal("Lattice=\"30 0 0 9 30 0 0 0 1\"", 3), HasSubstr("triclinic"));
+  EXPECT_THAT(refusal("Lattice=\"30 0 0 0 30 0 0 0 1\" pbc=\"T F F\"", 2),
+              HasSubstr("it is not along y"));
+  EXPECT_THAT(refusal("Lattice=\"30 0 0 0 30 0\"", 3), HasSubstr("no box for --periodic"));
 }
 
 TEST(PeriodicReplay, LaterBoxesWithoutThePeriodicAxisAreRefused) {

@@ -65,6 +65,28 @@ TEST(Xyz, ExtendedXyzDescribesItsColumnsAndItsTime) {
   EXPECT_EQ(read.frames[1].time, 0.5);
 }
 
+TEST(Xyz, LatticesAreBoxes) {
+  const support::TemporaryFolder directory;
+  const auto box = [&](const std::string& comment) {
+    return ReadOne(directory.Write("a.xyz", "1\n" + comment + "\nA 1 2 0\n")).box;
+  };
+  const std::string lattice = "Lattice=\"9 0 0 0 8 0 0 0 1\"";
+  const RecordedBox whole{.low = {0, 0}, .length = {9, 8}, .is_periodic = {true, true}};
+  EXPECT_EQ(box(lattice), whole);
+  EXPECT_EQ(box("pbc=\"T T F\" " + lattice), whole);
+  EXPECT_EQ(box("Lattice=\"9 1e-15 0 -1e-15 8 0 0 0 1\""), whole) << "rounding errors";
+  RecordedBox other = whole;
+  other.low = {-4, 3};
+  other.is_periodic[0] = false;
+  EXPECT_EQ(box(lattice + " Origin=\"-4 3 0\" pbc=\"F T F\""), other);
+  EXPECT_TRUE(box("Lattice=\"9 0 0 1 8 0 0 0 1\"").value().is_tilted);
+  EXPECT_TRUE(box("Lattice=\"0 9 0 8 0 0 0 0 1\"").value().is_tilted);
+  for (const std::string wrong : {"", "Lattice=\"9 0 0 0 8 0\"", "Lattice=9",
+                                  "Lattice=\"9 0 0 0 8 0 0 0 nan\"", "Lattice=\"a b c\""}) {
+    EXPECT_EQ(box(wrong), std::nullopt) << wrong;
+  }
+}
+
 TEST(Xyz, TheTimestepOfLammpsIsTheStep) {
   const support::TemporaryFolder directory;
   const RecordedFrame frame =

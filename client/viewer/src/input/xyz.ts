@@ -1,5 +1,6 @@
 // XYZ text: a count, a line of comment, then lines of "type x y z"; frame after frame. In extended XYZ
-// the comment describes the columns: Properties=species:S:1:pos:R:3 Time=0.5.
+// the comment describes the columns and the box: Properties=species:S:1:pos:R:3 Lattice="9 0 0 0 9 0 0 0 9" Time=0.5.
+import type { RecordedBox } from './periodic';
 import { TextRows } from './rows';
 import { InputError } from './source';
 import { splitAtBlanks } from './table';
@@ -7,6 +8,9 @@ import type { FrameTable, TableReader } from './table_source';
 
 const PLAIN_COLUMNS = ['type', 'x', 'y', 'z'];
 const MOST_COLUMNS = 4096;
+
+/** An edge is parallel to an axis if its other components are at most this share of the longest edge. */
+const TILT_TOLERANCE = 1e-9;
 
 /** Whether a file is XYZ text: its first line is a count, and its extension or a comment of LAMMPS says so. */
 export function isXyz(head: string, extension: string): boolean {
@@ -37,6 +41,26 @@ function namesOf(properties: string, where: string): string[] {
 
 function refuse(properties: string, where: string): never {
   throw new InputError(`${where}: Properties=${properties} must list NAME:TYPE:COLUMNS.`);
+}
+
+/** The finite numbers after `key` in a comment. Undefined for anything other than `count` of them. */
+function numbersOf(comment: string, key: string, count: number): number[] | undefined {
+  const numbers = splitAtBlanks(valueOf(comment, key)).map(Number);
+  return numbers.length === count && numbers.every(Number.isFinite) ? numbers : undefined;
+}
+
+/** The box by Lattice="..." (edge after edge), Origin="..." (by default 0) and pbc="T T F" (by default all axes). */
+function boxOf(comment: string): RecordedBox | undefined {
+  const edges = numbersOf(comment, 'Lattice=', 9);
+  if (!edges) return undefined;
+  const origin = numbersOf(comment, 'Origin=', 3) ?? [0, 0, 0];
+  const pbc = splitAtBlanks(valueOf(comment, 'pbc='));
+  const longest = Math.max(...edges.map(Math.abs));
+  return {
+    axes: [0, 1, 2].map((k) =>
+      pbc.length !== 3 || /^[Tt1]/.test(pbc[k]) ? { origin: origin[k], length: edges[4 * k] } : undefined),
+    isTilted: edges.some((part, k) => k % 4 !== 0 && Math.abs(part) > TILT_TOLERANCE * longest),
+  };
 }
 
 export class XyzReader implements TableReader {
@@ -82,7 +106,7 @@ export class XyzReader implements TableReader {
     const time = valueOf(comment, 'Time=');
     return {
       names, columnCount: names.length, rows: new TextRows(rows, name), index, name,
-      time: time !== '' && Number.isFinite(Number(time)) ? Number(time) : null,
+      time: time !== '' && Number.isFinite(Number(time)) ? Number(time) : null, box: boxOf(comment),
     };
   }
 }
