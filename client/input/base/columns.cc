@@ -224,8 +224,8 @@ absl::Status PlanAttributes(const Names& names, const Names& canonical,
       columns = {*column};
     }
     if (columns.empty()) {
-      return absl::FailedPreconditionError(Concat(
-          "there is no column '", asked, "' for --attributes; the columns are ", List(names)));
+      return absl::FailedPreconditionError(
+          Concat("there is no column '", asked, "'; the columns are ", List(names)));
     }
     plan.attributes.push_back({asked, std::move(columns)});
   }

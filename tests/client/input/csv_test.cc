@@ -141,7 +141,7 @@ TEST(Csv, ItsSelectionHoldsForAttributesToo) {
 TEST(Csv, AMissingAttributeIsToldWithTheColumnsThereAre) {
   ExpectRefused(CsvRefusal("x,y,p\n1,2,3\n", {.attributes = {"density"}}),
                 absl::StatusCode::kFailedPrecondition,
-                {"frame.csv", "'density'", "--attributes", "x,y,p"});
+                {"frame.csv", "no column 'density'", "x,y,p"});
   ExpectRefused(CsvRefusal("x,y,p\n1,2,3\n", {.attributes = {"velocity"}}),
                 absl::StatusCode::kFailedPrecondition, {"'velocity'"});
   ExpectRefused(CsvRefusal("x,y,p\n1,2,high\n", {.attributes = {"p"}}), absl::StatusCode::kDataLoss,
