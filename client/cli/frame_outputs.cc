@@ -31,7 +31,8 @@ void AddStatisticsFlags(CLI::App& app, FrameOutputs::Places& places, const std::
   }
   CLI::Option* const stats =
       app.add_option("--stats", places.stats,
-                     "Statistics of every frame, as CSV or JSON by extension")
+                     "Statistics of every frame, as CSV or JSON by extension. Sections of surfaces "
+                     "have a second file: FILE_sections.csv for FILE.csv")
           ->type_name("FILE")
           ->group(group);
   app.add_option("--gauge", places.gauges,
@@ -55,6 +56,16 @@ std::string_view FormatOf(const FrameOutputs::Places& places) {
 StatisticsOf StatisticsFor(const FrameOutputs::Places& places) {
   if (places.surface) return StatisticsOf::kSurfaces;
   return places.walls ? StatisticsOf::kOutlinesAtWalls : StatisticsOf::kOutlines;
+}
+
+// The file of statistics of the sections of surfaces: "FILE_sections.csv" for "FILE.csv". Their
+// columns differ from those of surfaces. Sections of outlines have rows in the file of the
+// outlines.
+std::optional<std::string> SectionStatistics(const FrameOutputs::Places& places) {
+  if (places.stats.empty() || !places.surface || !places.sections) return std::nullopt;
+  std::filesystem::path path = places.stats;
+  const std::string extension = path.extension().string();
+  return path.replace_extension().string() + "_sections" + extension;
 }
 
 absl::Status CheckSurfaces(const FrameOutputs::Places& places,
@@ -93,6 +104,7 @@ absl::Status FrameOutputs::Check(const Places& places) {
 std::vector<std::string> FrameOutputs::Targets(const Places& places) {
   std::vector<std::string> targets;
   if (!places.stats.empty()) targets.push_back(places.stats);
+  if (auto stats = SectionStatistics(places)) targets.push_back(*std::move(stats));
   if (places.output_dir.empty()) return targets;
   const std::vector<FrameFormat> formats = *ParseFrameFormats(FormatOf(places));
   std::error_code error;
@@ -126,6 +138,11 @@ absl::StatusOr<FrameOutputs> FrameOutputs::Create(const Places& places) {
     if (!statistics.ok()) return statistics.status();
     outputs.statistics_.emplace(*std::move(statistics));
   }
+  if (const auto stats = SectionStatistics(places)) {
+    auto statistics = StatisticsWriter::Create(*stats);
+    if (!statistics.ok()) return statistics.status();
+    outputs.section_statistics_.emplace(*std::move(statistics));
+  }
   return outputs;
 }
 
@@ -134,13 +151,17 @@ absl::Status FrameOutputs::Write(const FrameRecord& frame) {
   absl::Status status;
   if (frames_) status = frames_->Write(frame);
   if (status.ok() && statistics_) status = statistics_->Add(frame);
+  for (std::size_t k = 0; section_statistics_ && k < frame.result.sections.size(); ++k) {
+    if (status.ok()) status = section_statistics_->Add(SectionOf(frame, k));
+  }
   return status;
 }
 
 absl::Status FrameOutputs::Finish() {
-  const absl::Status listed = frames_ ? frames_->Finish() : absl::OkStatus();
-  const absl::Status counted = statistics_ ? statistics_->Finish() : absl::OkStatus();
-  return listed.ok() ? counted : listed;
+  absl::Status status = frames_ ? frames_->Finish() : absl::OkStatus();
+  if (statistics_) status.Update(statistics_->Finish());
+  if (section_statistics_) status.Update(section_statistics_->Finish());
+  return status;
 }
 
 }  // namespace partiemc::client

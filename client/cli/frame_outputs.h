@@ -32,6 +32,7 @@ class FrameOutputs {
     bool compress_glb = false;
     bool surface = false;                  ///< The frames are surfaces in space.
     bool walls = false;                    ///< The stream has walls.
+    bool sections = false;                 ///< The stream has sections.
     std::vector<std::string> gauges = {};  ///< "NAME=KIND:NUMBERS" (partiemc/gauges.h).
   };
 
@@ -43,7 +44,7 @@ class FrameOutputs {
   /// writable, the first Write fails. Errors: as Check and AtomicFile.
   static absl::StatusOr<FrameOutputs> Create(const Places& places);
 
-  /// The file of statistics, and the files in the output directory that frames can replace.
+  /// The files of statistics, and the files in the output directory that frames can replace.
   /// Requires: Check(places) is OK.
   static std::vector<std::string> Targets(const Places& places);
 
@@ -64,6 +65,7 @@ class FrameOutputs {
   std::optional<FrameWriter> frames_;
   bool show_normals_ = false;
   std::optional<StatisticsWriter> statistics_;
+  std::optional<StatisticsWriter> section_statistics_;  // Of the sections of surfaces.
   Summary summary_;
 };
 

@@ -331,6 +331,7 @@ int Watch(const WatchFlags& flags) {
   }
   places.surface = (*watcher)->stream().parameters.output == Output::kSurface;
   const ReconstructionParameters& parameters = (*watcher)->stream().parameters;
+  places.sections = !parameters.sections.empty();
   places.walls = !parameters.walls.empty() || !parameters.wall_phases.empty();
   auto outputs = FrameOutputs::Create(places);
   if (!outputs.ok()) {

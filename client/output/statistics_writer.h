@@ -43,7 +43,7 @@ enum class StatisticsOf : std::uint8_t {
 ///
 /// The columns of surfaces in order: frame, particles, bodies, cavities, points, triangles, genus,
 /// area, volume, milliseconds, dropped_cavities, dropped_components, dropped_spray, surface_digest,
-/// time, doubts. Sections of a surface have no rows.
+/// time, doubts. Sections of a surface have no rows; they fit a file of outlines (SectionOf).
 ///
 /// `genus` counts the handles of bodies and cavities. `volume` is the volume of bodies minus their
 /// cavities. `area` is the sum over bodies and cavities.

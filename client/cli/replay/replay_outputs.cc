@@ -10,8 +10,10 @@ namespace partiemc::client {
 
 namespace {
 
-FrameOutputs::Places PlacesOf(const ReplayFlags& flags) {
+FrameOutputs::Places PlacesOf(const ReplayFlags& flags,
+                              const ReconstructionParameters& parameters) {
   FrameOutputs::Places places = flags.files;
+  places.sections = !parameters.sections.empty();
   places.surface = flags.surface;
   places.walls = !flags.walls.empty();
   return places;
@@ -22,7 +24,7 @@ FrameOutputs::Places PlacesOf(const ReplayFlags& flags) {
 absl::StatusOr<ReplayOutputs> ReplayOutputs::Create(const ReplayFlags& flags,
                                                     const ReconstructionParameters& parameters,
                                                     const Sequence& input) {
-  const FrameOutputs::Places places = PlacesOf(flags);
+  const FrameOutputs::Places places = PlacesOf(flags, parameters);
   if (absl::Status status = FrameOutputs::Check(places); !status.ok()) return status;
   std::vector<std::string> targets = FrameOutputs::Targets(places);
   if (!flags.report.empty()) targets.push_back(flags.report);

@@ -56,12 +56,16 @@ TEST(SurfaceReplay, WritesFilesStatisticsAndOutlinesOnPlanes) {
   EXPECT_THAT(Column(stats, "bodies"), ElementsAre("2", "2"));
   EXPECT_THAT(Column(stats, "genus"), ElementsAre("0", "0"));
   EXPECT_THAT(Column(stats, "particles"), ElementsAre("778", "778"));
-  EXPECT_THAT(
-      FilesIn(output.path()),
-      ElementsAre("files/frame_000000.ply", "files/frame_000000.stl",
-                  "files/frame_000000_section_1.ply", "files/frame_000000_section_1.stl",
-                  "files/frame_000001.ply", "files/frame_000001.stl",
-                  "files/frame_000001_section_1.ply", "files/frame_000001_section_1.stl", "s.csv"));
+  EXPECT_THAT(FilesIn(output.path()),
+              ElementsAre("files/frame_000000.ply", "files/frame_000000.stl",
+                          "files/frame_000000_section_1.ply", "files/frame_000000_section_1.stl",
+                          "files/frame_000001.ply", "files/frame_000001.stl",
+                          "files/frame_000001_section_1.ply", "files/frame_000001_section_1.stl",
+                          "s.csv", "s_sections.csv"));
+  const std::string of_sections = Content(output.Path("s_sections.csv"));
+  EXPECT_THAT(Column(of_sections, "frame"), ElementsAre("0", "1"));
+  EXPECT_THAT(Column(of_sections, "section"), ElementsAre("1", "1"));
+  EXPECT_THAT(Column(of_sections, "polylines"), ElementsAre("2", "2"));
   const std::string ply = Content(output.Path("files/frame_000001.ply"));
   EXPECT_THAT(ply, StartsWith("ply\nformat binary_little_endian 1.0\n"));
   EXPECT_THAT(ply.substr(0, 600), HasSubstr("property float p\n"));
