@@ -87,26 +87,6 @@ absl::Status SetBox(const ReplayFlags& flags, const std::optional<RecordedBox>& 
   return absl::OkStatus();
 }
 
-// Parses --slice. Empty if the text is neither x=C, y=C or z=C nor six numbers.
-std::optional<SlicePlane> SliceOf(std::string_view text) {
-  if (text.size() > 2 && text[1] == '=' && text[0] >= 'x' && text[0] <= 'z') {
-    const auto at = Number(text.substr(2));
-    if (!at) return std::nullopt;
-    const auto axis = static_cast<std::size_t>(text[0] - 'x');
-    SlicePlane slice{.normal = {}};
-    slice.origin[axis] = *at;
-    // With this sign of the normal, the picture has the two other axes in alphabetical order.
-    slice.normal[axis] = axis == 1 ? -1 : 1;
-    return slice;
-  }
-  const std::vector<double> numbers = Numbers(text);
-  if (numbers.size() != 6) return std::nullopt;
-  SlicePlane slice;
-  std::copy_n(numbers.begin(), 3, slice.origin.begin());
-  std::copy_n(numbers.begin() + 3, 3, slice.normal.begin());
-  return slice;
-}
-
 // The name in "NAME=1,2"; empty without one.
 std::string AttributeOf(std::string_view text) {
   const std::size_t end = text.find('=');
@@ -200,6 +180,25 @@ absl::Status AddSections(const ReplayFlags& flags, ReconstructionParameters& par
 }
 
 }  // namespace
+
+std::optional<SlicePlane> SliceOf(std::string_view text) {
+  if (text.size() > 2 && text[1] == '=' && text[0] >= 'x' && text[0] <= 'z') {
+    const auto at = Number(text.substr(2));
+    if (!at) return std::nullopt;
+    const auto axis = static_cast<std::size_t>(text[0] - 'x');
+    SlicePlane slice{.normal = {}};
+    slice.origin[axis] = *at;
+    // With this sign of the normal, the picture has the two other axes in alphabetical order.
+    slice.normal[axis] = axis == 1 ? -1 : 1;
+    return slice;
+  }
+  const std::vector<double> numbers = Numbers(text);
+  if (numbers.size() != 6) return std::nullopt;
+  SlicePlane slice;
+  std::copy_n(numbers.begin(), 3, slice.origin.begin());
+  std::copy_n(numbers.begin() + 3, 3, slice.normal.begin());
+  return slice;
+}
 
 std::optional<double> PositiveNumber(std::string_view text) {
   const auto value = Number(text);

@@ -28,6 +28,10 @@ absl::StatusOr<ReconstructionParameters> ParametersOf(
     const ReplayFlags& flags, std::optional<double> spacing,
     const std::optional<RecordedBox>& recorded_box = std::nullopt);
 
+/// The plane of one --slice: x=C, y=C, z=C, or a point and a normal, six numbers. Empty for any
+/// other text.
+std::optional<SlicePlane> SliceOf(std::string_view text);
+
 /// Frames per second of `--rate`; absent for "max". Errors: INVALID_ARGUMENT.
 absl::StatusOr<std::optional<double>> RateOf(std::string_view text);
 

@@ -12,6 +12,7 @@
 #include "client/cli/replay/frame_feeder.h"
 #include "client/cli/replay/looped_input.h"
 #include "client/cli/replay/missing_phases.h"
+#include "client/cli/replay/particle_places.h"
 #include "client/cli/replay/refusal_text.h"
 #include "client/cli/replay/replay_outputs.h"
 #include "client/cli/replay_parameters.h"
@@ -89,7 +90,8 @@ class Receiver {
         outputs_(outputs),
         progress_(progress),
         sections_in_plane_(SectionsInPlane(stream.info().parameters)),
-        missing_phases_(stream.info().parameters) {}
+        missing_phases_(stream.info().parameters),
+        particle_places_(flags, stream.info().parameters) {}
 
   /// kGood at the end of the stream, when every frame has a response.
   ReplayEnd Run() {
@@ -110,6 +112,7 @@ class Receiver {
   std::uint64_t answered() const { return answered_; }
   std::uint64_t failed_checks() const { return failed_checks_; }
   const MissingPhases& missing_phases() const { return missing_phases_; }
+  const ParticlePlaces& particle_places() const { return particle_places_; }
 
  private:
   absl::Status Take() {
@@ -123,6 +126,7 @@ class Receiver {
     }
     std::unique_ptr<RecordedFrame> frame = feeder_.TakeAnswered();
     missing_phases_.Remove(*frame);
+    particle_places_.Add(*frame);
     absl::Status status;
     if (event_.kind == Event::Kind::kRefusal) {
       Refuse(frame->source, RefusalText(*frame, flags_.sequence.attributes, event_.message));
@@ -234,6 +238,7 @@ class Receiver {
   Progress& progress_;
   const std::vector<std::size_t> sections_in_plane_;
   MissingPhases missing_phases_;
+  ParticlePlaces particle_places_;
   Event event_;
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
@@ -254,12 +259,11 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   ExitCode code = kGood;
   for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
   for (const std::string& warning : receiver.missing_phases().Warnings()) Complain(kGood, warning);
+  const std::vector<std::string> of_places = receiver.particle_places().Warnings();
+  for (const std::string& warning : of_places) Complain(kGood, warning);
   if (summary.is_empty()) {
-    const bool has_walls = !flags.walls.empty() || !flags.wall_planes.empty();
     Complain(kGood, Concat("no frame has ", flags.surface ? "a body" : "an outline",
-                           has_walls ? "; are the particles behind a wall? The fluid is on the "
-                                       "left of --wall, and above --wall-plane without `below`"
-                                     : "; is --spacing right?"));
+                           of_places.empty() ? "; is --spacing right?" : ""));
   }
   if (summary.refused_count() > 0 && !flags.keep_going) {
     Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),

@@ -115,6 +115,27 @@ TEST(SurfaceReplay, DropsSmallBodiesOnRequest) {
   EXPECT_GT(size_with("0"), 10 * size_with("1000"));
 }
 
+TEST(SurfaceReplay, PlanesBesideTheParticlesAreTold) {
+  const support::TemporaryFolder input;
+  WriteBalls(input);
+  const auto error = [&](std::vector<std::string> flags) {
+    flags.insert(flags.begin(),
+                 {"replay", input.path().string(), "--local", "--quiet", "--spacing", "1"});
+    const Ran ran = RunPartiemc(flags);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return ran.error;
+  };
+  EXPECT_EQ(error({"--slice", "z=7"}),
+            "partiemc: --slice z=7: the plane meets no particle; along z it is at 7, and the "
+            "particles are from -4 to 4\npartiemc: no frame has an outline\n");
+  // A surface has its bodies nevertheless. In both frames together, x goes from -4 to 16.3.
+  EXPECT_EQ(error({"--surface", "--slice", "z=0", "--slice", "x=-6"}),
+            "partiemc: --slice x=-6: the plane meets no particle; along x it is at -6, and the "
+            "particles are from -4 to 16.3\n");
+  EXPECT_THAT(error({"--slice", "0,0,9,1,0,1"}), Not(HasSubstr("meets no particle")));
+  EXPECT_THAT(error({"--slice", "0,0,-9,1,0,1"}), HasSubstr("along its normal it is at -6.364"));
+}
+
 TEST(SurfaceReplay, TellsWhatItRequires) {
   const support::TemporaryFolder input;
   WriteBalls(input);

@@ -11,7 +11,9 @@
 namespace partiemc::client {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 // A column of 20 x 15 particles in the left corner of a tank.
@@ -158,7 +160,38 @@ TEST(WallsReplay, WallsThatLeaveNothingAreTold) {
   const Ran ran = RunPartiemc({"replay", folder.Path("column.csv"), "--local", "--spacing", "1",
                                "--check", "--wall", "0,0,0,20,10,20,10,0"});  // Clockwise.
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
-  EXPECT_THAT(ran.error, HasSubstr("no frame has an outline; are the particles behind a wall?"));
+  EXPECT_THAT(ran.error,
+              AllOf(HasSubstr("column.csv: all particles are behind a wall (--wall number 1)"),
+                    HasSubstr("no frame has an outline\n")));
+}
+
+TEST(WallsReplay, WallsBeforeMostParticlesAreTold) {
+  const support::TemporaryFolder folder;
+  std::ofstream file(folder.Path("column.csv"));
+  std::ofstream block(folder.Path("block.csv"));
+  file << "x,y\n";
+  block << "x,y,z\n";
+  for (int k = 0; k < 400; ++k) file << k % 20 + .5 << "," << k / 20 + .5 << "\n";
+  for (int k = 0; k < 512; ++k) {
+    block << k % 8 + .5 << "," << k / 8 % 8 + .5 << "," << k / 64 + .5 << "\n";
+  }
+  file.close();
+  block.close();
+  const auto error = [&](const std::string& name, std::vector<std::string> flags) {
+    flags.insert(flags.end(), {"--local", "--quiet"});
+    const Ran ran = RanReplay(folder.Path(name), flags);
+    EXPECT_EQ(ran.exit_code, 0) << ran.error;
+    return ran.error;
+  };
+  // Clockwise, so an obstacle, from the height 8: twelve of twenty rows are in it.
+  EXPECT_THAT(error("column.csv", {"--wall", "0,0,1,0", "--wall", "0,8,0,20,20,20,20,8"}),
+              HasSubstr("most particles are behind a wall (--wall number 2), so they are not"));
+  EXPECT_THAT(error("column.csv", {"--wall", "0,8,20,8,20,20,0,20"}), IsEmpty());
+  EXPECT_THAT(error("column.csv", {"--wall", "20,12,0,12"}), IsEmpty());
+  EXPECT_THAT(error("column.csv", {"--wall", "20,8,0,8"}), HasSubstr("--wall number 1"));
+  EXPECT_THAT(error("block.csv", {"--surface", "--wall-plane", "z=5"}),
+              HasSubstr("most particles are behind a wall (--wall-plane number 1)"));
+  EXPECT_THAT(error("block.csv", {"--surface", "--wall-plane", "z=5,below"}), IsEmpty());
 }
 
 TEST(WallsReplay, WallsOfNoParticleAreReported) {
