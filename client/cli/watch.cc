@@ -150,7 +150,13 @@ void CompleteRecording(WatchFlags& flags, bool has_mode) {
         Concat("--record: with --mode ", flags.mode, "; requires --mode every"));
   }
   flags.mode = "every";
-  if (flags.from.empty()) flags.from = kOldest;
+}
+
+// Begins with the oldest frame if the user wants all frames of a recording, or of a stream that
+// starts: its first frames can be sent before the search finds it.
+void CompleteFrom(WatchFlags& flags) {
+  const bool wants_all = !flags.record.empty() || (flags.wait && flags.mode == "every");
+  if (wants_all && flags.from.empty()) flags.from = kOldest;
 }
 
 absl::StatusOr<std::unique_ptr<Watcher>> OpenWatcher(const WatchFlags& flags) {
@@ -295,7 +301,9 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
                    "of FILE.pemc has the same bits. "
                    "Sets --mode every and, unless --from is given, --from oldest")
       ->type_name("FILE");
-  verb->add_flag("--wait", flags.wait, "Wait for the stream to start, until Ctrl-C");
+  verb->add_flag("--wait", flags.wait,
+                 "Wait for the stream to start, until Ctrl-C. With --mode every, begins with the "
+                 "oldest frame unless --from is given");
   verb->add_flag("--quiet", flags.quiet, "No progress and no table");
   verb->footer(
       "A watcher never slows the stream. A watcher that joins late receives the newest frame at\n"
@@ -311,7 +319,10 @@ CLI::App* AddWatch(CLI::App& app, WatchFlags& flags) {
       "  partiemc watch dam-break --wait --record dam.pemc\n"
       "  partiemc watch tank --max-triangles 20000 --output-dir out\n"
       "Exit codes: 0 good, 1 failed, 2 wrong usage, 4 server or its stream, 130 interrupted.");
-  verb->parse_complete_callback([&flags, mode] { CompleteRecording(flags, mode->count() > 0); });
+  verb->parse_complete_callback([&flags, mode] {
+    CompleteRecording(flags, mode->count() > 0);
+    CompleteFrom(flags);
+  });
   return verb;
 }
 

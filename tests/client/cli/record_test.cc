@@ -237,6 +237,17 @@ TEST_F(Record, WaitsForTheStreamToStart) {
   EXPECT_THAT(watch.Out(), HasSubstr("recorded: 40 frames;"));
 }
 
+TEST_F(Record, WaitForEveryFrameBeginsWithTheFirst) {
+  Program watch(PARTIEMC_PROGRAM, {"watch", "block", "--server", server_.address(), "--wait",
+                                   "--mode", "every", "--stats", Path("seen.csv")});
+  // After some searches the pause before the next one is long enough for several frames.
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  Program producer(PARTIEMC_PROGRAM, Producer({"--rate", "40"}));
+  EXPECT_EQ(watch.Wait(), 0) << watch.Error();
+  EXPECT_EQ(producer.Wait(), 0) << producer.Error();
+  EXPECT_EQ(Digests(Content(Path("seen.csv"))), Digests(Content(Path("made.csv"))));
+}
+
 TEST_F(Record, WaitEndsByCtrlC) {
   Program watch(PARTIEMC_PROGRAM, {"watch", "block", "--server", server_.address(), "--wait"});
   for (int k = 0; k < 1000 && watch.Running() && watch.Error().empty(); ++k) {
