@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cstdint>
+
 #include "client/output/formats/file_mesh.h"
 #include "client/output/formats/formats.h"
 #include "client/output/text.h"
@@ -44,7 +47,8 @@ void AppendFace(std::string& out, const Surface& surface, std::size_t triangle) 
   out += '\n';
 }
 
-/// A group for each body. Cut triangles also belong to the group `cut`.
+/// A group for each body. Bodies of a stream also belong to the group identity_N, which has the
+/// same number N in each frame. Cut triangles also belong to the group `cut`.
 void AppendBodies(std::string& out, const Surface& surface, const std::vector<bool>& cuts) {
   const std::vector<std::uint32_t> bodies = BodyOfShells(surface);
   std::vector<std::vector<std::size_t>> shells;
@@ -53,14 +57,19 @@ void AppendBodies(std::string& out, const Surface& surface, const std::vector<bo
     shells[bodies[shell]].push_back(shell);
   }
   for (std::size_t body = 0; body < shells.size(); ++body) {
-    AppendAll(out, "g body_", body, "\n");
+    const auto outer = std::ranges::find(
+        shells[body], kNoShell, [&](std::size_t shell) { return surface.outer_of[shell]; });
+    const std::uint64_t identity = surface.measures[*outer].identity;
+    const std::string groups =
+        Concat("g body_", body, identity > 0 ? Concat(" identity_", identity) : "");
+    AppendAll(out, groups, "\n");
     bool in_cut = false;
     for (const std::size_t shell : shells[body]) {
       for (std::size_t k = surface.triangle_offsets[shell]; k < surface.triangle_offsets[shell + 1];
            ++k) {
         if (!cuts.empty() && cuts[k] != in_cut) {
           in_cut = cuts[k];
-          AppendAll(out, "g body_", body, in_cut ? Concat(" ", kCut) : "", "\n");
+          AppendAll(out, groups, in_cut ? Concat(" ", kCut) : "", "\n");
         }
         AppendFace(out, surface, k);
       }

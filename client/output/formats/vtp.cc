@@ -8,6 +8,7 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkTypeUInt64Array.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataWriter.h>
 
@@ -28,6 +29,10 @@ constexpr unsigned char kOuterRingClass = 2;
 constexpr unsigned char kHoleClass = 3;
 
 constexpr const char* kNormals = "Normals";
+
+// Cell array: the identity of the ring or shell (partiemc/result.h, surface.h). 0 if it is not
+// tracked, and for triangles of outlines.
+constexpr const char* kIdentity = "identity";
 
 void AddField(vtkPolyData* data, const char* name, double value) {
   vtkNew<vtkDoubleArray> array;
@@ -82,6 +87,8 @@ void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) 
   classes->SetName("class");
   vtkNew<vtkIntArray> ring_of;
   ring_of->SetName("ring");
+  vtkNew<vtkTypeUInt64Array> identities;
+  identities->SetName(kIdentity);
   vtkNew<vtkCellArray> lines;
   const Rings& rings = mesh.rings();
   const vtkIdType first = mesh.first_of_rings();
@@ -91,14 +98,17 @@ void AddOutline(const FileMesh& mesh, const Mesh& triangles, vtkPolyData* data) 
     if (closed) lines->InsertCellPoint(first + points[0]);
     classes->InsertNextValue(rings.outer_of[ring] == kNoRing ? kOuterRingClass : kHoleClass);
     ring_of->InsertNextValue(static_cast<int>(ring));
+    identities->InsertNextValue(rings.measures[ring].identity);
   });
   for (std::size_t k = 0; k < triangles.TriangleCount(); ++k) {
     classes->InsertNextValue(static_cast<unsigned char>(triangles.classes[k]));
     ring_of->InsertNextValue(-1);
+    identities->InsertNextValue(0);
   }
   data->SetLines(lines);
   data->GetCellData()->AddArray(classes);
   data->GetCellData()->AddArray(ring_of);
+  data->GetCellData()->AddArray(identities);
 }
 
 // Adds `wetted` and `contact_angle` if the rings touch walls. Points that only the mesh has get 0
@@ -133,16 +143,20 @@ void AddShells(const Surface& surface, vtkPolyData* data) {
   vtkNew<vtkIntArray> shell_of, body_of;
   shell_of->SetName("shell");
   body_of->SetName("body");
+  vtkNew<vtkTypeUInt64Array> identities;
+  identities->SetName(kIdentity);
   const std::vector<std::uint32_t> bodies = BodyOfShells(surface);
   for (std::size_t shell = 0; shell < bodies.size(); ++shell) {
     for (std::uint32_t k = surface.triangle_offsets[shell]; k < surface.triangle_offsets[shell + 1];
          ++k) {
       shell_of->InsertNextValue(static_cast<int>(shell));
       body_of->InsertNextValue(static_cast<int>(bodies[shell]));
+      identities->InsertNextValue(surface.measures[shell].identity);
     }
   }
   data->GetCellData()->AddArray(shell_of);
   data->GetCellData()->AddArray(body_of);
+  data->GetCellData()->AddArray(identities);
 }
 
 }  // namespace

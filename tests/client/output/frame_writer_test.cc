@@ -181,6 +181,7 @@ TEST(Vtp, HasLinesBeforePolygonsWithClasses) {
   EXPECT_THAT(vtp, HasSubstr("NumberOfLines=\"3\""));
   EXPECT_THAT(vtp, HasSubstr("NumberOfPolys=\"9\""));
   EXPECT_THAT(vtp, HasSubstr("Name=\"class\""));
+  EXPECT_THAT(vtp, HasSubstr("type=\"UInt64\" Name=\"identity\""));
   EXPECT_THAT(vtp, HasSubstr("TimeValue"));
   EXPECT_THAT(vtp, HasSubstr("</VTKFile>"));
 }

@@ -113,6 +113,8 @@ class Surfaces(unittest.TestCase):
         numpy.testing.assert_array_equal(shells, data["shell"][triangles[:, 0]])
         bodies = vtk_to_numpy(self.vtp.GetCellData().GetArray("body"))
         self.assertEqual(set(bodies), {0, 1})
+        identities = vtk_to_numpy(self.vtp.GetCellData().GetArray("identity"))
+        numpy.testing.assert_array_equal(identities, 70 + shells)
         volumes = {shell: volume_of(self.ply.points, triangles[shells == shell]) for shell in range(3)}
         cavity, = (shell for shell in volumes if volumes[shell] < 0)
         self.assertEqual(len(set(zip(shells, bodies))), 3)

@@ -33,7 +33,9 @@ void WriteAll(const std::filesystem::path& directory) {
       {.directory = directory / "packed", .formats = {FrameFormat::kGlb}, .compress_glb = true}));
   StatisticsWriter statistics =
       Required(StatisticsWriter::Create(directory / "stats.json", {}, StatisticsOf::kSurfaces));
-  const Surface scene = HollowBallAndTorus(), empty, cut = WithCuts(scene);
+  Surface scene = HollowBallAndTorus();
+  for (std::size_t k = 0; k < scene.ShellCount(); ++k) scene.measures[k].identity = 70 + k;
+  const Surface empty, cut = WithCuts(scene);
   const std::array<const Surface*, 4> surfaces = {&scene, &scene, &empty, &cut};
   const Result no_outline;
   for (std::uint64_t k = 0; k < surfaces.size(); ++k) {

@@ -11,6 +11,7 @@
 #include "client/output/frame_writer.h"
 #include "client/output/read_files.h"
 #include "client/output/surface_scene.h"
+#include "client/output/text.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
@@ -201,6 +202,26 @@ TEST(SurfaceFiles, ObjHasAGroupForEachBody) {
   EXPECT_NEAR(volume / TrueVolume(surface), 1, 1e-9);
 }
 
+TEST(SurfaceFiles, ObjNamesTrackedBodies) {
+  Surface surface = WithCuts(Scene());
+  const auto groups = [&] {
+    std::set<std::string> found;
+    for (const auto& words : ObjLines(Encode(FrameFormat::kObj, surface))) {
+      if (words[0] == "g" && words.size() > 2) found.insert(words[1] + " " + words[2]);
+    }
+    return found;
+  };
+  for (std::size_t k = 0; k < surface.ShellCount(); ++k) surface.measures[k].identity = 0;
+  EXPECT_THAT(groups(), UnorderedElementsAre("body_0 cut", "body_1 cut"));
+  std::vector<std::string> expected;
+  for (std::size_t k = 0; k < surface.ShellCount(); ++k) {
+    surface.measures[k].identity = 70 + k;
+    if (surface.outer_of[k] != kNoShell) continue;
+    expected.push_back(Concat("body_", expected.size(), " identity_", 70 + k));
+  }
+  EXPECT_THAT(groups(), ::testing::UnorderedElementsAreArray(expected));
+}
+
 TEST(SurfaceFiles, StlHasTheNormalsOfFacets) {
   const Surface& surface = Scene();
   const std::string stl = Encode(FrameFormat::kStl, surface);
@@ -241,8 +262,9 @@ TEST(SurfaceFiles, StlHasTheNormalsOfFacets) {
 }
 
 TEST(SurfaceFiles, ObjHasAGroupOfTrianglesOnWalls) {
-  const Surface surface = WithCuts(Scene());
+  Surface surface = WithCuts(Scene());
   ASSERT_THAT(surface.cuts, Not(IsEmpty()));
+  for (ShellMeasures& measures : surface.measures) measures.identity = 0;
   std::map<std::vector<std::string>, std::size_t> faces;
   std::vector<std::string> group;
   for (const auto& words : ObjLines(Encode(FrameFormat::kObj, surface))) {
