@@ -68,7 +68,11 @@ def surface_to_meshio(surface, attributes=None):
 
 
 def to_svg(result, width=800):
-    """The text of an SVG picture: outline and mesh, `width` pixels wide."""
+    """The text of an SVG picture: outline and mesh, `width` pixels wide. Surfaces are refused."""
+    if len(result.surface.points) > 0:
+        raise ValueError("to_svg: the result is a surface, and to_svg draws outlines; draw a section "
+                         "(result.sections[0].to_svg()), write a mesh (result.surface.to_meshio()), or let "
+                         "`partiemc replay --surface --format svg` draw the surface")
     points = result.rings.points
     if len(points) == 0:
         return '<svg xmlns="http://www.w3.org/2000/svg"/>\n'

@@ -111,6 +111,11 @@ class Surfaces(unittest.TestCase):
         mesh = surface.to_meshio(self.result.attributes)
         self.assertEqual(mesh.point_data["where"].shape, surface.points.shape)
 
+    def test_svg_is_of_outlines(self):
+        with self.assertRaisesRegex(ValueError, "is a surface.*sections.*to_meshio"):
+            self.result.to_svg()
+        self.assertIn("<path", self.result.sections[0].to_svg())
+
     def test_what_they_do_not_take_is_told(self):
         for arguments, field in (({}, "parameters.spacing"),
                                  ({"spacing": 1, "slice": ("z", 0)}, "parameters.slice"),
