@@ -1,6 +1,7 @@
 // Compares the places of the particles with the planes and walls of the flags.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <string>
