@@ -40,7 +40,7 @@ inline constexpr std::string_view kReasonPageToken = "PAGE_TOKEN";
 absl::Status NoSuchStream(const std::string& name,
                           std::string rule =
                               "must be the name of an open stream; ListStreams "
-                              "tells them");
+                              "(`partiemc streams`) lists them");
 
 struct StreamDescription {
   std::string name;  ///< Empty: the registry generates one.

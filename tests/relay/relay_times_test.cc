@@ -65,8 +65,8 @@ TEST_F(RelayTimes, RefusesAnUnknownNameAndSaysWhatToDo) {
   absl::Status status = FindNothing();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(status.message(),
-            "open.stream_name: \"nothing\"; must be the name of an open stream; ListStreams tells "
-            "them");
+            "open.stream_name: \"nothing\"; must be the name of an open stream; ListStreams "
+            "(`partiemc streams`) lists them");
   shows_.bus().SetConnected(false);
   ASSERT_TRUE(Within(seconds(1), [this] { return !shows_.relay().connected(); }));
   status = FindNothing();
