@@ -15,9 +15,10 @@
 namespace partiemc {
 namespace {
 
-// In kernel radii: copies of percolating bodies reach kCopyMargin beyond the box, at most one
-// length. More than kCopyEnd before the end of the copies, the field and the windows of an outline
-// do not depend on this end. Means along a whole ring (vertices/virtual_plane.cc) do, but little.
+// In kernel radii of the largest particle: copies of percolating bodies reach kCopyMargin beyond
+// the box, at most one length. More than kCopyEnd before the end of the copies, the field and the
+// windows of an outline do not depend on this end. Means along a whole ring
+// (vertices/virtual_plane.cc) do, but little.
 constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
 // Checks a frame as the output of the stream requires.
@@ -84,11 +85,11 @@ absl::Status Filter(const PreparationInput& input, const Lengths& lengths,
   return status;
 }
 
-absl::Status LiftFrame(const PreparationInput& input, double spacing, std::span<const int> axes,
+// `radius`: the largest kernel radius, world units.
+absl::Status LiftFrame(const PreparationInput& input, double radius, std::span<const int> axes,
                        FrameMemory& memory, LiftScratch& scratch, Frame& frame,
                        Prepared& prepared) {
   const ReconstructionParameters& parameters = input.parameters;
-  const double radius = parameters.kernel_radius * spacing;
   // Rings that may cross themselves cannot be cut. Without a margin, Lift refuses bodies that
   // percolate.
   const double margin = KeepsGuarantees(parameters.placement) ? kCopyMargin * radius : 0;
@@ -130,14 +131,22 @@ absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
   prepared.lengths = *decided;
   if (!prepared.lengths) return absl::OkStatus();
   const Lengths& lengths = *prepared.lengths;
+  SizeRange sizes;
+  if (parameters.sizes == Sizes::kOwn) {
+    // Before copies are added, so that errors name a given particle.
+    const auto range = RangeOfSizes(input.given, parameters, lengths);
+    if (!range.ok()) return range.status();
+    sizes = *range;
+  }
   // Slices and surfaces have no check of the resolution.
   if (is_outline && !parameters.slice) {
-    status = CheckStep(input.given, parameters.plane, lengths.spacing, prepared.doubts);
+    status =
+        CheckStep(input.given, parameters.plane, lengths.spacing * sizes.smallest, prepared.doubts);
     if (!status.ok() && !lengths.is_provisional) return status;
   }
   if (parameters.box) {
     status = CheckBoxLengths(parameters.box, *input.given.box, parameters.kernel_radius,
-                             lengths.spacing);
+                             lengths.spacing, sizes);
     if (!status.ok()) return status;
   }
   std::array<int, 3> all_axes;
@@ -149,7 +158,8 @@ absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
   }
   if (!parameters.box || !is_outline) return absl::OkStatus();
   prepared.is_lifted = true;
-  return LiftFrame(input, lengths.spacing, axes, memory, scratch.lift, frame, prepared);
+  const double radius = parameters.kernel_radius * lengths.spacing * sizes.Reach();
+  return LiftFrame(input, radius, axes, memory, scratch.lift, frame, prepared);
 }
 
 BoxMotion MotionInPlane(const ReconstructionParameters& parameters, const Frame& frame,

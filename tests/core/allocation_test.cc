@@ -7,6 +7,7 @@
 #include <ostream>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -179,32 +180,38 @@ TEST(WarmSlice, AllocatesNothing) {
 }
 
 // Bodies that cross the faces of a periodic box, without and with a layer that percolates.
-class WarmPeriodicFrame : public testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(Percolates, WarmPeriodicFrame, testing::Bool(),
-                         testing::PrintToStringParamName());
+class WarmPeriodicFrame : public testing::TestWithParam<std::tuple<bool, Sizes>> {};
+INSTANTIATE_TEST_SUITE_P(Percolates, WarmPeriodicFrame,
+                         testing::Combine(testing::Bool(),
+                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
 TEST_P(WarmPeriodicFrame, AllocatesNothing) {
+  const auto [percolates, sizes] = GetParam();
   const ReconstructionParameters parameters{
-      .spacing = 1.0, .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}}};
+      .spacing = 1.0,
+      .sizes = sizes,
+      .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}}};
   const auto reconstructor = Reconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   std::vector<Particles> frames;
   for (int k = 0; k < 4; ++k) {
     Particles frame = support::Disc(12, 20.0 * k, 9.0 * k);
     frame.Add(support::Disc(8, 45 - 20.0 * k, 40 + 5.0 * k));
-    if (GetParam()) frame.Add(support::Lattice(90, 12 + k, .3, 60));
+    if (percolates) frame.Add(support::Lattice(90, 12 + k, .3, 60));
     for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
+    if (sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());
     frames.push_back(frame);
   }
   State state;
   Result result;
-  ExpectWarm(frames.size(), 12, 1, [&](std::size_t k, Workspace& workspace) {
+  const int rounds = sizes == Sizes::kOwn ? 24 : 12;  // As in WarmFrame.
+  ExpectWarm(frames.size(), rounds, 1, [&](std::size_t k, Workspace& workspace) {
     return reconstructor->Reconstruct(frames[k].AsFrame(), state, workspace, result);
   });
-  if (!GetParam()) {
+  if (!percolates) {
     EXPECT_EQ(result.rings.RingCount(), 2u);
   }
-  EXPECT_EQ(result.statistics.cut_bodies, GetParam() ? 1u : 0u);
+  EXPECT_EQ(result.statistics.cut_bodies, percolates ? 1u : 0u);
 }
 
 // Each frame has another box.
@@ -396,6 +403,15 @@ std::vector<MemoryCase> MemoryCases() {
   wrapped = boxed(600);
   wrapped.wraps = true;
   add("wrapped noise", support::Noise(random, 30'000, 300), {.box = wrapped});
+  add("body of own sizes in a periodic box", sized(support::Disc(120)),
+      {.sizes = Sizes::kOwn, .box = boxed(300)});
+  add("percolating noise of own sizes", sized(support::Noise(random, 30'000, 300)),
+      {.sizes = Sizes::kOwn, .box = boxed(600)});
+  add("wrapped noise of own sizes", sized(support::Noise(random, 30'000, 300)),
+      {.sizes = Sizes::kOwn, .box = wrapped});
+  ReconstructionParameters boxed_grains = grains;
+  boxed_grains.box = boxed(200);
+  add("percolating grains", sized(support::Lattice(199, 20, -99.7)), boxed_grains);
   for (const auto& [name, particles] :
        {std::pair("filtered body", support::Disc(120)), std::pair("filtered drops", spread(150, 7)),
         std::pair("filtered body in few tiles", support::Scaled(support::Disc(160), .25))}) {

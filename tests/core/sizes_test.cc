@@ -333,9 +333,6 @@ TEST(Sizes, RefusesWhatHasNoOwnSizes) {
   parameters.slice = SlicePlane();
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = kOwn;
-  parameters.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
-  EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
-  parameters = kOwn;
   parameters.noise_filter = .5;
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = kOwn;

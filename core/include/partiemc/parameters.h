@@ -186,8 +186,8 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
   /// local size. Frames must have volumes. Except with grains, an absent spacing is estimated as
   /// the root mean square of the sizes. A size must be within a factor of `kMostSizeRatio` of the
-  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `box`, `noise_filter`
-  /// and Placement::kFarthestParticle.
+  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `noise_filter`,
+  /// Placement::kFarthestParticle, and for surfaces `box`.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 
@@ -277,9 +277,9 @@ struct ReconstructionParameters {
   /// Particles may lie in the box or beside it. Results are unwrapped unless `wraps`: each body is
   /// whole, and the centre of its bounding box lies in the box. A body that reaches its own image
   /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
-  /// (PERCOLATES). A length must be at least four kernel radii and at most kMostSpacings
-  /// spacings. For outlines, only axes of the plane of the particles may be periodic. Excludes
-  /// slices, phases, walls and own sizes. A frame may have another box (Frame::box).
+  /// (PERCOLATES). A length must be at least four kernel radii, in each frame also those of its
+  /// largest particle, and at most kMostSpacings spacings. For outlines, only axes of the plane of
+  /// the particles may be periodic. Excludes slices, phases, walls. Frame::box may replace it.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md).

@@ -167,7 +167,9 @@ constexpr double kMinBoxLength = 4;
 // Checks the box, and that slices and the placement do not exclude it.
 absl::Status CheckBox(const ReconstructionParameters& p) {
   if (!p.box) return absl::OkStatus();
-  if (auto status = Validate(*p.box, p.kernel_radius, p.spacing.value_or(0)); !status.ok()) {
+  const double kernel_radius =
+      p.boundary == Boundary::kGrains ? kGrainKernelRadius : p.kernel_radius;
+  if (auto status = Validate(*p.box, kernel_radius, p.spacing.value_or(0)); !status.ok()) {
     return status;
   }
   if (p.box->wraps && !KeepsGuarantees(p.placement)) {
@@ -194,7 +196,9 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
                            return section.slice.has_value();
                          });
   if (has_slice) return refused("for a slice");
-  if (p.box) return refused("with a periodic box");
+  if (p.box && p.output == Output::kSurface) {
+    return refused("for a surface with a periodic box");
+  }
   if (p.noise_filter) return refused("with a noise filter");
   if (!KeepsGuarantees(p.placement)) {
     return refused("for the placement " + std::string(Name(p.placement)));

@@ -1,6 +1,8 @@
 // The lengths of one frame in cells.
 #pragma once
 
+#include <algorithm>
+
 #include "partiemc/parameters.h"
 
 namespace partiemc {
@@ -8,6 +10,10 @@ namespace partiemc {
 /// The smallest and the largest size of the particles of a frame, in spacings.
 struct SizeRange {
   double smallest = 1, largest = 1;
+
+  /// The factor of lengths in a periodic box that are given in kernel radii R = beta h. The kernel
+  /// of the largest particle has its radius; cells have the spacing, so the factor is at least 1.
+  double Reach() const { return std::max(1.0, largest); }
 };
 
 /// Parameters, spacing and lattice in the form that the stages use. Lengths are in cells (lattice

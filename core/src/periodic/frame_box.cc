@@ -22,6 +22,14 @@ absl::Status OfFrame(const absl::Status& status) {
   return ViolationError(status.code(), *std::move(violation));
 }
 
+// Names the largest particle in an error about a least length.
+absl::Status ForLargest(const absl::Status& status) {
+  std::optional<Violation> violation = FindViolation(status);
+  if (!violation) return status;
+  violation->rule += ", for the largest particle";
+  return ViolationError(status.code(), *std::move(violation));
+}
+
 }  // namespace
 
 absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& frame) {
@@ -45,8 +53,10 @@ absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& fram
 }
 
 absl::Status CheckBoxLengths(const std::optional<PeriodicBox>& of_stream, const PeriodicBox& box,
-                             double kernel_radius, double spacing) {
+                             double kernel_radius, double spacing, const SizeRange& sizes) {
   absl::Status status = Validate(box, kernel_radius, spacing);
+  // All other limits are met, so only a least length can still be violated.
+  if (status.ok()) status = ForLargest(Validate(box, kernel_radius * sizes.Reach(), spacing));
   return status.ok() || of_stream == box ? status : OfFrame(status);
 }
 

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "absl/status/status.h"
+#include "frame/scale.h"
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 
@@ -22,10 +23,12 @@ namespace partiemc {
 /// periodic axes, or if Validate refuses an axis.
 absl::Status ResolveBox(const std::optional<PeriodicBox>& of_stream, Frame& frame);
 
-/// Checks the lengths of the box of a frame after ResolveBox. Errors: as Validate; they name
-/// `parameters.box` if `box` is the box of the stream, else `box`.
+/// Checks the lengths of the box of a frame after ResolveBox. A length must be at least four kernel
+/// radii, of the largest particle if sizes differ. `kernel_radius` is in spacings, `spacing` in
+/// world units. Errors: as Validate; they name `parameters.box` if `box` is the box of the stream,
+/// else `box`.
 absl::Status CheckBoxLengths(const std::optional<PeriodicBox>& of_stream, const PeriodicBox& box,
-                             double kernel_radius, double spacing);
+                             double kernel_radius, double spacing, const SizeRange& sizes = {});
 
 /// The box that a history stores: absent if `box` is absent or the box of the stream. `box`: the
 /// box of the frame after ResolveBox.

@@ -22,6 +22,8 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
   c.given_weight.assign(components, 0);
   c.has_copies.assign(components, 0);
   c.total.assign(components, 0);
+  const bool has_sizes = input.parameters.sizes == Sizes::kOwn;
+  c.own_area.assign(has_sizes ? components : 0, 0);
   c.set.resize(components);
   std::iota(c.set.begin(), c.set.end(), 0u);
   std::size_t visited = 0;
@@ -34,6 +36,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
         if (source >= given) return;
         ++c.given_count[component];
         if (!input.bins.weight.empty()) c.given_weight[component] += input.bins.weight[particle];
+        if (has_sizes) c.own_area[component] += input.lifted.frame.volumes[source];
       });
   for (std::size_t copy = 0; copy < input.lifted.originals.size(); ++copy) {
     if (copy % kItemsPerCheck == 0) ThrowIfCancelled();
@@ -44,6 +47,7 @@ void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, Body
     if (of_given == kNoComponent) {
       of_given = of_copy;  // Further copies join this component.
       ++c.total[of_copy];
+      if (has_sizes) c.own_area[of_copy] += input.lifted.frame.volumes[given + copy];
     }
     const std::uint32_t a = RootOf(c.set, of_copy), b = RootOf(c.set, of_given);
     c.set[std::max(a, b)] = std::min(a, b);
@@ -78,6 +82,7 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
     // A given particle may lie in no component although its copy lies in one. `given_count` lacks
     // such particles; JoinImages has counted them in `total`.
     c.total[root] += std::exchange(c.total[component], 0) + c.given_count[component];
+    if (!c.own_area.empty()) c.own_area[root] += std::exchange(c.own_area[component], 0);
     if (outer != kNoRing) {
       c.largest[root] = std::max(c.largest[root], AreaOfRing(topology, outer));
     }
@@ -106,9 +111,12 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
 
 bool IsSpray(const BodyChoiceInput& input, const BodyChoice& c, std::uint32_t root) {
   const ReconstructionParameters& parameters = input.parameters;
-  const double square = input.spacing * input.spacing / (input.cell_size * input.cell_size);
+  const double cell = input.cell_size * input.cell_size;
+  const double square = input.spacing * input.spacing / cell;
+  const double of_particles =
+      c.own_area.empty() ? static_cast<double>(c.total[root]) * square : c.own_area[root] / cell;
   // An image of a long body ends where its copies end, so its area may be too small.
-  const double area = std::max(c.largest[root], static_cast<double>(c.total[root]) * square);
+  const double area = std::max(c.largest[root], of_particles);
   return c.total[root] < parameters.min_component_particles ||
          area < parameters.min_component_area * square;
 }

@@ -30,6 +30,8 @@ struct BodyChoice {
                                             // root: whether its set has.
   std::vector<std::uint32_t> best;          // By root: the component that stays whole.
   std::vector<std::uint64_t> total;         // By root: particles of the body.
+  std::vector<double> own_area;             // With own sizes, by root: sum of h_i^2 over the
+                                            // particles of the body, world units.
   std::vector<double> largest;              // By root: area of the largest image, squared cells.
 };
 
@@ -46,7 +48,7 @@ struct BodyChoiceInput {
 /// Decides the fate of each component of a frame with copies. Components that share a particle,
 /// given or copied, are images of one body.
 /// - Spray goes: bodies below ReconstructionParameters::min_component_*. Their area is the largest
-///   image's, or h^2 per particle if this is more.
+///   image's, or h^2 (with own sizes h_i^2) per particle if this is more.
 /// - If the box wraps, all other bodies are cut.
 /// - A body without copies stays whole.
 /// - An image that lies in the window, widened by `reach`, is complete. Of the complete images, the

@@ -36,7 +36,8 @@ RingMeasures MeasureRing(std::span<const double> points) {
   return measures;
 }
 
-WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window) {
+WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window,
+                               std::span<const float> sizes) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 2> low{-kInfinity, -kInfinity}, high{kInfinity, kInfinity};
   for (std::size_t k = 0; k < 2; ++k) {
@@ -50,7 +51,9 @@ WindowMeasures MeasureInWindow(std::span<const double> points, const Window& win
   const std::size_t count = points.size() / 2;
   const double base = std::clamp(points[1], low[1], high[1]);
   for (std::size_t k = 0; k < count; ++k) {
-    const Point a = PointAt(points, k), b = PointAt(points, k + 1 < count ? k + 1 : 0);
+    const std::size_t next = k + 1 < count ? k + 1 : 0;
+    const double size = sizes.empty() ? 1 : (double{sizes[k]} + sizes[next]) / 2;
+    const Point a = PointAt(points, k), b = PointAt(points, next);
     const double dx = b.x - a.x, dy = b.y - a.y;
     std::array<double, 6> at{0, 1, 1, 1, 1, 1};
     std::size_t pieces = 1;
@@ -73,7 +76,7 @@ WindowMeasures MeasureInWindow(std::span<const double> points, const Window& win
       const double x = a.x + middle * dx, y = a.y + middle * dy;
       if (x <= low[0] || x >= high[0] || y <= low[1] || y >= high[1]) continue;
       const double length = at[piece + 1] - at[piece];
-      measures.perimeter += length * std::sqrt(dx * dx + dy * dy);
+      measures.perimeter += size * length * std::sqrt(dx * dx + dy * dy);
     }
   }
   return measures;

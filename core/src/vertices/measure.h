@@ -18,8 +18,11 @@ struct WindowMeasures {
   double perimeter = 0;  ///< Length of the ring's part in the window, without the window's sides.
 };
 
-/// Measures the part of a ring in a window. Requires: at least one point.
-WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window);
+/// Measures the part of a ring in a window. `sizes`: by point; each piece of the perimeter then
+/// counts times the mean of both points of its segment. Empty: all are 1. Requires: at least one
+/// point.
+WindowMeasures MeasureInWindow(std::span<const double> points, const Window& window,
+                               std::span<const float> sizes = {});
 
 void MeasureRings(Rings& rings);
 

@@ -23,24 +23,6 @@ double VolumeOf(const VertexInput& input, std::size_t ring) {
   return input.topology.particle_weight[ring] / input.scale.weight_per_volume;
 }
 
-struct RingPart {
-  bool counts;
-  double area, perimeter;
-};
-
-// The part of a ring that counts. If the body will be cut, this is the part in the window: the rest
-// surrounds copies of its particles.
-RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring) {
-  const RingMeasures& whole = rings.measures[ring];
-  if (input.percolation == nullptr || !input.percolation->IsCut(input.topology, ring)) {
-    const bool is_gone =
-        input.percolation != nullptr && input.percolation->IsGone(input.topology, ring);
-    return {!is_gone, whole.area, whole.perimeter};
-  }
-  const WindowMeasures part = MeasureInWindow(rings.RingPoints(ring), input.percolation->window);
-  return {true, part.area, part.perimeter};
-}
-
 // Sums term(length, local size) over the segments of a ring.
 template <typename Term>
 double SumOverSegments(std::span<const double> points, std::span<const float> sizes, Term term) {
@@ -69,6 +51,26 @@ std::span<const float> SizesOf(const Rings& rings, std::size_t ring, std::span<c
   return sizes.subspan(rings.offsets[ring], rings.offsets[ring + 1] - rings.offsets[ring]);
 }
 
+struct RingPart {
+  bool counts;
+  double area, perimeter;  // Each segment of the perimeter counts times the local size.
+};
+
+// The part of a ring that counts. If the body will be cut, this is the part in the window: the rest
+// surrounds copies of its particles. `sizes`: of the points of the ring, or empty.
+RingPart PartOf(const VertexInput& input, const Rings& rings, std::size_t ring,
+                std::span<const float> sizes) {
+  const RingMeasures& whole = rings.measures[ring];
+  const auto points = rings.RingPoints(ring);
+  if (input.percolation != nullptr && input.percolation->IsCut(input.topology, ring)) {
+    const WindowMeasures part = MeasureInWindow(points, input.percolation->window, sizes);
+    return {true, part.area, part.perimeter};
+  }
+  const bool is_gone =
+      input.percolation != nullptr && input.percolation->IsGone(input.topology, ring);
+  return {!is_gone, whole.area, sizes.empty() ? whole.perimeter : SizedLength(points, sizes)};
+}
+
 // The target of the offset for this frame, in spacings; empty if no component is long enough.
 std::optional<double> TargetOf(const VertexInput& input, std::span<const float> sizes,
                                double spacing, Rings& rings) {
@@ -85,12 +87,12 @@ std::optional<double> TargetOf(const VertexInput& input, std::span<const float> 
     const std::size_t outer = is_outer ? ring : rings.outer_of[ring];
     // Spray does not count: its area depends on how it broke off.
     if (length_in_sizes(outer) < constants.ShortestRing() * spacing) continue;
-    const auto [counts, ring_area, ring_perimeter] = PartOf(input, rings, ring);
+    const auto [counts, ring_area, ring_perimeter] =
+        PartOf(input, rings, ring, SizesOf(rings, ring, sizes));
     if (!counts) continue;
     if (is_outer) volume += VolumeOf(input, ring);
     area += ring_area;
-    perimeter += sizes.empty() ? ring_perimeter
-                               : SizedLength(rings.RingPoints(ring), SizesOf(rings, ring, sizes));
+    perimeter += ring_perimeter;
   }
   if (perimeter <= 0) return std::nullopt;
   volume *= input.scale.cell_size * input.scale.cell_size;
